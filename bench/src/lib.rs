@@ -1,0 +1,1 @@
+//! Everything around plant and controller: run summaries and pictures.

@@ -1,0 +1,1 @@
+//! The axis controllers behind a CAN bus.

@@ -1,0 +1,1 @@
+//! The rig behind a CAN bus, in real time.

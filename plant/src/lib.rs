@@ -1,0 +1,1 @@
+//! Physics of the servo-pneumatic rig: two axes, linkage, sensors.

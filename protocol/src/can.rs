@@ -1,0 +1,147 @@
+//! One classic CAN frame, laid out as the kernel lays out `struct can_frame`.
+//!
+//! The same 16 bytes travel on a SocketCAN socket and on the embedded bus, so that a frame has one
+//! form in this project and a foreign client that speaks `struct can_frame` needs no translation.
+//!
+//! Source: Linux `include/uapi/linux/can.h`.
+
+use std::fmt;
+
+/// Bytes of one `struct can_frame`.
+pub const CAN_FRAME_BYTES: usize = 16;
+
+/// Flag of an extended (29-bit) identifier.
+pub const EXTENDED_FLAG: u32 = 0x8000_0000;
+/// Flag of a remote transmission request.
+pub const REMOTE_FLAG: u32 = 0x4000_0000;
+/// Flag of an error frame.
+pub const ERROR_FLAG: u32 = 0x2000_0000;
+
+/// A classic CAN frame: identifier with the kernel's flags, and 0 to 8 bytes of data.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct CanFrame {
+    can_id: u32,
+    len: u8,
+    data: [u8; 8],
+}
+
+impl CanFrame {
+    /// A data frame with an 11-bit identifier.
+    ///
+    /// # Panics
+    /// If `id` exceeds 11 bits or `data` 8 bytes: both come from `rig.dbc`, which is checked when the crate is built.
+    #[must_use]
+    pub fn new(id: u16, data: &[u8]) -> Self {
+        assert!(id < 0x800, "identifier {id:#x} exceeds 11 bits");
+        Self::from_raw(u32::from(id), data)
+    }
+
+    /// A frame from an identifier that carries the kernel's flags, as a foreign client sent it.
+    ///
+    /// # Panics
+    /// If `data` is longer than 8 bytes.
+    #[must_use]
+    pub fn from_raw(can_id: u32, data: &[u8]) -> Self {
+        let mut bytes = [0; 8];
+        bytes[..data.len()].copy_from_slice(data);
+        Self { can_id, len: data.len() as u8, data: bytes }
+    }
+
+    /// The frame in 16 bytes of `struct can_frame`; `None` when the length byte says more than 8.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; CAN_FRAME_BYTES]) -> Option<Self> {
+        let [i0, i1, i2, i3, len, _, _, _, data @ ..] = *bytes;
+        if len > 8 {
+            return None;
+        }
+        let mut frame = Self { can_id: u32::from_ne_bytes([i0, i1, i2, i3]), len, data };
+        // Bytes beyond the length are not part of the frame; clearing them makes equality mean what it says.
+        frame.data[usize::from(len)..].fill(0);
+        Some(frame)
+    }
+
+    /// The 16 bytes of `struct can_frame`.
+    #[must_use]
+    pub fn to_bytes(self) -> [u8; CAN_FRAME_BYTES] {
+        let mut bytes = [0; CAN_FRAME_BYTES];
+        bytes[..4].copy_from_slice(&self.can_id.to_ne_bytes());
+        bytes[4] = self.len;
+        bytes[8..].copy_from_slice(&self.data);
+        bytes
+    }
+
+    /// Identifier with the kernel's flags in its three highest bits.
+    #[must_use]
+    pub fn raw_id(&self) -> u32 {
+        self.can_id
+    }
+
+    /// The 11-bit identifier of a plain data frame; `None` for extended, remote and error frames.
+    #[must_use]
+    pub fn standard_id(&self) -> Option<u16> {
+        (self.can_id < 0x800).then_some(self.can_id as u16)
+    }
+
+    /// The data, 0 to 8 bytes.
+    #[must_use]
+    pub fn data(&self) -> &[u8] {
+        &self.data[..usize::from(self.len)]
+    }
+}
+
+impl fmt::Display for CanFrame {
+    /// As candump writes it: `123#0011AABB`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.standard_id() {
+            Some(id) => write!(f, "{id:03X}#")?,
+            None => write!(f, "{:08X}#", self.can_id & !EXTENDED_FLAG)?,
+        }
+        if self.can_id & REMOTE_FLAG != 0 {
+            return write!(f, "R");
+        }
+        self.data().iter().try_for_each(|byte| write!(f, "{byte:02X}"))
+    }
+}
+
+impl fmt::Debug for CanFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_those_of_the_kernels_struct() {
+        let frame = CanFrame::new(0x123, &[1, 2, 3]);
+        let mut expected = [0; 16];
+        expected[..4].copy_from_slice(&0x123_u32.to_ne_bytes());
+        expected[4] = 3;
+        expected[8..11].copy_from_slice(&[1, 2, 3]);
+        assert_eq!(frame.to_bytes(), expected);
+        assert_eq!(CanFrame::from_bytes(&expected), Some(frame));
+    }
+
+    #[test]
+    fn length_beyond_eight_is_no_frame() {
+        let mut bytes = CanFrame::new(1, &[]).to_bytes();
+        bytes[4] = 9;
+        assert_eq!(CanFrame::from_bytes(&bytes), None);
+    }
+
+    #[test]
+    fn extended_remote_and_error_frames_have_no_standard_id() {
+        for flag in [EXTENDED_FLAG, REMOTE_FLAG, ERROR_FLAG] {
+            assert_eq!(CanFrame::from_raw(flag | 0x110, &[]).standard_id(), None);
+        }
+    }
+
+    #[test]
+    fn text_is_that_of_candump() {
+        assert_eq!(CanFrame::new(0x11, &[0xAB, 1]).to_string(), "011#AB01");
+        assert_eq!(CanFrame::from_raw(EXTENDED_FLAG | 0x110, &[]).to_string(), "00000110#");
+        assert_eq!(CanFrame::from_raw(REMOTE_FLAG | 0x110, &[]).standard_id(), None);
+    }
+}

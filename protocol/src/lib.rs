@@ -1,0 +1,3 @@
+//! What crosses the wire: rig.dbc, typed frames, buses.
+
+pub mod can;

@@ -1,0 +1,1 @@
+//! Time: clocks, periodic loop, priority and pinning, histograms.
