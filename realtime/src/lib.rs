@@ -1,1 +1,49 @@
-//! Time: clocks, periodic loop, priority and pinning, histograms.
+//! Time: clocks, the periodic loop, priority and pinning, histograms of lateness.
+//!
+//! This room knows when something is due and how late it came, and nothing of what is done then: no bus, no plant,
+//! no protocol. Whoever runs a cycle brings the work; the loop brings the deadline and the statistics.
+//!
+//! ```text
+//!  Clock ──────────► PeriodicLoop ──────────► LoopStatistics ──► percentiles (summary.json)
+//!  real or virtual   deadline n = start + n T  three Recorders     write_hlog  (*.hlog)
+//!                         ▲
+//!  acquire(Request): FIFO, one CPU, locked memory, no deep sleep; each refusal is a warning with a remedy
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`clock`] | [`Instant`], the trait [`Clock`], the system's monotonic clock, a virtual one for tests |
+//! | [`periodic`] | the loop, its re-arm rule, what happens on an overrun |
+//! | [`histogram`] | recorders that never allocate, percentiles, HdrHistogram logs |
+//! | [`privileges`] | what the thread asks of the system, what it got, what was refused and how to get it |
+//! | [`allocations`] | an allocator that counts, for the proof that a cycle allocates nothing |
+//!
+//! ```
+//! use realtime::{OverrunPolicy, PeriodicConfig, PeriodicLoop, VirtualClock, Clock};
+//! use std::time::Duration;
+//!
+//! let clock = VirtualClock::new();
+//! let config = PeriodicConfig { period: Duration::from_millis(1), policy: OverrunPolicy::Stop, spin: None };
+//! let start = clock.now() + Duration::from_millis(5);
+//! let mut periodic = PeriodicLoop::new(&clock, config, start);
+//! for _ in 0..1000 {
+//!     let cycle = periodic.next_cycle().expect("the virtual clock is never late");
+//!     // … the work of cycle.index …
+//!     periodic.end_of_work();
+//! }
+//! assert_eq!(periodic.statistics().wakeup_ns.percentiles().max, Some(0));
+//! ```
+
+pub mod allocations;
+pub mod clock;
+pub mod histogram;
+pub mod periodic;
+pub mod privileges;
+mod virtual_clock;
+
+pub use clock::{Clock, Instant, MonotonicClock, VirtualClock};
+pub use histogram::{Percentiles, Recorder, write_hlog};
+pub use periodic::{
+    ConfigError, Cycle, LoopStatistics, Overrun, OverrunPolicy, PeriodicConfig, PeriodicLoop, UnknownPolicy,
+};
+pub use privileges::{Grants, Refusal, Request, acquire};
