@@ -1,3 +1,9 @@
 //! What crosses the wire: rig.dbc, typed frames, buses.
 
+pub mod bus;
+pub mod bus_load;
 pub mod can;
+pub mod checksum;
+pub mod exit;
+pub mod frames;
+pub mod run_folder;

@@ -1,0 +1,150 @@
+//! Buses: one trait, chosen by URL, frames time-stamped both ways, every loss counted.
+//!
+//! ```text
+//!   emulator ──┐                          ┌── can://vcan0     the kernel's bus (hardware and vcan alike)
+//!              ├── Bus ── SocketPeer ─────┤
+//!   controller ┘                          └── unix:///path    the embedded bus ── Host (one for each bus)
+//! ```
+//!
+//! Both kinds are sockets that carry one `struct can_frame` a packet, so one peer serves both; what differs
+//! is how the socket is opened ([`can_link`], [`unix_link`]). The wire of the embedded bus, its injected loss
+//! and the lockstep barrier live in [`host`] and nowhere else.
+//!
+//! A bus takes its stamps from a clock that is handed to it ([`StampClock`]), so that it knows neither a
+//! real nor a simulated time.
+
+mod can_link;
+pub mod control;
+pub mod host;
+mod kernel_receive;
+pub mod lockstep;
+mod socket_peer;
+mod unix_link;
+mod url;
+mod wire;
+
+use crate::can::CanFrame;
+use std::time::Duration;
+
+pub use url::{BusUrl, UrlError, WireOptions};
+
+/// The clock that stamps frames: nanoseconds since an epoch of the caller's choice.
+pub type StampClock = Box<dyn Fn() -> u64 + Send>;
+
+/// What [`Bus::receive`] found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Received {
+    /// A frame, and when it arrived at this peer's queue, in ns of the bus's [`StampClock`].
+    Frame(CanFrame, u64),
+    /// A packet of the lockstep barrier; only peers that joined receive any.
+    Barrier(control::Control),
+    /// The queue is empty, or the bus is down (see [`Bus::is_up`]).
+    Nothing,
+}
+
+/// Why a frame did not leave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// The transmit queue is full: the frame is dropped and counted, never retried in the cycle.
+    #[error("transmit queue is full, frame dropped")]
+    QueueFull,
+    /// The bus is down; the peer keeps trying to come back.
+    #[error("bus is down, frame dropped")]
+    Down,
+}
+
+/// Why a bus could not be opened, or cannot do what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The interface or socket is not there or not for us.
+    #[error("cannot open bus {url}: {reason}; {remedy}")]
+    Open {
+        /// The bus as it was asked for.
+        url: String,
+        /// What the system said.
+        reason: String,
+        /// What a person can do.
+        remedy: &'static str,
+    },
+    /// Another host serves this embedded bus already.
+    #[error("bus {url} has a host already (lock file {lock}); connect to it, or choose another path")]
+    HostExists {
+        /// The bus as it was asked for.
+        url: String,
+        /// The lock file that the other host holds.
+        lock: String,
+    },
+    /// SocketCAN has no barrier.
+    #[error("{url} cannot run in lockstep: the barrier lives in the embedded bus; use --bus unix:///PATH")]
+    NoBarrier {
+        /// The bus as it was asked for.
+        url: String,
+    },
+}
+
+/// What a peer counted since it was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct BusCounters {
+    /// Frames handed to the bus.
+    pub sent: u64,
+    /// Well-formed frames taken from the bus.
+    pub received: u64,
+    /// Frames that the transmit queue, or a bus that was down, did not take.
+    pub dropped_on_send: u64,
+    /// Frames that the kernel dropped at our receive queue (SocketCAN's overflow count).
+    pub dropped_on_receive: u64,
+    /// Packets that are no `struct can_frame`.
+    pub malformed: u64,
+    /// Error frames of a SocketCAN interface.
+    pub error_frames: u64,
+    /// Times the bus went away.
+    pub disconnects: u64,
+    /// Times it came back.
+    pub reconnects: u64,
+}
+
+/// A CAN bus as a peer sees it. Nothing here blocks but [`Bus::wait_readable`].
+pub trait Bus: Send {
+    /// Puts a frame on the bus and tells when, in ns of the bus's clock.
+    ///
+    /// # Errors
+    /// [`SendError`] when the frame was dropped; it is counted and never queued for later, since a command that
+    /// arrives late is worse than none.
+    fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError>;
+
+    /// Takes the oldest waiting frame. Tries to come back when the bus was down.
+    fn receive(&mut self) -> Received;
+
+    /// Waits until something can be received, or for `timeout`.
+    fn wait_readable(&mut self, timeout: Duration);
+
+    /// Whether the bus is there.
+    fn is_up(&self) -> bool;
+
+    /// Counters since opening.
+    fn counters(&self) -> &BusCounters;
+
+    /// Joins the lockstep barrier under `name`, or as the rig.
+    ///
+    /// # Errors
+    /// [`BusError::NoBarrier`] on `can://`.
+    fn join_lockstep(&mut self, role: control::Role, name: &str) -> Result<(), BusError>;
+
+    /// Tells the barrier that this member has posted its frames of `cycle`.
+    fn done(&mut self, cycle: u32);
+}
+
+/// Opens the bus that `url` names, stamping frames with `clock`.
+///
+/// An embedded bus whose host is not there yet is not an error: the peer keeps trying, see [`Bus::is_up`].
+///
+/// # Errors
+/// [`BusError::Open`] when a `can://` interface does not exist, is down, or may not be used.
+pub fn open(url: &BusUrl, clock: StampClock) -> Result<Box<dyn Bus>, BusError> {
+    match url {
+        BusUrl::Can { interface } => {
+            Ok(Box::new(socket_peer::SocketPeer::open(can_link::CanLink::new(interface), url, clock)?))
+        }
+        BusUrl::Unix { path, .. } => Ok(Box::new(socket_peer::SocketPeer::lazy(unix_link::UnixLink::new(path), url, clock))),
+    }
+}

@@ -1,0 +1,319 @@
+//! The lockstep barrier: who may act in which cycle, and in which order frames are delivered.
+//!
+//! ```text
+//!              all have joined           rig: done(k)           rig's frames to all
+//!   Gathering ─────────────────► RigActs ────────────► RigDone ─────────────────────► MembersAct
+//!               Go(0) to the rig    ▲                            Go(k) to the members    │   │
+//!                                   │  posted frames to all but their senders            │   │
+//!                                   └────────────────────────────────────────────────────┘   │
+//!                                      every member: done(k); Go(k+1) to the rig             │
+//!                                                                                            ▼
+//!                                         5 s of wall time without done(k): the host names the member
+//! ```
+//!
+//! Frames of one release are sorted by identifier, then by the sender's name, then by the order of posting: the log
+//! does not depend on which process was faster, nor on how many processes the controllers are. A foreign controller
+//! knows nothing of this: it counts as done when a command on its identifier echoes the cycle.
+//!
+//! This file decides; [`super::host`] reads, writes and keeps the time.
+
+use super::control::Role;
+use crate::can::CanFrame;
+use crate::frames::Frame;
+use std::collections::BTreeMap;
+
+/// A connection of the host, by the order in which it was accepted.
+pub(super) type PeerId = u64;
+
+/// Who takes part, besides the rig.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BarrierConfig {
+    /// Controllers that will join by name.
+    pub members: usize,
+    /// Identifiers of the command frames of foreign controllers, which join by their echo.
+    pub echo_ids: Vec<u16>,
+}
+
+/// What the host has to do when a phase is complete.
+pub(super) struct Release {
+    /// Frames with their senders, in the order of delivery.
+    pub(super) frames: Vec<(CanFrame, PeerId)>,
+    /// Who may act next.
+    pub(super) go: Vec<PeerId>,
+    /// In which cycle.
+    pub(super) cycle: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Gathering,
+    RigActs,
+    RigDone,
+    MembersAct,
+}
+
+struct Member {
+    name: String,
+    done: bool,
+}
+
+struct Posted {
+    frame: CanFrame,
+    from: PeerId,
+    sender: String,
+}
+
+/// State of the barrier.
+pub(super) struct Barrier {
+    config: BarrierConfig,
+    phase: Phase,
+    cycle: u32,
+    rig: Option<PeerId>,
+    members: BTreeMap<PeerId, Member>,
+    /// For each of `config.echo_ids`, whether its echo of this cycle was seen.
+    echoed: Vec<bool>,
+    from_rig: Vec<Posted>,
+    from_others: Vec<Posted>,
+}
+
+impl Barrier {
+    pub(super) fn new(config: BarrierConfig) -> Self {
+        let echoed = vec![false; config.echo_ids.len()];
+        Self {
+            config,
+            phase: Phase::Gathering,
+            cycle: 0,
+            rig: None,
+            members: BTreeMap::new(),
+            echoed,
+            from_rig: Vec::new(),
+            from_others: Vec::new(),
+        }
+    }
+
+    /// Members in the barrier, the rig not counted.
+    pub(super) fn member_count(&self) -> usize {
+        self.members.len() + self.echoed.len()
+    }
+
+    /// The rig's connection.
+    pub(super) fn rig(&self) -> Option<PeerId> {
+        self.rig
+    }
+
+    /// Whether losing a frame at this peer's queue would break determinism.
+    pub(super) fn must_not_lose(&self, peer: PeerId) -> bool {
+        self.rig == Some(peer) || self.members.contains_key(&peer)
+    }
+
+    /// A peer joins. Later joiners of a running barrier act from the next release on.
+    pub(super) fn join(&mut self, peer: PeerId, role: Role, name: String) {
+        match role {
+            Role::Rig => self.rig = Some(peer),
+            Role::Member => {
+                let done = self.phase == Phase::MembersAct;
+                self.members.insert(peer, Member { name, done });
+            }
+        }
+    }
+
+    /// A peer's connection is gone: the others go on without it.
+    pub(super) fn leave(&mut self, peer: PeerId) {
+        self.members.remove(&peer);
+        if self.rig == Some(peer) {
+            self.rig = None;
+        }
+    }
+
+    /// A peer posts a frame.
+    pub(super) fn post(&mut self, from: PeerId, frame: CanFrame) {
+        if self.rig == Some(from) {
+            self.from_rig.push(Posted { frame, from, sender: String::new() });
+            return;
+        }
+        let sender = match self.members.get(&from) {
+            Some(member) => member.name.clone(),
+            None => {
+                if self.phase == Phase::MembersAct {
+                    self.note_echo(&frame);
+                }
+                String::new()
+            }
+        };
+        self.from_others.push(Posted { frame, from, sender });
+    }
+
+    fn note_echo(&mut self, frame: &CanFrame) {
+        let Some(index) = self.config.echo_ids.iter().position(|id| frame.standard_id() == Some(*id)) else {
+            return;
+        };
+        let echo = match Frame::decode(frame) {
+            Ok(Frame::DriveValveCommand(command) | Frame::LoadValveCommand(command)) => command.echo,
+            _ => return,
+        };
+        // The echo carries the low 12 bits of the cycle number.
+        if u32::from(echo) == self.cycle & 0xFFF {
+            self.echoed[index] = true;
+        }
+    }
+
+    /// A peer says that it posted all its frames of `cycle`.
+    pub(super) fn done(&mut self, from: PeerId, cycle: u32) {
+        if cycle != self.cycle {
+            return;
+        }
+        if self.rig == Some(from) && self.phase == Phase::RigActs {
+            self.phase = Phase::RigDone;
+        } else if let Some(member) = self.members.get_mut(&from) {
+            member.done = true;
+        }
+    }
+
+    /// The name of the first that keeps the barrier waiting, in order of joining; `None` while it is the rig's turn.
+    pub(super) fn waits_for(&self) -> Option<String> {
+        if self.phase != Phase::MembersAct {
+            return None;
+        }
+        let joined = self.members.values().find(|member| !member.done).map(|member| member.name.clone());
+        joined.or_else(|| {
+            let index = self.echoed.iter().position(|echoed| !echoed)?;
+            Some(format!("echo on {:#05x}", self.config.echo_ids[index]))
+        })
+    }
+
+    /// What to do now, if a phase is complete. `connected` is the number of peers, joined or not.
+    pub(super) fn release(&mut self, connected: usize) -> Option<Release> {
+        match self.phase {
+            Phase::Gathering => {
+                let rig = self.rig?;
+                let strangers = connected.saturating_sub(self.members.len() + 1);
+                if self.members.len() < self.config.members || strangers < self.echoed.len() {
+                    return None;
+                }
+                self.phase = Phase::RigActs;
+                Some(Release { frames: Vec::new(), go: vec![rig], cycle: 0 })
+            }
+            Phase::RigActs => None,
+            Phase::RigDone => {
+                self.phase = Phase::MembersAct;
+                let go = self.members.keys().copied().collect();
+                Some(Release { frames: sorted(&mut self.from_rig), go, cycle: self.cycle })
+            }
+            Phase::MembersAct => {
+                let rig = self.rig?;
+                if self.waits_for().is_some() {
+                    return None;
+                }
+                self.members.values_mut().for_each(|member| member.done = false);
+                self.echoed.fill(false);
+                self.cycle += 1;
+                self.phase = Phase::RigActs;
+                Some(Release { frames: sorted(&mut self.from_others), go: vec![rig], cycle: self.cycle })
+            }
+        }
+    }
+}
+
+fn sorted(posted: &mut Vec<Posted>) -> Vec<(CanFrame, PeerId)> {
+    // Stable: frames of one sender on one identifier keep their order.
+    posted.sort_by(|a, b| (a.frame.raw_id(), &a.sender).cmp(&(b.frame.raw_id(), &b.sender)));
+    posted.drain(..).map(|entry| (entry.frame, entry.from)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::ValveCommand;
+
+    const RIG: PeerId = 0;
+
+    fn frame(id: u16) -> CanFrame {
+        CanFrame::new(id, &[id as u8])
+    }
+
+    fn ids(release: &Release) -> Vec<u16> {
+        release.frames.iter().filter_map(|(frame, _)| frame.standard_id()).collect()
+    }
+
+    /// A barrier of a rig and the named members, released into cycle 0.
+    fn started(names: &[&str]) -> Barrier {
+        let mut barrier = Barrier::new(BarrierConfig { members: names.len(), echo_ids: vec![] });
+        barrier.join(RIG, Role::Rig, "rig".into());
+        for (peer, name) in (1..).zip(names) {
+            assert!(barrier.release(names.len() + 1).is_none(), "released before {name} joined");
+            barrier.join(peer, Role::Member, (*name).into());
+        }
+        let release = barrier.release(names.len() + 1).unwrap();
+        assert_eq!((release.go, release.cycle), (vec![RIG], 0));
+        barrier
+    }
+
+    #[test]
+    fn one_cycle_goes_rig_members_rig() {
+        let mut barrier = started(&["drive", "load"]);
+        barrier.post(RIG, frame(0x121));
+        barrier.post(RIG, frame(0x120));
+        assert!(barrier.release(3).is_none());
+        barrier.done(RIG, 0);
+        let to_members = barrier.release(3).unwrap();
+        assert_eq!((ids(&to_members), to_members.go.as_slice()), (vec![0x120, 0x121], &[1, 2][..]));
+
+        barrier.post(2, frame(0x111));
+        barrier.done(2, 0);
+        assert!(barrier.release(3).is_none());
+        assert_eq!(barrier.waits_for().as_deref(), Some("drive"));
+        barrier.post(1, frame(0x110));
+        barrier.done(1, 0);
+        let to_rig = barrier.release(3).unwrap();
+        assert_eq!((ids(&to_rig), to_rig.go.as_slice(), to_rig.cycle), (vec![0x110, 0x111], &[RIG][..], 1));
+    }
+
+    #[test]
+    fn order_of_delivery_does_not_depend_on_who_was_faster() {
+        let orders = [[1, 2], [2, 1]].map(|order| {
+            let mut barrier = started(&["b", "a"]);
+            barrier.done(RIG, 0);
+            barrier.release(3).unwrap();
+            for peer in order {
+                barrier.post(peer, frame(0x150));
+                barrier.post(peer, frame(0x110));
+                barrier.done(peer, 0);
+            }
+            barrier.release(3).unwrap().frames
+        });
+        assert_eq!(orders[0], orders[1]);
+    }
+
+    #[test]
+    fn done_for_another_cycle_counts_for_nothing() {
+        let mut barrier = started(&["drive"]);
+        barrier.done(RIG, 7);
+        assert!(barrier.release(2).is_none());
+    }
+
+    #[test]
+    fn a_member_that_leaves_no_longer_holds_the_barrier() {
+        let mut barrier = started(&["drive", "load"]);
+        barrier.done(RIG, 0);
+        barrier.release(3).unwrap();
+        barrier.done(1, 0);
+        barrier.leave(2);
+        assert_eq!(barrier.release(2).unwrap().cycle, 1);
+        assert_eq!(barrier.member_count(), 1);
+    }
+
+    #[test]
+    fn a_foreign_controller_is_done_when_its_command_echoes_the_cycle() {
+        let mut barrier = Barrier::new(BarrierConfig { members: 0, echo_ids: vec![0x110] });
+        barrier.join(RIG, Role::Rig, "rig".into());
+        assert!(barrier.release(1).is_none(), "released before the stranger connected");
+        barrier.release(2).unwrap();
+        barrier.done(RIG, 0);
+        barrier.release(2).unwrap();
+        for (echo, released) in [(9, false), (0, true)] {
+            let command = ValveCommand { opening: 0.0, alive: 0, echo, enable: true };
+            barrier.post(5, Frame::DriveValveCommand(command).encode().unwrap());
+            assert_eq!(barrier.release(2).is_some(), released, "echo {echo}");
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! A peer on any bus that is a packet socket: sends, receives, counts, and comes back when the bus does.
+//!
+//! When the bus goes, frames are dropped and counted, and the peer tries to open it again ten times a second; what
+//! was dropped meanwhile is never sent later. Neither sending nor receiving blocks or allocates while the bus is up.
+
+use super::control::{CONTROL_BYTES, Control, Kind, Role};
+use super::kernel_receive::{self, Packet};
+use super::url::BusUrl;
+use super::{Bus, BusCounters, BusError, Received, SendError, StampClock};
+use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::net::{SendFlags, send};
+use std::io;
+use std::os::fd::{AsFd, OwnedFd};
+use std::time::{Duration, Instant};
+
+/// How a kind of bus opens its socket.
+pub(super) trait Link: Send {
+    /// Whether the embedded bus's barrier can be joined through this link.
+    const HAS_BARRIER: bool;
+    /// Whether the kernel counts what it drops at the receive queue.
+    const COUNTS_OVERFLOW: bool;
+    /// What a person can do when opening fails.
+    const REMEDY: &'static str;
+
+    /// Opens a non-blocking socket to the bus.
+    fn connect(&self) -> io::Result<OwnedFd>;
+}
+
+/// Time between two attempts to open a bus that is gone.
+const RETRY_PERIOD: Duration = Duration::from_millis(100);
+
+/// A peer on a bus that is a packet socket.
+pub(super) struct SocketPeer<L> {
+    link: L,
+    url: String,
+    clock: StampClock,
+    socket: Option<OwnedFd>,
+    /// False from the moment the system says the network is down until a packet passes again.
+    usable: bool,
+    ever_up: bool,
+    next_attempt: Instant,
+    joined: Option<Control>,
+    overflow_seen: u32,
+    counters: BusCounters,
+}
+
+impl<L: Link> SocketPeer<L> {
+    /// Opens the bus now.
+    pub(super) fn open(link: L, url: &BusUrl, clock: StampClock) -> Result<Self, BusError> {
+        let mut peer = Self::new(link, url, clock);
+        match peer.connect() {
+            Ok(()) => Ok(peer),
+            Err(error) => {
+                Err(BusError::Open { url: peer.url, reason: error.to_string(), remedy: L::REMEDY })
+            }
+        }
+    }
+
+    /// Opens the bus now if it is there, else keeps trying.
+    pub(super) fn lazy(link: L, url: &BusUrl, clock: StampClock) -> Self {
+        let mut peer = Self::new(link, url, clock);
+        peer.try_again();
+        peer
+    }
+
+    fn new(link: L, url: &BusUrl, clock: StampClock) -> Self {
+        Self {
+            link,
+            url: url.to_string(),
+            clock,
+            socket: None,
+            usable: false,
+            ever_up: false,
+            next_attempt: Instant::now(),
+            joined: None,
+            overflow_seen: 0,
+            counters: BusCounters::default(),
+        }
+    }
+
+    fn connect(&mut self) -> io::Result<()> {
+        let socket = self.link.connect()?;
+        kernel_receive::enable_stamps(socket.as_fd(), L::COUNTS_OVERFLOW)?;
+        if let Some(join) = self.joined {
+            send(&socket, &join.to_bytes(), SendFlags::DONTWAIT)?;
+        }
+        self.socket = Some(socket);
+        self.overflow_seen = 0;
+        if self.ever_up {
+            self.counters.reconnects += 1;
+        }
+        (self.usable, self.ever_up) = (true, true);
+        Ok(())
+    }
+
+    fn try_again(&mut self) {
+        let now = Instant::now();
+        if now >= self.next_attempt && self.connect().is_err() {
+            self.next_attempt = now + RETRY_PERIOD;
+        }
+    }
+
+    fn went_away(&mut self, error: rustix::io::Errno) {
+        if self.usable {
+            self.counters.disconnects += 1;
+        }
+        self.usable = false;
+        // An interface that is merely down keeps its socket; one that is gone, or a host that is, needs a new one.
+        if error != rustix::io::Errno::NETDOWN {
+            self.socket = None;
+            self.next_attempt = Instant::now() + RETRY_PERIOD;
+        }
+    }
+
+    fn passed(&mut self) {
+        if !self.usable {
+            self.usable = true;
+            self.counters.reconnects += 1;
+        }
+    }
+
+    fn sort(&mut self, packet: &Packet) -> Option<Received> {
+        if let Some(overflow) = packet.overflow {
+            self.counters.dropped_on_receive += u64::from(overflow.wrapping_sub(self.overflow_seen));
+            self.overflow_seen = overflow;
+        }
+        if packet.own_echo {
+            return None;
+        }
+        if packet.len == CONTROL_BYTES && self.joined.is_some() {
+            if let Some(control) = Control::from_bytes(&packet.bytes[..CONTROL_BYTES]) {
+                return Some(Received::Barrier(control));
+            }
+        }
+        let frame = packet.bytes[..packet.len].try_into().ok().and_then(|bytes: &[u8; CAN_FRAME_BYTES]| {
+            CanFrame::from_bytes(bytes)
+        });
+        match frame {
+            Some(frame) if frame.raw_id() & ERROR_FLAG != 0 => {
+                self.counters.error_frames += 1;
+                None
+            }
+            Some(frame) => {
+                self.counters.received += 1;
+                Some(Received::Frame(frame, (self.clock)().saturating_sub(packet.age_ns.unwrap_or(0))))
+            }
+            None => {
+                self.counters.malformed += 1;
+                None
+            }
+        }
+    }
+
+    fn send_packet(&mut self, bytes: &[u8]) -> Result<(), SendError> {
+        if self.socket.is_none() {
+            self.try_again();
+        }
+        let Some(socket) = &self.socket else { return Err(SendError::Down) };
+        match send(socket, bytes, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
+            Ok(_) => {
+                self.passed();
+                Ok(())
+            }
+            Err(rustix::io::Errno::NOBUFS | rustix::io::Errno::AGAIN) => Err(SendError::QueueFull),
+            Err(error) => {
+                self.went_away(error);
+                Err(SendError::Down)
+            }
+        }
+    }
+}
+
+impl<L: Link> Bus for SocketPeer<L> {
+    fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError> {
+        let result = self.send_packet(&frame.to_bytes());
+        match result {
+            Ok(()) => self.counters.sent += 1,
+            Err(_) => self.counters.dropped_on_send += 1,
+        }
+        result.map(|()| (self.clock)())
+    }
+
+    fn receive(&mut self) -> Received {
+        if self.socket.is_none() {
+            self.try_again();
+        }
+        while let Some(socket) = &self.socket {
+            match kernel_receive::receive(socket.as_fd()) {
+                Ok(packet) if packet.len == 0 => self.went_away(rustix::io::Errno::CONNRESET),
+                Ok(packet) => {
+                    self.passed();
+                    if let Some(received) = self.sort(&packet) {
+                        return received;
+                    }
+                }
+                Err(error) => match rustix::io::Errno::from_io_error(&error) {
+                    Some(rustix::io::Errno::AGAIN | rustix::io::Errno::INTR) | None => break,
+                    Some(errno) => {
+                        self.went_away(errno);
+                        break;
+                    }
+                },
+            }
+        }
+        Received::Nothing
+    }
+
+    fn wait_readable(&mut self, timeout: Duration) {
+        let Some(socket) = self.socket.as_ref().filter(|_| self.usable) else {
+            // Down: nothing will wake us, so sleep the time to the next attempt.
+            std::thread::sleep(timeout.min(RETRY_PERIOD / 10));
+            return;
+        };
+        let timeout = Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: i64::from(timeout.subsec_nanos()) };
+        // An interrupted wait is a wait that ended early, which the caller's loop absorbs.
+        let _ = poll(&mut [PollFd::new(socket, PollFlags::IN)], Some(&timeout));
+    }
+
+    fn is_up(&self) -> bool {
+        self.usable
+    }
+
+    fn counters(&self) -> &BusCounters {
+        &self.counters
+    }
+
+    fn join_lockstep(&mut self, role: Role, name: &str) -> Result<(), BusError> {
+        if !L::HAS_BARRIER {
+            return Err(BusError::NoBarrier { url: self.url.clone() });
+        }
+        let join = Control::named(Kind::Join(role), 0, name);
+        self.joined = Some(join);
+        if self.socket.is_some() {
+            // A failure shows as a bus that is down; the packet is sent again when it is back.
+            let _ = self.send_packet(&join.to_bytes());
+        }
+        Ok(())
+    }
+
+    fn done(&mut self, cycle: u32) {
+        // A failure shows as a bus that is down, and as a time-out of the barrier.
+        let _ = self.send_packet(&Control::new(Kind::Done, cycle).to_bytes());
+    }
+}
