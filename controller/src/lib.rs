@@ -1,1 +1,28 @@
-//! The axis controllers behind a CAN bus.
+//! The axis controllers behind a CAN bus: position control of the drive, the load held shut.
+//!
+//! It reads nothing of the process but the bus; of the plant it knows the nominal numbers of the rig file.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`station`] | frames in, commands out |
+//! | [`pace`] | what moves it: the rig's frames, or the barrier |
+//! | [`rig_view`] | cycle numbers, lost frames |
+//! | [`main_chain`] | from a rig at rest through the experiment to done |
+//! | [`set_point`] | profiles and motion laws |
+//! | [`axes`], [`position_p`], [`linearisation`] | the axis controllers, the algorithm, the inverse valve characteristic |
+//! | [`figures`] | dynamic and static error |
+//! | [`run`], [`recording`], [`experiment`], [`cli`] | around it |
+
+pub mod axes;
+pub mod cli;
+pub mod experiment;
+pub mod figures;
+pub mod linearisation;
+pub mod main_chain;
+pub mod pace;
+pub mod position_p;
+pub mod recording;
+pub mod rig_view;
+pub mod run;
+pub mod set_point;
+pub mod station;

@@ -1,1 +1,28 @@
-//! The rig behind a CAN bus, in real time.
+//! The rig behind a CAN bus: the plant in real time or in lockstep, recorded.
+//!
+//! It cannot tell whose controller sits on the bus, and puts nothing on it that the rig would not send. What only a
+//! simulation knows goes to `truth.csv`.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`station`] | one cycle: sensors out, commands in, records, step |
+//! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
+//! | [`commands`], [`sources`], [`live_cycles`] | which command acts, who sends it, how old it is |
+//! | [`telegrams`] | the frames that the rig sends |
+//! | [`recording`] | the queues out of the 1 ms path, and the files |
+//! | [`run`], [`inputs`], [`experiment`], [`summary`], [`host_thread`], [`cli`] | around it |
+
+pub mod cli;
+pub mod commands;
+pub mod event;
+pub mod experiment;
+pub mod host_thread;
+pub mod inputs;
+pub mod live_cycles;
+pub mod pace;
+pub mod recording;
+pub mod run;
+pub mod sources;
+pub mod station;
+pub mod summary;
+pub mod telegrams;

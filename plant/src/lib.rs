@@ -1,1 +1,59 @@
 //! Physics of the servo-pneumatic rig: two axes, linkage, sensors.
+//!
+//! A [`Plant`] is a rig ([`RigParameters`]) and a [`State`]; [`Plant::step`] moves it by one period of 1 ms under
+//! [`Inputs`], [`Plant::truth`] names every force and flow at an instant, [`Sensors`] make readings of it.
+//! The crate has no clock, no input or output, no thread, no log, and allocates nothing in its step.
+//!
+//! Where things are computed, in the order of a step:
+//!
+//! | file | law |
+//! |---|---|
+//! | `valve.rs` | command to spool, K_V tables, flow through an edge |
+//! | `supply.rs` | supply node, emergency stop, check valves |
+//! | `chamber.rs` | volumes, pressures, flow lag and its bounds, pneumatic force |
+//! | `linkage.rs` | gap and contact force |
+//! | `motion.rs` | friction, stick and slip, end stops, motion under a held force |
+//! | `integrator.rs` | the substep that puts them together |
+//! | `truth.rs` | the list of all terms at an instant |
+//! | `sensors.rs` | noise, rounding, saturation |
+//!
+//! ```
+//! use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
+//!
+//! let rig = RigParameters::baseline();
+//! let mut plant = Plant::new(&rig, &Setup::default())?;
+//! let mut sensors = Sensors::new(&rig, 1);
+//! let inputs = Inputs { valve: [0.3, 0.0], ..Inputs::default() };
+//! for _ in 0..200 {
+//!     let [drive, _load] = sensors.sample(&plant, &inputs); // at t_k, before the step
+//!     assert!(drive.position.value < 0.5);
+//!     plant.step(&inputs); // to t_k + 1 ms
+//! }
+//! assert!(plant.state().axes[0].extension_m > 0.1);
+//! # Ok::<(), plant::SetupError>(())
+//! ```
+//!
+//! Source of the model: rig-model.md, after Neugebauer, Quellmalz, Schönherr, Schlegel, "Control of a servo-pneumatic
+//! experimental rig", The Archive of Mechanical Engineering LVIII (2011) no. 2, DOI 10.2478/v10180-011-0014-6.
+
+mod chamber;
+mod integrator;
+mod lanes;
+mod linkage;
+mod motion;
+pub mod parameters;
+mod plant;
+mod sensors;
+mod setup;
+mod state;
+mod supply;
+mod truth;
+mod valve;
+
+pub use parameters::{ParameterError, RigParameters};
+pub use plant::{LinkRefused, Plant};
+pub use sensors::{AxisReadings, Reading, Sensors};
+pub use setup::{Setup, SetupError};
+pub use state::{Axis, AxisState, Inputs, State};
+pub use truth::{AxisTruth, Truth};
+pub use valve::quantise_valve;

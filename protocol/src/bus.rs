@@ -145,6 +145,8 @@ pub fn open(url: &BusUrl, clock: StampClock) -> Result<Box<dyn Bus>, BusError> {
         BusUrl::Can { interface } => {
             Ok(Box::new(socket_peer::SocketPeer::open(can_link::CanLink::new(interface), url, clock)?))
         }
-        BusUrl::Unix { path, .. } => Ok(Box::new(socket_peer::SocketPeer::lazy(unix_link::UnixLink::new(path), url, clock))),
+        BusUrl::Unix { path, .. } => {
+            Ok(Box::new(socket_peer::SocketPeer::lazy(unix_link::UnixLink::new(path), url, clock)))
+        }
     }
 }

@@ -16,6 +16,7 @@
 //! | [`periodic`] | the loop, its re-arm rule, what happens on an overrun |
 //! | [`histogram`] | recorders that never allocate, percentiles, HdrHistogram logs |
 //! | [`privileges`] | what the thread asks of the system, what it got, what was refused and how to get it |
+//! | [`signals`] | Ctrl-C and SIGTERM as a flag |
 //! | [`allocations`] | an allocator that counts, for the proof that a cycle allocates nothing |
 //!
 //! ```
@@ -39,6 +40,7 @@ pub mod clock;
 pub mod histogram;
 pub mod periodic;
 pub mod privileges;
+pub mod signals;
 mod virtual_clock;
 
 pub use clock::{Clock, Instant, MonotonicClock, VirtualClock};
@@ -47,3 +49,4 @@ pub use periodic::{
     ConfigError, Cycle, LoopStatistics, Overrun, OverrunPolicy, PeriodicConfig, PeriodicLoop, UnknownPolicy,
 };
 pub use privileges::{Grants, Refusal, Request, acquire};
+pub use signals::Interrupt;

@@ -35,8 +35,7 @@ impl CanLink {
 impl Link for CanLink {
     const HAS_BARRIER: bool = false;
     const COUNTS_OVERFLOW: bool = true;
-    const REMEDY: &'static str =
-        "make it with 'ip link add dev vcan0 type vcan' and 'ip link set vcan0 up', or use --bus unix:///PATH";
+    const REMEDY: &'static str = "make it with 'ip link add dev vcan0 type vcan' and 'ip link set vcan0 up', or use --bus unix:///PATH";
 
     fn connect(&self) -> io::Result<OwnedFd> {
         self.check_up()?;

@@ -115,13 +115,20 @@ mod tests {
 
     #[test]
     fn packets_survive_the_wire() {
-        for kind in
-            [Kind::Join(Role::Rig), Kind::Join(Role::Member), Kind::Done, Kind::Go { members: 2 }, Kind::TimedOut]
-        {
+        for kind in [
+            Kind::Join(Role::Rig),
+            Kind::Join(Role::Member),
+            Kind::Done,
+            Kind::Go { members: 2 },
+            Kind::TimedOut,
+        ] {
             let packet = Control::named(kind, 0x0102_0304, "controller drive");
             assert_eq!(Control::from_bytes(&packet.to_bytes()), Some(packet));
         }
-        assert_eq!(Control::named(Kind::Done, 0, "a name of more than twenty bytes").name().len(), LONGEST_NAME);
+        assert_eq!(
+            Control::named(Kind::Done, 0, "a name of more than twenty bytes").name().len(),
+            LONGEST_NAME
+        );
     }
 
     #[test]

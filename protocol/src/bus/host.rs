@@ -88,11 +88,7 @@ impl Host {
     ///
     /// # Errors
     /// [`BusError::HostExists`] when a live host serves it; [`BusError::Open`] when folder, lock or socket cannot be made.
-    pub fn bind(
-        path: &Path,
-        wire: WireOptions,
-        barrier: Option<BarrierConfig>,
-    ) -> Result<Self, BusError> {
+    pub fn bind(path: &Path, wire: WireOptions, barrier: Option<BarrierConfig>) -> Result<Self, BusError> {
         let url = BusUrl::Unix { path: path.into(), wire }.to_string();
         let opened = |error: io::Error| BusError::Open {
             url: url.clone(),
@@ -227,7 +223,8 @@ impl Host {
             self.waiting_since = Instant::now();
         }
         let Some(barrier) = &self.barrier else { return };
-        let Some(name) = barrier.waits_for().filter(|_| self.waiting_since.elapsed() > BARRIER_TIMEOUT) else {
+        let Some(name) = barrier.waits_for().filter(|_| self.waiting_since.elapsed() > BARRIER_TIMEOUT)
+        else {
             return;
         };
         if let Some(rig) = barrier.rig().and_then(|rig| self.peers.get(&rig)) {
@@ -299,8 +296,12 @@ fn open_lock(path: &Path) -> io::Result<(OwnedFd, PathBuf)> {
 fn listen(path: &Path) -> io::Result<(OwnedFd, OwnedFd)> {
     // We hold the lock, so a socket file that is still there belongs to a host that is gone. Anything else stays.
     match std::fs::symlink_metadata(path) {
-        Ok(found) if std::os::unix::fs::FileTypeExt::is_socket(&found.file_type()) => std::fs::remove_file(path)?,
-        Ok(_) => return Err(io::Error::new(io::ErrorKind::AlreadyExists, "the path is taken by another file")),
+        Ok(found) if std::os::unix::fs::FileTypeExt::is_socket(&found.file_type()) => {
+            std::fs::remove_file(path)?
+        }
+        Ok(_) => {
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "the path is taken by another file"));
+        }
         Err(_) => {}
     }
     let listener = rustix::net::socket_with(

@@ -51,9 +51,7 @@ impl<L: Link> SocketPeer<L> {
         let mut peer = Self::new(link, url, clock);
         match peer.connect() {
             Ok(()) => Ok(peer),
-            Err(error) => {
-                Err(BusError::Open { url: peer.url, reason: error.to_string(), remedy: L::REMEDY })
-            }
+            Err(error) => Err(BusError::Open { url: peer.url, reason: error.to_string(), remedy: L::REMEDY }),
         }
     }
 
@@ -128,14 +126,16 @@ impl<L: Link> SocketPeer<L> {
         if packet.own_echo {
             return None;
         }
-        if packet.len == CONTROL_BYTES && self.joined.is_some() {
-            if let Some(control) = Control::from_bytes(&packet.bytes[..CONTROL_BYTES]) {
-                return Some(Received::Barrier(control));
-            }
+        if packet.len == CONTROL_BYTES
+            && self.joined.is_some()
+            && let Some(control) = Control::from_bytes(&packet.bytes[..CONTROL_BYTES])
+        {
+            return Some(Received::Barrier(control));
         }
-        let frame = packet.bytes[..packet.len].try_into().ok().and_then(|bytes: &[u8; CAN_FRAME_BYTES]| {
-            CanFrame::from_bytes(bytes)
-        });
+        let frame = packet.bytes[..packet.len]
+            .try_into()
+            .ok()
+            .and_then(|bytes: &[u8; CAN_FRAME_BYTES]| CanFrame::from_bytes(bytes));
         match frame {
             Some(frame) if frame.raw_id() & ERROR_FLAG != 0 => {
                 self.counters.error_frames += 1;
@@ -212,7 +212,8 @@ impl<L: Link> Bus for SocketPeer<L> {
             std::thread::sleep(timeout.min(RETRY_PERIOD / 10));
             return;
         };
-        let timeout = Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: i64::from(timeout.subsec_nanos()) };
+        let timeout =
+            Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: i64::from(timeout.subsec_nanos()) };
         // An interrupted wait is a wait that ended early, which the caller's loop absorbs.
         let _ = poll(&mut [PollFd::new(socket, PollFlags::IN)], Some(&timeout));
     }

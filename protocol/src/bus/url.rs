@@ -106,7 +106,9 @@ impl fmt::Display for BusUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Can { interface } => write!(f, "can://{interface}"),
-            Self::Unix { path, wire } if *wire == WireOptions::default() => write!(f, "unix://{}", path.display()),
+            Self::Unix { path, wire } if *wire == WireOptions::default() => {
+                write!(f, "unix://{}", path.display())
+            }
             Self::Unix { path, wire } => {
                 write!(f, "unix://{}?loss={}&seed={}", path.display(), wire.loss, wire.seed)
             }

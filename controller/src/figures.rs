@@ -1,0 +1,89 @@
+//! Figures of the position control, taken cycle by cycle: dynamic and static error (bus.md, A run's folder).
+//!
+//! Dynamic: largest |set-point - position sensor| while the set-point moves. Static: largest of the mean |error| over the last
+//! 0.2 s of each rest. Both over the experiment alone, not over the way to it.
+
+use crate::set_point::SetPoint;
+
+/// Samples of the last 0.2 s of a rest.
+const STATIC_WINDOW: usize = 200;
+
+/// The figures so far.
+#[derive(Debug)]
+pub struct PositionFigures {
+    largest_moving_m: Option<f64>,
+    largest_resting_m: Option<f64>,
+    window_m: [f64; STATIC_WINDOW],
+    rested: usize,
+}
+
+impl Default for PositionFigures {
+    fn default() -> Self {
+        Self { largest_moving_m: None, largest_resting_m: None, window_m: [0.0; STATIC_WINDOW], rested: 0 }
+    }
+}
+
+impl PositionFigures {
+    /// Takes a cycle of the experiment.
+    pub fn take(&mut self, set_point: &SetPoint, position_m: f64) {
+        let error_m = (set_point.position_m - position_m).abs();
+        if set_point.moving {
+            self.end_rest();
+            self.largest_moving_m =
+                Some(self.largest_moving_m.map_or(error_m, |largest| largest.max(error_m)));
+        } else {
+            self.window_m[self.rested % STATIC_WINDOW] = error_m;
+            self.rested += 1;
+        }
+    }
+
+    /// Closes the rest that is going on, if any; a rest shorter than the window says nothing.
+    pub fn end_rest(&mut self) {
+        if self.rested >= STATIC_WINDOW {
+            let mean_m = self.window_m.iter().sum::<f64>() / STATIC_WINDOW as f64;
+            self.largest_resting_m =
+                Some(self.largest_resting_m.map_or(mean_m, |largest| largest.max(mean_m)));
+        }
+        self.rested = 0;
+    }
+
+    /// Dynamic error, m; `None` before the set-point moved.
+    #[must_use]
+    pub fn dynamic_m(&self) -> Option<f64> {
+        self.largest_moving_m
+    }
+
+    /// Static error, m; `None` before a rest was long enough.
+    #[must_use]
+    pub fn static_m(&self) -> Option<f64> {
+        self.largest_resting_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moving_and_resting_errors_are_kept_apart() {
+        let mut figures = PositionFigures::default();
+        let moving = SetPoint { position_m: 0.2, velocity_m_per_s: 0.1, moving: true };
+        [0.19, 0.25, 0.2].iter().for_each(|position| figures.take(&moving, *position));
+        // The rest starts 3 mm off and creeps: only its last 200 samples count.
+        (0..500).for_each(|_| figures.take(&SetPoint::at_rest(0.2), 0.203));
+        (0..200).for_each(|_| figures.take(&SetPoint::at_rest(0.2), 0.2004));
+        assert_eq!(figures.static_m(), None, "the rest is not over");
+        figures.take(&moving, 0.2);
+        // Differences of numbers near 0.2 carry roundings of 3e-17.
+        assert!((figures.dynamic_m().unwrap() - 0.05).abs() < 1e-15);
+        assert!((figures.static_m().unwrap() - 0.0004).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_short_rest_says_nothing() {
+        let mut figures = PositionFigures::default();
+        (0..199).for_each(|_| figures.take(&SetPoint::at_rest(0.2), 0.3));
+        figures.end_rest();
+        assert_eq!((figures.dynamic_m(), figures.static_m()), (None, None));
+    }
+}

@@ -1,0 +1,170 @@
+//! What moves the controllers: the rig's frames as they arrive, or the lockstep barrier.
+//!
+//! In real time the controllers have no clock of their own that could drift against the rig's: the sensors of a cycle wake
+//! them, and their wake-up latency is counted from the arrival of the frame at our queue.
+
+use crate::station::{News, Station};
+use protocol::bus::control::{Kind, Role};
+use protocol::bus::{Bus, BusError, Received};
+use protocol::frames::MainChainState;
+use realtime::{Clock, Interrupt, Recorder as Histogram};
+use std::time::{Duration, Instant as WallInstant};
+
+/// Longest wait for a frame before looking at the world again.
+const PATIENCE: Duration = Duration::from_millis(20);
+/// Silence of the sensors after which a person is told; the rig shuts its valve by itself.
+const SILENCE: Duration = Duration::from_millis(200);
+/// Silence after Done that counts as the rig's end.
+const DONE_SILENCE: Duration = Duration::from_secs(1);
+/// Answers that the allocation count leaves out at the start.
+const WARM_UP: u64 = 1000;
+/// Period of the answers, ns.
+const PERIOD_NS: u64 = 1_000_000;
+
+/// Why the controllers ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The rig said that it ends, or fell silent after Done.
+    RigEnded,
+    /// Ctrl-C or SIGTERM.
+    Interrupted,
+    /// The bus was gone, or no sensors came, for longer than the grace time.
+    BusGone,
+    /// Lockstep: a member was not done in time.
+    LockstepTimeout,
+}
+
+/// What a pace measured.
+pub struct Paced {
+    /// Why it ended.
+    pub end: End,
+    /// Arrival of the drive's sensors to our waking up, ns.
+    pub wakeup_ns: Histogram,
+    /// Waking up to the last frame sent, ns.
+    pub execution_ns: Histogram,
+    /// |time between two answers - period|, ns.
+    pub period_error_ns: Histogram,
+    /// Allocations in the 1 ms path after warm-up; 0 unless the counting allocator is built in.
+    pub allocations: u64,
+}
+
+impl Paced {
+    fn new() -> Self {
+        Self {
+            end: End::RigEnded,
+            wakeup_ns: Histogram::new(),
+            execution_ns: Histogram::new(),
+            period_error_ns: Histogram::new(),
+            allocations: 0,
+        }
+    }
+}
+
+/// Answers frames as they arrive.
+pub fn run_real(
+    station: &mut Station,
+    bus: &mut dyn Bus,
+    clock: &impl Clock,
+    grace: Duration,
+    interrupt: &Interrupt,
+) -> Paced {
+    let mut paced = Paced::new();
+    let mut last_frame = WallInstant::now();
+    let mut last_answer_ns = None;
+    let mut silent = false;
+    let mut was_up = bus.is_up();
+    let mut watch = None;
+    paced.end = loop {
+        bus.wait_readable(PATIENCE);
+        if watch.is_none() && station.answered() >= WARM_UP {
+            watch = Some(realtime::allocations::watch());
+        }
+        let woke_ns = clock.now().as_nanos();
+        let mut newest_ns = None;
+        while let Received::Frame(frame, stamp_ns) = bus.receive() {
+            newest_ns = Some(stamp_ns);
+            station.take(&frame);
+        }
+        if station.answer(bus) {
+            paced.execution_ns.record(clock.now().as_nanos().saturating_sub(woke_ns));
+            if let Some(last_ns) = last_answer_ns.replace(woke_ns) {
+                paced.period_error_ns.record(PERIOD_NS.abs_diff(woke_ns.saturating_sub(last_ns)));
+            }
+            paced.wakeup_ns.record(woke_ns.saturating_sub(newest_ns.unwrap_or(woke_ns)));
+        }
+        if interrupt.came() {
+            break End::Interrupted;
+        }
+        if station.ending() {
+            break End::RigEnded;
+        }
+        if newest_ns.is_some() {
+            last_frame = WallInstant::now();
+        }
+        let quiet = last_frame.elapsed();
+        if bus.is_up() != was_up {
+            was_up = bus.is_up();
+            station.tell(if was_up { News::BusBack } else { News::BusLost });
+        }
+        if (quiet > SILENCE) != silent {
+            silent = !silent;
+            if silent {
+                station.tell(News::SensorsSilent);
+            }
+        }
+        if quiet > DONE_SILENCE && station.drive().state() == MainChainState::Done {
+            break End::RigEnded;
+        }
+        if quiet > grace {
+            break End::BusGone;
+        }
+    };
+    drop(watch);
+    paced.allocations = realtime::allocations::counted();
+    paced
+}
+
+/// Answers when the barrier says so.
+///
+/// # Errors
+/// [`BusError::NoBarrier`] on a bus without one.
+pub fn run_lockstep(
+    station: &mut Station,
+    bus: &mut dyn Bus,
+    name: &str,
+    grace: Duration,
+    interrupt: &Interrupt,
+) -> Result<Paced, BusError> {
+    bus.join_lockstep(Role::Member, name)?;
+    let mut paced = Paced::new();
+    let mut waiting_since = None;
+    paced.end = loop {
+        match bus.receive() {
+            Received::Frame(frame, _) => station.take(&frame),
+            Received::Barrier(control) => match control.kind {
+                Kind::Go { .. } => {
+                    waiting_since = None;
+                    if station.ending() {
+                        break End::RigEnded;
+                    }
+                    station.answer(bus);
+                    bus.done(control.cycle);
+                }
+                Kind::TimedOut => break End::LockstepTimeout,
+                _ => {}
+            },
+            Received::Nothing => {
+                if interrupt.came() {
+                    break End::Interrupted;
+                }
+                // A host that went took the rig with it; simulated time does not go on elsewhere.
+                let since = *waiting_since.get_or_insert_with(WallInstant::now);
+                if bus.counters().disconnects > 0 || since.elapsed() > grace {
+                    break if station.ending() { End::RigEnded } else { End::BusGone };
+                }
+                bus.wait_readable(Duration::from_millis(100));
+            }
+        }
+    };
+    Ok(paced)
+}

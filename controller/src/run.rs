@@ -1,0 +1,258 @@
+//! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
+
+use crate::axes::DriveAxis;
+use crate::cli::{Pace, RunArguments};
+use crate::experiment::{DriveExperiment, ExperimentError};
+use crate::linearisation::Linearisation;
+use crate::pace::{self, End, Paced};
+use crate::position_p::PositionP;
+use crate::recording;
+use crate::rig_view::PerAxis;
+use crate::station::{IgnoredFrames, News, Outlets, Station};
+use crossbeam_channel::bounded;
+use plant::RigParameters;
+use protocol::bus::{self, Bus, BusCounters, BusError};
+use protocol::exit::Exit;
+use protocol::frames::MainChainState;
+use protocol::run_folder::{LineFile, SCHEMA_VERSION, write_json};
+use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request};
+use serde::Serialize;
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Name in the lockstep barrier.
+const MEMBER_NAME: &str = "controller";
+/// Rows that fit the queue: 16 s.
+const ROW_QUEUE: usize = 16 * 1024;
+const NEWS_QUEUE: usize = 1024;
+
+/// What keeps the controllers from running.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A file cannot be read, or says something that is not allowed.
+    #[error("{0}")]
+    Input(String),
+    /// The experiment file.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// The bus.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The output folder.
+    #[error("cannot write {0}; choose another folder with --out")]
+    Output(String),
+}
+
+impl RunError {
+    /// The exit code that the error leads to.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Bus(BusError::NoBarrier { .. }) => Exit::BadInput,
+            Self::Bus(_) => Exit::BusFailed,
+            _ => Exit::BadInput,
+        }
+    }
+}
+
+/// `controller.json`: what the controllers were run with and what they counted.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema_version: u32,
+    command_line: Vec<String>,
+    version: &'static str,
+    title: String,
+    position_p: PositionP,
+    started_unix_s: Option<f64>,
+    ended_because: &'static str,
+    chain_state: &'static str,
+    repetitions_done: u32,
+    position_error_dynamic_m: Option<f64>,
+    position_error_static_m: Option<f64>,
+    cycles_answered: u64,
+    rig_cycles_skipped: u64,
+    sensors_received: PerAxis,
+    sensors_lost: PerAxis,
+    frames_ignored: IgnoredFrames,
+    bus: BusCounters,
+    wakeup_ns: Percentiles,
+    execution_ns: Percentiles,
+    period_error_ns: Percentiles,
+    allocations_in_cycle: Option<u64>,
+    records_dropped: u64,
+    realtime_granted: Vec<String>,
+    realtime_refused: Vec<String>,
+    news: Vec<News>,
+}
+
+/// Runs the controllers as the command line asks.
+///
+/// # Errors
+/// [`RunError`] when the run cannot start or be saved; how it went is the exit code.
+pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
+    let rig_toml = read(&arguments.rig)?;
+    let rig = RigParameters::from_toml(&rig_toml, &arguments.rig.display().to_string())
+        .map_err(|error| RunError::Input(error.to_string()))?;
+    let experiment = DriveExperiment::from_toml(
+        &read(&arguments.experiment)?,
+        &arguments.experiment.display().to_string(),
+        rig.cylinder().stroke_m,
+    )?;
+    std::fs::create_dir_all(&arguments.out)
+        .map_err(|error| RunError::Output(format!("{}: {error}", arguments.out.display())))?;
+    let table = LineFile::create(&arguments.out.join("controller.csv"))
+        .map_err(|error| RunError::Output(error.to_string()))?;
+    let interrupt = Interrupt::watch(Exit::Interrupted as i32)
+        .map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
+    let mut bus = bus::open(&arguments.bus, Box::new(|| MonotonicClock.now().as_nanos()))?;
+
+    let (record_sender, records) = bounded(ROW_QUEUE);
+    let (news_sender, news) = bounded(NEWS_QUEUE);
+    let waits = arguments.pace == Pace::Lockstep;
+    let outlets = Outlets { records: record_sender, news: news_sender, waits };
+    let drive = DriveAxis::new(experiment.clone(), Linearisation::new(&rig), arguments.repeat);
+    let started = Instant::now();
+    std::thread::scope(|scope| {
+        let writer = scope.spawn(|| recording::run(table, &records, &news, || interrupt.ask()));
+        let work = scope.spawn(|| work(arguments, drive, outlets, bus.as_mut(), &interrupt));
+        let finished = join(work);
+        let (told, failure) = join(writer);
+        save(arguments, &experiment, started, finished?, told, failure.is_some())
+    })
+}
+
+struct Finished {
+    paced: Paced,
+    grants: Grants,
+    bus: BusCounters,
+    state: MainChainState,
+    repetitions: u32,
+    errors_m: [Option<f64>; 2],
+    answered: u64,
+    skipped: u64,
+    received: PerAxis,
+    lost: PerAxis,
+    ignored: IgnoredFrames,
+    records_dropped: u64,
+}
+
+fn work(
+    arguments: &RunArguments,
+    drive: DriveAxis,
+    outlets: Outlets,
+    bus: &mut dyn Bus,
+    interrupt: &Interrupt,
+) -> Result<Finished, RunError> {
+    let grants = acquire_realtime(arguments);
+    let mut station = Station::new(drive, outlets);
+    let grace = Duration::from_secs_f64(arguments.bus_grace);
+    let paced = match arguments.pace {
+        Pace::Real => pace::run_real(&mut station, bus, &MonotonicClock, grace, interrupt),
+        Pace::Lockstep => pace::run_lockstep(&mut station, bus, MEMBER_NAME, grace, interrupt)?,
+    };
+    let drive = station.drive();
+    Ok(Finished {
+        paced,
+        grants,
+        bus: *bus.counters(),
+        state: drive.state(),
+        repetitions: drive.status().repetition.into(),
+        errors_m: [drive.figures().dynamic_m(), drive.figures().static_m()],
+        answered: station.answered(),
+        skipped: station.view().skipped(),
+        received: station.view().received(),
+        lost: station.view().lost(),
+        ignored: station.ignored(),
+        records_dropped: station.records_dropped(),
+    })
+}
+
+fn acquire_realtime(arguments: &RunArguments) -> Grants {
+    if arguments.pace == Pace::Lockstep || arguments.no_realtime {
+        return Grants::default();
+    }
+    let grants = realtime::acquire(&Request {
+        fifo_priority: Some(arguments.fifo_priority),
+        cpu: arguments.cpu,
+        lock_memory: true,
+        dma_latency: true,
+        timer_slack: true,
+    });
+    grants.refusals().iter().for_each(|refusal| eprintln!("controller: warning: {refusal}"));
+    grants
+}
+
+fn save(
+    arguments: &RunArguments,
+    experiment: &DriveExperiment,
+    started: Instant,
+    finished: Finished,
+    news: Vec<News>,
+    output_failed: bool,
+) -> Result<Exit, RunError> {
+    let Finished { paced, grants, bus, .. } = &finished;
+    let done = finished.state == MainChainState::Done || arguments.repeat;
+    let (exit, ended_because) = match paced.end {
+        _ if output_failed => (Exit::BadInput, "the output could not be written"),
+        End::RigEnded if done => (Exit::Good, "done, and the rig has ended"),
+        End::RigEnded => (Exit::BusFailed, "the rig ended before the experiment was done"),
+        End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved"),
+        End::BusGone => {
+            (Exit::BusFailed, "no sensors for too long; is 'emulator run' on this bus? see --bus-grace")
+        }
+        End::LockstepTimeout => (Exit::LockstepTimeout, "a member of the barrier was not done in time"),
+    };
+    eprintln!("controller: {ended_because}");
+    let real = arguments.pace == Pace::Real;
+    let unix_s =
+        SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(started.elapsed());
+    if real {
+        let parts = [
+            ("controller-wakeup", paced.wakeup_ns.histogram()),
+            ("controller-execution", paced.execution_ns.histogram()),
+            ("controller-period-error", paced.period_error_ns.histogram()),
+        ];
+        let path = arguments.out.join("controller.hlog");
+        realtime::write_hlog(&path, &parts, unix_s.as_secs_f64(), started.elapsed())
+            .map_err(|error| RunError::Output(format!("{}: {error}", path.display())))?;
+    }
+    let report = Report {
+        schema_version: SCHEMA_VERSION,
+        command_line: std::env::args().collect(),
+        version: env!("CARGO_PKG_VERSION"),
+        title: experiment.title.clone(),
+        position_p: experiment.position_p,
+        started_unix_s: real.then_some(unix_s.as_secs_f64()),
+        ended_because,
+        chain_state: finished.state.name(),
+        repetitions_done: finished.repetitions,
+        position_error_dynamic_m: finished.errors_m[0],
+        position_error_static_m: finished.errors_m[1],
+        cycles_answered: finished.answered,
+        rig_cycles_skipped: finished.skipped,
+        sensors_received: finished.received,
+        sensors_lost: finished.lost,
+        frames_ignored: finished.ignored,
+        bus: *bus,
+        wakeup_ns: paced.wakeup_ns.percentiles(),
+        execution_ns: paced.execution_ns.percentiles(),
+        period_error_ns: paced.period_error_ns.percentiles(),
+        allocations_in_cycle: cfg!(feature = "count-allocations").then_some(paced.allocations),
+        records_dropped: finished.records_dropped,
+        realtime_granted: grants.granted().to_vec(),
+        realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
+        news,
+    };
+    write_json(&arguments.out.join("controller.json"), &report)
+        .map_err(|error| RunError::Output(error.to_string()))?;
+    Ok(exit)
+}
+
+fn join<T>(thread: std::thread::ScopedJoinHandle<'_, T>) -> T {
+    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+fn read(path: &Path) -> Result<String, RunError> {
+    std::fs::read_to_string(path)
+        .map_err(|error| RunError::Input(format!("cannot read {}: {error}", path.display())))
+}

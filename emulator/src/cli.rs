@@ -1,0 +1,124 @@
+//! The emulator's command line.
+
+use crate::pace::Pace;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use protocol::bus::BusUrl;
+use protocol::exit::EXIT_CODE_HELP;
+use protocol::frames::{DRIVE_VALVE_COMMAND, LOAD_VALVE_COMMAND};
+use realtime::OverrunPolicy;
+use std::path::PathBuf;
+
+/// Emulates the servo-pneumatic rig on a CAN bus.
+#[derive(Debug, Parser)]
+#[command(name = "emulator", version, about, after_help = EXIT_CODE_HELP)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What the emulator can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the rig: simulate both axes, send sensor frames, obey valve commands, record everything.
+    Run(Box<RunArguments>),
+    /// Host an embedded bus alone, without a rig.
+    Bus(BusArguments),
+    /// Print the worst-case load of the bus, computed from rig.dbc.
+    BusLoad,
+}
+
+/// How to run the rig.
+#[derive(Args, Debug)]
+pub struct RunArguments {
+    /// Bus: can://IFACE (SocketCAN) or unix:///PATH[?loss=P&seed=N] (embedded, hosted here).
+    #[arg(long, default_value_t = BusUrl::default_embedded())]
+    pub bus: BusUrl,
+    /// Rig file with the plant's numbers.
+    #[arg(long)]
+    pub rig: PathBuf,
+    /// Experiment file, of which the rig's initial state is read.
+    #[arg(long)]
+    pub experiment: Option<PathBuf>,
+    /// Folder for the run's files; made if missing.
+    #[arg(long, default_value = "runs/latest")]
+    pub out: PathBuf,
+    /// End after this much simulated time; without it, when the controllers are done.
+    #[arg(long, value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// real: one cycle each millisecond; lockstep: as fast as all members allow, to the byte the same every time.
+    #[arg(long, default_value_t = Pace::Real)]
+    pub pace: Pace,
+    /// Lockstep: controllers that will join the barrier.
+    #[arg(long, default_value_t = 1)]
+    pub members: usize,
+    /// Lockstep: foreign controllers that join by the echo in their commands; may be given twice.
+    #[arg(long, value_enum)]
+    pub lockstep_echo: Vec<EchoAxis>,
+    /// Lockstep: how long to wait for the members to join, in s.
+    #[arg(long, default_value = "30", value_parser = seconds)]
+    pub join_timeout: f64,
+    /// Seed of the sensors' noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// After a late wake-up: catch-up (compute the missed cycles, send the newest) or stop.
+    #[arg(long, default_value_t = OverrunPolicy::CatchUp)]
+    pub overrun: OverrunPolicy,
+    /// FIFO priority of the rig loop, 1 to 98; the bus host gets one more.
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(1..=98))]
+    pub fifo_priority: u8,
+    /// CPU that the rig loop is pinned to; not pinned without it.
+    #[arg(long)]
+    pub cpu: Option<usize>,
+    /// Wake this many microseconds early and spin until the deadline.
+    #[arg(long)]
+    pub spin_us: Option<u64>,
+    /// Ask the system for no priority, no locked memory and no latency request.
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Ignore frames of the bench: hand force, link, weights.
+    #[arg(long)]
+    pub no_bench_frames: bool,
+    /// How long the bus may be gone before the run ends, in s.
+    #[arg(long, default_value = "5", value_parser = seconds)]
+    pub bus_grace: f64,
+}
+
+/// How to host a bus.
+#[derive(Args, Debug)]
+pub struct BusArguments {
+    /// The embedded bus: unix:///PATH[?loss=P&seed=N].
+    #[arg(long, default_value_t = BusUrl::default_embedded())]
+    pub bus: BusUrl,
+    /// End after this time; without it, on Ctrl-C.
+    #[arg(long, value_parser = seconds)]
+    pub seconds: Option<f64>,
+}
+
+/// An axis whose foreign controller joins the barrier by its echo.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum EchoAxis {
+    /// Commands of the drive axis.
+    Drive,
+    /// Commands of the load axis.
+    Load,
+}
+
+impl EchoAxis {
+    /// Identifier of the axis's command frame.
+    #[must_use]
+    pub fn command_id(self) -> u16 {
+        match self {
+            Self::Drive => DRIVE_VALVE_COMMAND.id,
+            Self::Load => LOAD_VALVE_COMMAND.id,
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    const LONGEST_S: f64 = 1e7;
+    text.parse()
+        .ok()
+        .filter(|seconds: &f64| *seconds > 0.0 && *seconds <= LONGEST_S)
+        .ok_or_else(|| format!("'{text}' is not a time in seconds above 0, at most {LONGEST_S}"))
+}

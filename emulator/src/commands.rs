@@ -1,0 +1,238 @@
+//! Takes the valve commands of one axis from the bus and tells which opening acts.
+//!
+//! A command is latched at the start of the cycle after it arrived and held for the cycle (bus.md, Time). What
+//! must not act is counted and ignored: a frame whose echo is older than 20 cycles or answers no cycle that was
+//! sent; a command that two senders dispute; a command grown older than 20 cycles, for which the valve shuts until a
+//! fresh one comes.
+
+use crate::live_cycles::LiveCycles;
+use crate::sources::{SourceWatch, Step};
+use protocol::frames::ValveCommand;
+use serde::Serialize;
+
+/// Age in cycles beyond which a command is stale (bus.md, Time).
+pub const STALE_AFTER_CYCLES: u64 = 20;
+
+/// What was counted of one axis's commands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct CommandCounters {
+    /// Commands taken over, whether or not a later one of the same cycle replaced them.
+    pub accepted: u64,
+    /// Commands refused because their echo was too old, or answered no cycle that was sent.
+    pub refused_stale: u64,
+    /// Times that the acting command grew stale and the valve was shut.
+    pub expired: u64,
+    /// Commands that never came, by the gaps in the sender's counter.
+    pub lost: u64,
+    /// Times that the fault `two-sources` was latched.
+    pub two_sources: u64,
+}
+
+/// What changed with a latch, for messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// The command grew stale: valve shut.
+    Expired,
+    /// A fresh command came after the valve had been shut for want of one.
+    Fresh,
+    /// Two senders use the identifier: valve shut.
+    TwoSources,
+    /// One of the two has been silent: its commands act again.
+    OneSource,
+}
+
+/// The command path of one axis.
+#[derive(Default)]
+pub struct CommandIntake {
+    sources: SourceWatch,
+    acting: Option<ValveCommand>,
+    /// An accepted command was there, and grew stale.
+    expired: bool,
+    disputed: bool,
+    counters: CommandCounters,
+}
+
+impl CommandIntake {
+    /// Takes a well-formed command that arrived before `cycle`. True when it was accepted.
+    pub fn take(&mut self, command: ValveCommand, cycle: u64, live: &LiveCycles) -> bool {
+        match live.age(command.echo) {
+            Some(age) if age <= STALE_AFTER_CYCLES => {}
+            _ => {
+                self.counters.refused_stale += 1;
+                return false;
+            }
+        }
+        if let Step::Continues { lost } = self.sources.note(command.alive, cycle) {
+            self.counters.lost += lost;
+        }
+        self.counters.accepted += 1;
+        self.acting = Some(command);
+        true
+    }
+
+    /// Latches what acts over `cycle`, the last command taken being the one that counts.
+    pub fn latch(&mut self, cycle: u64, live: &LiveCycles) -> Option<Change> {
+        let disputed = self.sources.two_sources(cycle);
+        if disputed != self.disputed {
+            self.disputed = disputed;
+            self.counters.two_sources += u64::from(disputed);
+            return Some(if disputed { Change::TwoSources } else { Change::OneSource });
+        }
+        let too_old =
+            |command: &ValveCommand| live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES);
+        if self.acting.as_ref().is_some_and(too_old) {
+            self.acting = None;
+            self.expired = true;
+            self.counters.expired += 1;
+            return Some(Change::Expired);
+        }
+        if self.acting.is_some() && self.expired {
+            self.expired = false;
+            return Some(Change::Fresh);
+        }
+        None
+    }
+
+    /// Valve opening that acts, in -1 to 1.
+    #[must_use]
+    pub fn opening(&self) -> f64 {
+        match &self.acting {
+            Some(command) if command.enable && !self.disputed => command.opening,
+            _ => 0.0,
+        }
+    }
+
+    /// Age of the acting command in cycles, 1 being the least; `None` without one.
+    #[must_use]
+    pub fn age_cycles(&self, live: &LiveCycles) -> Option<u64> {
+        self.acting.as_ref().and_then(|command| live.age(command.echo))
+    }
+
+    /// Whether the valve is shut because no fresh command is there.
+    #[must_use]
+    pub fn stale(&self) -> bool {
+        self.acting.is_none()
+    }
+
+    /// Whether the valve is shut because two senders dispute it.
+    #[must_use]
+    pub fn disputed(&self) -> bool {
+        self.disputed
+    }
+
+    /// Counters since the start.
+    #[must_use]
+    pub fn counters(&self) -> &CommandCounters {
+        &self.counters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An intake and its cycles, with a sender that answers each cycle unless told not to.
+    #[derive(Default)]
+    struct Bench {
+        intake: CommandIntake,
+        live: LiveCycles,
+        cycle: u64,
+        alive: u8,
+    }
+
+    impl Bench {
+        fn command(&mut self, opening: f64, echo: u64) -> ValveCommand {
+            self.alive = (self.alive + 1) % 16;
+            ValveCommand { opening, alive: self.alive, echo: (echo % 4096) as u16, enable: true }
+        }
+
+        /// Sends the sensors of the next cycle, having first taken an answer to the last one, if any.
+        fn cycle(&mut self, answer: Option<f64>) -> Option<Change> {
+            if let Some(opening) = answer {
+                let command = self.command(opening, self.cycle - 1);
+                self.intake.take(command, self.cycle, &self.live);
+            }
+            self.live.sent(self.cycle);
+            let change = self.intake.latch(self.cycle, &self.live);
+            self.cycle += 1;
+            change
+        }
+    }
+
+    #[test]
+    fn a_command_acts_in_the_next_cycle_and_is_held() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        assert_eq!(bench.intake.opening(), 0.0);
+        bench.cycle(Some(0.5));
+        assert_eq!((bench.intake.opening(), bench.intake.age_cycles(&bench.live)), (0.5, Some(1)));
+        bench.cycle(None);
+        assert_eq!((bench.intake.opening(), bench.intake.age_cycles(&bench.live)), (0.5, Some(2)));
+    }
+
+    #[test]
+    fn a_command_older_than_twenty_cycles_shuts_the_valve_until_a_fresh_one() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        bench.cycle(Some(0.5));
+        let changes: Vec<_> = (2..=20).filter_map(|_| bench.cycle(None)).collect();
+        assert_eq!((changes.as_slice(), bench.intake.opening()), (&[][..], 0.5));
+        assert_eq!(bench.cycle(None), Some(Change::Expired));
+        assert_eq!(bench.intake.opening(), 0.0);
+        assert_eq!(bench.cycle(Some(0.25)), Some(Change::Fresh));
+        assert_eq!(bench.intake.opening(), 0.25);
+    }
+
+    #[test]
+    fn a_stale_echo_is_counted_and_never_applied() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        for _ in 0..100 {
+            bench.cycle(Some(0.5));
+        }
+        for echo in [0, 79, 500, 4000] {
+            let command = bench.command(-1.0, echo);
+            assert!(!bench.intake.take(command, bench.cycle, &bench.live), "echo {echo}");
+        }
+        assert_eq!((bench.intake.opening(), bench.intake.counters().refused_stale), (0.5, 4));
+    }
+
+    #[test]
+    fn the_last_of_several_commands_in_a_cycle_counts() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        for opening in [0.1, 0.2, 0.3] {
+            let command = bench.command(opening, 0);
+            bench.intake.take(command, 1, &bench.live);
+        }
+        bench.cycle(None);
+        assert_eq!(bench.intake.opening(), 0.3);
+    }
+
+    #[test]
+    fn a_command_that_does_not_enable_keeps_the_valve_shut() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        let command = ValveCommand { enable: false, ..bench.command(0.5, 0) };
+        bench.intake.take(command, 1, &bench.live);
+        bench.cycle(None);
+        assert_eq!((bench.intake.opening(), bench.intake.stale()), (0.0, false));
+    }
+
+    #[test]
+    fn two_senders_shut_the_valve_until_one_is_silent() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        let mut changes = Vec::new();
+        for _ in 0..30 {
+            let intruder = ValveCommand { opening: 1.0, alive: 15 - bench.alive, echo: 0, enable: true };
+            let intruder = ValveCommand { echo: (bench.cycle - 1) as u16, ..intruder };
+            bench.intake.take(intruder, bench.cycle, &bench.live);
+            changes.extend(bench.cycle(Some(0.5)));
+        }
+        assert_eq!((changes.as_slice(), bench.intake.opening()), (&[Change::TwoSources][..], 0.0));
+        let changes: Vec<_> = (0..30).filter_map(|_| bench.cycle(Some(0.5))).collect();
+        assert_eq!((changes.as_slice(), bench.intake.opening()), (&[Change::OneSource][..], 0.5));
+        assert_eq!(bench.intake.counters().two_sources, 1);
+    }
+}

@@ -1,0 +1,100 @@
+//! What a run has to tell a person, each with its cycle.
+
+use plant::Axis;
+use serde::Serialize;
+use std::fmt;
+
+/// Something that happened in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// Cycle in which it was noticed.
+    pub cycle: u64,
+    /// What happened.
+    pub kind: EventKind,
+}
+
+/// Kinds of events.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EventKind {
+    /// The loop woke late: so many cycles were computed without being sent.
+    Skipped {
+        /// Number of cycles.
+        cycles: u64,
+    },
+    /// No fresh command for 20 cycles: valve shut.
+    CommandStale(#[serde(serialize_with = "axis_name")] Axis),
+    /// Fresh commands again.
+    CommandFresh(#[serde(serialize_with = "axis_name")] Axis),
+    /// Two senders on one command identifier: valve shut.
+    TwoSources(#[serde(serialize_with = "axis_name")] Axis),
+    /// One of them has been silent for 20 cycles.
+    OneSource(#[serde(serialize_with = "axis_name")] Axis),
+    /// Somebody tripped the emergency stop.
+    EmergencyStop,
+    /// Somebody released it.
+    EmergencyStopReleased,
+    /// The rods were linked.
+    Linked,
+    /// The rods were parted.
+    Unlinked,
+    /// Linking was refused because the eye is not within the gap.
+    LinkRefused,
+    /// A frame that `rig.dbc` does not allow was ignored; only the first of a kind is told.
+    Malformed {
+        /// Its identifier with the kernel's flags.
+        raw_id: u32,
+    },
+    /// A frame arrived that only a rig sends: there is a second rig on the bus.
+    SecondRig {
+        /// Its identifier.
+        id: u16,
+    },
+    /// The bus went away.
+    BusLost,
+    /// The bus came back.
+    BusBack,
+}
+
+fn axis_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(axis.name())
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cycle {}: ", self.cycle)?;
+        match self.kind {
+            EventKind::Skipped { cycles } => write!(f, "woke late, {cycles} cycle(s) computed but not sent"),
+            EventKind::CommandStale(axis) => write!(
+                f,
+                "no fresh {} command for 20 cycles, valve shut; is its controller running?",
+                axis.name()
+            ),
+            EventKind::CommandFresh(axis) => write!(f, "fresh {} commands again, valve follows", axis.name()),
+            EventKind::TwoSources(axis) => write!(
+                f,
+                "fault two-sources: two senders on the {} command, valve shut; stop one of them",
+                axis.name()
+            ),
+            EventKind::OneSource(axis) => {
+                write!(f, "one sender left on the {} command, valve follows", axis.name())
+            }
+            EventKind::EmergencyStop => write!(f, "emergency stop"),
+            EventKind::EmergencyStopReleased => write!(f, "emergency stop released"),
+            EventKind::Linked => write!(f, "rods linked"),
+            EventKind::Unlinked => write!(f, "rods parted"),
+            EventKind::LinkRefused => {
+                write!(f, "link refused: the load eye is not within the gap of the carriage")
+            }
+            EventKind::Malformed { raw_id } => write!(
+                f,
+                "a frame with identifier {raw_id:#05x} is not as rig.dbc says and was ignored; more are counted silently"
+            ),
+            EventKind::SecondRig { id } => {
+                write!(f, "frame {id:#05x} came from elsewhere: another rig is on this bus; stop one of them")
+            }
+            EventKind::BusLost => write!(f, "the bus is gone; trying to come back"),
+            EventKind::BusBack => write!(f, "the bus is back"),
+        }
+    }
+}

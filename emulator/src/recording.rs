@@ -1,0 +1,127 @@
+//! What the 1 ms path hands to the recorder: cycles, frames and events, through bounded queues.
+//!
+//! ```text
+//!   rig loop ── try_send ──► [cycles]  ──┐
+//!            ── try_send ──► [frames]  ──┼── polled every few ms ── writer ──► files
+//!            ── try_send ──► [events]  ──┘
+//! ```
+//!
+//! The queues are allocated before the start; sending takes no lock and wakes nobody, because the writer polls
+//! (facts: 0.2 us against 9 us with a blocked receiver). A full queue loses the record and counts it.
+
+pub mod candump;
+pub mod tables;
+pub mod writer;
+
+use crate::event::Event;
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use plant::{AxisReadings, Truth};
+use protocol::can::CanFrame;
+use std::sync::{Arc, Weak};
+
+/// Cycles that fit the queue: 16 s, longer than any stall that a run survives in practice.
+const CYCLE_QUEUE: usize = 16 * 1024;
+/// Frames that fit the queue, some eight for each of those cycles.
+const FRAME_QUEUE: usize = 8 * CYCLE_QUEUE;
+/// Events that fit the queue.
+const EVENT_QUEUE: usize = 4096;
+
+/// One row of `measurement.csv` and of `truth.csv`.
+#[derive(Clone, Debug)]
+pub struct CycleRecord {
+    /// Cycle number; the row's time is this many milliseconds.
+    pub cycle: u64,
+    /// Valve openings acting over the cycle, drive and load, -1 to 1.
+    pub valve: [f64; 2],
+    /// Sensors sampled at the cycle's start, drive and load.
+    pub readings: [AxisReadings; 2],
+    /// What only a simulation knows.
+    pub truth: Truth,
+}
+
+/// One line of `bus.log`.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameRecord {
+    /// When it was sent or arrived, in ns of the run's clock.
+    pub stamp_ns: u64,
+    /// The frame.
+    pub frame: CanFrame,
+}
+
+/// The sending ends, held by the rig loop.
+pub struct Recorder {
+    cycles: Sender<CycleRecord>,
+    frames: Sender<FrameRecord>,
+    events: Sender<Event>,
+    /// Lockstep waits for the writer rather than lose a record: simulated time has no deadline.
+    waits: bool,
+    dropped: u64,
+    _alive: Arc<()>,
+}
+
+/// The receiving ends, held by the writer.
+pub struct Records {
+    cycles: Receiver<CycleRecord>,
+    frames: Receiver<FrameRecord>,
+    events: Receiver<Event>,
+    sender_alive: Weak<()>,
+}
+
+/// Makes the queues. With `waits`, a full queue holds the sender up instead of losing the record.
+#[must_use]
+pub fn queues(waits: bool) -> (Recorder, Records) {
+    let (cycle_sender, cycles) = bounded(CYCLE_QUEUE);
+    let (frame_sender, frames) = bounded(FRAME_QUEUE);
+    let (event_sender, events) = bounded(EVENT_QUEUE);
+    let alive = Arc::new(());
+    let sender_alive = Arc::downgrade(&alive);
+    let recorder = Recorder {
+        cycles: cycle_sender,
+        frames: frame_sender,
+        events: event_sender,
+        waits,
+        dropped: 0,
+        _alive: alive,
+    };
+    (recorder, Records { cycles, frames, events, sender_alive })
+}
+
+impl Records {
+    /// Whether nothing more can come.
+    fn senders_gone(&self) -> bool {
+        self.sender_alive.strong_count() == 0
+    }
+}
+
+impl Recorder {
+    /// Hands over a cycle.
+    pub fn cycle(&mut self, record: CycleRecord) {
+        self.dropped += hand_over(&self.cycles, record, self.waits);
+    }
+
+    /// Hands over a frame.
+    pub fn frame(&mut self, record: FrameRecord) {
+        self.dropped += hand_over(&self.frames, record, self.waits);
+    }
+
+    /// Hands over an event.
+    pub fn event(&mut self, event: Event) {
+        self.dropped += hand_over(&self.events, event, self.waits);
+    }
+
+    /// Records lost to full queues.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+/// Returns how many records were lost: 0 or 1.
+fn hand_over<T>(queue: &Sender<T>, record: T, waits: bool) -> u64 {
+    match queue.try_send(record) {
+        Ok(()) => 0,
+        // A writer that is gone has said why; then there is nobody to wait for.
+        Err(TrySendError::Full(record)) if waits => u64::from(queue.send(record).is_err()),
+        Err(_) => 1,
+    }
+}

@@ -1,0 +1,59 @@
+//! Rows of `measurement.csv` (what sensors and valves show) and `truth.csv` (what only a simulation knows).
+//!
+//! Columns of the first are those of rig-model.md, no others. Numbers are written with the fewest digits that read back
+//! to the same bits.
+
+use crate::recording::CycleRecord;
+use plant::Truth;
+use std::io::{self, Write};
+
+/// Columns of `measurement.csv` after `time_s`, for one axis; each is prefixed with `drive_` or `load_`.
+const AXIS_COLUMNS: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
+
+/// Writes the head of `measurement.csv`, whose comment line tells how the rig was set up.
+///
+/// # Errors
+/// What `out` says.
+pub fn write_measurement_head(out: &mut impl Write, linked: bool, added_mass_kg: f64) -> io::Result<()> {
+    write!(out, "# linked={linked} added_mass_kg={added_mass_kg}\ntime_s")?;
+    for axis in ["drive", "load"] {
+        AXIS_COLUMNS.iter().try_for_each(|column| write!(out, ",{axis}_{column}"))?;
+    }
+    writeln!(out)
+}
+
+/// Writes one row of `measurement.csv`.
+///
+/// # Errors
+/// What `out` says.
+pub fn write_measurement(out: &mut impl Write, record: &CycleRecord) -> io::Result<()> {
+    write_time(out, record.cycle)?;
+    for (valve, axis) in record.valve.iter().zip(&record.readings) {
+        let readings = [&axis.position, &axis.force, &axis.pressure_a, &axis.pressure_b];
+        write!(out, ",{valve}")?;
+        readings.iter().try_for_each(|reading| write!(out, ",{}", reading.value))?;
+    }
+    writeln!(out)
+}
+
+/// Writes the head of `truth.csv`.
+///
+/// # Errors
+/// What `out` says.
+pub fn write_truth_head(out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "time_s,{}", Truth::COLUMNS.join(","))
+}
+
+/// Writes one row of `truth.csv`.
+///
+/// # Errors
+/// What `out` says.
+pub fn write_truth(out: &mut impl Write, record: &CycleRecord) -> io::Result<()> {
+    write_time(out, record.cycle)?;
+    record.truth.values().iter().try_for_each(|value| write!(out, ",{value}"))?;
+    writeln!(out)
+}
+
+fn write_time(out: &mut impl Write, cycle: u64) -> io::Result<()> {
+    write!(out, "{}.{:03}", cycle / 1000, cycle % 1000)
+}

@@ -1,0 +1,149 @@
+//! The thread that empties the queues into the run's folder and tells events to a person.
+//!
+//! It polls, so that the rig loop never wakes it. Files grow by whole lines and reach the disk five times a second: a
+//! process that is killed leaves files that read to their last line. When a write fails (a full disk, a folder that
+//! went away), the run is asked to end, and what was written stays.
+
+use super::{Records, candump, tables};
+use crate::event::Event;
+use crate::pace::Shared;
+use protocol::run_folder::LineFile;
+use std::io;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Pause between two looks at the queues.
+const POLL_PERIOD: Duration = Duration::from_millis(4);
+/// Longest time that a recorded line stays in memory.
+const FLUSH_PERIOD: Duration = Duration::from_millis(200);
+/// Events told on the terminal; `run.json`'s neighbour `summary.json` holds them all.
+const EVENTS_TOLD: usize = 40;
+/// Events kept for the summary.
+const EVENTS_KEPT: usize = 1000;
+
+/// What the writer has to know of the run.
+pub struct WriterSetup {
+    /// The run's folder; it exists.
+    pub folder: PathBuf,
+    /// Interface name in `bus.log`.
+    pub interface: String,
+    /// What turns the run's clock into the time stamps of `bus.log`, in ns.
+    pub epoch_offset_ns: u64,
+    /// How the rig was set up, for the comment line of `measurement.csv`.
+    pub linked: bool,
+    /// Weights on the carriage, for the same line.
+    pub added_mass_kg: f64,
+}
+
+/// What the writer leaves behind.
+#[derive(Debug, Default)]
+pub struct WriterReport {
+    /// Rows in `measurement.csv` and `truth.csv`.
+    pub rows: u64,
+    /// Lines in `bus.log`.
+    pub frames: u64,
+    /// The first events.
+    pub events: Vec<Event>,
+    /// Events in all.
+    pub event_count: u64,
+    /// Why writing stopped, if it did.
+    pub failure: Option<String>,
+}
+
+/// The open files of a run.
+pub struct Writer {
+    setup: WriterSetup,
+    bus_log: LineFile,
+    measurement: LineFile,
+    truth: LineFile,
+    report: WriterReport,
+}
+
+impl Writer {
+    /// Opens the files and writes their heads.
+    ///
+    /// # Errors
+    /// Names the file that cannot be made.
+    pub fn create(setup: WriterSetup) -> io::Result<Self> {
+        let open = |name: &str| LineFile::create(&setup.folder.join(name));
+        let (bus_log, mut measurement, mut truth) =
+            (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
+        tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
+        tables::write_truth_head(truth.lines())?;
+        Ok(Self { setup, bus_log, measurement, truth, report: WriterReport::default() })
+    }
+
+    /// Writes until the sending ends are gone and the queues are empty.
+    #[must_use]
+    pub fn run(mut self, records: &Records, shared: &Shared) -> WriterReport {
+        let mut last_flush = Instant::now();
+        loop {
+            // Asked before draining: what was sent before the ends went is drained below.
+            let finished = records.senders_gone();
+            let drained = self.drain(records);
+            let flushed = if finished || last_flush.elapsed() > FLUSH_PERIOD {
+                last_flush = Instant::now();
+                self.flush()
+            } else {
+                Ok(())
+            };
+            if let Err(error) = drained.and(flushed) {
+                self.fail(&error, shared);
+                return self.report;
+            }
+            if finished {
+                return self.report;
+            }
+            std::thread::sleep(POLL_PERIOD);
+        }
+    }
+
+    fn drain(&mut self, records: &Records) -> io::Result<()> {
+        for record in records.cycles.try_iter() {
+            tables::write_measurement(self.measurement.lines(), &record)?;
+            tables::write_truth(self.truth.lines(), &record)?;
+            self.report.rows += 1;
+            self.measurement.write_when_full()?;
+            self.truth.write_when_full()?;
+        }
+        for record in records.frames.try_iter() {
+            let (interface, offset) = (&self.setup.interface, self.setup.epoch_offset_ns);
+            candump::write_line(self.bus_log.lines(), interface, offset, &record)?;
+            self.report.frames += 1;
+            self.bus_log.write_when_full()?;
+        }
+        for event in records.events.try_iter() {
+            self.tell(event);
+        }
+        Ok(())
+    }
+
+    fn tell(&mut self, event: Event) {
+        self.report.event_count += 1;
+        if self.report.events.len() < EVENTS_KEPT {
+            self.report.events.push(event);
+        }
+        match self.report.events.len() {
+            count if count < EVENTS_TOLD => eprintln!("emulator: {event}"),
+            EVENTS_TOLD => eprintln!("emulator: {event}; further events stand in summary.json only"),
+            _ => {}
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.bus_log.write_out()?;
+        self.measurement.write_out()?;
+        self.truth.write_out()
+    }
+
+    fn fail(&mut self, error: &io::Error, shared: &Shared) {
+        let folder = self.setup.folder.display();
+        let message = format!(
+            "cannot write to {folder}: {error}; free space or choose another --out, what was written stays"
+        );
+        eprintln!("emulator: {message}");
+        self.report.failure = Some(message);
+        shared.output_failed.store(true, Ordering::Relaxed);
+    }
+}

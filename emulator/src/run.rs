@@ -1,0 +1,384 @@
+//! One run of the rig: files read, bus opened, threads started, everything saved however it ends.
+//!
+//! ```text
+//!   main ─ waits, tells progress, sees signals
+//!    ├─ bus host    serves the embedded bus (FIFO, one above the rig loop)
+//!    ├─ writer      empties the queues into the run's folder
+//!    └─ rig loop    the 1 ms path
+//! ```
+
+use crate::cli::RunArguments;
+use crate::host_thread::HostThread;
+use crate::inputs::Inputs;
+use crate::pace::{self, End, Limits, Pace, Paced, Shared};
+use crate::recording::writer::{Writer, WriterReport, WriterSetup};
+use crate::recording::{self, Recorder};
+use crate::station::{Station, StationFigures, StationParts};
+use crate::summary::{Machine, RunDescription, Summary};
+use plant::Sensors;
+use protocol::bus::host::{Host, HostReport};
+use protocol::bus::lockstep::BarrierConfig;
+use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, StampClock};
+use protocol::exit::Exit;
+use protocol::run_folder::{SCHEMA_VERSION, write_json};
+use realtime::{
+    Clock, Grants, Interrupt, MonotonicClock, Percentiles, PeriodicConfig, Recorder as Histogram, Request,
+};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::ScopedJoinHandle;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Interface name in the log of the embedded bus, and of every lockstep run, so that logs can be compared.
+const EMBEDDED_INTERFACE: &str = "bus0";
+/// How often progress is told.
+const PROGRESS_PERIOD: Duration = Duration::from_secs(5);
+
+/// What keeps a run from starting.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A file cannot be read, or says something that is not allowed.
+    #[error("{0}")]
+    Input(String),
+    /// The bus cannot be opened.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A file of the run's folder cannot be written.
+    #[error("cannot write {file}: {reason}; choose another folder with --out")]
+    Output {
+        /// The file or folder.
+        file: String,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl RunError {
+    /// The exit code that the error leads to.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Input(_) | Self::Output { .. } | Self::Bus(BusError::NoBarrier { .. }) => Exit::BadInput,
+            Self::Bus(_) => Exit::BusFailed,
+        }
+    }
+
+    fn output(file: &Path, error: &io::Error) -> Self {
+        Self::Output { file: file.display().to_string(), reason: error.to_string() }
+    }
+}
+
+/// Runs the rig as the command line asks.
+///
+/// # Errors
+/// [`RunError`] when the run cannot start; how a run that started went is the exit code.
+pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
+    let lockstep = arguments.pace == Pace::Lockstep;
+    if lockstep && matches!(arguments.bus, BusUrl::Can { .. }) {
+        return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
+    }
+    let inputs = Inputs::read(&arguments.rig, arguments.experiment.as_deref())?;
+    let shared = Shared { interrupt: watch_interrupt()?, ..Shared::default() };
+
+    let started = RunStart::now(lockstep);
+    let (recorder, records) = recording::queues(lockstep);
+    let writer = open_folder(arguments, &inputs, &started)?;
+    let host = start_host(arguments)?;
+    // Simulated time in lockstep, where the log must not show the machine's clock.
+    let simulated_ns = Arc::new(AtomicU64::new(0));
+    let mut bus = bus::open(&arguments.bus, stamp_clock(lockstep, &simulated_ns))?;
+
+    std::thread::scope(|scope| {
+        let writer = scope.spawn(|| writer.run(&records, &shared));
+        let bus = bus.as_mut();
+        let rig_loop =
+            scope.spawn(|| rig_loop(arguments, &inputs, &started, recorder, bus, &simulated_ns, &shared));
+        tell_progress(&rig_loop, &shared);
+        let outcome = join(rig_loop);
+        let written = join(writer);
+        let host = host.and_then(HostThread::stop);
+        finish(arguments, &started, outcome?, written, host)
+    })
+}
+
+/// Watches for Ctrl-C and SIGTERM.
+///
+/// # Errors
+/// [`RunError::Input`] when the system takes no handler.
+pub fn watch_interrupt() -> Result<Interrupt, RunError> {
+    Interrupt::watch(Exit::Interrupted as i32)
+        .map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
+}
+
+/// When a run's clock started, in the clocks that its files speak.
+struct RunStart {
+    /// Seconds since 1970; `None` in lockstep.
+    unix_s: Option<f64>,
+    /// What turns the run's clock into the stamps of `bus.log`.
+    epoch_offset_ns: u64,
+    began: Instant,
+}
+
+impl RunStart {
+    fn now(lockstep: bool) -> Self {
+        let began = Instant::now();
+        if lockstep {
+            return Self { unix_s: None, epoch_offset_ns: 0, began };
+        }
+        let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let epoch_offset_ns = (unix.as_nanos() as u64).saturating_sub(MonotonicClock.now().as_nanos());
+        Self { unix_s: Some(unix.as_secs_f64()), epoch_offset_ns, began }
+    }
+}
+
+/// What the rig loop hands back.
+struct LoopOutcome {
+    paced: Paced,
+    figures: StationFigures,
+    bus: BusCounters,
+}
+
+fn rig_loop(
+    arguments: &RunArguments,
+    inputs: &Inputs,
+    started: &RunStart,
+    recorder: Recorder,
+    bus: &mut dyn Bus,
+    simulated_ns: &AtomicU64,
+    shared: &Shared,
+) -> Result<LoopOutcome, RunError> {
+    let grants = acquire_realtime(arguments);
+    describe(arguments, inputs, started, &grants)?;
+    let mut station = Station::new(StationParts {
+        plant: inputs.plant.clone(),
+        sensors: Sensors::new(&inputs.rig, arguments.seed),
+        recorder,
+        bench_frames: !arguments.no_bench_frames,
+        lockstep: arguments.pace == Pace::Lockstep,
+    });
+    let limits = Limits {
+        cycles: arguments.seconds.map(|seconds| (seconds * 1000.0).round() as u64),
+        bus_grace: Duration::from_secs_f64(arguments.bus_grace),
+        join: Duration::from_secs_f64(arguments.join_timeout),
+    };
+    let paced = match arguments.pace {
+        Pace::Real => {
+            pace::run_real(&mut station, bus, MonotonicClock, loop_config(arguments)?, &limits, shared)
+        }
+        Pace::Lockstep => pace::run_lockstep(&mut station, bus, simulated_ns, &limits, shared)?,
+    };
+    // Taking the figures drops the station and with it the queues' sending ends, which lets the writer finish.
+    Ok(LoopOutcome { paced, figures: station.into_figures(), bus: *bus.counters() })
+}
+
+fn loop_config(arguments: &RunArguments) -> Result<PeriodicConfig, RunError> {
+    let spin = arguments.spin_us.map(Duration::from_micros);
+    let config = PeriodicConfig { period: pace::CYCLE, policy: arguments.overrun, spin };
+    config.check().map_err(|error| RunError::Input(format!("--spin-us: {error}")))?;
+    Ok(config)
+}
+
+fn acquire_realtime(arguments: &RunArguments) -> Grants {
+    if arguments.pace == Pace::Lockstep || arguments.no_realtime {
+        return Grants::default();
+    }
+    let grants = realtime::acquire(&Request {
+        fifo_priority: Some(arguments.fifo_priority),
+        cpu: arguments.cpu,
+        lock_memory: true,
+        dma_latency: true,
+        timer_slack: true,
+    });
+    grants.refusals().iter().for_each(|refusal| eprintln!("emulator: warning: {refusal}"));
+    grants
+}
+
+fn start_host(arguments: &RunArguments) -> Result<Option<HostThread>, RunError> {
+    let BusUrl::Unix { path, wire } = &arguments.bus else { return Ok(None) };
+    let lockstep = arguments.pace == Pace::Lockstep;
+    let barrier = lockstep.then(|| BarrierConfig {
+        members: arguments.members,
+        echo_ids: arguments.lockstep_echo.iter().map(|axis| axis.command_id()).collect(),
+    });
+    let fifo =
+        (!lockstep && !arguments.no_realtime).then(|| arguments.fifo_priority.saturating_add(1).min(99));
+    match Host::bind(path, *wire, barrier) {
+        Ok(host) => Ok(Some(HostThread::start(host, fifo))),
+        Err(BusError::HostExists { .. }) => {
+            eprintln!("emulator: {} has a host already; joining it", arguments.bus);
+            Ok(None)
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn stamp_clock(lockstep: bool, simulated_ns: &Arc<AtomicU64>) -> StampClock {
+    if lockstep {
+        let simulated_ns = Arc::clone(simulated_ns);
+        Box::new(move || simulated_ns.load(Ordering::Relaxed))
+    } else {
+        Box::new(|| MonotonicClock.now().as_nanos())
+    }
+}
+
+fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) -> Result<Writer, RunError> {
+    let folder = arguments.out.as_path();
+    std::fs::create_dir_all(folder).map_err(|error| RunError::output(folder, &error))?;
+    let interface = match &arguments.bus {
+        BusUrl::Can { interface } => interface.as_str(),
+        BusUrl::Unix { .. } => EMBEDDED_INTERFACE,
+    };
+    Writer::create(WriterSetup {
+        folder: folder.into(),
+        interface: interface.into(),
+        epoch_offset_ns: started.epoch_offset_ns,
+        linked: inputs.section.linked,
+        added_mass_kg: inputs.section.added_mass_kg,
+    })
+    .map_err(|error| RunError::output(folder, &error))
+}
+
+fn describe(
+    arguments: &RunArguments,
+    inputs: &Inputs,
+    started: &RunStart,
+    grants: &Grants,
+) -> Result<(), RunError> {
+    let description = RunDescription {
+        schema_version: SCHEMA_VERSION,
+        emulator_command_line: std::env::args().collect(),
+        emulator_version: env!("CARGO_PKG_VERSION"),
+        counts_allocations: cfg!(feature = "count-allocations"),
+        started_unix_s: started.unix_s,
+        pace: arguments.pace.to_string(),
+        bus: arguments.bus.to_string(),
+        seed: arguments.seed,
+        rig_toml: inputs.rig_toml.clone(),
+        experiment_toml: inputs.experiment_toml.clone(),
+        rig_setup: inputs.section.clone(),
+        realtime_granted: grants.granted().to_vec(),
+        realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
+        machine: Machine::read(),
+    };
+    let path = arguments.out.join("run.json");
+    write_json(&path, &description).map_err(|error| RunError::output(&path, &error))
+}
+
+fn tell_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
+    let mut told = Instant::now();
+    while !rig_loop.is_finished() {
+        std::thread::sleep(Duration::from_millis(10));
+        if told.elapsed() >= PROGRESS_PERIOD {
+            told = Instant::now();
+            let seconds = shared.cycle.load(Ordering::Relaxed) as f64 / 1000.0;
+            let skipped = shared.skipped.load(Ordering::Relaxed);
+            eprintln!("emulator: {seconds:.0} s simulated, {skipped} cycles skipped");
+        }
+    }
+}
+
+fn join<T>(thread: ScopedJoinHandle<'_, T>) -> T {
+    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+fn finish(
+    arguments: &RunArguments,
+    started: &RunStart,
+    outcome: LoopOutcome,
+    written: WriterReport,
+    host: Option<HostReport>,
+) -> Result<Exit, RunError> {
+    let (exit, reason) = verdict(&outcome.paced.end);
+    eprintln!("emulator: {reason}");
+    if let Some(statistics) = &outcome.paced.statistics {
+        let path = arguments.out.join("emulator.hlog");
+        let parts = [
+            ("emulator-wakeup", statistics.wakeup_ns.histogram()),
+            ("emulator-execution", statistics.execution_ns.histogram()),
+            ("emulator-period-error", statistics.period_error_ns.histogram()),
+            ("round-trip", outcome.figures.round_trip.histogram()),
+        ];
+        realtime::write_hlog(&path, &parts, started.unix_s.unwrap_or(0.0), started.began.elapsed())
+            .map_err(|error| RunError::output(&path, &error))?;
+    }
+    let path = arguments.out.join("summary.json");
+    let summary = summarise(outcome, written, host, reason, exit == Exit::Good);
+    write_json(&path, &summary).map_err(|error| RunError::output(&path, &error))?;
+    Ok(exit)
+}
+
+fn summarise(
+    outcome: LoopOutcome,
+    written: WriterReport,
+    bus_host: Option<HostReport>,
+    ended_because: String,
+    passed: bool,
+) -> Summary {
+    let LoopOutcome { paced, figures, bus } = outcome;
+    let [drive_commands, load_commands] = figures.commands;
+    let both = [drive_commands, load_commands];
+    let lost = both.iter().map(|commands| commands.lost).sum();
+    let loops = paced.statistics.as_ref();
+    let percentiles = |recorder: Option<&Histogram>| {
+        recorder.map_or_else(|| Histogram::new().percentiles(), Histogram::percentiles)
+    };
+    let of_loop =
+        |pick: fn(&realtime::LoopStatistics) -> &Histogram| -> Percentiles { percentiles(loops.map(pick)) };
+    Summary {
+        schema_version: SCHEMA_VERSION,
+        position_error_dynamic_m: None,
+        position_error_static_m: None,
+        cycles: paced.cycles,
+        skipped: figures.skipped,
+        overruns: loops.map_or(0, |statistics| statistics.overruns),
+        late_completions: loops.map_or(0, |statistics| statistics.late_completions),
+        frames_sent: bus.sent,
+        frames_received: bus.received,
+        frames_lost: lost,
+        frames_lost_at_rig: lost,
+        frames_malformed: figures.frames.malformed + bus.malformed,
+        stale_commands: both.iter().map(|commands| commands.refused_stale + commands.expired).sum(),
+        wakeup_ns: of_loop(|statistics| &statistics.wakeup_ns),
+        execution_ns: of_loop(|statistics| &statistics.execution_ns),
+        period_error_ns: of_loop(|statistics| &statistics.period_error_ns),
+        round_trip_ns: figures.round_trip.percentiles(),
+        allocations_in_cycle: cfg!(feature = "count-allocations").then_some(paced.allocations),
+        records_dropped: figures.records_dropped,
+        ended_because,
+        passed,
+        thresholds: serde_json::Map::new(),
+        drive_commands,
+        load_commands,
+        frames_ignored: figures.frames,
+        bus,
+        bus_host,
+        event_count: written.event_count,
+        events: written.events,
+    }
+}
+
+/// The exit code of an end, and the sentence that tells it.
+fn verdict(end: &End) -> (Exit, String) {
+    match end {
+        End::ControllersDone => (Exit::Good, "the controllers are done".into()),
+        End::TimeUp => (Exit::Good, "the time asked for is up".into()),
+        End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
+        End::OutputFailed => (Exit::BadInput, "the output could not be written".into()),
+        End::BusGone => (Exit::BusFailed, "the bus was gone for too long; see --bus-grace".into()),
+        End::NobodyJoined => (
+            Exit::BusFailed,
+            "not all members joined the barrier in time; start 'controller run --pace lockstep', or see --members".into(),
+        ),
+        End::MembersLeft => (Exit::BusFailed, "all members left the barrier before they were done".into()),
+        End::LockstepTimeout(name) => {
+            (Exit::LockstepTimeout, format!("lockstep: '{name}' was not done within 5 s of wall time"))
+        }
+        End::Overrun(overrun) => (Exit::BoundBroken, overrun.to_string()),
+        End::NotFinite => (
+            Exit::BoundBroken,
+            "fault not-finite: the plant's state is no longer finite; please report the rig file".into(),
+        ),
+    }
+}

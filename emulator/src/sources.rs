@@ -1,0 +1,138 @@
+//! Tells whether one or two senders use a command identifier, from the 4-bit counters that interleave.
+//!
+//! One sender's counter goes up by one a frame; lost frames make it jump by at most the cycles that passed. Two senders
+//! on one identifier break that rule with at least every second frame, whatever their counters are:
+//!
+//! ```text
+//!   one sender, one frame lost:   4 5 . 7 8        steps 1 . 2 1      no break (two cycles passed)
+//!   a restart:                    4 5 6 0 1        steps 1 1 10 1     one break
+//!   two senders:                  4 11 5 12 6 13   steps 7 10 7 10    all breaks
+//!   two in step:                  4 4 5 5 6 6      steps 0 1 0 1      every second one
+//! ```
+//!
+//! Four breaks within 20 cycles latch the fault; it goes when none was seen for 20 cycles, which is what one sender
+//! falling silent brings about (bus.md, Frames).
+
+/// Cycles that a break is remembered, and that a fault lasts without one.
+pub const SILENCE_CYCLES: u64 = 20;
+/// Breaks within [`SILENCE_CYCLES`] that latch the fault: a restart makes one, two in quick succession two.
+const BREAKS_TO_LATCH: usize = 4;
+/// Values of the counter.
+const COUNTER_RANGE: u64 = 16;
+
+/// What a frame's counter said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The sender's next frame, after `lost` that never came.
+    Continues {
+        /// Frames lost since the one before.
+        lost: u64,
+    },
+    /// Not a continuation: a restart, or another sender.
+    Breaks,
+}
+
+/// Watches the counter of one command identifier.
+#[derive(Default)]
+pub struct SourceWatch {
+    last: Option<(u8, u64)>,
+    breaks: [Option<u64>; BREAKS_TO_LATCH],
+    two_sources: bool,
+}
+
+impl SourceWatch {
+    /// Takes note of a frame with counter `alive` in `cycle`.
+    pub fn note(&mut self, alive: u8, cycle: u64) -> Step {
+        let step = match self.last {
+            None => Step::Continues { lost: 0 },
+            // After a silence the command was stale, which is told; what comes now may be a restart, so that its
+            // counter says nothing about loss.
+            Some((_, seen)) if cycle - seen > SILENCE_CYCLES => Step::Continues { lost: 0 },
+            Some((last, seen)) => {
+                let ahead = (COUNTER_RANGE + u64::from(alive) - u64::from(last)) % COUNTER_RANGE;
+                // A frame may come late into the next cycle, so one more than the cycles that passed.
+                let allowed = cycle - seen + 1;
+                match ahead {
+                    // Sixteen lost frames look like none; the cycles that passed tell them apart.
+                    0 if cycle - seen >= COUNTER_RANGE => Step::Continues { lost: COUNTER_RANGE - 1 },
+                    1.. if ahead <= allowed => Step::Continues { lost: ahead - 1 },
+                    _ => Step::Breaks,
+                }
+            }
+        };
+        self.last = Some((alive, cycle));
+        if step == Step::Breaks {
+            self.breaks.rotate_left(1);
+            self.breaks[BREAKS_TO_LATCH - 1] = Some(cycle);
+            self.two_sources |= self.breaks[0].is_some_and(|oldest| cycle - oldest < SILENCE_CYCLES);
+        }
+        step
+    }
+
+    /// Whether two senders are at work, as of `cycle`.
+    pub fn two_sources(&mut self, cycle: u64) -> bool {
+        let newest = self.breaks[BREAKS_TO_LATCH - 1];
+        if newest.is_none_or(|newest| cycle - newest >= SILENCE_CYCLES) {
+            self.two_sources = false;
+        }
+        self.two_sources
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Feeds one frame a cycle from each sender whose counters start at `starts`, for `cycles` cycles.
+    fn feed(watch: &mut SourceWatch, starts: &[u8], cycles: std::ops::Range<u64>) {
+        for cycle in cycles {
+            for start in starts {
+                watch.note(((u64::from(*start) + cycle) % 16) as u8, cycle);
+            }
+        }
+    }
+
+    #[test]
+    fn two_senders_are_found_whatever_their_counters() {
+        for first in 0..16 {
+            for second in 0..16 {
+                let mut watch = SourceWatch::default();
+                feed(&mut watch, &[first, second], 0..20);
+                assert!(watch.two_sources(19), "counters starting at {first} and {second}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_sender_is_never_two_even_with_loss_and_restarts() {
+        let mut watch = SourceWatch::default();
+        feed(&mut watch, &[3], 0..50);
+        feed(&mut watch, &[3], 60..70);
+        // Two restarts in quick succession.
+        feed(&mut watch, &[9], 70..73);
+        feed(&mut watch, &[1], 73..90);
+        assert!(!watch.two_sources(89));
+    }
+
+    #[test]
+    fn the_fault_goes_when_one_sender_has_been_silent_for_twenty_cycles() {
+        let mut watch = SourceWatch::default();
+        feed(&mut watch, &[0, 5], 0..40);
+        assert!(watch.two_sources(40));
+        feed(&mut watch, &[0], 40..60);
+        assert!(watch.two_sources(59), "still within twenty cycles of the last break");
+        feed(&mut watch, &[0], 60..61);
+        assert!(!watch.two_sources(60));
+    }
+
+    #[test]
+    fn lost_frames_are_counted_by_the_gap() {
+        let mut watch = SourceWatch::default();
+        watch.note(4, 10);
+        assert_eq!(watch.note(5, 11), Step::Continues { lost: 0 });
+        assert_eq!(watch.note(8, 14), Step::Continues { lost: 2 });
+        assert_eq!(watch.note(9, 14), Step::Continues { lost: 0 });
+        assert_eq!(watch.note(9, 15), Step::Breaks);
+        assert_eq!(watch.note(13, 36), Step::Continues { lost: 0 }, "after a silence of 21 cycles");
+    }
+}

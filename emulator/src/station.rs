@@ -1,0 +1,321 @@
+//! The rig on its bus: one cycle of plant, sensors, commands and records, whatever paces it.
+//!
+//! ```text
+//!   t_k  missed cycles ──► publish(k) ─────────► take(frame)* ────────────► act(k) ──► t_k+1
+//!        computed, not     sample sensors,       what arrived before t_k    latch, record,
+//!        sent              send frames           (in lockstep: before Go)   step the plant
+//! ```
+//!
+//! A command that arrived before t_k acts over [t_k, t_k+1) (bus.md, Time). Missed cycles are computed with the command
+//! latched before, so a stall changes which inputs there are and never the physics. Nothing here allocates, locks, prints
+//! or blocks.
+
+use crate::commands::{Change, CommandCounters, CommandIntake};
+use crate::event::{Event, EventKind};
+use crate::live_cycles::{ECHO_RANGE, LiveCycles};
+use crate::recording::{CycleRecord, FrameRecord, Recorder};
+use crate::telegrams::{self, CommandState, SLOW_PERIOD, STATUS_PHASE};
+use plant::{Axis, AxisReadings, Inputs, Plant, Sensors};
+use protocol::bus::Bus;
+use protocol::can::CanFrame;
+use protocol::frames::{
+    ChainStatus, DecodeError, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
+};
+use realtime::Recorder as Histogram;
+
+/// What a station is made of.
+pub struct StationParts {
+    /// The plant in its initial state.
+    pub plant: Plant,
+    /// Its sensors.
+    pub sensors: Sensors,
+    /// Where cycles, frames and events go.
+    pub recorder: Recorder,
+    /// Whether frames of the bench (hand force, link, weights) are obeyed.
+    pub bench_frames: bool,
+    /// Whether simulated time is the bus's time.
+    pub lockstep: bool,
+}
+
+/// Frames that arrived, by what became of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct FrameCounters {
+    /// Not as `rig.dbc` says: length, checksum, reserved bits, a raw value out of range.
+    pub malformed: u64,
+    /// Identifiers that `rig.dbc` does not know, extended and remote frames.
+    pub unknown: u64,
+    /// Frames that only the rig sends.
+    pub second_rig: u64,
+}
+
+/// What a station counted.
+pub struct StationFigures {
+    /// Frames by what became of them.
+    pub frames: FrameCounters,
+    /// Commands of drive and load by what became of them.
+    pub commands: [CommandCounters; 2],
+    /// Time from the drive's sensors sent to the command that answers them received, in ns; empty in lockstep.
+    pub round_trip: Histogram,
+    /// Cycles computed without being sent.
+    pub skipped: u64,
+    /// Records lost to full queues.
+    pub records_dropped: u64,
+}
+
+/// The rig on its bus.
+pub struct Station {
+    plant: Plant,
+    sensors: Sensors,
+    inputs: Inputs,
+    commands: [CommandIntake; 2],
+    live: LiveCycles,
+    recorder: Recorder,
+    bench_frames: bool,
+    lockstep: bool,
+    readings: [AxisReadings; 2],
+    skipped: u64,
+    bus_was_up: bool,
+    frames: FrameCounters,
+    /// When the drive's sensors of a cycle were sent, by the cycle's low bits; 0 where not.
+    sent_ns: Box<[u64; ECHO_RANGE as usize]>,
+    round_trip: Histogram,
+    chains_done: [Option<bool>; 2],
+}
+
+impl Station {
+    /// Puts the rig on its bus, before cycle 0.
+    #[must_use]
+    pub fn new(parts: StationParts) -> Self {
+        let StationParts { plant, mut sensors, recorder, bench_frames, lockstep } = parts;
+        let inputs = Inputs::default();
+        // Replaced by the first cycle's own sample; a scratch value has no meaning, and costs a draw of noise.
+        let readings = sensors.sample(&plant, &inputs);
+        Self {
+            plant,
+            sensors,
+            inputs,
+            commands: Default::default(),
+            live: LiveCycles::new(),
+            recorder,
+            bench_frames,
+            lockstep,
+            readings,
+            skipped: 0,
+            bus_was_up: true,
+            frames: FrameCounters::default(),
+            sent_ns: Box::new([0; ECHO_RANGE as usize]),
+            round_trip: Histogram::new(),
+            chains_done: [None; 2],
+        }
+    }
+
+    /// Computes `count` cycles from `first` on that the loop missed, with the commands latched before.
+    pub fn miss(&mut self, first: u64, count: u64) {
+        if count == 0 {
+            return;
+        }
+        self.skipped += count;
+        self.live.skipped(first, count);
+        self.tell(first + count, EventKind::Skipped { cycles: count });
+        for cycle in first..first + count {
+            self.readings = self.sensors.sample(&self.plant, &self.inputs);
+            self.advance(cycle);
+        }
+    }
+
+    /// Samples the sensors of `cycle` and sends what is due. `after_miss` sends the tick first, so that receivers know
+    /// which cycle the sensors are of.
+    pub fn publish(&mut self, cycle: u64, after_miss: bool, bus: &mut dyn Bus) {
+        self.readings = self.sensors.sample(&self.plant, &self.inputs);
+        let [drive, load] = &self.readings;
+        let drive = Frame::DriveSensors(telegrams::sensors(drive, cycle));
+        let load = Frame::LoadSensors(telegrams::sensors(load, cycle));
+        if after_miss {
+            self.send(&telegrams::tick(cycle, self.skipped, true, self.lockstep, false), bus);
+        }
+        let sent_ns = self.send(&drive, bus);
+        self.sent_ns[(cycle % u64::from(ECHO_RANGE)) as usize] = sent_ns.unwrap_or(0);
+        self.live.sent(cycle);
+        self.send(&load, bus);
+        if cycle.is_multiple_of(SLOW_PERIOD) && !after_miss {
+            self.send(&telegrams::tick(cycle, self.skipped, false, self.lockstep, false), bus);
+        }
+        if cycle % SLOW_PERIOD == STATUS_PHASE {
+            let commands = CommandState {
+                stale: self.commands.each_ref().map(CommandIntake::stale),
+                two_sources: self.commands.each_ref().map(CommandIntake::disputed),
+            };
+            self.send(&telegrams::status(&self.plant, &self.readings, commands), bus);
+        }
+        if bus.is_up() != self.bus_was_up {
+            self.bus_was_up = bus.is_up();
+            self.tell(cycle, if self.bus_was_up { EventKind::BusBack } else { EventKind::BusLost });
+        }
+    }
+
+    /// Says farewell: a tick that tells the controllers that no more sensors come after `cycle`.
+    pub fn publish_end(&mut self, cycle: u64, bus: &mut dyn Bus) {
+        self.send(&telegrams::tick(cycle, self.skipped, false, self.lockstep, true), bus);
+    }
+
+    /// Takes a frame that arrived before `cycle`.
+    pub fn take(&mut self, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
+        self.recorder.frame(FrameRecord { stamp_ns, frame: *frame });
+        match Frame::decode(frame) {
+            Ok(Frame::DriveValveCommand(command)) => {
+                if self.commands[0].take(command, cycle, &self.live) {
+                    self.note_round_trip(command, stamp_ns);
+                }
+            }
+            Ok(Frame::LoadValveCommand(command)) => {
+                self.commands[1].take(command, cycle, &self.live);
+            }
+            Ok(
+                Frame::ConsoleEmergencyStop(stop)
+                | Frame::DriveEmergencyStop(stop)
+                | Frame::LoadEmergencyStop(stop),
+            ) => self.obey_emergency_stop(stop, cycle),
+            Ok(Frame::DriveChainStatus(status)) => self.note_chain(0, status),
+            Ok(Frame::LoadChainStatus(status)) => self.note_chain(1, status),
+            Ok(Frame::HandForce(hand)) if self.bench_frames => {
+                self.inputs.hand_force_carriage_n = hand.carriage_n;
+                self.inputs.hand_force_load_n = hand.load_eye_n;
+            }
+            Ok(Frame::Link(link)) if self.bench_frames => self.obey_link(link.request, cycle),
+            Ok(Frame::Weights(weights)) if self.bench_frames => {
+                // rig.dbc allows what the plant allows, which a test holds.
+                let _ = self.plant.set_added_mass_kg(weights.added_mass_kg);
+            }
+            Ok(
+                Frame::DriveSensors(_)
+                | Frame::LoadSensors(_)
+                | Frame::Tick(_)
+                | Frame::RigStatus(_)
+                | Frame::RigEmergencyStop(_),
+            ) => {
+                self.frames.second_rig += 1;
+                if self.frames.second_rig == 1 {
+                    let id = frame.standard_id().unwrap_or_default();
+                    self.tell(cycle, EventKind::SecondRig { id });
+                }
+            }
+            Ok(_) => {}
+            Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
+                self.frames.unknown += 1;
+            }
+            Err(_) => {
+                self.frames.malformed += 1;
+                if self.frames.malformed == 1 {
+                    self.tell(cycle, EventKind::Malformed { raw_id: frame.raw_id() });
+                }
+            }
+        }
+    }
+
+    /// Latches the commands for `cycle`, records it, and steps the plant to the start of the next.
+    pub fn act(&mut self, cycle: u64) {
+        for axis in Axis::ALL {
+            let intake = &mut self.commands[axis as usize];
+            let change = intake.latch(cycle, &self.live);
+            self.inputs.valve[axis as usize] = plant::quantise_valve(intake.opening());
+            if let Some(change) = change {
+                self.tell(cycle, change_event(change, axis));
+            }
+        }
+        self.advance(cycle);
+    }
+
+    fn advance(&mut self, cycle: u64) {
+        self.recorder.cycle(CycleRecord {
+            cycle,
+            valve: self.inputs.valve,
+            readings: self.readings,
+            truth: self.plant.truth(&self.inputs),
+        });
+        self.plant.step(&self.inputs);
+    }
+
+    fn send(&mut self, frame: &Frame, bus: &mut dyn Bus) -> Option<u64> {
+        let frame = telegrams::encode(frame);
+        // What the bus did not take is counted there.
+        let stamp_ns = bus.send(&frame).ok()?;
+        self.recorder.frame(FrameRecord { stamp_ns, frame });
+        Some(stamp_ns)
+    }
+
+    fn note_round_trip(&mut self, command: ValveCommand, stamp_ns: u64) {
+        let sent_ns = self.sent_ns[usize::from(command.echo)];
+        if sent_ns != 0 && !self.lockstep {
+            self.round_trip.record(stamp_ns.saturating_sub(sent_ns));
+        }
+    }
+
+    fn note_chain(&mut self, axis: usize, status: ChainStatus) {
+        self.chains_done[axis] = Some(status.main_chain == MainChainState::Done);
+    }
+
+    fn obey_emergency_stop(&mut self, stop: EmergencyStop, cycle: u64) {
+        if stop.release && self.plant.emergency_stop() {
+            self.plant.release_emergency_stop();
+            self.tell(cycle, EventKind::EmergencyStopReleased);
+        } else if !stop.release && !self.plant.emergency_stop() {
+            self.plant.trip_emergency_stop();
+            self.tell(cycle, EventKind::EmergencyStop);
+        }
+    }
+
+    fn obey_link(&mut self, request: LinkRequest, cycle: u64) {
+        let kind = match request {
+            LinkRequest::Unlink => {
+                self.plant.unlink();
+                EventKind::Unlinked
+            }
+            LinkRequest::Link if self.plant.link().is_ok() => EventKind::Linked,
+            LinkRequest::Link => EventKind::LinkRefused,
+        };
+        self.tell(cycle, kind);
+    }
+
+    fn tell(&mut self, cycle: u64, kind: EventKind) {
+        self.recorder.event(Event { cycle, kind });
+    }
+
+    /// Whether every controller that was heard says that its chain is done.
+    #[must_use]
+    pub fn controllers_done(&self) -> bool {
+        self.chains_done.iter().flatten().count() > 0 && self.chains_done.iter().flatten().all(|done| *done)
+    }
+
+    /// Whether the plant's state is finite; when not, the run must end with silence on the bus.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.plant.state().is_finite()
+    }
+
+    /// Cycles computed without being sent.
+    #[must_use]
+    pub fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    /// The figures of the run; the station goes, and with it the recorder's sending ends.
+    #[must_use]
+    pub fn into_figures(self) -> StationFigures {
+        StationFigures {
+            frames: self.frames,
+            commands: self.commands.map(|intake| *intake.counters()),
+            round_trip: self.round_trip,
+            skipped: self.skipped,
+            records_dropped: self.recorder.dropped(),
+        }
+    }
+}
+
+fn change_event(change: Change, axis: Axis) -> EventKind {
+    match change {
+        Change::Expired => EventKind::CommandStale(axis),
+        Change::Fresh => EventKind::CommandFresh(axis),
+        Change::TwoSources => EventKind::TwoSources(axis),
+        Change::OneSource => EventKind::OneSource(axis),
+    }
+}

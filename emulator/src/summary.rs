@@ -1,0 +1,142 @@
+//! `run.json` at the start of a run and `summary.json` at its end: what was used, and what was counted.
+//!
+//! Keys that others read are those of bus.md. What only the controllers know (the position errors) stands as null until
+//! the controllers' own files are joined to it.
+
+use crate::commands::CommandCounters;
+use crate::event::Event;
+use crate::experiment::RigSection;
+use crate::station::FrameCounters;
+use protocol::bus::BusCounters;
+use protocol::bus::host::HostReport;
+use realtime::Percentiles;
+use serde::Serialize;
+
+/// `run.json`: what a run was made with.
+#[derive(Debug, Serialize)]
+pub struct RunDescription {
+    /// See [`protocol::run_folder::SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// The emulator's command line.
+    pub emulator_command_line: Vec<String>,
+    /// The emulator's version.
+    pub emulator_version: &'static str,
+    /// Whether the build counts allocations, which costs a little time.
+    pub counts_allocations: bool,
+    /// Start of the run's clock, in s since 1970; null in lockstep, whose time is simulated.
+    pub started_unix_s: Option<f64>,
+    /// `real` or `lockstep`.
+    pub pace: String,
+    /// The bus by its URL.
+    pub bus: String,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// The rig file as it was read.
+    pub rig_toml: String,
+    /// The experiment file as it was read; null without one.
+    pub experiment_toml: Option<String>,
+    /// Initial state of the rig as used.
+    pub rig_setup: RigSection,
+    /// What the system granted for real time.
+    pub realtime_granted: Vec<String>,
+    /// What it refused, with the remedy.
+    pub realtime_refused: Vec<String>,
+    /// The machine.
+    pub machine: Machine,
+}
+
+/// The machine of a run.
+#[derive(Debug, Serialize)]
+pub struct Machine {
+    /// Kernel release and build.
+    pub kernel: String,
+    /// Model name of the processor.
+    pub processor: String,
+    /// Processors that may be used.
+    pub processors: usize,
+    /// Clock source of the kernel.
+    pub clock_source: String,
+}
+
+impl Machine {
+    /// Reads what `/proc` and `/sys` tell; `unknown` where they do not.
+    #[must_use]
+    pub fn read() -> Self {
+        let file = |path: &str| std::fs::read_to_string(path).map(|text| text.trim().to_owned()).ok();
+        let unknown = || "unknown".to_owned();
+        let processor = file("/proc/cpuinfo").and_then(|text| {
+            let line = text.lines().find(|line| line.starts_with("model name"))?;
+            Some(line.split_once(':')?.1.trim().to_owned())
+        });
+        Self {
+            kernel: file("/proc/version").unwrap_or_else(unknown),
+            processor: processor.unwrap_or_else(unknown),
+            processors: std::thread::available_parallelism().map_or(0, usize::from),
+            clock_source: file("/sys/devices/system/clocksource/clocksource0/current_clocksource")
+                .unwrap_or_else(unknown),
+        }
+    }
+}
+
+/// `summary.json` as the emulator knows it.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    /// See [`protocol::run_folder::SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Largest |set-point - position sensor| while the set-point moves; the controllers know it.
+    pub position_error_dynamic_m: Option<f64>,
+    /// Largest mean |error| over the last 0.2 s of each rest; the controllers know it.
+    pub position_error_static_m: Option<f64>,
+    /// Cycles begun, skipped ones included.
+    pub cycles: u64,
+    /// Cycles computed late and not sent.
+    pub skipped: u64,
+    /// Wake-ups that missed at least one cycle.
+    pub overruns: u64,
+    /// Cycles whose work ended after the next deadline.
+    pub late_completions: u64,
+    /// Frames that the rig handed to the bus.
+    pub frames_sent: u64,
+    /// Frames that the rig took from the bus.
+    pub frames_received: u64,
+    /// Frames that never came, by gaps in the counters at the receivers.
+    pub frames_lost: u64,
+    /// The part of it that the rig missed: commands of both axes.
+    pub frames_lost_at_rig: u64,
+    /// Frames that were counted and ignored because they are not as `rig.dbc` says.
+    pub frames_malformed: u64,
+    /// Commands refused as stale, and commands that grew stale while acting.
+    pub stale_commands: u64,
+    /// Wake-up latency against the scheduled time; empty in lockstep.
+    pub wakeup_ns: Percentiles,
+    /// Execution time of a cycle; empty in lockstep.
+    pub execution_ns: Percentiles,
+    /// Period error; empty in lockstep.
+    pub period_error_ns: Percentiles,
+    /// Drive sensors sent to command received; empty in lockstep.
+    pub round_trip_ns: Percentiles,
+    /// Allocations in the 1 ms path after the first second; null unless built with `count-allocations`.
+    pub allocations_in_cycle: Option<u64>,
+    /// Records that did not reach the files because a queue was full.
+    pub records_dropped: u64,
+    /// Why the run ended.
+    pub ended_because: String,
+    /// Whether the run ended well and, once joined, kept all its thresholds.
+    pub passed: bool,
+    /// Bounds on named figures; filled when the files are joined.
+    pub thresholds: serde_json::Map<String, serde_json::Value>,
+    /// Commands of the drive axis by what became of them.
+    pub drive_commands: CommandCounters,
+    /// Commands of the load axis by what became of them.
+    pub load_commands: CommandCounters,
+    /// Frames received by what became of them.
+    pub frames_ignored: FrameCounters,
+    /// The rig's own counters of the bus.
+    pub bus: BusCounters,
+    /// What the host of the embedded bus counted; null when the emulator did not host it.
+    pub bus_host: Option<HostReport>,
+    /// Events in all.
+    pub event_count: u64,
+    /// The first events.
+    pub events: Vec<Event>,
+}

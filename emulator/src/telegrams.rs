@@ -1,0 +1,72 @@
+//! What the rig says on the bus: sensors every cycle, tick and status every ten.
+//!
+//! Tick and status are five cycles apart, so that no millisecond carries both.
+
+use plant::{AxisReadings, Plant};
+use protocol::can::CanFrame;
+use protocol::frames::{Frame, RigStatus, Sensors, Tick};
+
+/// Period of tick and status in cycles.
+pub const SLOW_PERIOD: u64 = 10;
+/// Cycle within the period in which the status is sent; the tick is sent in cycle 0.
+pub const STATUS_PHASE: u64 = 5;
+
+/// Sensors of one axis in `cycle`.
+#[must_use]
+pub fn sensors(readings: &AxisReadings, cycle: u64) -> Sensors {
+    Sensors {
+        position_m: readings.position.value,
+        force_n: readings.force.value,
+        pressure_a_pa: readings.pressure_a.value,
+        pressure_b_pa: readings.pressure_b.value,
+        alive: (cycle % 16) as u8,
+    }
+}
+
+/// The tick of `cycle`, with `skipped` cycles in all so far.
+#[must_use]
+pub fn tick(cycle: u64, skipped: u64, catch_up: bool, lockstep: bool, ending: bool) -> Frame {
+    // Both counters wrap as their fields in rig.dbc do.
+    Frame::Tick(Tick { cycle: cycle as u32, skipped: skipped as u16, catch_up, lockstep, ending })
+}
+
+/// What the rig's status needs besides plant and sensors.
+#[derive(Clone, Copy, Debug)]
+pub struct CommandState {
+    /// Valve shut for want of a fresh command, drive and load.
+    pub stale: [bool; 2],
+    /// Valve shut because two senders dispute it, drive and load.
+    pub two_sources: [bool; 2],
+}
+
+/// The rig's status.
+#[must_use]
+pub fn status(plant: &Plant, [drive, load]: &[AxisReadings; 2], commands: CommandState) -> Frame {
+    Frame::RigStatus(RigStatus {
+        supply_pressure_pa: plant.supply_pressure_pa(),
+        linked: plant.linked(),
+        emergency_stop: plant.emergency_stop(),
+        check_valves_shut: plant.check_valves_shut(),
+        drive_position_saturated: drive.position.saturated,
+        drive_force_saturated: drive.force.saturated,
+        drive_pressure_a_saturated: drive.pressure_a.saturated,
+        drive_pressure_b_saturated: drive.pressure_b.saturated,
+        load_position_saturated: load.position.saturated,
+        load_force_saturated: load.force.saturated,
+        load_pressure_a_saturated: load.pressure_a.saturated,
+        load_pressure_b_saturated: load.pressure_b.saturated,
+        drive_stale: commands.stale[0],
+        load_stale: commands.stale[1],
+        drive_two_sources: commands.two_sources[0],
+        load_two_sources: commands.two_sources[1],
+    })
+}
+
+/// Encodes a frame that the rig made itself.
+///
+/// # Panics
+/// If a value is beyond its range in `rig.dbc`: sensors saturate within it, which a test holds against the rig's ranges.
+#[must_use]
+pub fn encode(frame: &Frame) -> CanFrame {
+    frame.encode().unwrap_or_else(|error| panic!("the rig made a frame that rig.dbc does not allow: {error}"))
+}

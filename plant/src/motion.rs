@@ -1,0 +1,199 @@
+//! Motion of one axis: exact under a held force, with stick, slip, break-away and end stops.
+//!
+//! ```text
+//! F* = F_pn - b v - F_sli sign(v) - F_load        (sign(0) = 0)                 [Neugebauer 2011, eqs. 5-6]
+//! m dv/dt = F*                              v != 0
+//! m dv/dt = F* - sign(F*) F_sli             v = 0 and |F*| >  F_stat
+//! v stays 0                                 v = 0 and |F*| <= F_stat
+//! ```
+//!
+//! Under a force F held over a span h, viscous friction included, speed and way have closed forms, with z = b h / m:
+//!
+//! ```text
+//! v' = E v + G F        E = e^-z    G = (h / m) phi_1(z)    phi_1 = (1 - e^-z) / z
+//! x' = x + D v + W F    D = h phi_1(z)    W = (h^2 / m) phi_2(z)    phi_2 = (1 - phi_1) / z
+//! ```
+//!
+//! so a large b needs no small step, and b = 0 is no special case but a limit (series below z = 0.1). Where v
+//! passes zero inside the span, the instant is `t = (m / b) ln(1 - b v / F)`, and the rest of the span starts
+//! from standstill. At an end of the stroke the piston stops dead, and leaves as from any standstill
+//! [rig-model.md, One axis].
+//!
+//! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6.
+
+use crate::lanes::{Mask, Pair};
+use crate::parameters::{FrictionParameters, RigParameters};
+
+/// What moves each axis and what holds it.
+#[derive(Debug, Clone)]
+pub(crate) struct Motion {
+    masses_kg: [f64; 2],
+    stroke_m: f64,
+    friction: FrictionParameters,
+}
+
+/// E, G, D and W of the module's head for one span, one lane for each axis.
+#[derive(Debug, Clone)]
+pub(crate) struct MotionSpan {
+    pub(crate) keep: Pair,
+    pub(crate) gain: Pair,
+    pub(crate) drift: Pair,
+    pub(crate) push: Pair,
+}
+
+/// Where an axis is and how fast, in its own extension, m and m/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Place {
+    pub(crate) extension: f64,
+    pub(crate) velocity: f64,
+}
+
+impl Motion {
+    pub(crate) fn new(rig: &RigParameters, added_mass_kg: f64) -> Self {
+        Motion {
+            masses_kg: [rig.mass().drive_kg + added_mass_kg, rig.mass().load_kg],
+            stroke_m: rig.cylinder().stroke_m,
+            friction: *rig.friction(),
+        }
+    }
+
+    pub(crate) fn span(&self, span_s: f64) -> MotionSpan {
+        let of = |mass| Factors::new(mass, self.friction.viscous_n_s_per_m, span_s);
+        let factors = self.masses_kg.map(of);
+        let pair = |pick: fn(&Factors) -> f64| Pair::new(pick(&factors[0]), pick(&factors[1]));
+        MotionSpan {
+            keep: pair(|f| f.keep),
+            gain: pair(|f| f.gain),
+            drift: pair(|f| f.drift),
+            push: pair(|f| f.push),
+        }
+    }
+
+    pub(crate) fn mass_kg(&self, axis: usize) -> f64 {
+        self.masses_kg[axis]
+    }
+
+    pub(crate) fn stroke_m(&self) -> f64 {
+        self.stroke_m
+    }
+
+    /// Sliding friction on moving axes, N, against the motion; 0 at rest.
+    #[inline(always)]
+    pub(crate) fn sliding_friction(&self, velocity: Pair, moving: Mask) -> Pair {
+        -Pair::both(self.friction.sliding_force_n).with_sign_of(velocity).where_true(moving)
+    }
+
+    /// Viscous friction, N, against the motion.
+    #[inline(always)]
+    pub(crate) fn viscous_friction(&self, velocity: Pair) -> Pair {
+        -(Pair::both(self.friction.viscous_n_s_per_m) * velocity)
+    }
+
+    /// Whether a resting axis under this force stays, force in N without any friction.
+    #[inline(always)]
+    pub(crate) fn holds(&self, extension: f64, force: f64) -> bool {
+        force.abs() <= self.friction.break_away_force_n
+            || extension <= 0.0 && force < 0.0
+            || extension >= self.stroke_m && force > 0.0
+    }
+
+    /// Whether resting axes might leave within the span, so that a step must look closer.
+    #[inline(always)]
+    pub(crate) fn might_leave(&self, extension: Pair, force: Pair, margin: Pair) -> Mask {
+        let zero = Pair::both(0.0);
+        let pressed = extension.at_most(zero) & force.less(zero)
+            | Pair::both(self.stroke_m).at_most(extension) & zero.less(force);
+        Pair::both(self.friction.break_away_force_n).less(force.abs() + margin) & !pressed
+    }
+
+    /// Moves one axis through a span under a held force (N, without any friction), locating what happens inside.
+    ///
+    /// Never gives the force's work to friction: between two events the sliding friction opposes the motion.
+    pub(crate) fn advance(&self, axis: usize, from: Place, force: f64, span_s: f64) -> Place {
+        let (mass, viscous) = (self.masses_kg[axis], self.friction.viscous_n_s_per_m);
+        let mut place = from;
+        let mut left_s = span_s;
+        // A held force turns the motion around at most once, so two legs do; the third is for rounding.
+        for _ in 0..3 {
+            let direction = if place.velocity != 0.0 {
+                place.velocity.signum()
+            } else if self.holds(place.extension, force) {
+                return place;
+            } else {
+                force.signum()
+            };
+            let driving = force - direction * self.friction.sliding_force_n;
+            let next = Factors::new(mass, viscous, left_s).advance(place, driving);
+            if next.velocity * direction > 0.0 {
+                return self.stop_at_ends(next);
+            }
+            if place.velocity == 0.0 {
+                // Less than a rounding of way: the force exceeds the friction by nothing that moves a number.
+                return place;
+            }
+            let stop_s = zero_crossing(mass, viscous, place.velocity, driving).min(left_s);
+            let stop = Factors::new(mass, viscous, stop_s).advance(place, driving);
+            place = self.stop_at_ends(Place { extension: stop.extension, velocity: 0.0 });
+            left_s -= stop_s;
+        }
+        place
+    }
+
+    fn stop_at_ends(&self, place: Place) -> Place {
+        if place.extension < 0.0 {
+            Place { extension: 0.0, velocity: 0.0 }
+        } else if place.extension > self.stroke_m {
+            Place { extension: self.stroke_m, velocity: 0.0 }
+        } else {
+            place
+        }
+    }
+}
+
+/// E, G, D and W of one axis and one span.
+struct Factors {
+    keep: f64,
+    gain: f64,
+    drift: f64,
+    push: f64,
+}
+
+impl Factors {
+    fn new(mass_kg: f64, viscous_n_s_per_m: f64, span_s: f64) -> Self {
+        let z = viscous_n_s_per_m * span_s / mass_kg;
+        let phi_1 = if z == 0.0 { 1.0 } else { -libm::expm1(-z) / z };
+        Factors {
+            keep: libm::exp(-z),
+            gain: span_s / mass_kg * phi_1,
+            drift: span_s * phi_1,
+            push: span_s * span_s / mass_kg * phi_2(z, phi_1),
+        }
+    }
+
+    fn advance(&self, from: Place, force: f64) -> Place {
+        Place {
+            extension: from.extension + self.drift * from.velocity + self.push * force,
+            velocity: self.keep * from.velocity + self.gain * force,
+        }
+    }
+}
+
+/// (1 - phi_1) / z, by its series where the difference would lose digits.
+fn phi_2(z: f64, phi_1: f64) -> f64 {
+    if z > 0.1 {
+        return (1.0 - phi_1) / z;
+    }
+    // sum (-z)^n / (n + 2)!; the first term left out is below 1e-10 / 12! = 2e-19.
+    let mut sum = 0.0;
+    for n in (0..10).rev() {
+        sum = (1.0 - z * sum) / f64::from(n + 2);
+    }
+    sum
+}
+
+/// Time until a velocity under an opposing force is zero, s.
+fn zero_crossing(mass_kg: f64, viscous_n_s_per_m: f64, velocity: f64, force: f64) -> f64 {
+    let frictionless_s = -velocity * mass_kg / force;
+    let y = viscous_n_s_per_m * frictionless_s / mass_kg;
+    if y == 0.0 { frictionless_s } else { frictionless_s * (libm::log1p(y) / y) }
+}

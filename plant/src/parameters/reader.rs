@@ -1,0 +1,285 @@
+//! Reads a rig file against the table of parameters, and says where and what is wrong.
+//!
+//! The reader keeps the place of every key, so that a message names file, line, key, value and allowed range:
+//! what a person needs to repair the file without opening the code.
+
+use std::collections::BTreeMap;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::table::{KEYS, Key, Unit};
+
+/// Why a rig file is refused; every message gives the place, the key, the value and what is allowed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParameterError {
+    /// The file is not TOML.
+    #[error("{file}:{line}: not TOML: {message}")]
+    Syntax {
+        /// File as given by the caller.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// What the TOML reader says.
+        message: String,
+    },
+    /// A key or table that no rig has.
+    #[error("{file}:{line}: unknown key {key} = {value}; known here: {known}")]
+    UnknownKey {
+        /// File as given by the caller.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// `table.key` as written.
+        key: String,
+        /// Value as written.
+        value: String,
+        /// The keys that are known at this place.
+        known: String,
+    },
+    /// A key that every rig has is not there.
+    #[error("{file}:{line}: key {key} is missing from the table that starts here; allowed: {range}")]
+    MissingKey {
+        /// File as given by the caller.
+        file: String,
+        /// Line of the table's header, or 1 if the whole table is missing.
+        line: usize,
+        /// `table.key`.
+        key: String,
+        /// Allowed values.
+        range: String,
+    },
+    /// The value is no number, or not as many numbers as the key holds.
+    #[error("{file}:{line}: {key} = {value} is of the wrong type; allowed: {range}")]
+    WrongType {
+        /// File as given by the caller.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// `table.key`.
+        key: String,
+        /// Value as written.
+        value: String,
+        /// Allowed values.
+        range: String,
+    },
+    /// The value lies outside its range, or is not finite.
+    #[error("{file}:{line}: {key} = {value} is out of range; allowed: {range}")]
+    OutOfRange {
+        /// File as given by the caller.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// `table.key`.
+        key: String,
+        /// Value as written.
+        value: String,
+        /// Allowed values.
+        range: String,
+    },
+    /// Each value is in its range, but together they make no rig.
+    #[error("{file}:{line}: {key} = {value} contradicts another key: {rule}")]
+    Inconsistent {
+        /// File as given by the caller.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// `table.key`.
+        key: String,
+        /// Value as written.
+        value: String,
+        /// The rule that is broken, with the other value.
+        rule: String,
+    },
+}
+
+/// One value as read: the numbers in the file's unit, the text and the line for messages.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Entry {
+    pub(super) numbers: Vec<f64>,
+    pub(super) text: String,
+    pub(super) line: usize,
+}
+
+/// All values of a rig file in the file's units, each checked against its key.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Entries {
+    pub(super) file: String,
+    entries: BTreeMap<(&'static str, &'static str), Entry>,
+}
+
+impl Entries {
+    /// Reads the whole file; unknown, missing, mistyped and out-of-range keys are errors.
+    pub(super) fn read(text: &str, file: &str) -> Result<Self, ParameterError> {
+        let place = Place { text, file };
+        let root = DeTable::parse(text).map_err(|error| ParameterError::Syntax {
+            file: file.to_owned(),
+            line: place.line(error.span().map_or(0, |span| span.start)),
+            message: error.message().to_owned(),
+        })?;
+        place.refuse_unknown(root.get_ref())?;
+        let mut entries = BTreeMap::new();
+        for key in KEYS {
+            entries.insert((key.table, key.name), place.read_key(root.get_ref(), key)?);
+        }
+        Ok(Entries { file: file.to_owned(), entries })
+    }
+
+    /// The entry of a key of the table.
+    ///
+    /// # Panics
+    /// If the table holds no such key: a typing error in this crate.
+    pub(super) fn entry(&self, table: &str, name: &str) -> &Entry {
+        let key = KEYS.iter().find(|key| key.table == table && key.name == name);
+        let key = key.unwrap_or_else(|| panic!("{table}.{name} is not in the table of parameters"));
+        &self.entries[&(key.table, key.name)]
+    }
+
+    /// The value of a single-number key, in SI.
+    pub(super) fn si(&self, table: &str, name: &str) -> f64 {
+        self.si_points::<1>(table, name)[0]
+    }
+
+    /// The values of a key that holds several numbers, in SI.
+    pub(super) fn si_points<const N: usize>(&self, table: &str, name: &str) -> [f64; N] {
+        let unit = KEYS.iter().find(|key| key.table == table && key.name == name).map(|key| key.unit);
+        let numbers = &self.entry(table, name).numbers;
+        std::array::from_fn(|i| unit.map_or(numbers[i], |unit| unit.to_si(numbers[i])))
+    }
+
+    /// The same rig with one key changed, in the file's unit.
+    pub(super) fn with(&self, path: &str, numbers: &[f64]) -> Result<Self, ParameterError> {
+        let text = match numbers {
+            [one] => format!("{one}"),
+            many => format!("{many:?}"),
+        };
+        let Some(key) = KEYS.iter().find(|key| key.path() == path) else {
+            let known = KEYS.iter().map(Key::path).collect::<Vec<_>>().join(", ");
+            return Err(ParameterError::UnknownKey {
+                file: self.file.clone(),
+                line: 0,
+                key: path.to_owned(),
+                value: text,
+                known,
+            });
+        };
+        let line = self.entries[&(key.table, key.name)].line;
+        let entry = Entry { numbers: numbers.to_vec(), text, line };
+        check_range(key, &entry, &self.file)?;
+        let mut changed = self.clone();
+        changed.entries.insert((key.table, key.name), entry);
+        Ok(changed)
+    }
+}
+
+/// Text and name of the file being read.
+struct Place<'t> {
+    text: &'t str,
+    file: &'t str,
+}
+
+impl Place<'_> {
+    fn line(&self, offset: usize) -> usize {
+        1 + self.text.as_bytes()[..offset.min(self.text.len())].iter().filter(|byte| **byte == b'\n').count()
+    }
+
+    /// The value as the file writes it, on one line and cut to a readable length.
+    fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
+        let words =
+            self.text.get(value.span()).unwrap_or("").split_whitespace().collect::<Vec<_>>().join(" ");
+        if words.chars().count() > 60 { words.chars().take(57).chain("...".chars()).collect() } else { words }
+    }
+
+    fn refuse_unknown(&self, root: &DeTable<'_>) -> Result<(), ParameterError> {
+        let unknown = |key: &Spanned<_>, path: String, value: &Spanned<DeValue<'_>>, known: Vec<&str>| {
+            ParameterError::UnknownKey {
+                file: self.file.to_owned(),
+                line: self.line(key.span().start),
+                key: path,
+                value: self.written(value),
+                known: known.join(", "),
+            }
+        };
+        for (name, value) in root {
+            let known: Vec<&str> =
+                KEYS.iter().filter(|key| key.table == name.get_ref()).map(|key| key.name).collect();
+            if known.is_empty() {
+                let mut tables: Vec<&str> = KEYS.iter().map(|key| key.table).collect();
+                tables.dedup();
+                return Err(unknown(name, name.get_ref().to_string(), value, tables));
+            }
+            for (inner, value) in value.get_ref().as_table().into_iter().flatten() {
+                if !known.iter().any(|known| known == inner.get_ref()) {
+                    return Err(unknown(
+                        inner,
+                        format!("{}.{}", name.get_ref(), inner.get_ref()),
+                        value,
+                        known,
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn read_key(&self, root: &DeTable<'_>, key: &Key) -> Result<Entry, ParameterError> {
+        let table = root.iter().find(|(name, _)| name.get_ref() == key.table);
+        let value =
+            table.and_then(|(_, table)| table.get_ref().as_table()).and_then(|table| table.get(key.name));
+        let Some(value) = value else {
+            return Err(ParameterError::MissingKey {
+                file: self.file.to_owned(),
+                line: table.map_or(1, |(name, _)| self.line(name.span().start)),
+                key: key.path(),
+                range: key.range(),
+            });
+        };
+        let text = self.written(value);
+        let line = self.line(value.span().start);
+        let numbers = match value.get_ref() {
+            DeValue::Array(items) => items.iter().map(|item| as_number(item.get_ref())).collect(),
+            single => as_number(single).map(|number| vec![number]),
+        };
+        let is_array = matches!(value.get_ref(), DeValue::Array(_));
+        match numbers {
+            Some(numbers) if numbers.len() == key.count && is_array == (key.count > 1) => {
+                let entry = Entry { numbers, text, line };
+                check_range(key, &entry, self.file)?;
+                Ok(entry)
+            }
+            _ => Err(ParameterError::WrongType {
+                file: self.file.to_owned(),
+                line,
+                key: key.path(),
+                value: text,
+                range: key.range(),
+            }),
+        }
+    }
+}
+
+fn as_number(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Float(float) => float.as_str().parse().ok(),
+        DeValue::Integer(integer) => {
+            i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|whole| whole as f64)
+        }
+        _ => None,
+    }
+}
+
+fn check_range(key: &Key, entry: &Entry, file: &str) -> Result<(), ParameterError> {
+    let whole = |value: f64| key.unit != Unit::Bits || value == value.trunc();
+    // Written so that a NaN, which TOML admits, fails.
+    let good = |value: &f64| *value >= key.min && *value <= key.max && whole(*value);
+    if entry.numbers.len() == key.count && entry.numbers.iter().all(good) {
+        return Ok(());
+    }
+    Err(ParameterError::OutOfRange {
+        file: file.to_owned(),
+        line: entry.line,
+        key: key.path(),
+        value: entry.text.clone(),
+        range: key.range(),
+    })
+}

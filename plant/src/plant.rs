@@ -1,0 +1,161 @@
+//! The plant: both axes, the linkage and the supply, moved by one period at a time.
+//!
+//! It has no clock, no input or output, no thread and no log, and its step allocates nothing: whoever owns one decides
+//! what time is. Two plants with the same rig, setup and inputs are equal to the bit on every x86-64 machine.
+
+use std::sync::Arc;
+
+use crate::integrator::{Held, Integrator, SUBSTEPS};
+use crate::lanes::Pair;
+use crate::parameters::RigParameters;
+use crate::setup::{Setup, SetupError, check_added_mass, check_state, start_state};
+use crate::state::{Inputs, State};
+use crate::truth::{Truth, hand_forces};
+
+/// The simulated rig; constant model and moving state.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    rig: Arc<RigParameters>,
+    integrator: Integrator,
+    substeps: u32,
+    state: State,
+}
+
+/// Why linking is refused: the eye does not lie in the carriage's gap.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "the load's eye is {distance_m} m from the carriage; linking needs it within {half_gap_m} m to either side"
+)]
+pub struct LinkRefused {
+    /// x_load - x_drive, m.
+    pub distance_m: f64,
+    /// Half of the gap, m.
+    pub half_gap_m: f64,
+}
+
+impl Plant {
+    /// A plant of this rig at the start of this setup.
+    ///
+    /// # Errors
+    /// [`SetupError`] if the carriage lies outside the stroke or the weights outside the rig's limit.
+    pub fn new(rig: &RigParameters, setup: &Setup) -> Result<Self, SetupError> {
+        Ok(Self::assemble(rig, start_state(rig, setup)?, SUBSTEPS))
+    }
+
+    /// A plant of this rig in a given state, as for a window of a record.
+    ///
+    /// # Errors
+    /// [`SetupError`] if the state is none that the rig can be in.
+    pub fn in_state(rig: &RigParameters, state: &State) -> Result<Self, SetupError> {
+        check_state(rig, state)?;
+        Ok(Self::assemble(rig, *state, SUBSTEPS))
+    }
+
+    /// The same plant with another number of substeps in a period, 1 to 1000: for studies of accuracy.
+    ///
+    /// # Panics
+    /// If the number lies outside its range.
+    pub fn with_substeps(self, substeps: u32) -> Self {
+        assert!((1..=1000).contains(&substeps), "1 to 1000 substeps, not {substeps}");
+        Self::assemble(&self.rig.clone(), self.state, substeps)
+    }
+
+    fn assemble(rig: &RigParameters, state: State, substeps: u32) -> Self {
+        let integrator = Integrator::new(rig, state.added_mass_kg, substeps);
+        Plant { rig: Arc::new(rig.clone()), integrator, substeps, state }
+    }
+
+    /// Advances by exactly 1 ms with the inputs held.
+    ///
+    /// Commands beyond [-1, 1] are not the plant's to judge: the caller rounds and refuses them
+    /// ([`crate::quantise_valve`]). While the emergency stop holds, they count as 0.
+    pub fn step(&mut self, inputs: &Inputs) {
+        let command = if self.state.emergency_stop {
+            Pair::both(0.0)
+        } else {
+            Pair::new(inputs.valve[0], inputs.valve[1])
+        };
+        let held = Held {
+            command,
+            hand: hand_forces(inputs),
+            stopped: self.state.emergency_stop,
+            linked: self.state.linked,
+        };
+        self.integrator.advance(&mut self.state, held);
+    }
+
+    /// True states and terms at this instant; of the inputs only the hand forces matter, since a spool lags.
+    pub fn truth(&self, inputs: &Inputs) -> Truth {
+        Truth::at(&self.integrator, &self.rig, &self.state, inputs)
+    }
+
+    /// All that changes in the plant.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// The numbers the plant was made from.
+    pub fn rig(&self) -> &RigParameters {
+        &self.rig
+    }
+
+    /// Absolute pressure of the supply node, Pa.
+    pub fn supply_pressure_pa(&self) -> f64 {
+        self.state.supply_pressure_pa
+    }
+
+    /// Discharges the supply; valve commands count as 0 until the release [rig-model.md, Emergency stop].
+    pub fn trip_emergency_stop(&mut self) {
+        self.state.emergency_stop = true;
+    }
+
+    /// Lets the supply recover; commands act again at once, air flows once the check valves are open.
+    pub fn release_emergency_stop(&mut self) {
+        self.state.emergency_stop = false;
+    }
+
+    /// Whether the emergency stop is tripped.
+    pub fn emergency_stop(&self) -> bool {
+        self.state.emergency_stop
+    }
+
+    /// Whether the non-return valves at the chambers are shut.
+    pub fn check_valves_shut(&self) -> bool {
+        self.integrator.supply.check_valves_shut(self.state.supply_pressure_pa)
+    }
+
+    /// Whether the load's eye sits in the carriage.
+    pub fn linked(&self) -> bool {
+        self.state.linked
+    }
+
+    /// Puts the load's eye into the carriage; linking what is linked changes nothing.
+    ///
+    /// # Errors
+    /// [`LinkRefused`] unless the eye lies in the gap [rig-model.md, Masses and linkage].
+    pub fn link(&mut self) -> Result<(), LinkRefused> {
+        let [drive, load] = &self.state.axes;
+        let distance_m = self.integrator.distance(Pair::new(drive.extension_m, load.extension_m));
+        if self.state.linked || self.integrator.linkage.in_gap(distance_m) {
+            self.state.linked = true;
+            Ok(())
+        } else {
+            Err(LinkRefused { distance_m, half_gap_m: self.rig.linkage().gap_m / 2.0 })
+        }
+    }
+
+    /// Takes the load's eye out of the carriage; always possible.
+    pub fn unlink(&mut self) {
+        self.state.linked = false;
+    }
+
+    /// Puts weights on the carriage or takes them off, kg in all; the velocity stays.
+    ///
+    /// # Errors
+    /// [`SetupError::AddedMass`] if they are negative or more than the rig takes.
+    pub fn set_added_mass_kg(&mut self, kg: f64) -> Result<(), SetupError> {
+        self.state.added_mass_kg = check_added_mass(&self.rig, kg)?;
+        self.integrator = Integrator::new(&self.rig, kg, self.substeps);
+        Ok(())
+    }
+}

@@ -1,0 +1,116 @@
+# shellcheck shell=bash
+# shellcheck disable=SC2154,SC2034 # names shared with vcan-vm, which sources this
+# Builds the guest's initramfs; sourced by vcan-vm.
+#
+# Two cpio archives one after the other, which the kernel unpacks in turn: the base (busybox, dash, ip, can-utils,
+# modules, init) is cached on the sum of its contents; the payload (the job and /airbench) is made afresh for each call.
+#
+# Expects $cache, $root, $scripts, $out, the options, say, fail and packages.sh.
+
+# First line: what init loads. Second line: there for a job to modprobe.
+kernel_modules=(
+    virtio_pci virtio_blk can can_raw can_dev vcan
+    vxcan can_isotp can_gw slcan sja1000 kvaser_pci
+)
+
+# pack FOLDER: a cpio archive of it on standard output, as root's files, whoever packs them.
+pack() {
+    find_program cpio cpio
+    (cd "$1" && find . -mindepth 1 -print0 | run_unpacked "$found_program" --quiet -0 -o -H newc -R +0:+0)
+}
+
+# add_program TREE FILE NAME: a program and its shared libraries, loader included, as ldd finds them here.
+add_program() {
+    local library listing libraries=()
+    install -D "$2" "$1/usr/bin/$3"
+    listing=$(run_unpacked ldd "$2" 2>&1) || return 0 # static
+    if [[ $listing == *'not found'* ]]; then fail "$exit_no_boot" "$2 lacks libraries: $listing"; fi
+    mapfile -t libraries < <(grep -o '/[^ ]*' <<<"$listing")
+    for library in "${libraries[@]}"; do
+        case $library in
+            *ld-linux*) install -D "$library" "$1/lib64/${library##*/}" ;;
+            *) install -D "$library" "$1/usr/lib/${library##*/}" ;;
+        esac
+    done
+}
+
+# gather_base TREE: everything the guest has before the payload is added.
+gather_base() {
+    local tree=$1 program
+    mkdir -p "$tree"/{bin,dev,proc,sys,tmp,lib,lib64,usr/bin,usr/lib,results}
+    # Always unpacked: installing busybox-static would remove the package busybox.
+    find_unpacked busybox-static busybox
+    install "$found_program" "$tree/bin/busybox"
+    # Not busybox's shell: that one runs its own ip, which knows no `type vcan`, whatever PATH says.
+    # (So do its commands that start others, such as timeout and xargs: give those /usr/bin/ip.)
+    find_program dash dash
+    add_program "$tree" "$found_program" dash
+    ln -s ../usr/bin/dash "$tree/bin/sh"
+    find_program iproute2 ip
+    add_program "$tree" "$found_program" ip
+    for program in candump cansend cangen; do
+        find_program can-utils "$program"
+        add_program "$tree" "$found_program" "$program"
+    done
+    cp -r "$cache/kernel-$kernel/lib/modules" "$tree/lib/"
+    install "$scripts/vm/init" "$tree/init"
+}
+
+# Starts $out/vm/initramfs.cpio with the base.
+build_base_image() {
+    local sum image
+    staging=$(mktemp -d "$cache/staging.XXXXXX")
+    gather_base "$staging"
+    sum=$(cd "$staging" && find . -type f -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -c 1-16)
+    image=$cache/base-$kernel-$sum.cpio
+    if [[ ! -f $image ]]; then
+        say "building the initramfs ($(du -sh "$staging" | cut -f 1))"
+        rm -f "$cache/base-$kernel-"*.cpio
+        pack "$staging" >"$cache/base.new"
+        mv "$cache/base.new" "$image"
+    fi
+    cp "$image" "$out/vm/initramfs.cpio"
+    rm -rf "$staging"
+    staging=''
+}
+
+# the_only NAME OPTION: sets $found_file to the one file NAME of the checkout; people must say which if there are more.
+the_only() {
+    local found=()
+    mapfile -t found < <(find "$root" \( -name target -o -name runs -o -name '.git*' \) -prune -o -type f -name "$1" -print)
+    ((${#found[@]} == 1)) || fail "$exit_usage" "found ${#found[@]} files named $1 in the checkout, not one: give $2"
+    found_file=${found[0]}
+}
+
+# Static binaries, because the guest has none of their libraries; a target folder of their own, because other RUSTFLAGS
+# in the usual one would make cargo rebuild everything at each change of sides.
+build_binaries() {
+    local target=x86_64-unknown-linux-gnu
+    type -P cargo >/dev/null || fail "$exit_usage" "no cargo to build emulator and controller with"
+    say "building emulator and controller, static"
+    (cd "$root" && RUSTFLAGS="-C target-feature=+crt-static" cargo build --release --quiet --target "$target" \
+        --target-dir target/vm -p emulator -p controller) 8>&- ||
+        fail "$exit_usage" "emulator or controller cannot be built"
+    install -D -t "$1" "$root/target/vm/$target/release/emulator" "$root/target/vm/$target/release/controller"
+}
+
+# Adds what belongs to this call to $out/vm/initramfs.cpio.
+add_payload() {
+    local tree=$out/vm/payload
+    mkdir -p "$tree/airbench"
+    if [[ $binaries == yes ]]; then
+        if [[ -z $rig ]]; then the_only rig.toml --rig && rig=$found_file; fi
+        if [[ -z $experiment ]]; then the_only point-to-point.toml --experiment && experiment=$found_file; fi
+        [[ -f $rig && -f $experiment ]] || fail "$exit_usage" "no such file: $rig or $experiment"
+        cp "$rig" "$tree/airbench/rig.toml"
+        cp "$experiment" "$tree/airbench/point-to-point.toml"
+        build_binaries "$tree/airbench"
+    fi
+    if [[ -n $payload ]]; then cp -rL "$payload/." "$tree/airbench/"; fi
+    if [[ -n $job_command ]]; then
+        printf '%s\n' "$job_command" >"$tree/job"
+    else
+        cp "$scripts/vm/job" "$tree/job"
+    fi
+    pack "$tree" >>"$out/vm/initramfs.cpio"
+}
