@@ -72,7 +72,9 @@ pub fn run_real(
     let mut last_frame = WallInstant::now();
     let mut last_answer_ns = None;
     let mut silent = false;
-    let mut was_up = bus.is_up();
+    // Not being connected yet is no loss; only what was up can be lost.
+    let mut was_up = true;
+    let mut ever_up = false;
     let mut watch = None;
     paced.end = loop {
         bus.wait_readable(PATIENCE);
@@ -102,7 +104,8 @@ pub fn run_real(
             last_frame = WallInstant::now();
         }
         let quiet = last_frame.elapsed();
-        if bus.is_up() != was_up {
+        ever_up |= bus.is_up();
+        if ever_up && bus.is_up() != was_up {
             was_up = bus.is_up();
             station.tell(if was_up { News::BusBack } else { News::BusLost });
         }

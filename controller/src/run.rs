@@ -104,7 +104,8 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         .map_err(|error| RunError::Output(error.to_string()))?;
     let interrupt = Interrupt::watch(Exit::Interrupted as i32)
         .map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
-    let mut bus = bus::open(&arguments.bus, Box::new(|| MonotonicClock.now().as_nanos()))?;
+    let mut bus =
+        bus::open(&arguments.bus, Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns)))?;
 
     let (record_sender, records) = bounded(ROW_QUEUE);
     let (news_sender, news) = bounded(NEWS_QUEUE);

@@ -217,9 +217,9 @@ fn start_host(arguments: &RunArguments) -> Result<Option<HostThread>, RunError> 
 fn stamp_clock(lockstep: bool, simulated_ns: &Arc<AtomicU64>) -> StampClock {
     if lockstep {
         let simulated_ns = Arc::clone(simulated_ns);
-        Box::new(move || simulated_ns.load(Ordering::Relaxed))
+        Box::new(move |_age_ns| simulated_ns.load(Ordering::Relaxed))
     } else {
-        Box::new(|| MonotonicClock.now().as_nanos())
+        Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns))
     }
 }
 

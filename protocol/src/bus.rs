@@ -28,8 +28,11 @@ use std::time::Duration;
 
 pub use url::{BusUrl, UrlError, WireOptions};
 
-/// The clock that stamps frames: nanoseconds since an epoch of the caller's choice.
-pub type StampClock = Box<dyn Fn() -> u64 + Send>;
+/// The clock that stamps frames: the time of what happened so many ns ago, in ns since an epoch of the caller's choice.
+///
+/// A real clock subtracts the age that the kernel tells of an arrival; a simulated one, for which no time passes between
+/// arrival and reading, ignores it.
+pub type StampClock = Box<dyn Fn(u64) -> u64 + Send>;
 
 /// What [`Bus::receive`] found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +106,7 @@ pub struct BusCounters {
     pub reconnects: u64,
 }
 
-/// A CAN bus as a peer sees it. Nothing here blocks but [`Bus::wait_readable`].
+/// A CAN bus as a peer sees it. Nothing here blocks but [`Bus::wait_readable`], and [`Bus::receive`] in a barrier.
 pub trait Bus: Send {
     /// Puts a frame on the bus and tells when, in ns of the bus's clock.
     ///
@@ -112,7 +115,8 @@ pub trait Bus: Send {
     /// arrives late is worse than none.
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError>;
 
-    /// Takes the oldest waiting frame. Tries to come back when the bus was down.
+    /// Takes the oldest waiting frame. Tries to come back when the bus was down. A member of the lockstep barrier, which has
+    /// nothing to do before its turn, waits a little for a packet.
     fn receive(&mut self) -> Received;
 
     /// Waits until something can be received, or for `timeout`.

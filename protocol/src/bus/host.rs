@@ -9,7 +9,7 @@
 //! refused. The lock goes with the process that holds it, however it ends.
 
 use super::control::{Control, Kind};
-use super::kernel_receive;
+use super::kernel_receive::{self, Wait};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
 use super::url::{BusUrl, WireOptions};
 use super::wire::Wire;
@@ -157,7 +157,7 @@ impl Host {
     fn take_from(&mut self, id: PeerId) {
         for _ in 0..PACKETS_A_TURN {
             let Some(peer) = self.peers.get(&id) else { return };
-            let packet = match kernel_receive::receive(peer.socket.as_fd()) {
+            let packet = match kernel_receive::receive(peer.socket.as_fd(), Wait::No) {
                 Ok(packet) if packet.len > 0 => packet,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
@@ -173,7 +173,8 @@ impl Host {
                     None => self.deliver(&frame, id),
                 }
             } else if let Some(control) = Control::from_bytes(bytes) {
-                self.obey(id, &control);
+                // A member says Done last: asking once more would find its queue empty.
+                return self.obey(id, &control);
             } else {
                 self.report.malformed += 1;
             }

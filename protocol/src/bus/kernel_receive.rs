@@ -51,11 +51,20 @@ fn set_flag(socket: BorrowedFd<'_>, option: libc::c_int) -> io::Result<()> {
     if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
-/// Takes one packet without blocking.
+/// Whether a call may sleep until a packet comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wait {
+    /// Return at once.
+    No,
+    /// Sleep for as long as the socket's receive time-out allows.
+    UntilTimeout,
+}
+
+/// Takes one packet.
 ///
 /// # Errors
 /// What `recvmsg` says; `WouldBlock` when nothing waits. A closed peer is a packet of length 0.
-pub(super) fn receive(socket: BorrowedFd<'_>) -> io::Result<Packet> {
+pub(super) fn receive(socket: BorrowedFd<'_>, wait: Wait) -> io::Result<Packet> {
     let mut packet =
         Packet { bytes: [0; LONGEST_PACKET], len: 0, age_ns: None, overflow: None, own_echo: false };
     // Aligned for cmsghdr; holds a timespec and a u32 with their headers and room to spare.
@@ -67,8 +76,9 @@ pub(super) fn receive(socket: BorrowedFd<'_>) -> io::Result<Packet> {
     header.msg_iovlen = 1;
     header.msg_control = control.as_mut_ptr().cast();
     header.msg_controllen = size_of_val(&control);
+    let flags = if wait == Wait::No { libc::MSG_DONTWAIT } else { 0 };
     // SAFETY: header points to `part` and `control`, which outlive the call and have the sizes given.
-    let count = unsafe { libc::recvmsg(socket.as_raw_fd(), &raw mut header, libc::MSG_DONTWAIT) };
+    let count = unsafe { libc::recvmsg(socket.as_raw_fd(), &raw mut header, flags) };
     if count < 0 {
         return Err(io::Error::last_os_error());
     }
@@ -122,7 +132,7 @@ mod tests {
         enable_stamps(ours.as_fd(), false).unwrap();
         send(&theirs, &[7; 16], SendFlags::empty()).unwrap();
         std::thread::sleep(std::time::Duration::from_millis(3));
-        let packet = receive(ours.as_fd()).unwrap();
+        let packet = receive(ours.as_fd(), Wait::No).unwrap();
         assert_eq!((packet.len, packet.bytes[15]), (16, 7));
         // Slept 3 ms since; sleep never returns early, so 2 ms leaves room for clock granularity alone.
         assert!(packet.age_ns.unwrap() > 2_000_000);
@@ -132,13 +142,13 @@ mod tests {
     fn a_packet_too_long_keeps_a_length_that_nothing_accepts() {
         let (ours, theirs) = pair();
         send(&theirs, &[0; 100], SendFlags::empty()).unwrap();
-        assert_eq!(receive(ours.as_fd()).unwrap().len, LONGEST_PACKET);
+        assert_eq!(receive(ours.as_fd(), Wait::No).unwrap().len, LONGEST_PACKET);
     }
 
     #[test]
     fn an_empty_queue_would_block() {
         let (ours, _theirs) = pair();
-        let error = receive(ours.as_fd()).err().unwrap();
+        let error = receive(ours.as_fd(), Wait::No).err().unwrap();
         assert_eq!(error.kind(), io::ErrorKind::WouldBlock);
     }
 }

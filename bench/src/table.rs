@@ -1,0 +1,50 @@
+//! The short table at the end of a run.
+
+use crate::join::Joined;
+use serde_json::Value;
+use std::fmt::Write as _;
+
+/// The summary for a terminal: figures in the units that people use, bounds with whether they were kept.
+#[must_use]
+pub fn table(joined: &Joined) -> String {
+    let summary = &joined.summary;
+    let mut rows: Vec<(String, String)> = Vec::new();
+    let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
+    row("position error, dynamic", millimetres(&summary["position_error_dynamic_m"]));
+    row("position error, static", millimetres(&summary["position_error_static_m"]));
+    row("cycles", format!("{} ({} skipped)", summary["cycles"], summary["skipped"]));
+    row("overruns", summary["overruns"].to_string());
+    row("frames lost", summary["frames_lost"].to_string());
+    row("wake-up latency p50 / p99 / max", latency(&summary["wakeup_ns"]));
+    row("round trip p50 / p99 / max", latency(&summary["round_trip_ns"]));
+    if let Some(thresholds) = summary["thresholds"].as_object() {
+        for (name, entry) in thresholds {
+            let kept = if entry["kept"] == Value::Bool(true) { "kept" } else { "BROKEN" };
+            let bound = entry["bound"].as_f64().unwrap_or_default();
+            row(&format!("bound: {name}"), format!("at most {bound}: {kept}"));
+        }
+    }
+    row("ended", text(&summary["ended_because"]));
+    row("passed", if joined.passed() { "yes" } else { "NO" }.to_owned());
+    let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    rows.iter().fold(String::new(), |mut out, (name, value)| {
+        let _ = writeln!(out, "  {name:width$}  {value}"); // writing to a string cannot fail
+        out
+    })
+}
+
+fn millimetres(value: &Value) -> String {
+    value.as_f64().map_or_else(|| "not measured".to_owned(), |metres| format!("{:.3} mm", metres * 1e3))
+}
+
+fn latency(percentiles: &Value) -> String {
+    let microseconds = |key: &str| percentiles[key].as_f64().map(|ns| ns * 1e-3);
+    match (microseconds("p50"), microseconds("p99"), microseconds("max")) {
+        (Some(p50), Some(p99), Some(max)) => format!("{p50:.1} / {p99:.1} / {max:.1} us"),
+        _ => "none: simulated time".to_owned(),
+    }
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().unwrap_or("unknown").to_owned()
+}

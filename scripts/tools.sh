@@ -1,0 +1,76 @@
+# shellcheck shell=bash
+# What the tests need beside a Rust toolchain; sourced by scripts/test, which sets $tools.
+# As root from Debian with apt-get, else unpacked below $tools without installing anything.
+
+tools=${tools:?set by scripts/test}
+
+# PyPI packages by version: clients that the tests hold the product against.
+python_packages=(cantools==45.1.0 crccheck==1.3.1)
+gungraun_version=0.20.0
+
+install_tools() {
+    install_compiler && install_valgrind && install_python && install_gungraun
+}
+
+apt_updated=no
+apt_get() {
+    if [ $apt_updated = no ]; then
+        apt-get update -q >/dev/null
+        apt_updated=yes
+    fi
+    DEBIAN_FRONTEND=noninteractive apt-get "$@"
+}
+
+# Installs Debian packages as root; else unpacks them, without their dependencies, into $tools/debian.
+need_packages() {
+    if [ "$(id -u)" = 0 ]; then
+        apt_get install -y -q --no-install-recommends "$@" >/dev/null
+    else
+        mkdir -p "$tools/debian"
+        (cd "$tools/debian" && apt-get download -q "$@" >/dev/null && for package in *.deb; do dpkg -x "$package" .; done)
+    fi
+}
+
+# The benchmark's floor is C; a Rust toolchain links with a C compiler anyway.
+install_compiler() {
+    command -v gcc >/dev/null || need_packages gcc libc6-dev
+}
+
+install_valgrind() {
+    if command -v valgrind >/dev/null; then return; fi
+    [ -x "$tools/bin/valgrind" ] && return
+    need_packages valgrind libc6-dbg
+    [ "$(id -u)" = 0 ] && return
+    mkdir -p "$tools/bin"
+    # An unpacked valgrind has to be told where its tools are.
+    printf '#!/bin/sh\nVALGRIND_LIB=%s/debian/usr/libexec/valgrind exec %s/debian/usr/bin/valgrind "$@"\n' \
+        "$tools" "$tools" >"$tools/bin/valgrind"
+    chmod +x "$tools/bin/valgrind"
+}
+
+# A virtual environment with the pinned packages; made anew when the list changes.
+install_python() {
+    local stamp="$tools/venv/packages"
+    [ "$(cat "$stamp" 2>/dev/null)" = "${python_packages[*]}" ] && return
+    command -v python3 >/dev/null || need_packages python3
+    rm -rf "$tools/venv"
+    make_venv && "$tools/venv/bin/python" -m pip install --quiet --disable-pip-version-check "${python_packages[@]}" &&
+        echo "${python_packages[*]}" >"$stamp"
+}
+
+# Debian's python3 comes without ensurepip; its pip wheel does as well.
+make_venv() {
+    python3 -m venv "$tools/venv" 2>/dev/null && return
+    rm -rf "$tools/venv"
+    if [ "$(id -u)" = 0 ]; then
+        need_packages python3-venv && python3 -m venv "$tools/venv"
+    else
+        need_packages python3-pip-whl && python3 -m venv --without-pip "$tools/venv" &&
+            "$tools/venv/bin/python" "$(ls "$tools"/debian/usr/share/python-wheels/pip-*.whl)/pip" install --quiet pip
+    fi
+}
+
+install_gungraun() {
+    [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return
+    cargo install --quiet --locked gungraun-runner --version "$gungraun_version" --root "$tools"
+}
