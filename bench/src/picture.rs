@@ -15,6 +15,8 @@ const VERMILION: RGBColor = RGBColor(213, 94, 0);
 const GREEN: RGBColor = RGBColor(0, 158, 115);
 /// Columns of pixels that a curve is thinned to.
 const COLUMNS: usize = 1000;
+/// Rows of pixels in a panel, and some for the width of a line.
+const ROWS: f64 = 100.0;
 
 const METRE_IN_MM: f64 = 1e3;
 const PASCAL_IN_BAR: f64 = 1e-5;
@@ -131,11 +133,12 @@ fn draw_panel(
         .bold_line_style(BLACK.mix(0.18))
         .draw()?;
     for curve in &panel.curves {
-        draw_curve(&mut chart, curve, end_s)?;
+        draw_curve(&mut chart, thinned(&curve.samples, end_s, (high - low) / ROWS), curve)?;
     }
     if panel.curves.len() > 1 {
         chart
             .configure_series_labels()
+            .position(SeriesLabelPosition::UpperLeft)
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
             .label_font(("sans-serif", 13))
@@ -146,17 +149,18 @@ fn draw_panel(
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-fn draw_curve(chart: &mut Chart<'_, '_>, curve: &Curve, end_s: f64) -> Result<(), Failure> {
+fn draw_curve(chart: &mut Chart<'_, '_>, thin: Samples, curve: &Curve) -> Result<(), Failure> {
     let style = ShapeStyle { color: curve.colour.to_rgba(), filled: false, stroke_width: curve.width };
     chart
-        .draw_series(LineSeries::new(thinned(&curve.samples, end_s), style))?
+        .draw_series(LineSeries::new(thin, style))?
         .label(curve.name)
         .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
     Ok(())
 }
 
-/// Smallest and largest value of each pixel column, in the order in which they came.
-fn thinned(samples: &Samples, end_s: f64) -> Samples {
+/// Smallest and largest value of each pixel column, in the order in which they came; one where they differ by less than
+/// `pixel`, since a line that goes up and down within a pixel draws spikes at its corners.
+fn thinned(samples: &Samples, end_s: f64, pixel: f64) -> Samples {
     let column = |time: f64| (time / end_s * COLUMNS as f64) as usize;
     samples
         .chunk_by(|(one, _), (other, _)| column(*one) == column(*other))
@@ -164,6 +168,9 @@ fn thinned(samples: &Samples, end_s: f64) -> Samples {
             let by_value = |one: &&(f64, f64), other: &&(f64, f64)| one.1.total_cmp(&other.1);
             let extremes = chunk.iter().min_by(by_value).into_iter().chain(chunk.iter().max_by(by_value));
             let mut extremes: Samples = extremes.copied().collect();
+            if extremes[1].1 - extremes[0].1 < pixel {
+                extremes.pop();
+            }
             extremes.sort_by(|one, other| one.0.total_cmp(&other.0));
             extremes
         })
@@ -190,7 +197,7 @@ mod tests {
     fn thinning_keeps_every_spike() {
         let mut samples: Samples = (0..60_000).map(|ms| (f64::from(ms) * 1e-3, 0.0)).collect();
         samples[31_416].1 = 7.0;
-        let thin = thinned(&samples, 60.0);
+        let thin = thinned(&samples, 60.0, 0.1);
         assert!(thin.len() <= 2 * (COLUMNS + 1));
         assert!(thin.contains(&(31.416, 7.0)));
         assert!(thin.is_sorted_by(|one, other| one.0 <= other.0));

@@ -70,3 +70,60 @@ pub fn status(plant: &Plant, [drive, load]: &[AxisReadings; 2], commands: Comman
 pub fn encode(frame: &Frame) -> CanFrame {
     frame.encode().unwrap_or_else(|error| panic!("the rig made a frame that rig.dbc does not allow: {error}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::{RigParameters, Setup};
+    use protocol::frames::{DRIVE_SENSORS, LOAD_SENSORS, RIG_STATUS, SignalSpec, WEIGHTS};
+
+    fn signal(message: &protocol::frames::MessageSpec, name: &str) -> &'static SignalSpec {
+        message.signals.iter().find(|signal| signal.name == name).expect("the signal is in rig.dbc")
+    }
+
+    /// Both are decimal texts of one ratio; they may differ by roundings of the last of 17 digits.
+    fn assert_same(one: f64, other: f64, what: &str) {
+        assert!((one / other - 1.0).abs() < 1e-15, "{what}: {one} in rig.toml, {other} in rig.dbc");
+    }
+
+    #[test]
+    fn sensors_of_the_rig_and_signals_of_the_wire_have_one_step_and_one_range() {
+        let rig = RigParameters::baseline();
+        let sensors = rig.sensors();
+        for message in [DRIVE_SENSORS, LOAD_SENSORS] {
+            for (name, step, largest) in [
+                ("position", sensors.position_step_m(), sensors.position_range_m),
+                ("force", sensors.force_step_n(), sensors.force_range_n),
+                ("pressure_a", sensors.pressure_step_pa(), sensors.pressure_range_pa),
+                ("pressure_b", sensors.pressure_step_pa(), sensors.pressure_range_pa),
+            ] {
+                let signal = signal(message, name);
+                assert_same(step, signal.factor, name);
+                assert_same(largest, signal.max, name);
+            }
+        }
+        let supply = signal(RIG_STATUS, "supply_pressure");
+        assert!(rig.supply().pressure_pa < supply.max);
+    }
+
+    #[test]
+    fn the_plant_takes_every_weight_that_the_wire_can_carry() {
+        let rig = RigParameters::baseline();
+        let mut plant = Plant::new(&rig, &Setup::default()).unwrap();
+        let weights = signal(WEIGHTS, "added_mass");
+        for added_mass_kg in [weights.min, weights.max] {
+            assert!(plant.set_added_mass_kg(added_mass_kg).is_ok(), "{added_mass_kg} kg");
+        }
+    }
+
+    #[test]
+    fn saturated_sensors_are_sent_as_their_limit() {
+        // The parked load sits 0.8 mm beyond its sensor's range (rig-model.md, Sensors).
+        let rig = RigParameters::baseline();
+        let plant = Plant::new(&rig, &Setup::default()).unwrap();
+        let readings = plant::Sensors::new(&rig, 1).sample(&plant, &plant::Inputs::default());
+        assert!(readings[1].position.saturated);
+        let frame = encode(&Frame::LoadSensors(sensors(&readings[1], 7)));
+        assert_eq!(frame.data()[..2], [0xFF, 0xFF]);
+    }
+}

@@ -46,7 +46,7 @@ fn main() {
         for (scenario, windows) in scenarios.iter().zip(&truth) {
             compare(&rig, scheme, scenario, windows, &mut errors);
         }
-        let Scheme::Plant(steps) | Scheme::Explicit(_, steps) = scheme;
+        let (Scheme::Plant(steps) | Scheme::Explicit(_, steps)) = scheme;
         let (worst, median, max) = (errors.worst(), errors.median(), errors.max);
         let pairs = [0, 1, 2].map(|i: usize| format!("{:.3} | {:.4}", worst[i], median[i])).join(" | ");
         println!(

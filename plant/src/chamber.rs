@@ -20,6 +20,12 @@
 use crate::lanes::{Mask, Pair};
 use crate::parameters::{CylinderParameters, GasParameters, SupplyParameters};
 
+/// How much of its air a chamber may carry beyond a bound before the instant of crossing matters: below 1 Pa.
+///
+/// A full chamber with an open valve touches its bound again and again by some millionths of a pascal, since the
+/// flow law is vertical at equal pressures. Locating each of these would cost a careful step each time.
+const NEGLIGIBLE_SHARE: f64 = 1e-6;
+
 /// Geometry and pressures that do not change.
 #[derive(Debug, Clone)]
 pub(crate) struct Chambers {
@@ -141,28 +147,34 @@ impl Chambers {
 }
 
 impl Limits {
-    /// Where a step from one air to another carried air beyond a bound; `volume` is that of the end.
+    /// The air after a step, stopped at the bounds at the step's end, and where the instant of crossing would matter.
     #[inline(always)]
-    pub(crate) fn crossed(&self, from: Air, to: Air, volume: Pair) -> Mask {
-        let zero = Pair::both(0.0);
-        let filled = (volume * Pair::both(self.supply_pa)).less(to.stored) & zero.less(from.flow.max(to.flow));
-        let emptied = to.stored.less(volume * Pair::both(self.exhaust_pa)) & from.flow.min(to.flow).less(zero);
-        filled | emptied
+    pub(crate) fn stop(&self, from: Air, to: Air, volume: Pair) -> (Air, Mask) {
+        let most = (volume * Pair::both(self.supply_pa)).max(from.stored);
+        let least = (volume * Pair::both(self.exhaust_pa)).min(from.stored);
+        let stored = to.stored.min(most).max(least);
+        let beyond = (to.stored - stored).abs();
+        let within = beyond.at_most(Pair::both(0.0));
+        let air = Air { stored, flow: to.flow.where_true(within) };
+        (air, (stored * Pair::both(NEGLIGIBLE_SHARE)).less(beyond))
     }
 
     /// The air after a step, with the flow stopped at the instant at which a bound was crossed.
     ///
     /// The instant is found by a straight line between the pressures at both ends.
     pub(crate) fn hold(&self, from: Air, to: Air, volume_from: Pair, volume_to: Pair) -> Air {
-        let crossed = self.crossed(from, to, volume_to).to_array();
         let lane = |i: usize| {
             let (start_j, end_j) = (from.stored.to_array()[i], to.stored.to_array()[i]);
-            if !crossed[i] {
-                return (end_j, to.flow.to_array()[i]);
-            }
             let (v_start, v_end) = (volume_from.to_array()[i], volume_to.to_array()[i]);
             let (p_start, p_end) = (start_j / v_start, end_j / v_end);
-            let bound_pa = if p_end > self.supply_pa { self.supply_pa } else { self.exhaust_pa };
+            let (flow_start, flow_end) = (from.flow.to_array()[i], to.flow.to_array()[i]);
+            let bound_pa = if p_end > self.supply_pa && flow_start.max(flow_end) > 0.0 {
+                self.supply_pa
+            } else if p_end < self.exhaust_pa && flow_start.min(flow_end) < 0.0 {
+                self.exhaust_pa
+            } else {
+                return (end_j, flow_end);
+            };
             if (p_start - bound_pa) * (p_end - bound_pa) >= 0.0 {
                 // Beyond the bound from the start: nothing may flow that way at all.
                 return (start_j, 0.0);
@@ -250,7 +262,8 @@ mod tests {
         let volume = Pair::both(2e-5);
         // Compressed above the supply, the lag still carrying air in: it stops, but nothing is taken out.
         let squeezed = Air { stored: Pair::both(8e5 * 2e-5), flow: Pair::both(0.01) };
-        let next = chambers.limits(7e5).hold(squeezed, lag.advance(squeezed, Pair::both(0.0)), volume, volume);
+        let next =
+            chambers.limits(7e5).hold(squeezed, lag.advance(squeezed, Pair::both(0.0)), volume, volume);
         assert_eq!((next.stored.drive(), next.flow.drive()), (8e5 * 2e-5, 0.0));
     }
 }

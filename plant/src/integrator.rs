@@ -11,8 +11,8 @@
 //! ```
 //!
 //! The equations have corners: sticking, breaking away, turning round, making contact, meeting an end of the stroke,
-//! check valves moving. A substep first assumes that none lies in it ([`Integrator::smooth`], without a branch that
-//! could be guessed wrongly), then checks; if one does, it is discarded and made again in eight parts that locate it
+//! check valves moving. A substep first assumes that none lies in it ([`Integrator::smooth`], which branches only on
+//! being linked and in contact), then checks; if one does, it is discarded and made again in eight parts that locate it
 //! ([`Integrator::careful`]). So corners cost time only where they are.
 //!
 //! Why this scheme and this step: `docs/integration.md` has the measured table of error and cost for this and
@@ -36,8 +36,8 @@ pub(crate) const SUBSTEPS: u32 = 10;
 /// Parts of a substep that has a corner in it.
 const PARTS: u32 = 8;
 
-/// A resting axis is looked at closely from this far below its break-away force on, N: more than the contact force
-/// changes within half a substep while the other axis creeps.
+/// A resting axis linked to a moving one is looked at closely from this far below its break-away force on, N: more than
+/// the contact force changes within half a substep while the other axis creeps.
 const BREAK_AWAY_MARGIN_N: f64 = 0.5;
 
 /// The laws, and their constants for both lengths of step.
@@ -208,23 +208,22 @@ impl Integrator {
 
         let growth =
             self.chambers.force_growth(&span.lag, middle.per_volume, [from.air_a.flow, from.air_b.flow]);
-        let margin = growth.abs() + Pair::both(BREAK_AWAY_MARGIN_N);
+        let nudged_n = if held.linked && moving.any() { BREAK_AWAY_MARGIN_N } else { 0.0 };
+        let margin = growth.abs() + Pair::both(nudged_n);
         let leaves = !moving & self.motion.might_leave(from.extension, force, margin);
         let turns = moving & (velocity * from.velocity).at_most(zero);
         let overruns = extension.less(zero) | Pair::both(self.motion.stroke_m()).less(extension);
         let touches =
             held.linked && self.linkage.made_contact(self.distance(from.extension), self.distance(extension));
-        let next = Lanes {
-            extension,
-            velocity,
-            spool: held.command + (from.spool - held.command) * span.spool_to_end,
-            air_a: span.lag.advance(from.air_a, middle.edge_flow_a),
-            air_b: span.lag.advance(from.air_b, middle.edge_flow_b),
-        };
         let limits = self.chambers.limits(node.end_pa);
-        let bounded = limits.crossed(from.air_a, next.air_a, self.chambers.volume_a(extension))
-            | limits.crossed(from.air_b, next.air_b, self.chambers.volume_b(extension));
-        (next, (leaves | turns | overruns | bounded).any() | touches)
+        let stop = |air: Air, edge_flow: Pair, volume: Pair| {
+            limits.stop(air, span.lag.advance(air, edge_flow), volume)
+        };
+        let (air_a, fills_a) = stop(from.air_a, middle.edge_flow_a, self.chambers.volume_a(extension));
+        let (air_b, fills_b) = stop(from.air_b, middle.edge_flow_b, self.chambers.volume_b(extension));
+        let spool = held.command + (from.spool - held.command) * span.spool_to_end;
+        let next = Lanes { extension, velocity, spool, air_a, air_b };
+        (next, (leaves | turns | overruns | fills_a | fills_b).any() | touches)
     }
 
     /// A short step that may meet any corner.

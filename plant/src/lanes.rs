@@ -4,8 +4,8 @@
 //! root on them round exactly as on single numbers (IEEE 754), so the bits do not depend on this file. Other
 //! machines get the same operations one after the other.
 //!
-//! A [`Mask`] is the answer to a comparison, lane by lane. Choosing by mask costs no branch, and a branch that
-//! is guessed wrongly costs as much as a third of a substep.
+//! A [`Mask`] is the answer to a comparison, lane by lane. Choosing by mask costs no branch, so the two axes may
+//! decide differently and nothing can be guessed wrongly.
 
 use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 
@@ -112,10 +112,6 @@ impl Mask {
     #[inline(always)]
     pub(crate) fn any(self) -> bool {
         imp::any(self.0)
-    }
-
-    pub(crate) fn to_array(self) -> [bool; 2] {
-        [imp::first(self.0).to_bits() != 0, imp::second(self.0).to_bits() != 0]
     }
 }
 

@@ -197,3 +197,94 @@ fn zero_crossing(mass_kg: f64, viscous_n_s_per_m: f64, velocity: f64, force: f64
     let y = viscous_n_s_per_m * frictionless_s / mass_kg;
     if y == 0.0 { frictionless_s } else { frictionless_s * (libm::log1p(y) / y) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn motion(viscous_n_per_mm_per_s: f64) -> Motion {
+        let rig = RigParameters::baseline();
+        let rig = rig.with("friction.viscous_n_per_mm_per_s", &[viscous_n_per_mm_per_s]).expect("in range");
+        Motion::new(&rig, 0.0)
+    }
+
+    fn at(velocity: f64) -> Place {
+        Place { extension: 0.25, velocity }
+    }
+
+    #[test]
+    fn the_factors_solve_the_equation_of_motion() {
+        // z from far below to far above the change from series to difference.
+        for viscous in [0.0, 1e-6, 0.1, 1.1, 10.0] {
+            let span = 0.01;
+            let whole = motion(viscous).advance(0, at(0.2), 500.0, span);
+            let mut parts = at(0.2);
+            for _ in 0..1000 {
+                parts = motion(viscous).advance(0, parts, 500.0, span / 1000.0);
+            }
+            // An exact solution does not depend on how it is cut: a thousand roundings of 0.25 m and 1 m/s.
+            assert!((whole.extension - parts.extension).abs() < 1e-13, "b = {viscous}");
+            assert!((whole.velocity - parts.velocity).abs() < 1e-12, "b = {viscous}");
+        }
+        // And one of the solutions, written down: b = 0, 474 N on 5 kg.
+        let end = motion(0.0).advance(0, at(0.2), 500.0, 0.01);
+        assert!((end.velocity - (0.2 + 94.8 * 0.01)).abs() < 1e-15);
+        assert!((end.extension - (0.25 + 0.002 + 47.4e-4)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_long_push_ends_at_the_terminal_velocity() {
+        // (576 - 26) N / 1100 N s/m = 0.5 m/s; 20 ms are 4.4 time constants of 5 kg / 1100 N s/m.
+        let form = |t: f64| 0.5 * (1.0 - (-1100.0 / 5.0 * t).exp());
+        assert_eq!(form(0.0), 0.0);
+        for ms in 0..20 {
+            let t = f64::from(ms) * 1e-3;
+            let velocity = motion(1.1).advance(0, at(0.0), 576.0, t).velocity;
+            assert!((velocity - form(t)).abs() < 1e-14, "{ms} ms");
+        }
+    }
+
+    #[test]
+    fn a_decelerating_piston_stops_where_its_energy_is_spent_and_sticks() {
+        // b = 0: m v^2 / 2 = F_sli s, 0.5 * 5 * 0.1^2 / 26 = 0.96 mm.
+        let stop = motion(0.0).advance(0, at(0.1), 0.0, 0.1);
+        assert_eq!(stop.velocity, 0.0);
+        assert!((stop.extension - 0.25 - 0.5 * 5.0 * 0.01 / 26.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_piston_turns_round_inside_a_span_if_the_force_exceeds_the_static_friction() {
+        let held = motion(1.1).advance(0, at(0.01), -34.9, 0.01);
+        assert_eq!(held.velocity, 0.0);
+        let turned = motion(1.1).advance(0, at(0.01), -35.1, 0.01);
+        assert!(turned.velocity < 0.0);
+    }
+
+    #[test]
+    fn an_end_of_the_stroke_stops_the_piston_dead() {
+        let stop = motion(1.1).advance(1, Place { extension: 0.4999, velocity: 1.0 }, 500.0, 1e-3);
+        assert_eq!(stop, Place { extension: 0.5, velocity: 0.0 });
+        assert_eq!(motion(1.1).advance(1, stop, 1e6, 1e-3), stop, "pressed");
+        assert_eq!(motion(1.1).advance(1, stop, -34.0, 1e-3), stop, "held");
+        assert!(motion(1.1).advance(1, stop, -36.0, 1e-3).extension < 0.5, "leaves");
+    }
+
+    proptest! {
+        #[test]
+        fn friction_never_adds_energy(
+            velocity in -3.0..3.0_f64,
+            force in -2000.0..2000.0_f64,
+            viscous in 0.0..10.0_f64,
+            span in 1e-6..0.02_f64,
+        ) {
+            // Over any span: kinetic energy gained is at most the force's work. Ends take energy as well.
+            let start = at(velocity);
+            let end = motion(viscous).advance(0, start, force, span);
+            let gained = 2.5 * (end.velocity * end.velocity - velocity * velocity);
+            let work = force * (end.extension - start.extension);
+            // Roundings of energies up to some hundred joule.
+            prop_assert!(gained <= work + 1e-12 * (gained.abs() + work.abs() + 1.0), "{gained} J > {work} J");
+        }
+    }
+}

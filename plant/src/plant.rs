@@ -67,9 +67,17 @@ impl Plant {
 
     /// Advances by exactly 1 ms with the inputs held.
     ///
-    /// Commands beyond [-1, 1] are not the plant's to judge: the caller rounds and refuses them
-    /// ([`crate::quantise_valve`]). While the emergency stop holds, they count as 0.
+    /// The caller has rounded the commands to what the wire can carry ([`crate::quantise_valve`]) and refused NaN. While
+    /// the emergency stop holds, they count as 0.
+    ///
+    /// # Panics
+    /// In debug builds, if a command is not in [-1, 1] or a hand's force not finite: a bug of the caller.
     pub fn step(&mut self, inputs: &Inputs) {
+        debug_assert!(inputs.valve.iter().all(|u| (-1.0..=1.0).contains(u)), "{inputs:?}");
+        debug_assert!(
+            inputs.hand_force_carriage_n.is_finite() && inputs.hand_force_load_n.is_finite(),
+            "{inputs:?}"
+        );
         let command = if self.state.emergency_stop {
             Pair::both(0.0)
         } else {

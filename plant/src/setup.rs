@@ -110,9 +110,10 @@ pub(crate) fn check_state(rig: &RigParameters, state: &State) -> Result<(), Setu
         let good = (min..=max).contains(&value);
         if good { Ok(()) } else { Err(SetupError::State { name: name.to_owned(), value, min, max }) }
     };
-    // Wide enough for any rig of this kind, so that only nonsense is refused: a thousand bar, a thousand m/s.
+    // Wide enough for any rig of this kind, so that only nonsense is refused: 1 Pa, a thousand bar, a thousand m/s.
+    let (least_pa, most_pa) = (1.0, 1e8);
     let volume = rig.cylinder().dead_volume_m3 + rig.cylinder().stroke_m * rig.cylinder().piston_area_m2;
-    let (least_air, most_air) = (rig.cylinder().dead_volume_m3 * 1.0, volume * 1e8);
+    let (least_air, most_air) = (rig.cylinder().dead_volume_m3 * least_pa, volume * most_pa);
     for (axis, name) in state.axes.iter().zip(["drive", "load"]) {
         check(&format!("{name} extension_m"), axis.extension_m, 0.0, rig.cylinder().stroke_m)?;
         check(&format!("{name} rod_velocity_m_per_s"), axis.rod_velocity_m_per_s, -1e3, 1e3)?;

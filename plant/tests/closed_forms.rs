@@ -42,7 +42,14 @@ fn without_lag() -> RigParameters {
 }
 
 /// Compares one pressure with its closed form at each millisecond, from t = 0 on.
-fn follow(plant: &mut Plant, u: f64, ms: usize, pick: fn(&plant::AxisTruth) -> f64, form: impl Fn(f64) -> f64, tolerance: f64) {
+fn follow(
+    plant: &mut Plant,
+    u: f64,
+    ms: usize,
+    pick: fn(&plant::AxisTruth) -> f64,
+    form: impl Fn(f64) -> f64,
+    tolerance: f64,
+) {
     for k in 0..=ms {
         let got = pick(&plant.truth(&inputs(u)).axes[0]);
         let want = form(k as f64 * 1e-3);
@@ -107,8 +114,7 @@ fn with_its_lag_a_chamber_fills_and_vents_as_a_linear_system() {
     let rig = RigParameters::baseline();
     let tau = 8e-3;
     let edge = 0.5 * KV_TO_SI * 0.36 * P_SUPPLY;
-    let filling =
-        |t: f64| 1.5e5 + P_N / V_LARGE * edge * (t + tau * (-t / tau).exp_m1());
+    let filling = |t: f64| 1.5e5 + P_N / V_LARGE * edge * (t + tau * (-t / tau).exp_m1());
     assert_eq!(filling(0.0), 1.5e5);
     let mut plant = pressed(&rig, -0.5, 3e5, 1.5e5, [0.0, 0.0]);
     // The step is exact here: the edge flow does not depend on p. Roundings of 1e5 Pa.
@@ -118,8 +124,7 @@ fn with_its_lag_a_chamber_fills_and_vents_as_a_linear_system() {
     let half_k = P_N * KV_TO_SI * 0.30 / V_LARGE / 2.0;
     let root = (1.0 - 4.0 * tau * half_k).sqrt();
     let (fast, slow) = (-(1.0 + root) / (2.0 * tau), -(1.0 - root) / (2.0 * tau));
-    let venting =
-        |t: f64| 6.5e5 * (fast * (slow * t).exp() - slow * (fast * t).exp()) / (fast - slow);
+    let venting = |t: f64| 6.5e5 * (fast * (slow * t).exp() - slow * (fast * t).exp()) / (fast - slow);
     assert!((venting(0.0) - 6.5e5).abs() < 1e-9);
     let mut plant = pressed(&rig, 0.5, 3e5, 6.5e5, [0.0, 0.0]);
     // Midpoint rule: (half_k h)^2 / 24 per step, relative, over a time of 1 / half_k: 1e-9 of 6.5e5 Pa and a decade.
@@ -177,11 +182,14 @@ fn closed_chambers_keep_their_mass() {
     let mut travelled = 0.0;
     for k in 0..2000 {
         let push = 400.0 * (k as f64 * 0.02).sin();
-        let hand = Inputs { hand_force_carriage_n: push, hand_force_load_n: -push / 3.0, valve: [0.02, -0.02] };
+        let hand =
+            Inputs { hand_force_carriage_n: push, hand_force_load_n: -push / 3.0, valve: [0.02, -0.02] };
         plant.step(&hand);
         travelled += plant.state().axes[0].rod_velocity_m_per_s.abs() * 1e-3;
         for (now, then) in plant.state().axes.iter().zip(&before.axes) {
-            for (now, then) in [(now.stored_air_a_j, then.stored_air_a_j), (now.stored_air_b_j, then.stored_air_b_j)] {
+            for (now, then) in
+                [(now.stored_air_a_j, then.stored_air_a_j), (now.stored_air_b_j, then.stored_air_b_j)]
+            {
                 // The bound; in fact the two are the same to the bit.
                 assert!((now - then).abs() <= 1e-9 * then);
                 assert_eq!(now, then);

@@ -18,8 +18,10 @@ fn in_range(key: &Key, share: f64) -> f64 {
 /// A rig file from shares, with the pairs that must fit together put in order.
 fn rig_from(shares: &[f64]) -> RigParameters {
     let mut share = shares.iter().copied().cycle();
-    let mut values: Vec<(&Key, Vec<f64>)> =
-        KEYS.iter().map(|key| (key, share.by_ref().take(key.count).map(|s| in_range(key, s)).collect())).collect();
+    let mut values: Vec<(&Key, Vec<f64>)> = KEYS
+        .iter()
+        .map(|key| (key, share.by_ref().take(key.count).map(|s| in_range(key, s)).collect()))
+        .collect();
     let get = |values: &[(&Key, Vec<f64>)], name: &str| -> f64 {
         values.iter().find(|(key, _)| key.name == name).expect("a key").1[0]
     };
@@ -32,20 +34,23 @@ fn rig_from(shares: &[f64]) -> RigParameters {
         let first = numbers[0];
         match key.name {
             "atmospheric_pressure_bar" => numbers[0] = first.min(exhaust),
-            "check_valve_pressure_bar" => numbers[0] = first.clamp(exhaust + 0.01, (pressure - 0.01).min(key.max)),
+            "check_valve_pressure_bar" => {
+                numbers[0] = first.clamp(exhaust + 0.01, (pressure - 0.01).min(key.max))
+            }
             "rod_side_pressure_bar" => numbers[0] = first.clamp(exhaust, pressure),
             "annulus_area_mm2" => numbers[0] = first.min(piston * 0.99),
             "sliding_force_n" => numbers[0] = first.min(break_away),
             "carriage_kg" => numbers[0] = first.min(drive * 0.9),
             "opening" => {
-                // Growing by at least 0.01 from 0 to 1.
+                // Parts of at least 0.003 from 0 to 1.
                 let total: f64 = numbers[1..].iter().map(|part| part + 0.02).sum();
                 let mut sum = 0.0;
-                for i in 0..VALVE_POINTS {
-                    sum += if i == 0 { 0.0 } else { (numbers[i] + 0.02) / total };
-                    numbers[i] = if i == VALVE_POINTS - 1 { 1.0 } else { sum };
+                for number in &mut numbers[1..] {
+                    sum += (*number + 0.02) / total;
+                    *number = sum.min(1.0);
                 }
                 numbers[0] = 0.0;
+                numbers[VALVE_POINTS - 1] = 1.0;
             }
             "kv_supply_m3_per_h" | "kv_exhaust_m3_per_h" => {
                 numbers.sort_by(f64::total_cmp);
@@ -63,7 +68,11 @@ fn rig_from(shares: &[f64]) -> RigParameters {
         }
         let number = |value: &f64| format!("{value:?}");
         let list = numbers.iter().map(number).collect::<Vec<_>>().join(", ");
-        text += &if key.count == 1 { format!("{} = {list}\n", key.name) } else { format!("{} = [{list}]\n", key.name) };
+        text += &if key.count == 1 {
+            format!("{} = {list}\n", key.name)
+        } else {
+            format!("{} = [{list}]\n", key.name)
+        };
     }
     RigParameters::from_toml(&text, "generated.toml").unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
@@ -95,18 +104,25 @@ fn check(plant: &Plant, inputs: &Inputs) -> Result<(), TestCaseError> {
         prop_assert!(axis.pressure_a_pa > 0.0 && axis.pressure_b_pa > 0.0, "{axis:?}");
         prop_assert!((0.0..=stroke_m).contains(&state.extension_m), "{state:?}");
         prop_assert!(axis.spool.abs() <= 1.0);
-        let friction_power_w = (axis.viscous_friction_n + axis.sliding_friction_n) * axis.rod_velocity_m_per_s;
+        let friction_power_w =
+            (axis.viscous_friction_n + axis.sliding_friction_n) * axis.rod_velocity_m_per_s;
         prop_assert!(friction_power_w <= 0.0, "friction adds energy: {axis:?}");
-        prop_assert!(axis.holding_force_n == 0.0 || axis.rod_velocity_m_per_s == 0.0, "held while moving: {axis:?}");
+        prop_assert!(
+            axis.holding_force_n == 0.0 || axis.rod_velocity_m_per_s == 0.0,
+            "held while moving: {axis:?}"
+        );
         prop_assert!(state.extension_m > 0.0 || axis.rod_velocity_m_per_s >= 0.0, "moves out of the stroke");
-        prop_assert!(state.extension_m < stroke_m || axis.rod_velocity_m_per_s <= 0.0, "moves out of the stroke");
+        prop_assert!(
+            state.extension_m < stroke_m || axis.rod_velocity_m_per_s <= 0.0,
+            "moves out of the stroke"
+        );
     }
     prop_assert!(truth.contact_force_n * truth.linkage_distance_m >= 0.0, "the contact pulls: {truth:?}");
     Ok(())
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_admitted_rig_stays_finite_with_positive_pressures(

@@ -60,7 +60,8 @@ fn the_start_stays_at_rest() {
 fn a_setup_outside_the_rig_is_refused_with_its_range() {
     let rig = RigParameters::baseline();
     for carriage_position_m in [-1e-9, 0.500001, f64::NAN, f64::INFINITY] {
-        let error = Plant::new(&rig, &Setup { carriage_position_m, ..Setup::default() }).expect_err("refused");
+        let error =
+            Plant::new(&rig, &Setup { carriage_position_m, ..Setup::default() }).expect_err("refused");
         assert!(matches!(error, SetupError::CarriagePosition { .. }));
         assert!(error.to_string().contains("allowed are 0 to 0.5 m"), "{error}");
     }
@@ -241,6 +242,8 @@ fn shut_check_valves_hold_the_air_and_stop_the_motion() {
     run(&mut plant, valve(1.0, 0.0), 71);
     assert!(plant.check_valves_shut());
     let trapped = plant.state().axes;
+    let way = trapped[0].extension_m - x_trip;
+    assert!((0.03..0.06).contains(&way), "up to 6 cm at full speed until the valves shut: {way} m");
     for _ in 0..2000 {
         plant.step(&valve(1.0, -1.0));
         for (now, then) in plant.state().axes.iter().zip(&trapped) {
@@ -249,9 +252,8 @@ fn shut_check_valves_hold_the_air_and_stop_the_motion() {
         }
     }
     let drive = plant.state().axes[0];
-    assert_eq!(drive.rod_velocity_m_per_s, 0.0);
-    let way = drive.extension_m - x_trip;
-    assert!((0.0..0.08).contains(&way), "some centimetres after the trip: {way} m");
+    // With b = 1.1 N/(mm/s) the air spring is overdamped: the last micrometres are crept, not slipped.
+    assert!(drive.rod_velocity_m_per_s.abs() < 1e-5, "{} m/s", drive.rod_velocity_m_per_s);
 }
 
 #[test]

@@ -145,8 +145,7 @@ impl Reference {
         let contact = self.contact();
         let regime = self.regime(inputs);
         let acceleration = self.acceleration(inputs, 0, &regime);
-        let drive =
-            (CARRIAGE + self.added) * acceleration - contact - inputs.hand_force_carriage_n;
+        let drive = (CARRIAGE + self.added) * acceleration - contact - inputs.hand_force_carriage_n;
         Seen {
             x: self.axes.map(|axis| axis.x),
             force: [drive, -contact + inputs.hand_force_load_n],
@@ -239,11 +238,8 @@ impl Reference {
                 row[6] = (edge_b - axis.q_b) / TAU_FLOW;
             }
         }
-        rate[14] = if self.stopped {
-            (P_ATMOSPHERE - self.supply) / 0.05
-        } else {
-            (P_SUPPLY - self.supply) / 0.3
-        };
+        rate[14] =
+            if self.stopped { (P_ATMOSPHERE - self.supply) / 0.05 } else { (P_SUPPLY - self.supply) / 0.3 };
         rate
     }
 

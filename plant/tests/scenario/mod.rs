@@ -72,7 +72,8 @@ pub(crate) fn record(rig: &RigParameters, kind: Kind, ms: usize) -> Scenario {
         let quantised = |u: f64| plant::quantise_valve(u);
         let position_error = wanted - drive.position_m;
         let u_drive = 12.0 * position_error - 0.35 * drive.rod_velocity_m_per_s
-            + 0.05 * f64::from(position_error > 1e-3) - 0.05 * f64::from(position_error < -1e-3);
+            + 0.05 * f64::from(position_error > 1e-3)
+            - 0.05 * f64::from(position_error < -1e-3);
         let wanted_force = [0.0, 150.0, 350.0, 60.0][k / 700 % 4];
         let force_error = wanted_force - load.sensor_force_n;
         let u_load = if linked { 2e-3 * force_error } else { 0.2 * (k as f64 * 4e-3).sin() };
@@ -81,8 +82,7 @@ pub(crate) fn record(rig: &RigParameters, kind: Kind, ms: usize) -> Scenario {
         } else {
             (u_drive, u_load)
         };
-        let inputs =
-            Inputs { valve: [quantised(u_drive), quantised(u_load)], ..Inputs::default() };
+        let inputs = Inputs { valve: [quantised(u_drive), quantised(u_load)], ..Inputs::default() };
         scenario.inputs.push(inputs);
         scenario.states.push(*plant.state());
         plant.step(&inputs);

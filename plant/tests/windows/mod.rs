@@ -64,7 +64,8 @@ pub(crate) fn reference_windows(scenario: &Scenario, steps: u32) -> Vec<Window> 
             rig.advance(&scenario.inputs[start + k], steps, Method::RungeKutta4);
             window.seen.push(rig.seen(&Inputs::default()));
             if rig.corners != before {
-                (k.saturating_sub(5)..(k + 6).min(WINDOW_MS)).for_each(|near| window.near_corner[near] = true);
+                (k.saturating_sub(5)..(k + 6).min(WINDOW_MS))
+                    .for_each(|near| window.near_corner[near] = true);
             }
         }
         window

@@ -1,0 +1,56 @@
+//! A step, a sample and a look at the truth allocate nothing: counted by the allocator itself.
+
+#![allow(unsafe_code)] // an allocator that counts can only be an unsafe impl
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
+
+thread_local! {
+    /// Allocations of this thread; the test harness has threads of its own.
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every call goes to the system's allocator unchanged; counting touches a thread-local without a destructor.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_period_allocates_nothing() {
+    let rig = RigParameters::baseline();
+    let mut plant = Plant::new(&rig, &Setup { linked: true, ..Setup::default() }).expect("good");
+    let mut sensors = Sensors::new(&rig, 1);
+    let counted = ALLOCATIONS.with(Cell::get);
+    assert!(counted > 0, "the counter counts");
+    let mut sum = 0.0;
+    for k in 0..3000 {
+        match k {
+            1000 => plant.trip_emergency_stop(),
+            1500 => plant.release_emergency_stop(),
+            2000 => plant.unlink(),
+            _ => (),
+        }
+        let u = if k / 300 % 2 == 0 { 1.0 } else { -1.0 };
+        let inputs = Inputs { valve: [u, -0.5 * u], ..Inputs::default() };
+        sum += sensors.sample(&plant, &inputs)[0].position.value + plant.truth(&inputs).values()[0];
+        plant.step(&inputs);
+    }
+    assert_eq!(ALLOCATIONS.with(Cell::get), counted);
+    assert!(sum > 0.0);
+}

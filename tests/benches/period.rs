@@ -1,0 +1,192 @@
+//! One period of 1 ms of both axes, linked and moving, and the same scheme in plain C as its floor.
+//!
+//! `cargo bench -p system-tests --bench period`
+//!
+//! The motion is the recorded one of plant's tests of accuracy: set-points under load steps, with rests, sticking and
+//! contact. Before anything is timed, both codes run the whole record and must stay together to 1e-9: only then is it
+//! the same scheme. Divan gives the distribution over
+//! samples of 50 periods; the two last lines compare the best of alternating passes, which is what
+//! noise from the machine touches least. The code is that which ships: plain x86-64, the release profile.
+
+#![allow(unsafe_code, clippy::print_stdout)] // the floor is C, and a benchmark prints
+
+use std::ffi::{c_int, c_ulong};
+use std::hint::black_box;
+use std::time::Instant;
+
+use divan::Bencher;
+use plant::{AxisState, Inputs, Plant, RigParameters};
+
+#[path = "../../plant/tests/scenario/mod.rs"]
+mod scenario;
+
+use scenario::{Kind, Scenario};
+
+/// The rig's numbers as `struct rig` of floor.c has them.
+#[repr(C)]
+struct FloorRig {
+    supply: [f64; 4],
+    time_constants: [f64; 2],
+    tables: [[f64; 6]; 3],
+    cylinder: [f64; 4],
+    friction: [f64; 3],
+    masses: [f64; 2],
+    linkage: [f64; 3],
+}
+
+/// `struct axis` of floor.c.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+struct FloorAxis([f64; 7]);
+
+#[link(name = "floor", kind = "static")]
+unsafe extern "C" {
+    fn floor_size() -> c_ulong;
+    fn floor_new(plant: *mut u64, rig: *const FloorRig);
+    fn floor_step(plant: *const u64, axes: *mut FloorAxis, valve: *const f64, linked: c_int);
+}
+
+/// The C plant: constants behind a buffer of its own size, and the state.
+struct Floor {
+    constants: Vec<u64>,
+    axes: [FloorAxis; 2],
+}
+
+impl Floor {
+    fn new(rig: &RigParameters, axes: &[AxisState; 2]) -> Self {
+        let (supply, gas, valve) = (rig.supply(), rig.gas(), rig.valve());
+        let (cylinder, friction, mass, linkage) = (rig.cylinder(), rig.friction(), rig.mass(), rig.linkage());
+        let numbers = FloorRig {
+            supply: [
+                supply.pressure_pa,
+                supply.exhaust_pressure_pa,
+                supply.atmospheric_pressure_pa,
+                gas.normal_pressure_pa,
+            ],
+            time_constants: [valve.spool_time_constant_s, valve.flow_lag_time_constant_s],
+            tables: [valve.opening, valve.kv_supply_m3_per_h, valve.kv_exhaust_m3_per_h],
+            cylinder: [
+                cylinder.stroke_m,
+                cylinder.piston_area_m2,
+                cylinder.annulus_area_m2,
+                cylinder.dead_volume_m3,
+            ],
+            friction: [friction.break_away_force_n, friction.sliding_force_n, friction.viscous_n_s_per_m],
+            masses: [mass.drive_kg, mass.load_kg],
+            linkage: [linkage.gap_m, linkage.stiffness_n_per_m, linkage.damping_n_s_per_m],
+        };
+        // SAFETY: floor_size takes nothing and returns a constant.
+        let bytes = unsafe { floor_size() };
+        let mut constants = vec![0_u64; (bytes as usize).div_ceil(8)];
+        // SAFETY: the buffer has the size that C asked for and is aligned for doubles; FloorRig has the layout of
+        // struct rig, doubles only.
+        unsafe { floor_new(constants.as_mut_ptr(), &numbers) };
+        let axes = axes.map(|axis| {
+            FloorAxis([
+                axis.extension_m,
+                axis.rod_velocity_m_per_s,
+                axis.spool,
+                axis.stored_air_a_j,
+                axis.stored_air_b_j,
+                axis.flow_a_m3_per_s,
+                axis.flow_b_m3_per_s,
+            ])
+        });
+        Floor { constants, axes }
+    }
+
+    fn step(&mut self, inputs: &Inputs) {
+        // SAFETY: the constants were made by floor_new; axes and valve are two of each, as C reads and writes.
+        unsafe { floor_step(self.constants.as_ptr(), self.axes.as_mut_ptr(), inputs.valve.as_ptr(), 1) };
+    }
+}
+
+fn motion() -> (RigParameters, Scenario) {
+    let rig = RigParameters::baseline();
+    let kind = Kind { name: "linked under load steps", linked: true, ..Kind::FREE };
+    let scenario = scenario::record(&rig, kind, 6000);
+    (rig, scenario)
+}
+
+fn start(rig: &RigParameters, scenario: &Scenario) -> (Plant, Floor) {
+    let plant = Plant::in_state(rig, &scenario.states[0]).expect("a recorded state");
+    let floor = Floor::new(rig, &scenario.states[0].axes);
+    (plant, floor)
+}
+
+#[divan::bench(sample_count = 600, sample_size = 50)]
+fn plant_period(bencher: Bencher) {
+    let (rig, scenario) = motion();
+    let (fresh, _) = start(&rig, &scenario);
+    let (mut plant, mut k) = (fresh.clone(), 0);
+    bencher.bench_local(|| {
+        if k == scenario.inputs.len() {
+            (plant, k) = (fresh.clone(), 0);
+        }
+        plant.step(black_box(&scenario.inputs[k]));
+        k += 1;
+    });
+}
+
+#[divan::bench(sample_count = 600, sample_size = 50)]
+fn floor_period(bencher: Bencher) {
+    let (rig, scenario) = motion();
+    let (_, mut floor) = start(&rig, &scenario);
+    let (fresh, mut k) = (floor.axes, 0);
+    bencher.bench_local(|| {
+        if k == scenario.inputs.len() {
+            (floor.axes, k) = (fresh, 0);
+        }
+        floor.step(black_box(&scenario.inputs[k]));
+        k += 1;
+    });
+}
+
+/// Both codes through the whole record; panics where they part.
+fn check_the_same_scheme(rig: &RigParameters, scenario: &Scenario) {
+    let (mut plant, mut floor) = start(rig, scenario);
+    // What 1 means for each number of an axis: m, m/s, opening, J, J, m^3/s, m^3/s.
+    let scale = [0.5, 1.0, 1.0, 500.0, 500.0, 1e-2, 1e-2];
+    let mut worst = 0.0_f64;
+    for (k, inputs) in scenario.inputs.iter().enumerate() {
+        plant.step(inputs);
+        floor.step(inputs);
+        for (ours, theirs) in plant.state().axes.iter().zip(&floor.axes) {
+            let ours = [
+                ours.extension_m,
+                ours.rod_velocity_m_per_s,
+                ours.spool,
+                ours.stored_air_a_j,
+                ours.stored_air_b_j,
+                ours.flow_a_m3_per_s,
+                ours.flow_b_m3_per_s,
+            ];
+            for ((ours, theirs), scale) in ours.iter().zip(&theirs.0).zip(scale) {
+                worst = worst.max((ours - theirs).abs() / scale);
+                assert!(worst <= 1e-9, "{k} ms: the floor is another scheme, {ours} against {theirs}");
+            }
+        }
+    }
+    println!("same trajectory over {} ms to {worst:.1e}", scenario.inputs.len());
+}
+
+fn main() {
+    let (rig, scenario) = motion();
+    check_the_same_scheme(&rig, &scenario);
+    divan::main();
+
+    let periods = scenario.inputs.len() as f64;
+    let (mut plant_ns, mut floor_ns) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..30 {
+        let (mut plant, mut floor) = start(&rig, &scenario);
+        let before = Instant::now();
+        scenario.inputs.iter().for_each(|inputs| plant.step(black_box(inputs)));
+        plant_ns = plant_ns.min(before.elapsed().as_nanos() as f64 / periods);
+        let before = Instant::now();
+        scenario.inputs.iter().for_each(|inputs| floor.step(black_box(inputs)));
+        floor_ns = floor_ns.min(before.elapsed().as_nanos() as f64 / periods);
+        black_box((&plant, &floor.axes));
+    }
+    println!("plant {plant_ns:.0} ns per period of 1 ms: {:.0} times faster than real time", 1e6 / plant_ns);
+    println!("floor {floor_ns:.0} ns per period: the plant takes {:.2} of it", plant_ns / floor_ns);
+}
