@@ -6,7 +6,7 @@
 use crate::station::{News, Station};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{Bus, BusError, Received};
-use protocol::frames::MainChainState;
+use protocol::frames::{DRIVE_SENSORS, MainChainState};
 use realtime::{Clock, Interrupt, Recorder as Histogram};
 use std::time::{Duration, Instant as WallInstant};
 
@@ -82,9 +82,13 @@ pub fn run_real(
             watch = Some(realtime::allocations::watch());
         }
         let woke_ns = clock.now().as_nanos();
-        let mut newest_ns = None;
+        let mut arrived_ns = woke_ns;
+        let mut heard = false;
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
-            newest_ns = Some(stamp_ns);
+            heard = true;
+            if frame.standard_id() == Some(DRIVE_SENSORS.id) {
+                arrived_ns = stamp_ns;
+            }
             station.take(&frame);
         }
         if station.answer(bus) {
@@ -92,7 +96,7 @@ pub fn run_real(
             if let Some(last_ns) = last_answer_ns.replace(woke_ns) {
                 paced.period_error_ns.record(PERIOD_NS.abs_diff(woke_ns.saturating_sub(last_ns)));
             }
-            paced.wakeup_ns.record(woke_ns.saturating_sub(newest_ns.unwrap_or(woke_ns)));
+            paced.wakeup_ns.record(woke_ns.saturating_sub(arrived_ns));
         }
         if interrupt.came() {
             break End::Interrupted;
@@ -100,7 +104,7 @@ pub fn run_real(
         if station.ending() {
             break End::RigEnded;
         }
-        if newest_ns.is_some() {
+        if heard {
             last_frame = WallInstant::now();
         }
         let quiet = last_frame.elapsed();

@@ -1,1 +1,23 @@
-//! Whole-system tests: processes, buses, third-party clients.
+//! What the whole-system tests stand on: the shipped programs as processes, a peer on their bus, and their files.
+//!
+//! ```text
+//!   Scene ── a folder of its own: socket, rig file, experiment file, one output folder for each program
+//!     └─ Launch ── command line ──► Running ── signals, deadlines, stderr ──► Ended ── exit code
+//!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
+//!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised
+//! ```
+//!
+//! Nothing here waits without a limit; what is waited for, and what the programs said, stands in the panic. Programs are
+//! killed with their whole process group when their [`process::Running`] goes. No test asserts on timing: a limit is a
+//! protection against hanging, many times longer than what it limits takes.
+
+pub mod account;
+pub mod binaries;
+pub mod events;
+pub mod launch;
+pub mod load;
+pub mod peer;
+pub mod process;
+pub mod records;
+pub mod scene;
+pub mod turn;
