@@ -18,7 +18,7 @@ use crate::summary::{Machine, RunDescription, Summary};
 use plant::Sensors;
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
-use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, StampClock};
+use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock};
 use protocol::exit::Exit;
 use protocol::run_folder::{SCHEMA_VERSION, write_json};
 use realtime::{
@@ -85,10 +85,9 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let started = RunStart::now(lockstep);
     let (recorder, records) = recording::queues(lockstep);
     let writer = open_folder(arguments, &inputs, &started)?;
-    let host = start_host(arguments)?;
     // Simulated time in lockstep, where the log must not show the machine's clock.
     let simulated_ns = Arc::new(AtomicU64::new(0));
-    let mut bus = bus::open(&arguments.bus, stamp_clock(lockstep, &simulated_ns))?;
+    let (mut bus, host) = open_bus(arguments, stamp_clock(lockstep, &simulated_ns))?;
 
     std::thread::scope(|scope| {
         let writer = scope.spawn(|| writer.run(&records, &shared));
@@ -98,8 +97,10 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         tell_progress(&rig_loop, &shared);
         let outcome = join(rig_loop);
         let written = join(writer);
-        let host = host.and_then(HostThread::stop);
-        finish(arguments, &started, outcome?, written, host)
+        let thread_report = host.and_then(HostThread::stop);
+        let mut outcome = outcome?;
+        outcome.host = outcome.host.or(thread_report);
+        finish(arguments, &started, outcome, written)
     })
 }
 
@@ -138,6 +139,7 @@ struct LoopOutcome {
     paced: Paced,
     figures: StationFigures,
     bus: BusCounters,
+    host: Option<HostReport>,
 }
 
 fn rig_loop(
@@ -170,7 +172,12 @@ fn rig_loop(
         Pace::Lockstep => pace::run_lockstep(&mut station, bus, simulated_ns, &limits, shared)?,
     };
     // Taking the figures drops the station and with it the queues' sending ends, which lets the writer finish.
-    Ok(LoopOutcome { paced, figures: station.into_figures(), bus: *bus.counters() })
+    Ok(LoopOutcome {
+        paced,
+        figures: station.into_figures(),
+        bus: *bus.counters(),
+        host: bus.host_report().cloned(),
+    })
 }
 
 fn loop_config(arguments: &RunArguments) -> Result<PeriodicConfig, RunError> {
@@ -195,20 +202,29 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
     grants
 }
 
-fn start_host(arguments: &RunArguments) -> Result<Option<HostThread>, RunError> {
-    let BusUrl::Unix { path, wire } = &arguments.bus else { return Ok(None) };
+/// The rig's peer, and the thread that hosts the bus where one is needed.
+fn open_bus(
+    arguments: &RunArguments,
+    clock: StampClock,
+) -> Result<(Box<dyn Bus>, Option<HostThread>), RunError> {
+    let BusUrl::Unix { path, wire } = &arguments.bus else {
+        return Ok((bus::open(&arguments.bus, clock)?, None));
+    };
     let lockstep = arguments.pace == Pace::Lockstep;
     let barrier = lockstep.then(|| BarrierConfig {
         members: arguments.members,
         echo_ids: arguments.lockstep_echo.iter().map(|axis| axis.command_id()).collect(),
     });
-    let fifo =
-        (!lockstep && !arguments.no_realtime).then(|| arguments.fifo_priority.saturating_add(1).min(99));
     match Host::bind(path, *wire, barrier) {
-        Ok(host) => Ok(Some(HostThread::start(host, fifo))),
+        Ok(host) if lockstep => Ok((Box::new(HostedRig::new(host, clock)), None)),
+        Ok(host) => {
+            let fifo = (!arguments.no_realtime).then_some(arguments.fifo_priority + 1);
+            let thread = HostThread::start(host, fifo);
+            Ok((bus::open(&arguments.bus, clock)?, Some(thread)))
+        }
         Err(BusError::HostExists { .. }) => {
             eprintln!("emulator: {} has a host already; joining it", arguments.bus);
-            Ok(None)
+            Ok((bus::open(&arguments.bus, clock)?, None))
         }
         Err(error) => Err(error.into()),
     }
@@ -288,7 +304,6 @@ fn finish(
     started: &RunStart,
     outcome: LoopOutcome,
     written: WriterReport,
-    host: Option<HostReport>,
 ) -> Result<Exit, RunError> {
     let (exit, reason) = verdict(&outcome.paced.end);
     eprintln!("emulator: {reason}");
@@ -304,19 +319,13 @@ fn finish(
             .map_err(|error| RunError::output(&path, &error))?;
     }
     let path = arguments.out.join("summary.json");
-    let summary = summarise(outcome, written, host, reason, exit == Exit::Good);
+    let summary = summarise(outcome, written, reason, exit == Exit::Good);
     write_json(&path, &summary).map_err(|error| RunError::output(&path, &error))?;
     Ok(exit)
 }
 
-fn summarise(
-    outcome: LoopOutcome,
-    written: WriterReport,
-    bus_host: Option<HostReport>,
-    ended_because: String,
-    passed: bool,
-) -> Summary {
-    let LoopOutcome { paced, figures, bus } = outcome;
+fn summarise(outcome: LoopOutcome, written: WriterReport, ended_because: String, passed: bool) -> Summary {
+    let LoopOutcome { paced, figures, bus, host: bus_host } = outcome;
     let [drive_commands, load_commands] = figures.commands;
     let both = [drive_commands, load_commands];
     let lost = both.iter().map(|commands| commands.lost).sum();

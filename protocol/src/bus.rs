@@ -16,8 +16,9 @@
 mod can_link;
 pub mod control;
 pub mod host;
-mod kernel_receive;
+mod hosted_rig;
 pub mod lockstep;
+mod packets;
 mod socket_peer;
 mod unix_link;
 mod url;
@@ -26,6 +27,7 @@ mod wire;
 use crate::can::CanFrame;
 use std::time::Duration;
 
+pub use hosted_rig::HostedRig;
 pub use url::{BusUrl, UrlError, WireOptions};
 
 /// The clock that stamps frames: the time of what happened so many ns ago, in ns since an epoch of the caller's choice.
@@ -136,6 +138,11 @@ pub trait Bus: Send {
 
     /// Tells the barrier that this member has posted its frames of `cycle`.
     fn done(&mut self, cycle: u32);
+
+    /// What the bus's host counted, when this peer is the host as well.
+    fn host_report(&self) -> Option<&host::HostReport> {
+        None
+    }
 }
 
 /// Opens the bus that `url` names, stamping frames with `clock`.

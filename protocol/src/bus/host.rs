@@ -8,9 +8,9 @@
 //! The socket is guarded by a lock file beside it: whoever holds the lock may remove a stale socket; a second host is
 //! refused. The lock goes with the process that holds it, however it ends.
 
-use super::control::{Control, Kind};
-use super::kernel_receive::{self, Wait};
+use super::control::{Control, Kind, Role};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
+use super::packets::{Inbox, Outbox, Wait};
 use super::url::{BusUrl, WireOptions};
 use super::wire::Wire;
 use super::{BusError, unix_link};
@@ -18,8 +18,9 @@ use crate::can::{CAN_FRAME_BYTES, CanFrame};
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 use rustix::fs::{FlockOperation, Mode, OFlags};
 use rustix::net::{AddressFamily, SendFlags, SocketAddrUnix, SocketFlags, SocketType};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::io;
+use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,9 +33,11 @@ pub const BARRIER_TIMEOUT: Duration = Duration::from_secs(5);
 const PEER_QUEUE_BYTES: usize = 2 << 20;
 /// How long the host sleeps when nothing happens, so that it sees its stop flag.
 const IDLE_WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
-/// Packets taken from one peer before the next has its turn.
-const PACKETS_A_TURN: usize = 64;
+/// Peers that are looked at in one turn; epoll brings the others in the next.
+const EVENTS_A_TURN: usize = 32;
 const LISTENER: u64 = u64::MAX;
+/// The rig that lives in the host's process.
+const RIG_HERE: PeerId = u64::MAX - 1;
 
 /// Frames by identifier, as candump writes it.
 pub type FramesById = BTreeMap<String, u64>;
@@ -66,6 +69,19 @@ pub struct HostReport {
 struct Peer {
     socket: OwnedFd,
     report: usize,
+    outbox: Outbox,
+}
+
+/// A packet from the rig that lives in the host's process.
+pub(super) enum FromRig {
+    Frame(CanFrame),
+    Done(u32),
+}
+
+/// A packet for it.
+pub(super) enum ForRig {
+    Frame(CanFrame),
+    Barrier(Control),
 }
 
 /// The embedded bus, bound to its socket and not yet serving.
@@ -78,6 +94,8 @@ pub struct Host {
     wire: Wire,
     barrier: Option<Barrier>,
     waiting_since: Instant,
+    inbox: Inbox,
+    for_rig: Option<VecDeque<ForRig>>,
     report: HostReport,
     // Last, so that the lock outlives the socket file, which `drop` removes.
     _lock: OwnedFd,
@@ -110,6 +128,8 @@ impl Host {
             wire: Wire::new(&wire),
             barrier: barrier.map(Barrier::new),
             waiting_since: Instant::now(),
+            inbox: Inbox::new(),
+            for_rig: None,
             report: HostReport::default(),
             _lock: lock,
         })
@@ -120,22 +140,58 @@ impl Host {
     /// # Errors
     /// What epoll says when the system is out of memory or descriptors.
     pub fn serve(mut self, stop: &AtomicBool) -> io::Result<HostReport> {
-        let mut events = Vec::with_capacity(32);
         while !stop.load(Ordering::Relaxed) {
-            events.clear();
-            match epoll::wait(&self.epoll, rustix::buffer::spare_capacity(&mut events), Some(&IDLE_WAIT)) {
-                Ok(_) | Err(rustix::io::Errno::INTR) => {}
-                Err(error) => return Err(error.into()),
-            }
-            for event in &events {
-                match event.data.u64() {
-                    LISTENER => self.accept(),
-                    peer => self.take_from(peer),
-                }
-            }
-            self.advance_barrier();
+            self.turn(IDLE_WAIT)?;
         }
         Ok(std::mem::take(&mut self.report))
+    }
+
+    /// Waits for packets, at most for `patience`, and carries them on.
+    pub(super) fn turn(&mut self, patience: Timespec) -> io::Result<()> {
+        let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
+        let events = match epoll::wait(&self.epoll, &mut room, Some(&patience)) {
+            Ok((events, _)) => &*events,
+            Err(rustix::io::Errno::INTR) => &[],
+            Err(error) => return Err(error.into()),
+        };
+        for event in events {
+            match event.data.u64() {
+                LISTENER => self.accept(),
+                peer => self.take_from(peer),
+            }
+        }
+        self.advance_barrier();
+        Ok(())
+    }
+
+    /// The barrier's rig lives in this process: its packets come and go without a socket.
+    pub(super) fn join_rig_here(&mut self) -> bool {
+        let Some(barrier) = &mut self.barrier else { return false };
+        barrier.join(RIG_HERE, Role::Rig, "rig".into());
+        self.for_rig = Some(VecDeque::new());
+        true
+    }
+
+    /// What the rig that lives here says.
+    pub(super) fn take_from_rig(&mut self, packet: FromRig) {
+        let Some(barrier) = &mut self.barrier else { return };
+        match packet {
+            FromRig::Frame(frame) => barrier.post(RIG_HERE, frame),
+            FromRig::Done(cycle) => {
+                barrier.done(RIG_HERE, cycle);
+                self.advance_barrier();
+            }
+        }
+    }
+
+    /// The oldest packet for the rig that lives here.
+    pub(super) fn next_for_rig(&mut self) -> Option<ForRig> {
+        self.for_rig.as_mut()?.pop_front()
+    }
+
+    /// What was counted so far.
+    pub(super) fn report(&self) -> &HostReport {
+        &self.report
     }
 
     fn accept(&mut self) {
@@ -150,34 +206,40 @@ impl Host {
             return;
         }
         self.next_peer += 1;
-        self.peers.insert(id, Peer { socket, report: self.report.peers.len() });
+        self.peers.insert(id, Peer { socket, report: self.report.peers.len(), outbox: Outbox::new() });
         self.report.peers.push(PeerReport { name: process, ..PeerReport::default() });
     }
 
     fn take_from(&mut self, id: PeerId) {
-        for _ in 0..PACKETS_A_TURN {
-            let Some(peer) = self.peers.get(&id) else { return };
-            let packet = match kernel_receive::receive(peer.socket.as_fd(), Wait::No) {
-                Ok(packet) if packet.len > 0 => packet,
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                // Length 0 or an error: the peer is gone.
-                _ => return self.remove(id),
-            };
-            let bytes = &packet.bytes[..packet.len];
-            let frame = <&[u8; CAN_FRAME_BYTES]>::try_from(bytes).ok().and_then(CanFrame::from_bytes);
-            if let Some(frame) = frame {
-                self.report.peers[peer.report].frames_received += 1;
-                match &mut self.barrier {
-                    Some(barrier) => barrier.post(id, frame),
-                    None => self.deliver(&frame, id),
-                }
-            } else if let Some(control) = Control::from_bytes(bytes) {
-                // A member says Done last: asking once more would find its queue empty.
-                return self.obey(id, &control);
-            } else {
-                self.report.malformed += 1;
+        let Some(peer) = self.peers.get(&id) else { return };
+        // One batch, then the next peer has its turn; epoll tells again while more waits. Stamps are the peers' affair.
+        match self.inbox.fill(peer.socket.as_fd(), Wait::No, &|_| 0) {
+            Ok(()) => {}
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
+            Err(_) => self.remove(id),
+        }
+        while let Some(packet) = self.inbox.take() {
+            // Length 0: the peer is gone.
+            if packet.len == 0 {
+                return self.remove(id);
             }
+            self.take(id, &packet.bytes[..packet.len]);
+        }
+    }
+
+    fn take(&mut self, id: PeerId, bytes: &[u8]) {
+        let Some(peer) = self.peers.get(&id) else { return };
+        let frame = <&[u8; CAN_FRAME_BYTES]>::try_from(bytes).ok().and_then(CanFrame::from_bytes);
+        if let Some(frame) = frame {
+            self.report.peers[peer.report].frames_received += 1;
+            match &mut self.barrier {
+                Some(barrier) => barrier.post(id, frame),
+                None => self.deliver(&frame, id),
+            }
+        } else if let Some(control) = Control::from_bytes(bytes) {
+            self.obey(id, &control);
+        } else {
+            self.report.malformed += 1;
         }
     }
 
@@ -201,7 +263,7 @@ impl Host {
         }
     }
 
-    /// Puts one frame on the wire: to everyone but its sender.
+    /// Puts one frame on the wire: to everyone but its sender. What a member of the barrier gets leaves with its Go.
     fn deliver(&mut self, frame: &CanFrame, from: PeerId) {
         self.report.frames += 1;
         if self.wire.loses_next() {
@@ -209,16 +271,22 @@ impl Host {
             return;
         }
         let bytes = frame.to_bytes();
-        for (id, peer) in self.peers.iter().filter(|(id, _)| **id != from) {
-            let reliable = self.barrier.as_ref().is_some_and(|barrier| barrier.must_not_lose(*id));
-            if !send(peer, &bytes, reliable) {
+        if let Some(for_rig) = &mut self.for_rig
+            && from != RIG_HERE
+        {
+            for_rig.push_back(ForRig::Frame(*frame));
+        }
+        for (id, peer) in self.peers.iter_mut().filter(|(id, _)| **id != from) {
+            if self.barrier.as_ref().is_some_and(|barrier| barrier.must_not_lose(*id)) {
+                peer.post(&bytes);
+            } else if !peer.send(&bytes) {
                 count(&mut self.report.peers[peer.report].dropped_at_queue, frame);
             }
         }
     }
 
     fn advance_barrier(&mut self) {
-        let connected = self.peers.len();
+        let connected = self.peers.len() + usize::from(self.for_rig.is_some());
         while let Some(release) = self.barrier.as_mut().and_then(|barrier| barrier.release(connected)) {
             self.carry_out(release);
             self.waiting_since = Instant::now();
@@ -228,8 +296,8 @@ impl Host {
         else {
             return;
         };
-        if let Some(rig) = barrier.rig().and_then(|rig| self.peers.get(&rig)) {
-            send(rig, &Control::named(Kind::TimedOut, 0, &name).to_bytes(), true);
+        if let Some(rig) = barrier.rig() {
+            self.tell(rig, Control::named(Kind::TimedOut, 0, &name));
         }
     }
 
@@ -238,9 +306,19 @@ impl Host {
             self.deliver(frame, *from);
         }
         let members = self.barrier.as_ref().map_or(0, |barrier| barrier.member_count()) as u8;
-        let go = Control::new(Kind::Go { members }, release.cycle).to_bytes();
-        for peer in release.go.iter().filter_map(|id| self.peers.get(id)) {
-            send(peer, &go, true);
+        for id in release.go {
+            self.tell(id, Control::new(Kind::Go { members }, release.cycle));
+        }
+        // Members that may not act yet get their frames too, so that nothing waits in the host.
+        self.peers.values_mut().for_each(Peer::flush);
+    }
+
+    fn tell(&mut self, id: PeerId, control: Control) {
+        if let (RIG_HERE, Some(for_rig)) = (id, &mut self.for_rig) {
+            for_rig.push_back(ForRig::Barrier(control));
+        } else if let Some(peer) = self.peers.get_mut(&id) {
+            peer.post(&control.to_bytes());
+            peer.flush();
         }
     }
 }
@@ -252,21 +330,36 @@ impl Drop for Host {
     }
 }
 
-/// Sends without blocking, or for a peer of the barrier with a wait; false when the peer's queue did not take it.
-fn send(peer: &Peer, bytes: &[u8], reliable: bool) -> bool {
-    let flags = SendFlags::DONTWAIT | SendFlags::NOSIGNAL;
-    loop {
-        match rustix::net::send(&peer.socket, bytes, flags) {
-            Ok(_) => return true,
-            Err(rustix::io::Errno::AGAIN) if reliable => {
-                let timeout = Timespec { tv_sec: BARRIER_TIMEOUT.as_secs() as i64, tv_nsec: 0 };
-                if poll(&mut [PollFd::new(&peer.socket, PollFlags::OUT)], Some(&timeout)) == Ok(0) {
-                    return false;
-                }
-            }
+impl Peer {
+    /// Sends without blocking; false when the queue did not take the packet.
+    fn send(&self, bytes: &[u8]) -> bool {
+        match rustix::net::send(&self.socket, bytes, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
             // A peer that just went is removed when its end is read; nothing is lost by it.
-            Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => return true,
-            Err(_) => return false,
+            Ok(_) | Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => true,
+            Err(_) => false,
+        }
+    }
+
+    /// Adds a packet that must not be lost.
+    fn post(&mut self, bytes: &[u8]) {
+        if self.outbox.is_full() {
+            self.flush();
+        }
+        self.outbox.push(bytes);
+    }
+
+    /// Sends what was posted, waiting for room for as long as a member has to be done.
+    fn flush(&mut self) {
+        if self.outbox.is_empty() {
+            return;
+        }
+        while let Err(error) = self.outbox.flush(self.socket.as_fd()) {
+            let timeout = Timespec { tv_sec: BARRIER_TIMEOUT.as_secs() as i64, tv_nsec: 0 };
+            let full = error.kind() == io::ErrorKind::WouldBlock;
+            if !full || poll(&mut [PollFd::new(&self.socket, PollFlags::OUT)], Some(&timeout)) == Ok(0) {
+                // A member that is gone, or that does not read: the barrier's time-out names it.
+                self.outbox.clear();
+            }
         }
     }
 }

@@ -4,7 +4,7 @@
 //! was dropped meanwhile is never sent later. Neither sending nor receiving blocks or allocates while the bus is up.
 
 use super::control::{CONTROL_BYTES, Control, Kind, Role};
-use super::kernel_receive::{self, Packet, Wait};
+use super::packets::{self, Inbox, Outbox, Packet, Wait};
 use super::url::BusUrl;
 use super::{Bus, BusCounters, BusError, Received, SendError, StampClock};
 use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
@@ -45,6 +45,10 @@ pub(super) struct SocketPeer<L> {
     ever_up: bool,
     next_attempt: Instant,
     joined: Option<Control>,
+    inbox: Inbox,
+    drained: bool,
+    /// What a member of the barrier posts; it leaves with its `done`.
+    outbox: Outbox,
     overflow_seen: u32,
     counters: BusCounters,
 }
@@ -76,6 +80,9 @@ impl<L: Link> SocketPeer<L> {
             ever_up: false,
             next_attempt: Instant::now(),
             joined: None,
+            inbox: Inbox::new(),
+            drained: false,
+            outbox: Outbox::new(),
             overflow_seen: 0,
             counters: BusCounters::default(),
         }
@@ -83,7 +90,7 @@ impl<L: Link> SocketPeer<L> {
 
     fn connect(&mut self) -> io::Result<()> {
         let socket = self.link.connect()?;
-        kernel_receive::enable_stamps(socket.as_fd(), L::COUNTS_OVERFLOW)?;
+        packets::enable_stamps(socket.as_fd(), L::COUNTS_OVERFLOW)?;
         if let Some(join) = self.joined {
             enter_barrier(&socket, &join)?;
         }
@@ -108,6 +115,7 @@ impl<L: Link> SocketPeer<L> {
             self.counters.disconnects += 1;
         }
         self.usable = false;
+        self.outbox.clear();
         // An interface that is merely down keeps its socket; one that is gone, or a host that is, needs a new one.
         if error != rustix::io::Errno::NETDOWN {
             self.socket = None;
@@ -147,13 +155,46 @@ impl<L: Link> SocketPeer<L> {
             }
             Some(frame) => {
                 self.counters.received += 1;
-                Some(Received::Frame(frame, (self.clock)(packet.age_ns.unwrap_or(0))))
+                Some(Received::Frame(frame, packet.stamp_ns))
             }
             None => {
                 self.counters.malformed += 1;
                 None
             }
         }
+    }
+
+    /// Receives the next batch; false when there is none.
+    fn fill(&mut self) -> bool {
+        if self.socket.is_none() {
+            self.try_again();
+        }
+        let Some(socket) = &self.socket else { return false };
+        let wait = if self.joined.is_some() { Wait::UntilTimeout } else { Wait::No };
+        let Err(error) = self.inbox.fill(socket.as_fd(), wait, &self.clock) else { return true };
+        match rustix::io::Errno::from_io_error(&error) {
+            Some(rustix::io::Errno::AGAIN | rustix::io::Errno::INTR) | None => {}
+            Some(errno) => self.went_away(errno),
+        }
+        false
+    }
+
+    /// Sends a member's packets.
+    fn flush(&mut self) -> Result<(), SendError> {
+        let Some(socket) = &self.socket else { return Err(SendError::Down) };
+        self.outbox.flush(socket.as_fd()).map_err(|error| {
+            self.went_away(rustix::io::Errno::from_io_error(&error).unwrap_or(rustix::io::Errno::IO));
+            SendError::Down
+        })
+    }
+
+    /// Posts a member's packet.
+    fn post(&mut self, bytes: &[u8]) -> Result<(), SendError> {
+        if self.outbox.is_full() {
+            self.flush()?;
+        }
+        self.outbox.push(bytes);
+        Ok(())
     }
 
     fn send_packet(&mut self, bytes: &[u8]) -> Result<(), SendError> {
@@ -185,7 +226,8 @@ fn enter_barrier(socket: &OwnedFd, join: &Control) -> rustix::io::Result<()> {
 
 impl<L: Link> Bus for SocketPeer<L> {
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError> {
-        let result = self.send_packet(&frame.to_bytes());
+        let bytes = frame.to_bytes();
+        let result = if self.joined.is_some() { self.post(&bytes) } else { self.send_packet(&bytes) };
         match result {
             Ok(()) => self.counters.sent += 1,
             Err(_) => self.counters.dropped_on_send += 1,
@@ -194,29 +236,24 @@ impl<L: Link> Bus for SocketPeer<L> {
     }
 
     fn receive(&mut self) -> Received {
-        if self.socket.is_none() {
-            self.try_again();
-        }
-        let wait = if self.joined.is_some() { Wait::UntilTimeout } else { Wait::No };
-        while let Some(socket) = &self.socket {
-            match kernel_receive::receive(socket.as_fd(), wait) {
-                Ok(packet) if packet.len == 0 => self.went_away(rustix::io::Errno::CONNRESET),
-                Ok(packet) => {
-                    self.passed();
-                    if let Some(received) = self.sort(&packet) {
-                        return received;
-                    }
+        loop {
+            while let Some(packet) = self.inbox.take() {
+                if packet.len == 0 {
+                    self.went_away(rustix::io::Errno::CONNRESET);
+                    return Received::Nothing;
                 }
-                Err(error) => match rustix::io::Errno::from_io_error(&error) {
-                    Some(rustix::io::Errno::AGAIN | rustix::io::Errno::INTR) | None => break,
-                    Some(errno) => {
-                        self.went_away(errno);
-                        break;
-                    }
-                },
+                self.passed();
+                if let Some(received) = self.sort(&packet) {
+                    return received;
+                }
             }
+            // A batch that was not full has emptied the queue; what came since is for the next round.
+            if self.drained || !self.fill() {
+                self.drained = false;
+                return Received::Nothing;
+            }
+            self.drained = self.inbox.emptied_the_queue();
         }
-        Received::Nothing
     }
 
     fn wait_readable(&mut self, timeout: Duration) {
@@ -256,6 +293,6 @@ impl<L: Link> Bus for SocketPeer<L> {
 
     fn done(&mut self, cycle: u32) {
         // A failure shows as a bus that is down, and as a time-out of the barrier.
-        let _ = self.send_packet(&Control::new(Kind::Done, cycle).to_bytes());
+        let _ = self.post(&Control::new(Kind::Done, cycle).to_bytes()).and_then(|()| self.flush());
     }
 }

@@ -1,0 +1,325 @@
+//! Packets from and to a socket in batches, with what the kernel knows of each: arrival time, own echo, lost packets.
+//!
+//! `socketcan` 4.0 drops the overflow count and the message flags, rustix does not know these control messages; a
+//! small `recvmmsg` keeps them. The arrival stamp matters: a command is latched by when it *arrived*, not by when a
+//! late loop came round to read it. Batches matter too: one system call empties a queue and knows that it is empty.
+//!
+//! Source: `socket(7)` (SO_TIMESTAMPNS, SO_RXQ_OVFL), `recvmmsg(2)`, Linux Documentation/networking/can.rst (MSG_CONFIRM).
+
+#![allow(unsafe_code)] // recvmmsg, sendmmsg and setsockopt, nothing else
+
+use std::io;
+use std::os::fd::{AsRawFd, BorrowedFd};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Longest packet that is looked at; anything longer is malformed whatever it holds.
+pub(super) const LONGEST_PACKET: usize = 64;
+/// Packets that one system call moves at most.
+pub(super) const BATCH: usize = 16;
+/// Room for the control messages of one packet, in words: a timespec and a u32 with their headers take 56 bytes.
+const CONTROL_WORDS: usize = 8;
+
+/// A packet as the kernel handed it over.
+#[derive(Clone, Copy)]
+pub(super) struct Packet {
+    pub(super) bytes: [u8; LONGEST_PACKET],
+    pub(super) len: usize,
+    /// When the packet arrived, in ns of the clock that [`Inbox::fill`] was given.
+    pub(super) stamp_ns: u64,
+    /// Packets dropped at this socket's queue so far, modulo 2^32; only SocketCAN tells.
+    pub(super) overflow: Option<u32>,
+    /// Whether we sent this packet ourselves.
+    pub(super) own_echo: bool,
+}
+
+const NO_PACKET: Packet =
+    Packet { bytes: [0; LONGEST_PACKET], len: 0, stamp_ns: 0, overflow: None, own_echo: false };
+
+/// Whether a call may sleep until a packet comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wait {
+    /// Return at once.
+    No,
+    /// Sleep for as long as the socket's receive time-out allows.
+    UntilTimeout,
+}
+
+/// Packets that were received together and are taken one by one.
+pub(super) struct Inbox {
+    packets: [Packet; BATCH],
+    count: usize,
+    next: usize,
+}
+
+impl Inbox {
+    pub(super) const fn new() -> Self {
+        Self { packets: [NO_PACKET; BATCH], count: 0, next: 0 }
+    }
+
+    /// The oldest packet not yet taken. A packet of length 0 says that the peer is gone.
+    pub(super) fn take(&mut self) -> Option<Packet> {
+        let packet = self.packets[..self.count].get(self.next)?;
+        self.next += 1;
+        Some(*packet)
+    }
+
+    /// Whether the last batch was smaller than it could be: then the socket's queue was empty.
+    pub(super) fn emptied_the_queue(&self) -> bool {
+        self.count < BATCH
+    }
+
+    /// Receives the next batch; what was not taken of the last one is gone. `clock` tells the time of what happened so many
+    /// ns ago.
+    ///
+    /// # Errors
+    /// What `recvmmsg` says; `WouldBlock` when nothing waits.
+    pub(super) fn fill(
+        &mut self,
+        socket: BorrowedFd<'_>,
+        wait: Wait,
+        clock: &dyn Fn(u64) -> u64,
+    ) -> io::Result<()> {
+        (self.count, self.next) = (0, 0);
+        let mut control = [[0_u64; CONTROL_WORDS]; BATCH];
+        // SAFETY: iovec and mmsghdr are plain C structs for which all zeros is a valid value.
+        let mut parts: [libc::iovec; BATCH] = unsafe { std::mem::zeroed() };
+        // SAFETY: as above.
+        let mut headers: [libc::mmsghdr; BATCH] = unsafe { std::mem::zeroed() };
+        for (index, header) in headers.iter_mut().enumerate() {
+            let bytes = self.packets[index].bytes.as_mut_ptr().cast();
+            parts[index] = libc::iovec { iov_base: bytes, iov_len: LONGEST_PACKET };
+            header.msg_hdr.msg_iov = &raw mut parts[index];
+            header.msg_hdr.msg_iovlen = 1;
+            header.msg_hdr.msg_control = control[index].as_mut_ptr().cast();
+            header.msg_hdr.msg_controllen = size_of_val(&control[index]);
+        }
+        let flags = if wait == Wait::No { libc::MSG_DONTWAIT } else { libc::MSG_WAITFORONE };
+        // SAFETY: each header points to a part and a control buffer that outlive the call and have the sizes given.
+        let count = unsafe {
+            libc::recvmmsg(
+                socket.as_raw_fd(),
+                headers.as_mut_ptr(),
+                BATCH as libc::c_uint,
+                flags,
+                std::ptr::null_mut(),
+            )
+        };
+        self.count = usize::try_from(count).map_err(|_| io::Error::last_os_error())?;
+        for (packet, header) in self.packets.iter_mut().zip(&headers[..self.count]) {
+            // SAFETY: the kernel has just filled this header and the control buffer that it points to.
+            let age_ns = unsafe { note(packet, header) };
+            packet.stamp_ns = clock(age_ns);
+        }
+        Ok(())
+    }
+}
+
+/// Notes what the kernel said of one received packet, whose bytes are in place; tells its age, 0 without a stamp.
+///
+/// # Safety
+/// `header` was filled by `recvmmsg`, and its control buffer is alive.
+unsafe fn note(packet: &mut Packet, header: &libc::mmsghdr) -> u64 {
+    let truncated = header.msg_hdr.msg_flags & libc::MSG_TRUNC != 0;
+    // A truncated packet is longer than any we know; saying so by its length makes it malformed.
+    packet.len = if truncated { LONGEST_PACKET } else { header.msg_len as usize };
+    packet.own_echo = header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0;
+    packet.overflow = None;
+    let mut age_ns = 0;
+    // SAFETY: the CMSG macros walk the control buffer within msg_controllen; each payload is read unaligned with the type
+    // that its level and kind define.
+    unsafe {
+        let mut message = libc::CMSG_FIRSTHDR(&raw const header.msg_hdr);
+        while !message.is_null() {
+            match ((*message).cmsg_level, (*message).cmsg_type) {
+                (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => {
+                    age_ns = age_of(libc::CMSG_DATA(message).cast::<libc::timespec>().read_unaligned());
+                }
+                (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => {
+                    packet.overflow = Some(libc::CMSG_DATA(message).cast::<u32>().read_unaligned());
+                }
+                _ => {}
+            }
+            message = libc::CMSG_NXTHDR(&raw const header.msg_hdr, message);
+        }
+    }
+    age_ns
+}
+
+/// How long before now `stamp` of the wall clock was, in ns. A wall clock that was stepped in between can make a
+/// stamp lie in the future or far in the past: then the age is 0, as if the packet had not been stamped.
+fn age_of(stamp: libc::timespec) -> u64 {
+    const LONGEST_CREDIBLE_NS: u128 = 1_000_000_000;
+    let arrived = stamp.tv_sec as u128 * 1_000_000_000 + stamp.tv_nsec as u128;
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+    let age = now.saturating_sub(arrived);
+    if age > LONGEST_CREDIBLE_NS { 0 } else { age as u64 }
+}
+
+/// Packets that leave together.
+pub(super) struct Outbox {
+    packets: [([u8; LONGEST_PACKET], usize); BATCH],
+    count: usize,
+    sent: usize,
+}
+
+impl Outbox {
+    pub(super) const fn new() -> Self {
+        Self { packets: [([0; LONGEST_PACKET], 0); BATCH], count: 0, sent: 0 }
+    }
+
+    /// Whether the next packet needs a [`Outbox::flush`] first.
+    pub(super) fn is_full(&self) -> bool {
+        self.count == BATCH
+    }
+
+    /// Adds a packet of at most [`LONGEST_PACKET`] bytes.
+    pub(super) fn push(&mut self, bytes: &[u8]) {
+        let (slot, len) = &mut self.packets[self.count];
+        slot[..bytes.len()].copy_from_slice(bytes);
+        *len = bytes.len();
+        self.count += 1;
+    }
+
+    /// Whether nothing waits to be sent.
+    pub(super) fn is_empty(&self) -> bool {
+        self.count == self.sent
+    }
+
+    /// Forgets what waits.
+    pub(super) fn clear(&mut self) {
+        (self.count, self.sent) = (0, 0);
+    }
+
+    /// Sends all packets; the outbox is empty afterwards.
+    ///
+    /// # Errors
+    /// What `sendmmsg` says, `WouldBlock` for a full queue; what it did not take waits for the next call.
+    pub(super) fn flush(&mut self, socket: BorrowedFd<'_>) -> io::Result<()> {
+        let count = self.count;
+        // SAFETY: iovec and mmsghdr are plain C structs for which all zeros is a valid value.
+        let mut parts: [libc::iovec; BATCH] = unsafe { std::mem::zeroed() };
+        // SAFETY: as above.
+        let mut headers: [libc::mmsghdr; BATCH] = unsafe { std::mem::zeroed() };
+        for (index, header) in headers[..count].iter_mut().enumerate() {
+            let (bytes, len) = &mut self.packets[index];
+            parts[index] = libc::iovec { iov_base: bytes.as_mut_ptr().cast(), iov_len: *len };
+            header.msg_hdr.msg_iov = &raw mut parts[index];
+            header.msg_hdr.msg_iovlen = 1;
+        }
+        while self.sent < count {
+            let rest = &mut headers[self.sent..count];
+            // SAFETY: each header points to a part whose bytes outlive the call.
+            let taken = unsafe {
+                libc::sendmmsg(
+                    socket.as_raw_fd(),
+                    rest.as_mut_ptr(),
+                    rest.len() as libc::c_uint,
+                    libc::MSG_NOSIGNAL,
+                )
+            };
+            match usize::try_from(taken) {
+                Ok(taken) => self.sent += taken,
+                Err(_) => match io::Error::last_os_error() {
+                    error if error.kind() == io::ErrorKind::Interrupted => {}
+                    error => return Err(error),
+                },
+            }
+        }
+        self.clear();
+        Ok(())
+    }
+}
+
+/// Asks the kernel to stamp arrivals and to count what it drops.
+pub(super) fn enable_stamps(socket: BorrowedFd<'_>, count_overflow: bool) -> io::Result<()> {
+    set_flag(socket, libc::SO_TIMESTAMPNS)?;
+    if count_overflow {
+        set_flag(socket, libc::SO_RXQ_OVFL)?;
+    }
+    Ok(())
+}
+
+fn set_flag(socket: BorrowedFd<'_>, option: libc::c_int) -> io::Result<()> {
+    let on: libc::c_int = 1;
+    // SAFETY: the descriptor is borrowed for the call, and the value's size is that of the c_int it points to.
+    let result = unsafe {
+        libc::setsockopt(
+            socket.as_raw_fd(),
+            libc::SOL_SOCKET,
+            option,
+            (&raw const on).cast(),
+            size_of::<libc::c_int>() as libc::socklen_t,
+        )
+    };
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::net::{AddressFamily, SendFlags, SocketFlags, SocketType, send, socketpair};
+    use std::os::fd::{AsFd, OwnedFd};
+
+    fn pair() -> (OwnedFd, OwnedFd) {
+        socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::empty(), None).unwrap()
+    }
+
+    #[test]
+    fn a_unix_packet_carries_its_age() {
+        let (ours, theirs) = pair();
+        enable_stamps(ours.as_fd(), false).unwrap();
+        send(&theirs, &[7; 16], SendFlags::empty()).unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(3));
+        let mut inbox = Inbox::new();
+        inbox.fill(ours.as_fd(), Wait::No, &|age_ns| age_ns).unwrap();
+        let packet = inbox.take().unwrap();
+        assert_eq!((packet.len, packet.bytes[15]), (16, 7));
+        // Slept 3 ms since; sleep never returns early, so 2 ms leaves room for clock granularity alone.
+        assert!(packet.stamp_ns > 2_000_000, "the clock of this test tells the age itself");
+    }
+
+    #[test]
+    fn batches_keep_number_order_and_length() {
+        let (ours, theirs) = pair();
+        let (mut outbox, mut inbox) = (Outbox::new(), Inbox::new());
+        for len in 1..=BATCH {
+            outbox.push(&vec![len as u8; len]);
+        }
+        assert!(outbox.is_full());
+        outbox.flush(theirs.as_fd()).unwrap();
+        send(&theirs, &[99], SendFlags::empty()).unwrap();
+
+        inbox.fill(ours.as_fd(), Wait::No, &|age_ns| age_ns).unwrap();
+        assert!(!inbox.emptied_the_queue(), "one more waits");
+        for len in 1..=BATCH {
+            let packet = inbox.take().unwrap();
+            assert_eq!((packet.len, packet.bytes[len - 1]), (len, len as u8));
+        }
+        assert!(inbox.take().is_none());
+        inbox.fill(ours.as_fd(), Wait::No, &|age_ns| age_ns).unwrap();
+        assert!(inbox.emptied_the_queue());
+        assert_eq!(inbox.take().unwrap().bytes[0], 99);
+    }
+
+    #[test]
+    fn a_packet_too_long_keeps_a_length_that_nothing_accepts() {
+        let (ours, theirs) = pair();
+        send(&theirs, &[0; 100], SendFlags::empty()).unwrap();
+        let mut inbox = Inbox::new();
+        inbox.fill(ours.as_fd(), Wait::No, &|age_ns| age_ns).unwrap();
+        assert_eq!(inbox.take().unwrap().len, LONGEST_PACKET);
+    }
+
+    #[test]
+    fn an_empty_queue_would_block_and_a_closed_one_has_length_zero() {
+        let (ours, theirs) = pair();
+        let mut inbox = Inbox::new();
+        assert_eq!(
+            inbox.fill(ours.as_fd(), Wait::No, &|age_ns| age_ns).unwrap_err().kind(),
+            io::ErrorKind::WouldBlock
+        );
+        drop(theirs);
+        inbox.fill(ours.as_fd(), Wait::No, &|age_ns| age_ns).unwrap();
+        assert_eq!(inbox.take().unwrap().len, 0);
+    }
+}
