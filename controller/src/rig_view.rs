@@ -28,6 +28,12 @@ pub struct PerAxis {
 }
 
 impl PerAxis {
+    /// Of both axes.
+    #[must_use]
+    pub fn sum(&self) -> u64 {
+        self.drive + self.load
+    }
+
     fn of(&mut self, axis: Axis) -> &mut u64 {
         match axis {
             Axis::Drive => &mut self.drive,

@@ -203,7 +203,11 @@ fn save(
         }
         End::LockstepTimeout => (Exit::LockstepTimeout, "a member of the barrier was not done in time"),
     };
-    eprintln!("controller: {ended_because}");
+    eprintln!(
+        "controller: {ended_because}; {} cycles answered, {} sensor frames lost",
+        finished.answered,
+        finished.lost.sum()
+    );
     let real = arguments.pace == Pace::Real;
     let unix_s =
         SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(started.elapsed());

@@ -10,12 +10,14 @@
 //! | [`commands`], [`sources`], [`live_cycles`] | which command acts, who sends it, how old it is |
 //! | [`telegrams`] | the frames that the rig sends |
 //! | [`recording`] | the queues out of the 1 ms path, and the files |
+//! | `finish` | histograms, summary, exit code |
 //! | [`run`], [`inputs`], [`experiment`], [`summary`], [`host_thread`], [`cli`] | around it |
 
 pub mod cli;
 pub mod commands;
 pub mod event;
 pub mod experiment;
+mod finish;
 pub mod host_thread;
 pub mod inputs;
 pub mod live_cycles;

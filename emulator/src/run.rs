@@ -8,22 +8,21 @@
 //! ```
 
 use crate::cli::RunArguments;
+use crate::finish::finish;
 use crate::host_thread::HostThread;
 use crate::inputs::Inputs;
-use crate::pace::{self, End, Limits, Pace, Paced, Shared};
-use crate::recording::writer::{Writer, WriterReport, WriterSetup};
+use crate::pace::{self, Limits, Pace, Paced, Shared};
+use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::station::{Station, StationFigures, StationParts};
-use crate::summary::{Machine, RunDescription, Summary};
+use crate::summary::{Machine, RunDescription};
 use plant::Sensors;
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock};
 use protocol::exit::Exit;
 use protocol::run_folder::{SCHEMA_VERSION, write_json};
-use realtime::{
-    Clock, Grants, Interrupt, MonotonicClock, Percentiles, PeriodicConfig, Recorder as Histogram, Request,
-};
+use realtime::{Clock, Grants, Interrupt, MonotonicClock, PeriodicConfig, Request};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -65,7 +64,7 @@ impl RunError {
         }
     }
 
-    fn output(file: &Path, error: &io::Error) -> Self {
+    pub(crate) fn output(file: &Path, error: &io::Error) -> Self {
         Self::Output { file: file.display().to_string(), reason: error.to_string() }
     }
 }
@@ -114,12 +113,12 @@ pub fn watch_interrupt() -> Result<Interrupt, RunError> {
 }
 
 /// When a run's clock started, in the clocks that its files speak.
-struct RunStart {
+pub(crate) struct RunStart {
     /// Seconds since 1970; `None` in lockstep.
-    unix_s: Option<f64>,
+    pub(crate) unix_s: Option<f64>,
     /// What turns the run's clock into the stamps of `bus.log`.
     epoch_offset_ns: u64,
-    began: Instant,
+    pub(crate) began: Instant,
 }
 
 impl RunStart {
@@ -135,11 +134,11 @@ impl RunStart {
 }
 
 /// What the rig loop hands back.
-struct LoopOutcome {
-    paced: Paced,
-    figures: StationFigures,
-    bus: BusCounters,
-    host: Option<HostReport>,
+pub(crate) struct LoopOutcome {
+    pub(crate) paced: Paced,
+    pub(crate) figures: StationFigures,
+    pub(crate) bus: BusCounters,
+    pub(crate) host: Option<HostReport>,
 }
 
 fn rig_loop(
@@ -297,97 +296,4 @@ fn tell_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
 
 fn join<T>(thread: ScopedJoinHandle<'_, T>) -> T {
     thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-}
-
-fn finish(
-    arguments: &RunArguments,
-    started: &RunStart,
-    outcome: LoopOutcome,
-    written: WriterReport,
-) -> Result<Exit, RunError> {
-    let (exit, reason) = verdict(&outcome.paced.end);
-    eprintln!("emulator: {reason}");
-    if let Some(statistics) = &outcome.paced.statistics {
-        let path = arguments.out.join("emulator.hlog");
-        let parts = [
-            ("emulator-wakeup", statistics.wakeup_ns.histogram()),
-            ("emulator-execution", statistics.execution_ns.histogram()),
-            ("emulator-period-error", statistics.period_error_ns.histogram()),
-            ("round-trip", outcome.figures.round_trip.histogram()),
-        ];
-        realtime::write_hlog(&path, &parts, started.unix_s.unwrap_or(0.0), started.began.elapsed())
-            .map_err(|error| RunError::output(&path, &error))?;
-    }
-    let path = arguments.out.join("summary.json");
-    let summary = summarise(outcome, written, reason, exit == Exit::Good);
-    write_json(&path, &summary).map_err(|error| RunError::output(&path, &error))?;
-    Ok(exit)
-}
-
-fn summarise(outcome: LoopOutcome, written: WriterReport, ended_because: String, passed: bool) -> Summary {
-    let LoopOutcome { paced, figures, bus, host: bus_host } = outcome;
-    let [drive_commands, load_commands] = figures.commands;
-    let both = [drive_commands, load_commands];
-    let lost = both.iter().map(|commands| commands.lost).sum();
-    let loops = paced.statistics.as_ref();
-    let percentiles = |recorder: Option<&Histogram>| {
-        recorder.map_or_else(|| Histogram::new().percentiles(), Histogram::percentiles)
-    };
-    let of_loop =
-        |pick: fn(&realtime::LoopStatistics) -> &Histogram| -> Percentiles { percentiles(loops.map(pick)) };
-    Summary {
-        schema_version: SCHEMA_VERSION,
-        position_error_dynamic_m: None,
-        position_error_static_m: None,
-        cycles: paced.cycles,
-        skipped: figures.skipped,
-        overruns: loops.map_or(0, |statistics| statistics.overruns),
-        late_completions: loops.map_or(0, |statistics| statistics.late_completions),
-        frames_sent: bus.sent,
-        frames_received: bus.received,
-        frames_lost: lost,
-        frames_lost_at_rig: lost,
-        frames_malformed: figures.frames.malformed + bus.malformed,
-        stale_commands: both.iter().map(|commands| commands.refused_stale + commands.expired).sum(),
-        wakeup_ns: of_loop(|statistics| &statistics.wakeup_ns),
-        execution_ns: of_loop(|statistics| &statistics.execution_ns),
-        period_error_ns: of_loop(|statistics| &statistics.period_error_ns),
-        round_trip_ns: figures.round_trip.percentiles(),
-        allocations_in_cycle: cfg!(feature = "count-allocations").then_some(paced.allocations),
-        records_dropped: figures.records_dropped,
-        ended_because,
-        passed,
-        thresholds: serde_json::Map::new(),
-        drive_commands,
-        load_commands,
-        frames_ignored: figures.frames,
-        bus,
-        bus_host,
-        event_count: written.event_count,
-        events: written.events,
-    }
-}
-
-/// The exit code of an end, and the sentence that tells it.
-fn verdict(end: &End) -> (Exit, String) {
-    match end {
-        End::ControllersDone => (Exit::Good, "the controllers are done".into()),
-        End::TimeUp => (Exit::Good, "the time asked for is up".into()),
-        End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
-        End::OutputFailed => (Exit::BadInput, "the output could not be written".into()),
-        End::BusGone => (Exit::BusFailed, "the bus was gone for too long; see --bus-grace".into()),
-        End::NobodyJoined => (
-            Exit::BusFailed,
-            "not all members joined the barrier in time; start 'controller run --pace lockstep', or see --members".into(),
-        ),
-        End::MembersLeft => (Exit::BusFailed, "all members left the barrier before they were done".into()),
-        End::LockstepTimeout(name) => {
-            (Exit::LockstepTimeout, format!("lockstep: '{name}' was not done within 5 s of wall time"))
-        }
-        End::Overrun(overrun) => (Exit::BoundBroken, overrun.to_string()),
-        End::NotFinite => (
-            Exit::BoundBroken,
-            "fault not-finite: the plant's state is no longer finite; please report the rig file".into(),
-        ),
-    }
 }

@@ -1,0 +1,125 @@
+//! The end of a run: histograms and `summary.json` written, the run told in a few lines, the exit code chosen.
+
+use crate::cli::RunArguments;
+use crate::pace::End;
+use crate::recording::writer::WriterReport;
+use crate::run::{LoopOutcome, RunError, RunStart};
+use crate::summary::Summary;
+use protocol::exit::Exit;
+use protocol::run_folder::{SCHEMA_VERSION, write_json};
+use realtime::{Percentiles, Recorder as Histogram};
+use std::path::Path;
+
+/// Saves what is left to save, tells the run in a few lines, and says how it went.
+///
+/// # Errors
+/// [`RunError::Output`] when a file cannot be written.
+pub(crate) fn finish(
+    arguments: &RunArguments,
+    started: &RunStart,
+    outcome: LoopOutcome,
+    written: WriterReport,
+) -> Result<Exit, RunError> {
+    let (exit, reason) = verdict(&outcome.paced.end);
+    eprintln!("emulator: {reason}");
+    if let Some(statistics) = &outcome.paced.statistics {
+        let path = arguments.out.join("emulator.hlog");
+        let parts = [
+            ("emulator-wakeup", statistics.wakeup_ns.histogram()),
+            ("emulator-execution", statistics.execution_ns.histogram()),
+            ("emulator-period-error", statistics.period_error_ns.histogram()),
+            ("round-trip", outcome.figures.round_trip.histogram()),
+        ];
+        realtime::write_hlog(&path, &parts, started.unix_s.unwrap_or(0.0), started.began.elapsed())
+            .map_err(|error| RunError::output(&path, &error))?;
+    }
+    let path = arguments.out.join("summary.json");
+    let summary = summarise(outcome, written, reason, exit == Exit::Good);
+    tell(&summary, &arguments.out);
+    write_json(&path, &summary).map_err(|error| RunError::output(&path, &error))?;
+    Ok(exit)
+}
+
+/// The run in a few lines, for whoever watches.
+fn tell(summary: &Summary, folder: &Path) {
+    let Summary { cycles, skipped, overruns, frames_sent, frames_received, .. } = summary;
+    let Summary { frames_lost, frames_malformed, stale_commands, .. } = summary;
+    eprintln!("emulator: {cycles} cycles, {skipped} of them skipped in {overruns} overruns");
+    eprintln!(
+        "emulator: {frames_sent} frames sent, {frames_received} received, {frames_lost} lost by their counters, \
+         {frames_malformed} malformed, {stale_commands} stale commands"
+    );
+    if summary.wakeup_ns.count > 0 {
+        eprintln!("emulator: wake-up {}", summary.wakeup_ns);
+        eprintln!("emulator: round trip {}", summary.round_trip_ns);
+    }
+    eprintln!("emulator: files in {}", folder.display());
+}
+
+fn summarise(outcome: LoopOutcome, written: WriterReport, ended_because: String, passed: bool) -> Summary {
+    let LoopOutcome { paced, figures, bus, host: bus_host } = outcome;
+    let [drive_commands, load_commands] = figures.commands;
+    let both = [drive_commands, load_commands];
+    let lost = both.iter().map(|commands| commands.lost).sum();
+    let loops = paced.statistics.as_ref();
+    let percentiles = |recorder: Option<&Histogram>| {
+        recorder.map_or_else(|| Histogram::new().percentiles(), Histogram::percentiles)
+    };
+    let of_loop =
+        |pick: fn(&realtime::LoopStatistics) -> &Histogram| -> Percentiles { percentiles(loops.map(pick)) };
+    Summary {
+        schema_version: SCHEMA_VERSION,
+        position_error_dynamic_m: None,
+        position_error_static_m: None,
+        cycles: paced.cycles,
+        skipped: figures.skipped,
+        overruns: loops.map_or(0, |statistics| statistics.overruns),
+        late_completions: loops.map_or(0, |statistics| statistics.late_completions),
+        frames_sent: bus.sent,
+        frames_received: bus.received,
+        frames_lost: lost,
+        frames_lost_at_rig: lost,
+        frames_malformed: figures.frames.malformed + bus.malformed,
+        stale_commands: both.iter().map(|commands| commands.refused_stale + commands.expired).sum(),
+        wakeup_ns: of_loop(|statistics| &statistics.wakeup_ns),
+        execution_ns: of_loop(|statistics| &statistics.execution_ns),
+        period_error_ns: of_loop(|statistics| &statistics.period_error_ns),
+        round_trip_ns: figures.round_trip.percentiles(),
+        allocations_in_cycle: cfg!(feature = "count-allocations").then_some(paced.allocations),
+        records_dropped: figures.records_dropped,
+        ended_because,
+        passed,
+        thresholds: serde_json::Map::new(),
+        drive_commands,
+        load_commands,
+        frames_ignored: figures.frames,
+        bus,
+        bus_host,
+        event_count: written.event_count,
+        events: written.events,
+    }
+}
+
+/// The exit code of an end, and the sentence that tells it.
+fn verdict(end: &End) -> (Exit, String) {
+    match end {
+        End::ControllersDone => (Exit::Good, "the controllers are done".into()),
+        End::TimeUp => (Exit::Good, "the time asked for is up".into()),
+        End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
+        End::OutputFailed => (Exit::BadInput, "the output could not be written".into()),
+        End::BusGone => (Exit::BusFailed, "the bus was gone for too long; see --bus-grace".into()),
+        End::NobodyJoined => (
+            Exit::BusFailed,
+            "not all members joined the barrier in time; start 'controller run --pace lockstep', or see --members".into(),
+        ),
+        End::MembersLeft => (Exit::BusFailed, "all members left the barrier before they were done".into()),
+        End::LockstepTimeout(name) => {
+            (Exit::LockstepTimeout, format!("lockstep: '{name}' was not done within 5 s of wall time"))
+        }
+        End::Overrun(overrun) => (Exit::BoundBroken, overrun.to_string()),
+        End::NotFinite => (
+            Exit::BoundBroken,
+            "fault not-finite: the plant's state is no longer finite; please report the rig file".into(),
+        ),
+    }
+}
