@@ -50,7 +50,8 @@ pub fn write_truth_head(out: &mut impl Write) -> io::Result<()> {
 /// What `out` says.
 pub fn write_truth(out: &mut impl Write, record: &CycleRecord) -> io::Result<()> {
     write_time(out, record.cycle)?;
-    record.truth.values().iter().try_for_each(|value| write!(out, ",{value}"))?;
+    // Debug, for tiny numbers with an exponent: Display would spell out their zeros.
+    record.truth.values().iter().try_for_each(|value| write!(out, ",{value:?}"))?;
     writeln!(out)
 }
 
