@@ -44,8 +44,8 @@ pub struct Paced {
     pub execution_ns: Histogram,
     /// |time between two answers - period|, ns.
     pub period_error_ns: Histogram,
-    /// Allocations in the 1 ms path after warm-up; 0 unless the counting allocator is built in.
-    pub allocations: u64,
+    /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
+    pub allocations: Option<u64>,
 }
 
 impl Paced {
@@ -55,7 +55,7 @@ impl Paced {
             wakeup_ns: Histogram::new(),
             execution_ns: Histogram::new(),
             period_error_ns: Histogram::new(),
-            allocations: 0,
+            allocations: None,
         }
     }
 }
@@ -126,8 +126,10 @@ pub fn run_real(
             break End::BusGone;
         }
     };
-    drop(watch);
-    paced.allocations = realtime::allocations::counted();
+    paced.allocations = watch.map(|watch| {
+        drop(watch);
+        realtime::allocations::counted()
+    });
     paced
 }
 
@@ -151,6 +153,10 @@ pub fn run_lockstep(
             Received::Barrier(control) => match control.kind {
                 Kind::Go { .. } => {
                     waiting_since = None;
+                    // Here, since a run that goes on never finds the queue empty.
+                    if interrupt.came() {
+                        break End::Interrupted;
+                    }
                     if station.ending() {
                         break End::RigEnded;
                     }
@@ -167,7 +173,9 @@ pub fn run_lockstep(
                 // A host that went took the rig with it; simulated time does not go on elsewhere.
                 let since = *waiting_since.get_or_insert_with(WallInstant::now);
                 if bus.counters().disconnects > 0 || since.elapsed() > grace {
-                    break if station.ending() { End::RigEnded } else { End::BusGone };
+                    // The farewell itself may be lost on the wire; a rig that goes when all is done has ended.
+                    let ended = station.ending() || station.drive().state() == MainChainState::Done;
+                    break if ended { End::RigEnded } else { End::BusGone };
                 }
                 bus.wait_readable(Duration::from_millis(100));
             }

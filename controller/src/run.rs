@@ -11,7 +11,7 @@ use crate::rig_view::PerAxis;
 use crate::station::{IgnoredFrames, News, Outlets, Station};
 use crossbeam_channel::bounded;
 use plant::RigParameters;
-use protocol::bus::{self, Bus, BusCounters, BusError};
+use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
 use protocol::frames::MainChainState;
 use protocol::run_folder::{LineFile, SCHEMA_VERSION, write_json};
@@ -90,6 +90,9 @@ struct Report {
 /// # Errors
 /// [`RunError`] when the run cannot start or be saved; how it went is the exit code.
 pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
+    if arguments.pace == Pace::Lockstep && matches!(arguments.bus, BusUrl::Can { .. }) {
+        return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
+    }
     let rig_toml = read(&arguments.rig)?;
     let rig = RigParameters::from_toml(&rig_toml, &arguments.rig.display().to_string())
         .map_err(|error| RunError::Input(error.to_string()))?;
@@ -114,7 +117,9 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let drive = DriveAxis::new(experiment.clone(), Linearisation::new(&rig), arguments.repeat);
     let started = Instant::now();
     std::thread::scope(|scope| {
-        let writer = scope.spawn(|| recording::run(table, &records, &news, || interrupt.ask()));
+        // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
+        let asking = &interrupt;
+        let writer = scope.spawn(move || recording::run(table, &records, &news, || asking.ask()));
         let work = scope.spawn(|| work(arguments, drive, outlets, bus.as_mut(), &interrupt));
         let finished = join(work);
         let (told, failure) = join(writer);
@@ -198,9 +203,10 @@ fn save(
         End::RigEnded if done => (Exit::Good, "done, and the rig has ended"),
         End::RigEnded => (Exit::BusFailed, "the rig ended before the experiment was done"),
         End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved"),
-        End::BusGone => {
-            (Exit::BusFailed, "no sensors for too long; is 'emulator run' on this bus? see --bus-grace")
-        }
+        End::BusGone => (
+            Exit::BusFailed,
+            "nothing to answer for too long; is 'emulator run' on this bus, in the same --pace? see --bus-grace",
+        ),
         End::LockstepTimeout => (Exit::LockstepTimeout, "a member of the barrier was not done in time"),
     };
     eprintln!(
@@ -242,7 +248,7 @@ fn save(
         wakeup_ns: paced.wakeup_ns.percentiles(),
         execution_ns: paced.execution_ns.percentiles(),
         period_error_ns: paced.period_error_ns.percentiles(),
-        allocations_in_cycle: cfg!(feature = "count-allocations").then_some(paced.allocations),
+        allocations_in_cycle: paced.allocations.filter(|_| cfg!(feature = "count-allocations")),
         records_dropped: finished.records_dropped,
         realtime_granted: grants.granted().to_vec(),
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),

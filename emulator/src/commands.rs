@@ -49,22 +49,23 @@ pub struct CommandIntake {
     /// An accepted command was there, and grew stale.
     expired: bool,
     disputed: bool,
+    refused_since_accepted: u64,
     counters: CommandCounters,
 }
 
 impl CommandIntake {
     /// Takes a well-formed command that arrived before `cycle`. True when it was accepted.
     pub fn take(&mut self, command: ValveCommand, cycle: u64, live: &LiveCycles) -> bool {
-        match live.age(command.echo) {
-            Some(age) if age <= STALE_AFTER_CYCLES => {}
-            _ => {
-                self.counters.refused_stale += 1;
-                return false;
-            }
+        if live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES) {
+            self.counters.refused_stale += 1;
+            self.refused_since_accepted += 1;
+            return false;
         }
         if let Step::Continues { lost } = self.sources.note(command.alive, cycle) {
-            self.counters.lost += lost;
+            // A refused frame leaves a gap in the counters of those accepted, but it came.
+            self.counters.lost += lost.saturating_sub(self.refused_since_accepted);
         }
+        self.refused_since_accepted = 0;
         self.counters.accepted += 1;
         self.acting = Some(command);
         true
@@ -195,6 +196,17 @@ mod tests {
             assert!(!bench.intake.take(command, bench.cycle, &bench.live), "echo {echo}");
         }
         assert_eq!((bench.intake.opening(), bench.intake.counters().refused_stale), (0.5, 4));
+    }
+
+    #[test]
+    fn a_refused_frame_is_not_counted_as_lost_as_well() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        (0..40).for_each(|_| assert_eq!(bench.cycle(Some(0.5)), None));
+        let stale = bench.command(0.5, 2);
+        bench.intake.take(stale, bench.cycle, &bench.live);
+        bench.cycle(Some(0.5));
+        assert_eq!((bench.intake.counters().refused_stale, bench.intake.counters().lost), (1, 0));
     }
 
     #[test]

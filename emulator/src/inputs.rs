@@ -37,10 +37,20 @@ impl Inputs {
         };
         let plant = Plant::new(&parameters, &section.setup()).map_err(|error| {
             let file = experiment.map_or("default setup".into(), |path| path.display().to_string());
-            RunError::Input(format!("{file}: [rig] {error}"))
+            let line = experiment_toml.as_deref().and_then(|text| line_of_key(text, &error.to_string()));
+            let place = line.map_or(file.clone(), |line| format!("{file}:{line}"));
+            RunError::Input(format!("{place}: [rig] {error}"))
         })?;
         Ok(Self { rig_toml, experiment_toml, section, rig: parameters, plant })
     }
+}
+
+/// Line, from 1, of the key that `message` begins with; `None` when the file leaves it at its default.
+fn line_of_key(text: &str, message: &str) -> Option<usize> {
+    let key = message.split(' ').next()?;
+    let table = text.lines().position(|line| line.trim() == "[rig]")?;
+    let within = text.lines().skip(table).position(|line| line.trim_start().starts_with(key))?;
+    Some(table + within + 1)
 }
 
 fn read(path: &Path) -> Result<String, RunError> {

@@ -15,6 +15,8 @@ use std::time::{Duration, Instant as WallInstant};
 pub const CYCLE: Duration = Duration::from_millis(1);
 /// How long after the farewell the answers to the last cycles may still come in.
 const FAREWELL: Duration = Duration::from_millis(30);
+/// Lockstep: how long an interrupted rig still waits for the members' turn.
+const LAST_TURN: Duration = Duration::from_millis(500);
 /// Frames that may arrive between a cycle's start and a late loop's reading; they belong to the next cycle.
 const EARLY_FRAMES: usize = 256;
 /// Cycles that a watched section leaves out at the start: first touches of memory, first frames of each kind.
@@ -107,8 +109,8 @@ pub struct Paced {
     pub cycles: u64,
     /// Statistics of the loop; `None` in lockstep, which has no schedule.
     pub statistics: Option<LoopStatistics>,
-    /// Allocations in the 1 ms path after warm-up; 0 unless the counting allocator is built in.
-    pub allocations: u64,
+    /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
+    pub allocations: Option<u64>,
 }
 
 /// Runs the rig on the clock.
@@ -154,8 +156,10 @@ pub fn run_real<C: Clock>(
         }
         periodic.end_of_work();
     };
-    drop(watch);
-    let allocations = realtime::allocations::counted();
+    let allocations = watch.map(|watch| {
+        drop(watch);
+        realtime::allocations::counted()
+    });
     if end != End::NotFinite {
         station.publish_end(cycles, bus);
         let until = WallInstant::now() + FAREWELL;
@@ -204,7 +208,7 @@ pub fn run_lockstep(
         }
         bus.done(this_cycle as u32);
     };
-    Ok(Paced { end, cycles, statistics: None, allocations: 0 })
+    Ok(Paced { end, cycles, statistics: None, allocations: None })
 }
 
 /// Takes frames until the barrier says Go for `cycle`; tells how many members it has.
@@ -215,7 +219,7 @@ fn wait_for_go(
     patience: Duration,
     shared: &Shared,
 ) -> Result<u8, End> {
-    let mut until = None;
+    let mut since: Option<WallInstant> = None;
     loop {
         match bus.receive() {
             // Stamped in the cycle in which it was posted: the clock still shows it.
@@ -226,15 +230,15 @@ fn wait_for_go(
                 _ => {}
             },
             Received::Nothing => {
-                let now = WallInstant::now();
-                let until = *until.get_or_insert(now + patience);
-                if shared.interrupt.came() {
+                let waited = since.get_or_insert_with(WallInstant::now).elapsed();
+                // In the middle of a cycle the members finish their turn, so that they hear the farewell after it.
+                if shared.interrupt.came() && (cycle == 0 || waited >= LAST_TURN) {
                     return Err(End::Interrupted);
                 }
-                if now >= until {
+                if waited >= patience {
                     return Err(if cycle == 0 { End::NobodyJoined } else { End::BusGone });
                 }
-                bus.wait_readable((until - now).min(Duration::from_millis(100)));
+                bus.wait_readable((patience - waited).min(Duration::from_millis(100)));
             }
         }
     }

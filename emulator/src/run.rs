@@ -89,7 +89,9 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (mut bus, host) = open_bus(arguments, stamp_clock(lockstep, &simulated_ns))?;
 
     std::thread::scope(|scope| {
-        let writer = scope.spawn(|| writer.run(&records, &shared));
+        // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
+        let for_writer = &shared;
+        let writer = scope.spawn(move || writer.run(&records, for_writer));
         let bus = bus.as_mut();
         let rig_loop =
             scope.spawn(|| rig_loop(arguments, &inputs, &started, recorder, bus, &simulated_ns, &shared));
@@ -221,7 +223,8 @@ fn open_bus(
             let thread = HostThread::start(host, fifo);
             Ok((bus::open(&arguments.bus, clock)?, Some(thread)))
         }
-        Err(BusError::HostExists { .. }) => {
+        // A barrier has one rig, which is its host: a second emulator would take the first one's place.
+        Err(BusError::HostExists { .. }) if !lockstep => {
             eprintln!("emulator: {} has a host already; joining it", arguments.bus);
             Ok((bus::open(&arguments.bus, clock)?, None))
         }

@@ -4,7 +4,7 @@
 //! to their last line.
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Version of the JSON files; goes up when a key changes its meaning or goes.
@@ -18,6 +18,8 @@ pub struct LineFile {
     file: File,
     path: PathBuf,
     buffer: Vec<u8>,
+    /// Bytes of whole lines in the file.
+    length: u64,
 }
 
 impl LineFile {
@@ -27,7 +29,7 @@ impl LineFile {
     /// What the system says, with the file's name.
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = File::create(path).map_err(|error| named(path, &error))?;
-        Ok(Self { file, path: path.into(), buffer: Vec::with_capacity(2 * BATCH_BYTES) })
+        Ok(Self { file, path: path.into(), buffer: Vec::with_capacity(2 * BATCH_BYTES), length: 0 })
     }
 
     /// Where whole lines are appended; [`LineFile::write_when_full`] follows each.
@@ -49,8 +51,21 @@ impl LineFile {
     /// What the system says, with the file's name; the lines of this batch are gone then.
     pub fn write_out(&mut self) -> io::Result<()> {
         let result = self.file.write_all(&self.buffer).map_err(|error| named(&self.path, &error));
+        match result {
+            Ok(()) => self.length += self.buffer.len() as u64,
+            Err(_) => self.cut_half_line(),
+        }
         self.buffer.clear();
         result
+    }
+
+    /// A disk that is full takes a part of a batch: what it took of the last line goes again.
+    fn cut_half_line(&mut self) {
+        let taken = self.file.stream_position().map_or(0, |end| end.saturating_sub(self.length)) as usize;
+        let taken = &self.buffer[..taken.min(self.buffer.len())];
+        self.length += taken.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end as u64 + 1);
+        // A file that cannot be cut keeps its half line; the error that led here is told in any case.
+        let _ = self.file.set_len(self.length);
     }
 }
 

@@ -144,6 +144,10 @@ impl Writer {
         );
         eprintln!("emulator: {message}");
         self.report.failure = Some(message);
+        // One file failed; what waits for the others may still find room.
+        for file in [&mut self.bus_log, &mut self.measurement, &mut self.truth] {
+            let _ = file.write_out();
+        }
         shared.output_failed.store(true, Ordering::Relaxed);
     }
 }

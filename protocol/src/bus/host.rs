@@ -167,9 +167,9 @@ impl Host {
     /// The barrier's rig lives in this process: its packets come and go without a socket.
     pub(super) fn join_rig_here(&mut self) -> bool {
         let Some(barrier) = &mut self.barrier else { return false };
-        barrier.join(RIG_HERE, Role::Rig, "rig".into());
-        self.for_rig = Some(VecDeque::new());
-        true
+        let joined = barrier.join(RIG_HERE, Role::Rig, "rig".into());
+        self.for_rig = joined.then(VecDeque::new);
+        joined
     }
 
     /// What the rig that lives here says.
@@ -244,14 +244,19 @@ impl Host {
     }
 
     fn obey(&mut self, id: PeerId, control: &Control) {
-        let Some(barrier) = &mut self.barrier else { return };
-        match control.kind {
-            Kind::Join(role) => {
-                barrier.join(id, role, control.name());
-                self.report.peers[self.peers[&id].report].name = control.name();
+        let obeyed = match (&mut self.barrier, control.kind) {
+            (Some(barrier), Kind::Join(role)) => barrier.join(id, role, control.name()),
+            (Some(barrier), Kind::Done) => {
+                barrier.done(id, control.cycle);
+                true
             }
-            Kind::Done => barrier.done(id, control.cycle),
-            Kind::Go { .. } | Kind::TimedOut => self.report.malformed += 1,
+            // There is no barrier here, or only its host says this.
+            _ => false,
+        };
+        if !obeyed {
+            self.report.malformed += 1;
+        } else if let (Kind::Join(_), Some(peer)) = (control.kind, self.peers.get(&id)) {
+            self.report.peers[peer.report].name = control.name();
         }
     }
 

@@ -6,7 +6,7 @@
 use super::control::Role;
 use super::host::{ForRig, FromRig, Host, HostReport};
 use super::{Bus, BusCounters, BusError, Received, SendError, StampClock};
-use crate::can::CanFrame;
+use crate::can::{CanFrame, ERROR_FLAG};
 use rustix::time::Timespec;
 use std::time::Duration;
 
@@ -29,13 +29,17 @@ impl HostedRig {
     }
 
     fn take(&mut self) -> Option<Received> {
-        Some(match self.host.next_for_rig()? {
-            ForRig::Frame(frame) => {
-                self.counters.received += 1;
-                Received::Frame(frame, (self.clock)(0))
+        loop {
+            match self.host.next_for_rig()? {
+                // As at a socket's peer: counted, and no message to anybody.
+                ForRig::Frame(frame) if frame.raw_id() & ERROR_FLAG != 0 => self.counters.error_frames += 1,
+                ForRig::Frame(frame) => {
+                    self.counters.received += 1;
+                    return Some(Received::Frame(frame, (self.clock)(0)));
+                }
+                ForRig::Barrier(control) => return Some(Received::Barrier(control)),
             }
-            ForRig::Barrier(control) => Received::Barrier(control),
-        })
+        }
     }
 
     fn serve(&mut self, patience: Timespec) {

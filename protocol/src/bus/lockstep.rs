@@ -106,15 +106,17 @@ impl Barrier {
         self.rig == Some(peer) || self.members.contains_key(&peer)
     }
 
-    /// A peer joins. Later joiners of a running barrier act from the next release on.
-    pub(super) fn join(&mut self, peer: PeerId, role: Role, name: String) {
+    /// A peer joins; false when the part is taken. Later joiners of a running barrier act from the next release on.
+    pub(super) fn join(&mut self, peer: PeerId, role: Role, name: String) -> bool {
         match role {
+            Role::Rig if self.rig.is_some() => return false,
             Role::Rig => self.rig = Some(peer),
             Role::Member => {
                 let done = self.phase == Phase::MembersAct;
                 self.members.insert(peer, Member { name, done });
             }
         }
+        true
     }
 
     /// A peer's connection is gone: the others go on without it.
@@ -282,6 +284,13 @@ mod tests {
             barrier.release(3).unwrap().frames
         });
         assert_eq!(orders[0], orders[1]);
+    }
+
+    #[test]
+    fn a_second_rig_does_not_take_the_firsts_place() {
+        let mut barrier = started(&["drive"]);
+        assert!(!barrier.join(9, Role::Rig, "another".into()));
+        assert_eq!(barrier.rig(), Some(RIG));
     }
 
     #[test]

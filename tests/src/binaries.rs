@@ -1,0 +1,96 @@
+//! Where the programs under test are: given by the environment, else built once as they ship.
+//!
+//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator` and `controller`; a script that has
+//! built them sets these. Without them cargo builds the release profile, and says itself where the results are.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+/// A program under test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Program {
+    /// Process 1: the rig.
+    Emulator,
+    /// Process 2: the axis controllers.
+    Controller,
+}
+
+impl Program {
+    /// Name of package and binary.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Emulator => "emulator",
+            Self::Controller => "controller",
+        }
+    }
+}
+
+/// Which build of the programs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Build {
+    /// As they ship.
+    Shipped,
+    /// As they ship, with the counting allocator.
+    CountingAllocations,
+}
+
+/// The executable of `program` in `build`, which is made if nobody has.
+///
+/// # Panics
+/// When the programs are not where the environment says, or cannot be built.
+#[must_use]
+pub fn executable(program: Program, build: Build) -> PathBuf {
+    static SHIPPED: OnceLock<PathBuf> = OnceLock::new();
+    static COUNTING: OnceLock<PathBuf> = OnceLock::new();
+    let folder = match build {
+        Build::Shipped => SHIPPED.get_or_init(|| folder("AIRBENCH_BIN_DIR", &[])),
+        Build::CountingAllocations => COUNTING.get_or_init(|| {
+            folder(
+                "AIRBENCH_COUNTING_BIN_DIR",
+                &["--features", "emulator/count-allocations,controller/count-allocations"],
+            )
+        }),
+    };
+    let path = folder.join(program.name());
+    assert!(path.is_file(), "{} is no program; build it, or unset AIRBENCH_*BIN_DIR", path.display());
+    path
+}
+
+/// The checkout that is tested.
+#[must_use]
+pub fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the workspace").to_owned()
+}
+
+fn folder(variable: &str, features: &[&str]) -> PathBuf {
+    std::env::var_os(variable).map_or_else(|| build(features), PathBuf::from)
+}
+
+/// Builds both programs and asks cargo where it put them. With features, into a target folder of its own: else each
+/// build would throw the other's results away.
+fn build(features: &[&str]) -> PathBuf {
+    let mut cargo = Command::new(option_env!("CARGO").unwrap_or("cargo"));
+    cargo.current_dir(workspace()).args(["build", "--release", "--message-format=json-render-diagnostics"]);
+    for program in [Program::Emulator, Program::Controller] {
+        cargo.args(["--package", program.name(), "--bin", program.name()]);
+    }
+    if !features.is_empty() {
+        let target =
+            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
+        cargo.args(features).arg("--target-dir").arg(target.join("counting-allocations"));
+    }
+    let built = cargo.stderr(Stdio::inherit()).output().expect("cargo starts");
+    assert!(built.status.success(), "the programs do not build: {}", built.status);
+    let messages = String::from_utf8_lossy(&built.stdout);
+    let executable = messages.lines().find_map(|line| {
+        let message: serde_json::Value = serde_json::from_str(line).ok()?;
+        message["executable"].as_str().map(PathBuf::from)
+    });
+    executable
+        .expect("cargo names an executable")
+        .parent()
+        .expect("an executable lies in a folder")
+        .to_owned()
+}

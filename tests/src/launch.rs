@@ -1,0 +1,128 @@
+//! The command line of a program in a scene.
+
+use crate::binaries::{Build, Program, executable};
+use crate::process::Running;
+use crate::scene::Scene;
+use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// How time passes, as `--pace` says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// One cycle each millisecond.
+    Real,
+    /// As fast as the barrier allows.
+    Lockstep,
+}
+
+/// A program about to be started; each method changes one thing and hands it back.
+#[derive(Clone)]
+pub struct Launch {
+    program: Program,
+    build: Build,
+    bus: String,
+    rig: PathBuf,
+    experiment: PathBuf,
+    out: PathBuf,
+    pace: Pace,
+    more: Vec<OsString>,
+    shell: Option<String>,
+    user: Option<u32>,
+}
+
+impl Launch {
+    pub(crate) fn new(program: Program, scene: &Scene, pace: Pace) -> Self {
+        Self {
+            program,
+            build: Build::Shipped,
+            bus: scene.url(),
+            rig: scene.path("rig.toml"),
+            experiment: scene.path("experiment.toml"),
+            out: scene.path(program.name()),
+            pace,
+            more: Vec::new(),
+            shell: None,
+            user: None,
+        }
+    }
+
+    /// Another bus than the scene's.
+    #[must_use]
+    pub fn bus(mut self, url: impl Into<String>) -> Self {
+        self.bus = url.into();
+        self
+    }
+
+    /// Another rig file.
+    #[must_use]
+    pub fn rig(mut self, path: &Path) -> Self {
+        self.rig = path.into();
+        self
+    }
+
+    /// Another experiment file.
+    #[must_use]
+    pub fn experiment(mut self, path: &Path) -> Self {
+        self.experiment = path.into();
+        self
+    }
+
+    /// Another output folder.
+    #[must_use]
+    pub fn out(mut self, folder: &Path) -> Self {
+        self.out = folder.into();
+        self
+    }
+
+    /// Another build.
+    #[must_use]
+    pub fn build(mut self, build: Build) -> Self {
+        self.build = build;
+        self
+    }
+
+    /// More options, separated by spaces.
+    #[must_use]
+    pub fn with(mut self, options: &str) -> Self {
+        self.more.extend(options.split_whitespace().map(OsString::from));
+        self
+    }
+
+    /// A line of shell that is run first, in the same process: `ulimit` and the like.
+    #[must_use]
+    pub fn after_shell(mut self, line: &str) -> Self {
+        self.shell = Some(line.into());
+        self
+    }
+
+    /// As another user, which only root can ask for.
+    #[must_use]
+    pub fn as_user(mut self, user: u32) -> Self {
+        self.user = Some(user);
+        self
+    }
+
+    /// Starts it.
+    #[must_use]
+    pub fn start(&self) -> Running {
+        let program = executable(self.program, self.build);
+        let mut command = match &self.shell {
+            Some(line) => {
+                let mut shell = Command::new("sh");
+                shell.arg("-c").arg(format!("{line} && exec \"$0\" \"$@\"")).arg(program);
+                shell
+            }
+            None => Command::new(program),
+        };
+        let pace = if self.pace == Pace::Real { "real" } else { "lockstep" };
+        command.arg("run").arg("--bus").arg(&self.bus).arg("--rig").arg(&self.rig);
+        command.arg("--experiment").arg(&self.experiment).arg("--out").arg(&self.out);
+        command.args(["--pace", pace]).args(&self.more);
+        if let Some(user) = self.user {
+            command.uid(user).gid(user);
+        }
+        Running::start(self.program.name(), &mut command)
+    }
+}

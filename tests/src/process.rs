@@ -1,0 +1,223 @@
+//! A program while it runs, and what is left of it: exit code and everything it said.
+
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How long anything may take that should take a moment: a protection against hanging, no measure.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+const POLL: Duration = Duration::from_millis(5);
+
+/// A program in a process group of its own.
+pub struct Running {
+    name: String,
+    child: Child,
+    said: [Said; 2],
+}
+
+/// What a program wrote to a stream, gathered as it comes.
+struct Said {
+    text: Arc<Mutex<String>>,
+    reader: Option<JoinHandle<()>>,
+}
+
+/// How a program ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// What was started.
+    pub name: String,
+    /// Exit code; `None` when a signal ended it.
+    pub code: Option<i32>,
+    /// The signal that ended it.
+    pub signal: Option<i32>,
+    /// All it wrote to standard error.
+    pub stderr: String,
+    /// All it wrote to standard output.
+    pub stdout: String,
+}
+
+impl Running {
+    /// Starts `command`.
+    ///
+    /// # Panics
+    /// When the system does not start it.
+    #[must_use]
+    pub fn start(name: &str, command: &mut Command) -> Self {
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
+        let mut child = command.spawn().unwrap_or_else(|error| panic!("{name} does not start: {error}"));
+        let stderr = Said::gather(child.stderr.take().expect("stderr is piped"));
+        let stdout = Said::gather(child.stdout.take().expect("stdout is piped"));
+        Self { name: name.into(), child, said: [stderr, stdout] }
+    }
+
+    /// Sends a signal to the program.
+    ///
+    /// # Panics
+    /// When the program is gone: then the test is about something else than it says.
+    pub fn signal(&self, signal: Signal) {
+        if let Err(error) = kill_process(self.pid(), signal) {
+            panic!("{} cannot be sent {signal:?}: {error}\n{}", self.name, self.stderr());
+        }
+    }
+
+    /// What it has written to standard error so far.
+    #[must_use]
+    pub fn stderr(&self) -> String {
+        self.said[0].so_far()
+    }
+
+    /// The number of the process.
+    #[must_use]
+    pub fn number(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Waits until standard error holds `text`.
+    ///
+    /// # Panics
+    /// When it does not within [`PATIENCE`], or the program ends without saying it.
+    pub fn wait_for(&mut self, text: &str) {
+        self.wait_for_times(text, 1);
+    }
+
+    /// Waits until standard error holds `text` so many times.
+    ///
+    /// # Panics
+    /// As [`Running::wait_for`].
+    pub fn wait_for_times(&mut self, text: &str, times: usize) {
+        let until = Instant::now() + PATIENCE;
+        while self.stderr().matches(text).count() < times {
+            let gone = self.child.try_wait().expect("a child can be waited for").is_some();
+            if gone {
+                self.said.iter_mut().for_each(Said::finish);
+                let said = self.stderr();
+                assert!(said.matches(text).count() >= times, "{} ended without '{text}':\n{said}", self.name);
+                return;
+            }
+            assert!(Instant::now() < until, "{} does not say '{text}':\n{}", self.name, self.stderr());
+            std::thread::sleep(POLL);
+        }
+    }
+
+    /// Waits for the end.
+    ///
+    /// # Panics
+    /// When the program hangs.
+    #[must_use]
+    pub fn wait(self) -> Ended {
+        self.wait_within(PATIENCE)
+    }
+
+    /// Waits for the end for so long.
+    ///
+    /// # Panics
+    /// When the program has not ended by then.
+    #[must_use]
+    pub fn wait_within(mut self, limit: Duration) -> Ended {
+        let until = Instant::now() + limit;
+        let status = loop {
+            if let Some(status) = self.child.try_wait().expect("a child can be waited for") {
+                break status;
+            }
+            assert!(Instant::now() < until, "{} hangs; it said:\n{}", self.name, self.stderr());
+            std::thread::sleep(POLL);
+        };
+        self.said.iter_mut().for_each(Said::finish);
+        Ended {
+            name: self.name.clone(),
+            code: status.code(),
+            signal: status.signal(),
+            stderr: self.said[0].so_far(),
+            stdout: self.said[1].so_far(),
+        }
+    }
+
+    /// Kills it at once, as a crash would, and waits until it is gone.
+    ///
+    /// # Panics
+    /// When it was gone already.
+    pub fn kill(self) -> Ended {
+        self.signal(Signal::KILL);
+        self.wait()
+    }
+
+    fn pid(&self) -> Pid {
+        Pid::from_child(&self.child)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // A group that is gone already is what is wanted.
+        let _ = kill_process_group(self.pid(), Signal::KILL);
+        let _ = self.child.wait();
+    }
+}
+
+impl Said {
+    fn gather(stream: impl Read + Send + 'static) -> Self {
+        let text = Arc::new(Mutex::new(String::new()));
+        let gathered = Arc::clone(&text);
+        let reader = std::thread::spawn(move || {
+            for line in BufReader::new(stream).split(b'\n').map_while(Result::ok) {
+                let mut text = gathered.lock().expect("only whole lines are added under the lock");
+                text.push_str(&String::from_utf8_lossy(&line));
+                text.push('\n');
+            }
+        });
+        Self { text, reader: Some(reader) }
+    }
+
+    fn so_far(&self) -> String {
+        self.text.lock().expect("only whole lines are added under the lock").clone()
+    }
+
+    fn finish(&mut self) {
+        if let Some(reader) = self.reader.take() {
+            reader.join().expect("the reader does not panic");
+        }
+    }
+}
+
+impl Ended {
+    /// Holds the exit code against what is documented.
+    ///
+    /// # Panics
+    /// When it is another, with what the program said.
+    #[track_caller]
+    pub fn expect_code(self, code: i32) -> Self {
+        let Self { name, stderr, signal, .. } = &self;
+        assert_eq!(self.code, Some(code), "exit code of {name} (signal {signal:?}); it said:\n{stderr}");
+        self
+    }
+
+    /// Holds what it said against what a person must learn.
+    ///
+    /// # Panics
+    /// When one of `parts` is missing.
+    #[track_caller]
+    pub fn expect_said(self, parts: &[&str]) -> Self {
+        for part in parts {
+            assert!(self.stderr.contains(part), "{} does not say '{part}' but:\n{}", self.name, self.stderr);
+        }
+        self
+    }
+}
+
+/// Waits until `condition` holds.
+///
+/// # Panics
+/// When it does not within [`PATIENCE`]; `what` tells what was waited for.
+#[track_caller]
+pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+    let until = Instant::now() + PATIENCE;
+    while !condition() {
+        assert!(Instant::now() < until, "waited in vain for: {what}");
+        std::thread::sleep(POLL);
+    }
+}

@@ -1,0 +1,169 @@
+//! A folder of its own for each test, with everything that a run needs and everything that it leaves.
+
+use crate::binaries::{Build, Program, executable, workspace};
+use crate::launch::{Launch, Pace};
+use crate::peer::Peer;
+use crate::process::{Running, wait_until};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+
+/// An experiment of some 1.6 s: initial positioning 0.5 s, settling, 0.05 m in 0.4 s, a rest, settling, done.
+pub const SHORT: &str = r#"title = "short"
+[rig]
+carriage_position_m = 0.1
+[drive]
+law = "bestehorn"
+start_m = 0.1
+moves = [{ to_m = 0.15, duration_s = 0.4, rest_s = 0.25 }]
+settling_s = 0.2
+[drive.position-p]
+gain_per_s = 40.0
+velocity_feed_forward = 1.0
+"#;
+
+/// To and fro without a rest, for `--repeat`: after the first half second the valve is hardly ever shut.
+pub const RESTLESS: &str = r#"title = "restless"
+[rig]
+carriage_position_m = 0.2
+[drive]
+law = "bestehorn"
+start_m = 0.2
+moves = [{ to_m = 0.3, duration_s = 0.4, rest_s = 0.0 }, { to_m = 0.2, duration_s = 0.4, rest_s = 0.0 }]
+settling_s = 0.0
+[drive.position-p]
+gain_per_s = 40.0
+velocity_feed_forward = 1.0
+"#;
+
+/// A test's folder.
+pub struct Scene {
+    folder: TempDir,
+}
+
+impl Scene {
+    /// A folder with the shipped rig file and this experiment.
+    ///
+    /// # Panics
+    /// When the temporary folder cannot be written.
+    #[must_use]
+    pub fn new(experiment: &str) -> Self {
+        // Short, since the path of a socket holds 107 bytes.
+        let folder = tempfile::Builder::new().prefix("airbench-").tempdir().expect("a temporary folder");
+        let scene = Self { folder };
+        std::fs::copy(workspace().join("plant/rig.toml"), scene.path("rig.toml"))
+            .expect("plant/rig.toml is there");
+        scene.write("experiment.toml", experiment);
+        scene
+    }
+
+    /// A path in the folder.
+    #[must_use]
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file of the folder.
+    ///
+    /// # Panics
+    /// When it cannot be written.
+    pub fn write(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, text).expect("the temporary folder can be written");
+        path
+    }
+
+    /// The shipped rig file with one text replaced, under another name.
+    ///
+    /// # Panics
+    /// When the text to be replaced is not in the file.
+    pub fn rig_with(&self, name: &str, from: &str, to: &str) -> PathBuf {
+        let rig = std::fs::read_to_string(self.path("rig.toml")).expect("the rig file is there");
+        assert!(rig.contains(from), "'{from}' is not in the rig file");
+        self.write(name, &rig.replacen(from, to, 1))
+    }
+
+    /// The socket of the scene's bus.
+    #[must_use]
+    pub fn socket(&self) -> PathBuf {
+        self.path("bus")
+    }
+
+    /// The scene's bus by its URL.
+    #[must_use]
+    pub fn url(&self) -> String {
+        format!("unix://{}", self.socket().display())
+    }
+
+    /// The emulator on the scene's bus, writing to the folder `emulator`.
+    #[must_use]
+    pub fn emulator(&self, pace: Pace) -> Launch {
+        Launch::new(Program::Emulator, self, pace)
+    }
+
+    /// The controller on the scene's bus, writing to the folder `controller`.
+    #[must_use]
+    pub fn controller(&self, pace: Pace) -> Launch {
+        Launch::new(Program::Controller, self, pace)
+    }
+
+    /// A bus of its own process; `options` follow the URL's question mark. It serves when this returns.
+    #[must_use]
+    pub fn bus_host(&self, options: &str) -> Running {
+        let mut host = self.start_bus_host(options);
+        host.wait_for("hosting");
+        host
+    }
+
+    /// A bus of its own process, which may not get as far as serving.
+    #[must_use]
+    pub fn start_bus_host(&self, options: &str) -> Running {
+        let url = if options.is_empty() { self.url() } else { format!("{}?{options}", self.url()) };
+        let mut command = Command::new(executable(Program::Emulator, Build::Shipped));
+        Running::start("emulator bus", command.args(["bus", "--bus", &url]))
+    }
+
+    /// A peer on the scene's bus, waiting for its host if need be.
+    #[must_use]
+    pub fn peer(&self) -> Peer {
+        Peer::connect(&self.socket())
+    }
+
+    /// Waits until so many peers are connected to the scene's bus, as the kernel's list of sockets shows.
+    pub fn wait_for_peers(&self, count: usize) {
+        let socket = self.socket().display().to_string();
+        let connected = || {
+            let list = std::fs::read_to_string("/proc/net/unix").unwrap_or_default();
+            // Number, references, protocol, flags, type, state (03: connected), inode, path.
+            let peers = list.lines().filter(|line| line.ends_with(&socket));
+            peers.filter(|line| line.split_whitespace().nth(5) == Some("03")).count()
+        };
+        wait_until(&format!("{count} peers on {socket}"), || connected() >= count);
+    }
+
+    /// Waits until measurement.csv of the emulator's folder holds so many lines: the run is under way, and recorded.
+    pub fn wait_for_rows(&self, folder: &str, least: usize) {
+        let path = self.path(folder).join("measurement.csv");
+        let rows =
+            || std::fs::read(&path).map_or(0, |bytes| bytes.iter().filter(|byte| **byte == b'\n').count());
+        wait_until(&format!("{least} rows in {}", path.display()), || rows() >= least);
+    }
+
+    /// Waits until the emulator has recorded so many more rows than now: it still runs, and goes on.
+    pub fn wait_for_more_rows(&self, folder: &str, more: usize) {
+        let text = std::fs::read(self.path(folder).join("measurement.csv")).unwrap_or_default();
+        let now = text.iter().filter(|byte| **byte == b'\n').count();
+        self.wait_for_rows(folder, now + more);
+    }
+
+    /// Whether two files of the scene hold the same bytes.
+    ///
+    /// # Panics
+    /// When one cannot be read.
+    #[must_use]
+    pub fn same(&self, one: &Path, other: &Path) -> bool {
+        let read =
+            |path: &Path| std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        read(one) == read(other)
+    }
+}

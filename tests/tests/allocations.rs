@@ -1,0 +1,52 @@
+//! The 1 ms path of both shipped programs allocates nothing: ten seconds on a real bus after the first of warm-up.
+//!
+//! The programs are built once more, with the allocator that counts inside the 1 ms path; nothing else differs. That this
+//! counter does count is proven where it lives: `realtime/tests/allocations.rs`,
+//! `a_push_is_counted_inside_the_watch_and_not_outside`.
+
+use protocol::can::CanFrame;
+use system_tests::binaries::Build;
+use system_tests::launch::Pace;
+use system_tests::records::{count, json};
+use system_tests::scene::{RESTLESS, Scene};
+use system_tests::turn;
+
+#[test]
+fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let emulator =
+        scene.emulator(Pace::Real).build(Build::CountingAllocations).with("--seconds 11.5").start();
+    let stranger = scene.peer();
+    let controller = scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat").start();
+    // Frames to be refused come along: the paths that refuse are part of the 1 ms path too.
+    for row in (1000..11_000).step_by(500) {
+        scene.wait_for_rows("emulator", row);
+        for bad in [&[1, 2, 3, 4, 5][..], &[0; 3]] {
+            stranger.send(&CanFrame::new(0x110, bad).to_bytes());
+        }
+    }
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], true);
+    let summary = json(&scene.path("emulator/summary.json"));
+    let controller = json(&scene.path("controller/controller.json"));
+    assert_eq!(count(&summary, "/cycles"), 11_500);
+    assert_eq!(count(&summary, "/frames_malformed"), 40);
+    assert!(count(&controller, "/cycles_answered") > 10_000, "the controller took part throughout");
+    assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
+    assert_eq!(count(&controller, "/allocations_in_cycle"), 0);
+}
+
+#[test]
+fn programs_that_do_not_count_say_so() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let emulator = scene.emulator(Pace::Real).with("--seconds 1.2").start();
+    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], false);
+    assert!(json(&scene.path("emulator/summary.json"))["allocations_in_cycle"].is_null());
+    assert!(json(&scene.path("controller/controller.json"))["allocations_in_cycle"].is_null());
+}

@@ -1,0 +1,193 @@
+//! Faults of the bus and on it, in real time on the embedded bus: hosts that go, hosts too many, a second controller,
+//! a listener that does not listen.
+
+use rustix::process::Signal;
+use system_tests::account::of_sensors;
+use system_tests::events::{self, expect_valve_shut_between};
+use system_tests::launch::Pace;
+use system_tests::process::PATIENCE;
+use system_tests::records::{Table, bus_log, count, count_of_id, json};
+use system_tests::scene::{RESTLESS, SHORT, Scene};
+use system_tests::turn;
+
+const UNDER_WAY: usize = 900;
+
+#[test]
+fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let mut emulator = scene.emulator(Pace::Real).start();
+    let first = scene.controller(Pace::Real).with("--repeat").start();
+    scene.wait_for_rows("emulator", UNDER_WAY);
+    let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
+    emulator.wait_for("fault two-sources: two senders on the drive command, valve shut");
+    scene.wait_for_more_rows("emulator", 200);
+    let _ = second.kill();
+    emulator.wait_for("one sender left on the drive command, valve follows");
+    scene.wait_for_more_rows("emulator", 600);
+    emulator.signal(Signal::INT);
+    let _ = emulator.wait().expect_code(130);
+    let _ = first.wait().expect_code(0);
+    let summary = json(&scene.path("emulator/summary.json"));
+    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    expect_valve_shut_between(&summary, &measurement, "two-sources", "one-source");
+    for axis in ["drive", "load"] {
+        assert!(count(&summary, &format!("/{axis}_commands/two_sources")) >= 1, "{axis}");
+    }
+    let told = events::all(&summary);
+    for span in events::spans(&told, "two-sources", "one-source", measurement.len()) {
+        assert!(span.len() >= 20, "cleared after 20 silent cycles, not before: {span:?}");
+    }
+}
+
+#[test]
+fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the_gaps() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let host = scene.bus_host("");
+    let listener = scene.peer();
+    let never = scene.peer();
+    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    scene.wait_for_peers(3);
+    let emulator = scene.emulator(Pace::Real).start();
+    // 2000 cycles are some 9000 frames; the longest queue that the host asks for holds 5600.
+    scene.wait_for_rows("emulator", 2000);
+    let heard = std::thread::spawn(move || listener.frames_to_the_end());
+    scene.wait_for_more_rows("emulator", 500);
+    emulator.signal(Signal::INT);
+    let _ = emulator.wait().expect_code(130);
+    let _ = controller.wait().expect_code(0);
+    host.signal(Signal::INT);
+    let host = host.wait().expect_code(130);
+    let heard = heard.join().expect("the listener listens at last");
+    drop(never);
+
+    let report: serde_json::Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
+    let summary = json(&scene.path("emulator/summary.json"));
+    let of_peer = |index: usize| &report["peers"][index]["dropped_at_queue"];
+    let log = bus_log(&scene.path("emulator/bus.log"));
+    for id in [0x110_u16, 0x111, 0x120, 0x121, 0x130, 0x140, 0x150, 0x151, 0x152] {
+        let of_id = |frames: &[protocol::can::CanFrame]| {
+            frames.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
+        };
+        let dropped = count_of_id(of_peer(0), &format!("{id:03X}"));
+        assert_eq!(of_id(&log), of_id(&heard) + dropped, "{id:#x}: sent is heard and dropped");
+        assert!(of_id(&log) > 0, "{id:#x} was on the bus");
+    }
+    for (id, name) in [(0x120, "120"), (0x121, "121")] {
+        let gaps = of_sensors(&heard, id).missing_between_ticks;
+        assert_eq!(gaps, count_of_id(of_peer(0), name), "gaps in {id:#x} are what its queue dropped");
+        assert!(gaps > 0, "{id:#x}: the listener was late enough to lose some");
+        assert!(count_of_id(of_peer(1), name) > gaps, "who never reads loses more");
+    }
+    let axes = ["/drive_commands/lost", "/load_commands/lost", "/drive_commands/two_sources"];
+    assert!(axes.iter().all(|pointer| count(&summary, pointer) == 0), "the run is unaffected");
+    for peer in [2, 3] {
+        assert_eq!(
+            of_peer(peer).as_object().map(serde_json::Map::len),
+            Some(0),
+            "others' queues are their own"
+        );
+    }
+}
+
+#[test]
+fn a_bus_that_stays_away_ends_both_with_complete_files() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let host = scene.bus_host("");
+    let mut emulator = scene.emulator(Pace::Real).with("--bus-grace 1").start();
+    let controller = scene.controller(Pace::Real).with("--repeat --bus-grace 1").start();
+    scene.wait_for_rows("emulator", UNDER_WAY);
+    let _ = host.kill();
+    emulator.wait_for("the bus is gone");
+    let _ = emulator.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    let _ = controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    let summary = json(&scene.path("emulator/summary.json"));
+    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    measurement.expect_no_hole();
+    assert_eq!(count(&summary, "/cycles"), measurement.len() as u64);
+    assert_eq!(count(&summary, "/bus/disconnects"), 1);
+    assert!(count(&summary, "/bus/dropped_on_send") > 1000, "a second of frames was dropped, and counted");
+    assert_eq!(summary["passed"], false);
+    // Frames that the bus did not take were on no bus.
+    assert!(
+        count(&summary, "/frames_sent") + count(&summary, "/frames_received")
+            == bus_log(&scene.path("emulator/bus.log")).len() as u64
+    );
+    let _ = Table::read(&scene.path("emulator/truth.csv"));
+    assert_eq!(count(&json(&scene.path("controller/controller.json")), "/bus/disconnects"), 1);
+}
+
+#[test]
+fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let host = scene.bus_host("");
+    let mut emulator = scene.emulator(Pace::Real).with("--bus-grace 30").start();
+    let mut controller = scene.controller(Pace::Real).with("--repeat --bus-grace 30").start();
+    scene.wait_for_rows("emulator", UNDER_WAY);
+    let _ = host.kill();
+    emulator.wait_for("the bus is gone");
+    controller.wait_for("the bus is gone");
+    emulator.wait_for("no fresh drive command");
+    let host = scene.bus_host("");
+    emulator.wait_for("the bus is back");
+    controller.wait_for("the bus is back");
+    emulator.wait_for("fresh drive commands again");
+    scene.wait_for_more_rows("emulator", 600);
+    emulator.signal(Signal::INT);
+    let _ = emulator.wait().expect_code(130);
+    let _ = controller.wait().expect_code(0);
+    drop(host);
+    let summary = json(&scene.path("emulator/summary.json"));
+    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    measurement.expect_no_hole();
+    expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
+    let report = json(&scene.path("controller/controller.json"));
+    for counted in [&summary, &report] {
+        assert_eq!((count(counted, "/bus/disconnects"), count(counted, "/bus/reconnects")), (1, 1));
+    }
+    let told = events::all(&summary);
+    assert_eq!((events::times(&told, "bus-lost"), events::times(&told, "bus-back")), (1, 1));
+}
+
+#[test]
+fn the_socket_of_a_host_that_was_killed_is_taken_over() {
+    let _machine = turn::take();
+    let scene = Scene::new(SHORT);
+    let _ = scene.bus_host("").kill();
+    assert!(scene.socket().exists(), "a killed host leaves its socket");
+    let emulator = scene.emulator(Pace::Real).start();
+    let controller = scene.controller(Pace::Real).start();
+    let _ = emulator.wait_within(PATIENCE).expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    assert!(
+        json(&scene.path("emulator/summary.json"))["bus_host"].is_object(),
+        "the emulator hosted the bus"
+    );
+    assert!(!scene.socket().exists(), "a host that ends removes its socket");
+}
+
+#[test]
+fn a_second_host_is_refused_and_a_second_emulator_joins_and_is_told_by_both() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let mut first = scene.emulator(Pace::Real).start();
+    scene.wait_for_rows("emulator", 100);
+    let host = scene.start_bus_host("");
+    let _ = host
+        .wait()
+        .expect_code(3)
+        .expect_said(&["has a host already", "connect to it, or choose another path"]);
+    let mut second = scene.emulator(Pace::Real).out(&scene.path("second")).start();
+    second.wait_for("has a host already; joining it");
+    first.wait_for("another rig is on this bus; stop one of them");
+    second.wait_for("another rig is on this bus; stop one of them");
+    for emulator in [second, first] {
+        emulator.signal(Signal::INT);
+        let _ = emulator.wait().expect_code(130);
+    }
+    assert!(json(&scene.path("second/summary.json"))["bus_host"].is_null());
+    assert!(count(&json(&scene.path("emulator/summary.json")), "/frames_ignored/second_rig") > 0);
+}

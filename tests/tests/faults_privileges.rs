@@ -1,0 +1,48 @@
+//! Without privileges for real time a run works all the same; what was refused is told with its remedy.
+
+use std::os::unix::fs::{PermissionsExt, chown};
+use system_tests::launch::Pace;
+use system_tests::records::{count, json};
+use system_tests::scene::{SHORT, Scene};
+use system_tests::turn;
+
+const NOBODY: u32 = 65534;
+/// Limits under which no user but root may have FIFO priority or locked memory.
+const NO_LIMITS_RAISED: &str = "ulimit -r 0 && ulimit -l 64";
+
+#[test]
+fn a_user_without_privileges_is_told_the_remedy_and_the_run_succeeds() {
+    let _machine = turn::take();
+    let scene = Scene::new(SHORT);
+    let mut emulator = scene.emulator(Pace::Real).after_shell(NO_LIMITS_RAISED);
+    let mut controller = scene.controller(Pace::Real).after_shell(NO_LIMITS_RAISED);
+    if rustix::process::geteuid().is_root() {
+        let folder = scene.path("");
+        std::fs::set_permissions(&folder, PermissionsExt::from_mode(0o700)).expect("our own folder");
+        chown(&folder, Some(NOBODY), Some(NOBODY)).expect("root may give it away");
+        (emulator, controller) = (emulator.as_user(NOBODY), controller.as_user(NOBODY));
+    }
+    let (emulator, controller) = (emulator.start(), controller.start());
+    let remedies =
+        ["warning: no FIFO priority", "setcap cap_sys_nice+ep", "warning: no locked memory", "limits.d"];
+    let _ = emulator.wait().expect_code(0).expect_said(&remedies);
+    let _ = controller.wait().expect_code(0).expect_said(&remedies);
+    let run = json(&scene.path("emulator/run.json"));
+    let refused: Vec<&str> =
+        run["realtime_refused"].as_array().expect("a list").iter().filter_map(|line| line.as_str()).collect();
+    assert!(refused.iter().any(|line| line.contains("FIFO priority")), "the record knows too: {refused:?}");
+    assert!(count(&json(&scene.path("emulator/summary.json")), "/cycles") > 1500);
+}
+
+#[test]
+fn who_asks_for_no_privileges_is_warned_of_none() {
+    let _machine = turn::take();
+    let scene = Scene::new(SHORT);
+    let emulator = scene.emulator(Pace::Real).with("--no-realtime").start();
+    let controller = scene.controller(Pace::Real).with("--no-realtime").start();
+    for running in [emulator, controller] {
+        let ended = running.wait().expect_code(0);
+        assert!(!ended.stderr.contains("warning"), "{}", ended.stderr);
+    }
+    assert_eq!(json(&scene.path("emulator/run.json"))["realtime_granted"], serde_json::json!([]));
+}

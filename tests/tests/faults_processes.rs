@@ -1,0 +1,148 @@
+//! Faults of processes while running, in real time on the embedded bus: killed, restarted, stopped for a while.
+
+use rustix::process::Signal;
+use serde_json::Value;
+use std::time::Duration;
+use system_tests::events::{self, expect_valve_shut_between};
+use system_tests::launch::Pace;
+use system_tests::process::Running;
+use system_tests::records::{Table, count, count_of_id, json};
+use system_tests::scene::{RESTLESS, SHORT, Scene};
+use system_tests::turn;
+
+/// Rows after which the valve moves.
+const UNDER_WAY: usize = 900;
+const STOPPED: Duration = Duration::from_millis(200);
+
+/// Emulator and controller under way; the experiment repeats until the emulator is interrupted.
+fn under_way(scene: &Scene) -> (Running, Running) {
+    let emulator = scene.emulator(Pace::Real).start();
+    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    scene.wait_for_rows("emulator", UNDER_WAY);
+    (emulator, controller)
+}
+
+/// Goes on for a while, ends the run as a person would, and hands back summary and measurement.
+fn end(scene: &Scene, emulator: Running) -> (Value, Table) {
+    scene.wait_for_more_rows("emulator", 600);
+    emulator.signal(Signal::INT);
+    let _ = emulator.wait().expect_code(130);
+    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    measurement.expect_no_hole();
+    let summary = json(&scene.path("emulator/summary.json"));
+    assert_eq!(count(&summary, "/cycles"), measurement.len() as u64, "a row for each cycle");
+    assert_eq!(count(&summary, "/records_dropped"), 0);
+    (summary, measurement)
+}
+
+#[test]
+fn a_controller_that_is_killed_leaves_the_valve_shut_until_the_next_one_comes() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let (mut emulator, controller) = under_way(&scene);
+    let _ = controller.kill();
+    emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
+    let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
+    emulator.wait_for("fresh drive commands again");
+    let (summary, measurement) = end(&scene, emulator);
+    let _ = second.wait().expect_code(0);
+    expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
+    assert!(count(&summary, "/drive_commands/expired") >= 1);
+    assert_eq!(count(&summary, "/drive_commands/two_sources"), 0, "a restart is no second source");
+    assert!(!scene.path("controller/controller.json").exists(), "a killed process writes no report");
+    assert!(count(&json(&scene.path("second/controller.json")), "/cycles_answered") > 0);
+}
+
+#[test]
+fn an_emulator_that_is_killed_and_restarted_is_found_again_and_the_chain_starts_anew() {
+    let _machine = turn::take();
+    let scene = Scene::new(&SHORT.replace("rest_s = 0.25", "rest_s = 2.0"));
+    let emulator = scene.emulator(Pace::Real).out(&scene.path("first")).start();
+    let mut controller = scene.controller(Pace::Real).start();
+    controller.wait_for(": experiment");
+    scene.wait_for_rows("first", UNDER_WAY);
+    let _ = emulator.kill();
+    controller.wait_for("the bus is gone");
+    let second = scene.emulator(Pace::Real).out(&scene.path("second")).start();
+    controller.wait_for("the rig started anew; starting over");
+    let _ = second.wait().expect_code(0).expect_said(&["the controllers are done"]);
+    let _ = controller.wait().expect_code(0);
+    let report = json(&scene.path("controller/controller.json"));
+    assert!(count(&report, "/bus/disconnects") >= 1 && count(&report, "/bus/reconnects") >= 1);
+    let news = report["news"].as_array().expect("news");
+    let anew = news.iter().position(|item| item == "rig-restarted").expect("the restart is told");
+    let states: Vec<&str> = news[anew..].iter().filter_map(|item| item["state"][0].as_str()).collect();
+    assert_eq!(states, ["initial-positioning", "settling", "experiment", "final-settling", "done"]);
+    Table::read_to_last_whole_line(&scene.path("first/measurement.csv")).expect_no_hole();
+    let measurement = Table::read(&scene.path("second/measurement.csv"));
+    measurement.expect_no_hole();
+    assert!(
+        measurement.len() > 3000,
+        "the experiment was driven from its beginning: {} rows",
+        measurement.len()
+    );
+}
+
+#[test]
+fn a_controller_that_stands_still_has_its_valve_shut_and_its_losses_counted_at_both_ends() {
+    let _machine = turn::take();
+    // Long enough for the second to overflow the queue of a usual kernel.
+    for stopped in [STOPPED, 4 * STOPPED] {
+        let scene = Scene::new(RESTLESS);
+        let (mut emulator, controller) = under_way(&scene);
+        controller.signal(Signal::STOP);
+        emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
+        std::thread::sleep(stopped);
+        controller.signal(Signal::CONT);
+        emulator.wait_for("fresh drive commands again");
+        let (summary, measurement) = end(&scene, emulator);
+        let name = format!("process {}", controller.number());
+        let _ = controller.wait().expect_code(0);
+        expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
+        assert!(count(&summary, "/drive_commands/expired") >= 1);
+        assert_eq!(count(&summary, "/frames_lost_at_rig"), 0, "what was never sent is not lost");
+        assert!(count(&summary, "/stale_commands") >= 2, "both axes went stale");
+        let report = json(&scene.path("controller/controller.json"));
+        let peers = summary["bus_host"]["peers"].as_array().expect("peers");
+        let peer =
+            peers.iter().find(|peer| peer["name"] == name.as_str()).expect("the controller was a peer");
+        for (axis, id) in [("drive", "120"), ("load", "121")] {
+            let dropped = count_of_id(&peer["dropped_at_queue"], id);
+            assert_eq!(
+                count(&report, &format!("/sensors_lost/{axis}")),
+                dropped,
+                "{axis}, stopped for {stopped:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost_frames() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let (mut emulator, mut controller) = under_way(&scene);
+    emulator.signal(Signal::STOP);
+    controller.wait_for("no sensors for 0.2 s");
+    std::thread::sleep(STOPPED / 10);
+    emulator.signal(Signal::CONT);
+    emulator.wait_for("woke late");
+    let (summary, _) = end(&scene, emulator);
+    let _ = controller.wait().expect_code(0);
+    let skipped = count(&summary, "/skipped");
+    // It was stopped for 200 ms at least, since a controller waited for so long; that is a claim of cause, not of speed.
+    assert!(skipped >= 150, "{skipped} cycles skipped");
+    assert!(count(&summary, "/overruns") >= 1);
+    assert_eq!(count(&summary, "/frames_lost_at_rig"), 0, "nothing was lost at the rig");
+    let report = json(&scene.path("controller/controller.json"));
+    assert_eq!(count(&report, "/rig_cycles_skipped"), skipped, "the controller knows of every skipped cycle");
+    for axis in ["drive", "load"] {
+        assert_eq!(count(&report, &format!("/sensors_lost/{axis}")), 0, "{axis}: skipped is not lost");
+    }
+    let told: u64 = events::all(&summary)
+        .iter()
+        .filter(|event| event.kind == "skipped")
+        .map(|event| count(&event.of, "/cycles"))
+        .sum();
+    assert_eq!(told, skipped, "every skipped cycle was told");
+}

@@ -1,0 +1,99 @@
+//! Lockstep: the same command lines give the same files to the byte, however fast the machine and whoever starts first.
+
+use rustix::process::Signal;
+use std::time::Duration;
+use system_tests::launch::Pace;
+use system_tests::load::BusyLoops;
+use system_tests::records::{Table, bus_log, json};
+use system_tests::scene::{SHORT, Scene};
+
+/// Files of emulator and controller that must be the same.
+const FILES: [&str; 4] =
+    ["emulator/bus.log", "emulator/measurement.csv", "emulator/truth.csv", "controller/controller.csv"];
+
+/// How a run differs from another in what must not matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Circumstance {
+    EmulatorFirst,
+    ControllerFirst,
+    MachineBusy,
+    ControllerStoppedForAWhile,
+    ListenerThatNeverReads,
+}
+
+/// Runs the short experiment to its end.
+fn run(circumstance: Circumstance, options: &str) -> Scene {
+    let scene = Scene::new(SHORT);
+    let _busy = (circumstance == Circumstance::MachineBusy).then(BusyLoops::on_every_processor);
+    let (emulator, controller) =
+        (scene.emulator(Pace::Lockstep).with(options), scene.controller(Pace::Lockstep));
+    let (emulator, controller) = match circumstance {
+        Circumstance::ControllerFirst => {
+            let controller = controller.start();
+            std::thread::sleep(Duration::from_millis(50));
+            (emulator.start(), controller)
+        }
+        Circumstance::ListenerThatNeverReads => {
+            let emulator = emulator.start();
+            let listener = scene.peer();
+            let controller = controller.start();
+            let _ = emulator.wait().expect_code(0);
+            drop(listener);
+            let _ = controller.wait().expect_code(0);
+            return scene;
+        }
+        _ => (emulator.start(), controller.start()),
+    };
+    if circumstance == Circumstance::ControllerStoppedForAWhile {
+        let _peer = scene.peer();
+        controller.signal(Signal::STOP);
+        std::thread::sleep(Duration::from_millis(300));
+        controller.signal(Signal::CONT);
+    }
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    scene
+}
+
+#[test]
+fn two_runs_give_the_same_files_to_the_byte_whatever_the_circumstances() {
+    let first = run(Circumstance::EmulatorFirst, "");
+    let rows = Table::read(&first.path("emulator/measurement.csv"));
+    rows.expect_no_hole();
+    // 0.5 s to the start, 0.2 s settling, 0.65 s experiment, 0.2 s settling: fewer rows would compare nothing.
+    assert!(rows.len() > 1500, "{} rows", rows.len());
+    assert!(bus_log(&first.path("emulator/bus.log")).len() > 4 * rows.len());
+    for circumstance in [
+        Circumstance::EmulatorFirst,
+        Circumstance::ControllerFirst,
+        Circumstance::MachineBusy,
+        Circumstance::ControllerStoppedForAWhile,
+        Circumstance::ListenerThatNeverReads,
+    ] {
+        let again = run(circumstance, "");
+        for file in FILES {
+            assert!(first.same(&first.path(file), &again.path(file)), "{file} differs with {circumstance:?}");
+        }
+        for figure in ["position_error_dynamic_m", "position_error_static_m"] {
+            let of = |scene: &Scene| json(&scene.path("controller/controller.json"))[figure].clone();
+            assert_eq!(of(&first), of(&again), "{figure} with {circumstance:?}");
+            assert!(of(&first).is_number(), "{figure} was measured");
+        }
+    }
+}
+
+#[test]
+fn another_seed_gives_another_log() {
+    let (one, other) = (run(Circumstance::EmulatorFirst, ""), run(Circumstance::EmulatorFirst, "--seed 2"));
+    for file in FILES {
+        assert!(!one.same(&one.path(file), &other.path(file)), "{file} does not depend on the seed");
+    }
+}
+
+#[test]
+fn the_log_knows_no_wall_clock() {
+    let scene = run(Circumstance::EmulatorFirst, "");
+    let log = std::fs::read_to_string(scene.path("emulator/bus.log")).expect("a log");
+    assert!(log.starts_with("(0000000000.000000) bus0 120#"), "{:?}", log.lines().next());
+    assert!(json(&scene.path("emulator/run.json"))["started_unix_s"].is_null());
+}

@@ -1,0 +1,176 @@
+//! Lost frames are counted where they were lost and, apart from that, by the gaps at the receivers: both agree.
+//!
+//! ```text
+//!   host:       injected_loss by identifier                    what the wire lost
+//!   rig:        drive_commands.lost, load_commands.lost        gaps in the counters of 0x110, 0x111
+//!   controller: sensors_lost                                   ticks less sensors received, 0x120, 0x121
+//!   listener:   a trace of all that passed, held by this test  tells which were lost, and where
+//! ```
+//!
+//! The sums differ at the ends of a run only, and the trace says by how much: a receiver cannot miss what was sent
+//! before the first frame that it saw, nor after the last.
+
+use protocol::can::CanFrame;
+use rustix::process::Signal;
+use serde_json::Value;
+use std::path::Path;
+use system_tests::account::{command_counters, gaps, of_sensors};
+use system_tests::launch::Pace;
+use system_tests::records::{count, count_of_id, json};
+use system_tests::scene::{RESTLESS, Scene};
+use system_tests::turn;
+
+const WIRE: &str = "loss=0.01&seed=7";
+
+/// All that was counted in a run.
+struct Counted {
+    heard: Vec<CanFrame>,
+    host: Value,
+    summary: Value,
+    controller: Value,
+}
+
+impl Counted {
+    fn injected(&self, id: &str) -> u64 {
+        count_of_id(&self.host["injected_loss"], id)
+    }
+
+    fn heard(&self, id: u16) -> u64 {
+        self.heard.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
+    }
+
+    /// Nobody's queue was full, so that what one receiver missed all missed.
+    fn expect_no_full_queue(&self) {
+        for peer in self.host["peers"].as_array().expect("peers") {
+            let dropped = peer["dropped_at_queue"].as_object().expect("a table");
+            assert!(dropped.is_empty(), "a queue was full: {peer}");
+        }
+    }
+
+    fn check_sensors(&self, axis: &str, id: u16, name: &str) {
+        let sent = count(&self.summary, "/cycles") - count(&self.summary, "/skipped");
+        let injected = self.injected(name);
+        assert_eq!(
+            sent - self.heard(id),
+            injected,
+            "{axis} sensors: what the trace misses is what the wire lost"
+        );
+        let account = of_sensors(&self.heard, id);
+        let lost = count(&self.controller, &format!("/sensors_lost/{axis}"));
+        assert_eq!(
+            lost, account.missing_between_ticks,
+            "{axis} sensors: gaps at the controller, {account:?}"
+        );
+        let uncounted = injected - lost;
+        // At 1 % more than three of the few frames around the first and last tick are not lost.
+        assert!(
+            uncounted >= account.missing_before_first_tick && uncounted <= 3,
+            "{axis}: {uncounted}, {account:?}"
+        );
+        assert!(lost > 10, "{axis}: {lost} lost sensors prove nothing");
+    }
+
+    fn check_commands(&self, axis: &str, id: u16, name: &str) {
+        let counters = command_counters(&self.heard, id);
+        let commands = &self.summary[format!("{axis}_commands")];
+        assert_eq!(
+            count(commands, "/accepted"),
+            counters.len() as u64,
+            "{axis} commands: all heard were accepted"
+        );
+        let lost = count(commands, "/lost");
+        assert_eq!(lost, gaps(&counters), "{axis} commands: gaps at the rig are those of the trace");
+        // A controller's first command has counter 1.
+        let before = u64::from((counters[0] + 15) % 16);
+        let injected = self.injected(name);
+        let after = injected - lost - before;
+        assert!(
+            after <= 3,
+            "{axis} commands: {injected} lost on the wire, {before} before the first, {lost} in between"
+        );
+        assert!(lost > 10, "{axis}: {lost} lost commands prove nothing");
+        if axis == "drive" {
+            let answered = count(&self.controller, "/cycles_answered");
+            assert_eq!(
+                answered,
+                self.heard(id) + injected,
+                "each command sent was heard or lost on the wire"
+            );
+        }
+    }
+
+    fn check(&self) {
+        self.expect_no_full_queue();
+        self.check_sensors("drive", 0x120, "120");
+        self.check_sensors("load", 0x121, "121");
+        self.check_commands("drive", 0x110, "110");
+        self.check_commands("load", 0x111, "111");
+        let lost = |axis: &str| count(&self.summary, &format!("/{axis}_commands/lost"));
+        assert_eq!(count(&self.summary, "/frames_lost_at_rig"), lost("drive") + lost("load"));
+    }
+}
+
+fn run_in_lockstep(wire: &str) -> (Scene, Counted) {
+    let scene = Scene::new(RESTLESS);
+    let url = format!("{}?{wire}", scene.url());
+    let emulator = scene.emulator(Pace::Lockstep).bus(url).with("--members 2 --seconds 4").start();
+    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
+    let mut heard = Vec::new();
+    scene.peer().take_part("listener", |_, _, frames| heard.extend_from_slice(frames));
+    let _ = emulator.wait().expect_code(0);
+    // Good, unless the wire lost the rig's farewell.
+    let _ = controller.wait();
+    let summary = json(&scene.path("emulator/summary.json"));
+    let controller = json(&scene.path("controller/controller.json"));
+    let counted = Counted { heard, host: summary["bus_host"].clone(), summary, controller };
+    (scene, counted)
+}
+
+#[test]
+fn in_lockstep_both_sums_agree_for_each_identifier() {
+    run_in_lockstep(WIRE).1.check();
+}
+
+#[test]
+fn the_same_seed_loses_the_same_frames_and_another_seed_others() {
+    let log = |wire: &str| {
+        let (scene, _) = run_in_lockstep(wire);
+        std::fs::read(scene.path("emulator/measurement.csv")).expect("a measurement")
+    };
+    let first = log(WIRE);
+    assert!(first == log(WIRE), "the same seed gave another measurement");
+    assert!(first != log("loss=0.01&seed=8"), "another seed gave the same measurement");
+}
+
+#[test]
+fn without_loss_nobody_counts_any() {
+    let (_, counted) = run_in_lockstep("loss=0");
+    assert_eq!(counted.host["injected_loss"], Value::Object(serde_json::Map::new()));
+    for pointer in ["/drive_commands/lost", "/load_commands/lost", "/frames_lost_at_rig"] {
+        assert_eq!(count(&counted.summary, pointer), 0, "{pointer}");
+    }
+    for axis in ["drive", "load"] {
+        assert_eq!(count(&counted.controller, &format!("/sensors_lost/{axis}")), 0, "{axis}");
+    }
+}
+
+/// The host is a process of its own, so that everybody is on the bus before the first frame.
+#[test]
+fn in_real_time_both_sums_agree_for_each_identifier() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let host = scene.bus_host(WIRE);
+    let listener = scene.peer();
+    let trace = std::thread::spawn(move || listener.frames_to_the_end());
+    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    scene.wait_for_peers(2);
+    let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    host.signal(Signal::INT);
+    let host = host.wait().expect_code(130);
+    let host: Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
+    let read = |file: &str| json(Path::new(&scene.path(file)));
+    let (summary, controller) = (read("emulator/summary.json"), read("controller/controller.json"));
+    Counted { heard: trace.join().expect("the listener listens"), host, summary, controller }.check();
+}
