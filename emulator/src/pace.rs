@@ -293,7 +293,9 @@ impl Inbox {
         before_ns: u64,
         take: &mut impl FnMut(&CanFrame, u64),
     ) {
-        if stamp_ns < before_ns {
+        // Frames keep their order: what follows one that waits, waits too. Two clocks make up a stamp, and a thread that is
+        // held up between them stamps a frame later than the one behind it.
+        if stamp_ns < before_ns && self.count == 0 {
             take(&frame, stamp_ns);
         } else {
             self.early[self.count] = Some((frame, stamp_ns));

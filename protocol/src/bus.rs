@@ -43,7 +43,7 @@ pub enum Received {
     Frame(CanFrame, u64),
     /// A packet of the lockstep barrier; only peers that joined receive any.
     Barrier(control::Control),
-    /// The queue is empty, or the bus is down (see [`Bus::is_up`]).
+    /// Nothing more in this round: the queue was empty when it was last looked at, or the bus is down (see [`Bus::is_up`]).
     Nothing,
 }
 

@@ -9,8 +9,8 @@
 //! not. Worst-case stuffing adds a bit for each four after the first. A frame that is sent only while its cause lasts (emergency
 //! stop) counts as if it always did; frames sent on a change or an event are not cyclic and not counted.
 //!
-//! Frames of one period may fall into the same millisecond. That [`FULLEST_MILLISECOND_BITS`] may exceed what a millisecond carries:
-//! then arbitration sends the lower identifiers, which are the faster frames, and the rest waits for [`BACKLOG_MS`].
+//! Frames of one period may fall into the same millisecond. That [`FULLEST_MILLISECOND_BITS`] may exceed what a millisecond
+//! carries: then arbitration sends the lower identifiers, which are the faster frames, and the rest waits for [`BACKLOG_MS`].
 //!
 //! Source: Davis, Burns, Bril, Lukkien, "Controller Area Network (CAN) schedulability analysis: Refuted, revisited and
 //! revised", Real-Time Systems 35 (2007), eq. 1.
@@ -172,8 +172,8 @@ mod tests {
         assert!(MESSAGES.is_sorted_by(|one, other| one.id < other.id));
     }
 
-    /// By hand: per ms 2 commands of 105, 2 sensors of 135 and the reserve of 135; per 10 ms Tick 125, RigStatus 95, 2 ChainStatus
-    /// of 105, 2 ChainValues of 135; per 100 ms 4 emergency stops of 75.
+    /// By hand: per ms 2 commands of 105, 2 sensors of 135 and the reserve of 135; per 10 ms Tick 125, RigStatus 95,
+    /// 2 ChainStatus of 105, 2 ChainValues of 135; per 100 ms 4 emergency stops of 75.
     #[test]
     fn load_is_the_sum_made_by_hand() {
         let bits_per_ms = 615.0 + (125.0 + 95.0 + 210.0 + 270.0) / 10.0 + 300.0 / 100.0;

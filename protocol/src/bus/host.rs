@@ -301,9 +301,10 @@ impl Host {
         else {
             return;
         };
-        if let Some(rig) = barrier.rig() {
-            self.tell(rig, Control::named(Kind::TimedOut, 0, &name));
+        for peer in barrier.everyone() {
+            self.tell(peer, Control::named(Kind::TimedOut, 0, &name));
         }
+        self.waiting_since = Instant::now();
     }
 
     fn carry_out(&mut self, release: Release) {
@@ -386,7 +387,10 @@ fn make_private_folder(path: &Path) -> io::Result<()> {
 }
 
 fn open_lock(path: &Path) -> io::Result<(OwnedFd, PathBuf)> {
-    let lock_path = path.with_extension("lock");
+    // Added, not in place of an extension: buses `rig.a` and `rig.b` are two.
+    let mut lock_path = path.as_os_str().to_owned();
+    lock_path.push(".lock");
+    let lock_path = PathBuf::from(lock_path);
     let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC | OFlags::NOFOLLOW;
     let lock = rustix::fs::open(&lock_path, flags, Mode::RUSR | Mode::WUSR)?;
     Ok((lock, lock_path))

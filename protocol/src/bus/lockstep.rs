@@ -96,9 +96,9 @@ impl Barrier {
         self.members.len() + self.echoed.len()
     }
 
-    /// The rig's connection.
-    pub(super) fn rig(&self) -> Option<PeerId> {
-        self.rig
+    /// All connections in the barrier.
+    pub(super) fn everyone(&self) -> Vec<PeerId> {
+        self.rig.iter().chain(self.members.keys()).copied().collect()
     }
 
     /// Whether losing a frame at this peer's queue would break determinism.
@@ -109,6 +109,7 @@ impl Barrier {
     /// A peer joins; false when the part is taken. Later joiners of a running barrier act from the next release on.
     pub(super) fn join(&mut self, peer: PeerId, role: Role, name: String) -> bool {
         match role {
+            // The first stays: a second emulator must not end the run of the first.
             Role::Rig if self.rig.is_some() => return false,
             Role::Rig => self.rig = Some(peer),
             Role::Member => {
@@ -290,7 +291,7 @@ mod tests {
     fn a_second_rig_does_not_take_the_firsts_place() {
         let mut barrier = started(&["drive"]);
         assert!(!barrier.join(9, Role::Rig, "another".into()));
-        assert_eq!(barrier.rig(), Some(RIG));
+        assert_eq!(barrier.everyone(), [RIG, 1]);
     }
 
     #[test]

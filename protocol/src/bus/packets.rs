@@ -63,6 +63,16 @@ impl Inbox {
         Some(*packet)
     }
 
+    /// Whether everything was taken.
+    pub(super) fn is_empty(&self) -> bool {
+        self.next == self.count
+    }
+
+    /// Forgets what was not taken.
+    pub(super) fn clear(&mut self) {
+        (self.count, self.next) = (0, 0);
+    }
+
     /// Whether the last batch was smaller than it could be: then the socket's queue was empty.
     pub(super) fn emptied_the_queue(&self) -> bool {
         self.count < BATCH
@@ -94,16 +104,23 @@ impl Inbox {
             header.msg_hdr.msg_controllen = size_of_val(&control[index]);
         }
         let flags = if wait == Wait::No { libc::MSG_DONTWAIT } else { libc::MSG_WAITFORONE };
-        // SAFETY: each header points to a part and a control buffer that outlive the call and have the sizes given.
-        let count = unsafe {
-            libc::recvmmsg(
-                socket.as_raw_fd(),
-                headers.as_mut_ptr(),
-                BATCH as libc::c_uint,
-                flags,
-                std::ptr::null_mut(),
-            )
+        let mut take = || {
+            // SAFETY: each header points to a part and a control buffer that outlive the call and have the sizes given.
+            unsafe {
+                libc::recvmmsg(
+                    socket.as_raw_fd(),
+                    headers.as_mut_ptr(),
+                    BATCH as libc::c_uint,
+                    flags,
+                    std::ptr::null_mut(),
+                )
+            }
         };
+        let mut count = take();
+        // The kernel tells first, and once, that the other end closed with packets unread; what it had sent comes after.
+        if count < 0 && io::Error::last_os_error().raw_os_error() == Some(libc::ECONNRESET) {
+            count = take();
+        }
         self.count = usize::try_from(count).map_err(|_| io::Error::last_os_error())?;
         for (packet, header) in self.packets.iter_mut().zip(&headers[..self.count]) {
             // SAFETY: the kernel has just filled this header and the control buffer that it points to.

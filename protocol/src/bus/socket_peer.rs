@@ -43,6 +43,8 @@ pub(super) struct SocketPeer<L> {
     /// False from the moment the system says the network is down until a packet passes again.
     usable: bool,
     ever_up: bool,
+    /// When the bus was last lost, by the bus's clock: what arrived before says nothing of its return.
+    lost_ns: u64,
     next_attempt: Instant,
     joined: Option<Control>,
     inbox: Inbox,
@@ -78,6 +80,7 @@ impl<L: Link> SocketPeer<L> {
             socket: None,
             usable: false,
             ever_up: false,
+            lost_ns: 0,
             next_attempt: Instant::now(),
             joined: None,
             inbox: Inbox::new(),
@@ -95,6 +98,9 @@ impl<L: Link> SocketPeer<L> {
             enter_barrier(&socket, &join)?;
         }
         self.socket = Some(socket);
+        // What the old connection left unread, its end above all, is none of the new one's.
+        self.inbox.clear();
+        self.drained = false;
         self.overflow_seen = 0;
         if self.ever_up {
             self.counters.reconnects += 1;
@@ -113,6 +119,7 @@ impl<L: Link> SocketPeer<L> {
     fn went_away(&mut self, error: rustix::io::Errno) {
         if self.usable {
             self.counters.disconnects += 1;
+            self.lost_ns = (self.clock)(0);
         }
         self.usable = false;
         self.outbox.clear();
@@ -188,8 +195,14 @@ impl<L: Link> SocketPeer<L> {
         })
     }
 
-    /// Posts a member's packet.
+    /// Posts a member's packet; while the bus is down it is dropped, so that nothing old is sent later.
     fn post(&mut self, bytes: &[u8]) -> Result<(), SendError> {
+        if self.socket.is_none() {
+            self.try_again();
+        }
+        if self.socket.is_none() {
+            return Err(SendError::Down);
+        }
         if self.outbox.is_full() {
             self.flush()?;
         }
@@ -242,7 +255,9 @@ impl<L: Link> Bus for SocketPeer<L> {
                     self.went_away(rustix::io::Errno::CONNRESET);
                     return Received::Nothing;
                 }
-                self.passed();
+                if packet.stamp_ns > self.lost_ns {
+                    self.passed();
+                }
                 if let Some(received) = self.sort(&packet) {
                     return received;
                 }
@@ -257,6 +272,9 @@ impl<L: Link> Bus for SocketPeer<L> {
     }
 
     fn wait_readable(&mut self, timeout: Duration) {
+        if !self.inbox.is_empty() {
+            return;
+        }
         let Some(socket) = self.socket.as_ref().filter(|_| self.usable) else {
             // Down: nothing will wake us, so sleep the time to the next attempt.
             std::thread::sleep(timeout.min(RETRY_PERIOD / 10));

@@ -1,0 +1,173 @@
+//! A running host, connected peers, raw clients, and waits that have a limit.
+
+use protocol::bus::host::{Host, HostReport};
+use protocol::bus::lockstep::BarrierConfig;
+use protocol::bus::{self, Bus, BusUrl, Received, StampClock, WireOptions};
+use protocol::can::CanFrame;
+use rustix::net::{AddressFamily, SendFlags, SocketAddrUnix, SocketFlags, SocketType};
+use std::os::fd::OwnedFd;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Far beyond what any step here takes on a loaded machine.
+pub(crate) const LIMIT: Duration = Duration::from_secs(30);
+/// Frames that fit each queue even where the kernel grants no more than its default of 208 KiB, some 750 bytes each.
+pub(crate) const FITS_ANY_QUEUE: usize = 200;
+/// Frames on this identifier only tell that somebody is there; [`frames_until`] leaves them out.
+pub(crate) const HELLO_ID: u16 = 0x7FF;
+/// Frames on this identifier tell that everything sent before has passed.
+pub(crate) const FENCE_ID: u16 = 0x7FE;
+
+/// A folder with a socket path in it; the folder goes with the value.
+pub(crate) struct Place {
+    folder: tempfile::TempDir,
+}
+
+impl Place {
+    pub(crate) fn new() -> Self {
+        Self { folder: tempfile::tempdir().expect("a temporary folder can be made") }
+    }
+
+    pub(crate) fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    pub(crate) fn socket(&self) -> PathBuf {
+        self.folder.path().join("bus0")
+    }
+}
+
+/// A host that serves in a thread of its own.
+pub(crate) struct RunningHost {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<std::io::Result<HostReport>>,
+}
+
+impl RunningHost {
+    pub(crate) fn start(path: &Path, wire: WireOptions, barrier: Option<BarrierConfig>) -> Self {
+        let host = Host::bind(path, wire, barrier).unwrap_or_else(|error| panic!("{error}"));
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&stop);
+        Self { stop, thread: std::thread::spawn(move || host.serve(&seen)) }
+    }
+
+    pub(crate) fn plain(path: &Path) -> Self {
+        Self::start(path, WireOptions::default(), None)
+    }
+
+    /// Stops the host and tells what it counted.
+    pub(crate) fn stop(self) -> HostReport {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.join().expect("the host does not panic").expect("the host serves until it is stopped")
+    }
+}
+
+/// Nanoseconds since the first call, for everyone in this process.
+pub(crate) fn now_ns() -> u64 {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed().as_nanos() as u64
+}
+
+/// A peer as a program opens it, connected or not.
+pub(crate) fn open(path: &Path) -> Box<dyn Bus> {
+    // Read once before, so that no stamp lies before the clock's start.
+    now_ns();
+    let clock: StampClock = Box::new(|age_ns| now_ns().saturating_sub(age_ns));
+    let url = BusUrl::Unix { path: path.into(), wire: WireOptions::default() };
+    bus::open(&url, clock).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// `N` peers that the host has accepted: it accepts in the order of connecting, so when the last is heard, all are in.
+pub(crate) fn connected<const N: usize>(path: &Path) -> [Box<dyn Bus>; N] {
+    let mut peers = std::array::from_fn(|_| open(path));
+    let (last, others) = peers.split_last_mut().expect("at least one peer");
+    last.send(&CanFrame::new(HELLO_ID, &[])).expect("a connected peer sends");
+    for peer in others {
+        frames_until(peer.as_mut(), |frame| frame.standard_id() == Some(HELLO_ID));
+    }
+    peers
+}
+
+/// A connection without any of our code on this side.
+pub(crate) fn raw_client(path: &Path) -> OwnedFd {
+    let socket = raw_socket();
+    rustix::net::connect(&socket, &SocketAddrUnix::new(path).unwrap()).unwrap();
+    socket
+}
+
+/// A socket of the embedded bus's kind.
+pub(crate) fn raw_socket() -> OwnedFd {
+    rustix::net::socket_with(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None).unwrap()
+}
+
+/// Sends one packet as it is.
+pub(crate) fn send_raw(socket: &OwnedFd, bytes: &[u8]) {
+    assert_eq!(rustix::net::send(socket, bytes, SendFlags::NOSIGNAL).unwrap(), bytes.len());
+}
+
+/// Calls `look` until it finds something.
+///
+/// # Panics
+/// When nothing was found within [`LIMIT`].
+pub(crate) fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    let started = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(started.elapsed() < LIMIT, "waited {LIMIT:?} in vain for {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// What the peer receives next.
+pub(crate) fn next(peer: &mut dyn Bus) -> Received {
+    let started = Instant::now();
+    loop {
+        match peer.receive() {
+            Received::Nothing => peer.wait_readable(Duration::from_millis(100)),
+            received => return received,
+        }
+        assert!(started.elapsed() < LIMIT, "waited {LIMIT:?} in vain for a packet");
+    }
+}
+
+/// The next frame and its stamp.
+pub(crate) fn next_frame(peer: &mut dyn Bus) -> (CanFrame, u64) {
+    match next(peer) {
+        Received::Frame(frame, stamp_ns) => (frame, stamp_ns),
+        other => panic!("expected a frame, received {other:?}"),
+    }
+}
+
+/// Frames up to the one that is the `last`, which is left out, as are all hellos.
+pub(crate) fn frames_until(peer: &mut dyn Bus, last: impl Fn(&CanFrame) -> bool) -> Vec<CanFrame> {
+    let mut frames = Vec::new();
+    loop {
+        let (frame, _) = next_frame(peer);
+        if last(&frame) {
+            return frames;
+        }
+        if frame.standard_id() != Some(HELLO_ID) {
+            frames.push(frame);
+        }
+    }
+}
+
+/// Frames up to the next fence.
+pub(crate) fn frames_until_fence(peer: &mut dyn Bus) -> Vec<CanFrame> {
+    frames_until(peer, |frame| frame.standard_id() == Some(FENCE_ID))
+}
+
+/// Sends a fence.
+pub(crate) fn send_fence(peer: &mut dyn Bus) {
+    peer.send(&CanFrame::new(FENCE_ID, &[])).expect("a connected peer sends");
+}
+
+/// A frame that tells its number.
+pub(crate) fn numbered(id: u16, number: usize) -> CanFrame {
+    CanFrame::new(id, &(number as u64).to_le_bytes())
+}

@@ -1,0 +1,108 @@
+//! Tidy is a test: reads the tracked files and says with path:line what to do instead.
+//!
+//! The rules stand in `tidy_rules`, each with samples that it must find and samples that it must pass; a rule that finds nothing
+//! any more fails here before it can wave something through.
+
+mod tidy_rules;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use tidy_rules::{File, Problem, RULES, names_of_scripts, too_large};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate stands in the workspace")
+}
+
+/// Tracked files that are text, and the complaints about size, which need no reading.
+fn tracked() -> (Vec<File>, Vec<String>) {
+    // A checkout that belongs to another user, as in a container, is none for git otherwise.
+    let output = Command::new("git")
+        .current_dir(root())
+        .args(["-c", "safe.directory=*", "ls-files", "--stage", "-z"])
+        .output()
+        .expect("git is installed");
+    assert!(
+        output.status.success(),
+        "tidy needs a git checkout, to know which files are tracked: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let list = String::from_utf8(output.stdout).expect("paths are UTF-8");
+    let mut files = Vec::new();
+    let mut problems = Vec::new();
+    for entry in list.split_terminator('\0') {
+        let (stage, path) = entry.split_once('\t').expect("MODE OBJECT STAGE<tab>PATH");
+        // Deleted, and the deletion not yet committed: nothing to read.
+        let Ok(bytes) = fs::read(root().join(path)) else { continue };
+        problems.extend(too_large(bytes.len()).map(|advice| format!("{path}:1: {advice}")));
+        if let Ok(text) = String::from_utf8(bytes) {
+            files.push(File { path: path.into(), executable: stage.starts_with("100755"), text });
+        }
+    }
+    (files, problems)
+}
+
+#[test]
+fn the_tracked_files_are_tidy() {
+    let (files, mut complaints) = tracked();
+    assert!(files.len() > 50, "git lists only {} files", files.len());
+    for file in &files {
+        for rule in RULES.iter().filter(|rule| (rule.applies)(&file.path)) {
+            for Problem { line, advice } in (rule.check)(file) {
+                complaints.push(format!("{}:{line}: {advice} [{}]", file.path, rule.name));
+            }
+        }
+    }
+    assert!(complaints.is_empty(), "{} complaint(s):\n{}", complaints.len(), complaints.join("\n"));
+}
+
+#[test]
+fn documents_name_only_scripts_that_exist() {
+    let (files, _) = tracked();
+    let mut known: BTreeSet<&str> = BTreeSet::new();
+    for file in &files {
+        known.extend(Path::new(&file.path).ancestors().filter_map(Path::to_str));
+    }
+    let mut complaints = Vec::new();
+    let mut named = 0;
+    for file in files.iter().filter(|file| file.path.ends_with(".md") && !file.path.ends_with("CHANGELOG.md"))
+    {
+        for (line, script) in names_of_scripts(&file.text) {
+            named += 1;
+            if !known.contains(script.as_str()) {
+                complaints
+                    .push(format!("{}:{line}: {script} is not in the checkout: name one that is", file.path));
+            }
+        }
+    }
+    assert!(named > 0, "README names no script at all: the search is broken");
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+#[test]
+fn every_rule_finds_its_bad_samples_and_passes_its_good_ones() {
+    for rule in RULES {
+        assert!(!rule.bad.is_empty() && !rule.good.is_empty(), "{}: no samples", rule.name);
+        for (path, text, line) in rule.bad {
+            let file = File::sample(path, text);
+            assert!((rule.applies)(path), "{} does not look at {path}", rule.name);
+            let found: Vec<_> = (rule.check)(&file).into_iter().map(|problem| problem.line).collect();
+            assert_eq!(found, [*line], "{}: {path} with {text:?}", rule.name);
+        }
+        for (path, text) in rule.good {
+            let found = if (rule.applies)(path) { (rule.check)(&File::sample(path, text)) } else { vec![] };
+            let advice: Vec<_> = found.iter().map(|problem| &problem.advice).collect();
+            assert!(advice.is_empty(), "{}: {path} with {text:?}: {advice:?}", rule.name);
+        }
+    }
+}
+
+#[test]
+fn a_large_file_and_a_script_in_prose_are_found() {
+    assert!(too_large(512 << 10).is_none());
+    assert!(too_large((512 << 10) + 1).is_some());
+    let text = "Run `scripts/test`.\nOr .ci/run, or (scripts/vm/job); see scripts/.\nhttps://example.org/scripts/other";
+    let expected = [(1, "scripts/test"), (2, ".ci/run"), (2, "scripts/vm/job"), (2, "scripts")];
+    assert_eq!(names_of_scripts(text), expected.map(|(line, name)| (line, name.to_owned())));
+}

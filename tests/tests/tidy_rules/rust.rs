@@ -1,0 +1,266 @@
+//! Rules for Rust and for what the rooms may know of each other.
+
+use super::{Problem, Rule};
+
+fn is_rust(path: &str) -> bool {
+    path.ends_with(".rs")
+}
+
+/// Every file says what it is for.
+pub(super) const PURPOSE: Rule = Rule {
+    name: "purpose",
+    applies: is_rust,
+    check: |file| {
+        if file.text.starts_with("//! ") {
+            return Vec::new();
+        }
+        vec![Problem {
+            line: 1,
+            advice: "begin the file with '//!' and a sentence that says what it is for".into(),
+        }]
+    },
+    bad: &[("a.rs", "use std::fmt;\n", 1), ("a.rs", "", 1), ("a.rs", "// Prints.\n//! Late.\n", 1)],
+    good: &[("a.rs", "//! Prints.\n"), ("a.toml", "")],
+};
+
+/// The rooms that each room must not depend on, tests included.
+const FORBIDDEN_EDGES: &[(&str, &[&str])] = &[
+    ("protocol", &["realtime", "plant", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
+    ("realtime", &["protocol", "plant", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
+    ("plant", &["protocol", "realtime", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
+    ("emulator", &["controller", "bench", "discrepancy", "system-tests"]),
+    ("controller", &["emulator", "bench", "discrepancy", "system-tests"]),
+];
+
+/// House-style: who knows whom.
+pub(super) const CRATE_EDGES: Rule = Rule {
+    name: "crate-edges",
+    applies: |path| FORBIDDEN_EDGES.iter().any(|(room, _)| path == format!("{room}/Cargo.toml")),
+    check: |file| {
+        let (room, forbidden) =
+            FORBIDDEN_EDGES.iter().find(|(room, _)| file.path.starts_with(room)).expect("the rule applies");
+        let mut in_dependencies = false;
+        file.each_line(|line| {
+            let line = line.trim();
+            if let Some(table) = line.strip_prefix('[') {
+                let table = table.trim_end_matches(']');
+                in_dependencies = table.ends_with("dependencies");
+                // Such as [dependencies.plant].
+                let named = table.split_once("dependencies.").map(|(_, name)| name)?;
+                return forbidden.contains(&named).then(|| edge(room, named));
+            }
+            let key = line.split(['.', '=', ' ']).next().unwrap_or_default().trim_matches('"');
+            // Such as physics = { package = "plant" }, or a path.
+            let renamed = forbidden.iter().find(|name| {
+                line.contains(&format!("package = \"{name}\""))
+                    || line.contains(&format!("path = \"../{name}\""))
+            });
+            let named = forbidden.iter().find(|name| **name == key).or(renamed)?;
+            in_dependencies.then(|| edge(room, named))
+        })
+    },
+    bad: &[
+        ("protocol/Cargo.toml", "[dependencies]\nrealtime.workspace = true\n", 2),
+        ("plant/Cargo.toml", "[dev-dependencies]\nprotocol = { path = \"../protocol\" }\n", 2),
+        ("realtime/Cargo.toml", "[dependencies.plant]\nworkspace = true\n", 1),
+        ("emulator/Cargo.toml", "[dependencies]\nclap = \"1\"\nbench.workspace = true\n", 3),
+        ("controller/Cargo.toml", "[dependencies]\nrig = { package = \"emulator\", version = \"1\" }\n", 2),
+    ],
+    good: &[
+        ("protocol/Cargo.toml", "[package]\nname = \"protocol\"\n[dependencies]\nplantuml = \"1\"\n"),
+        ("emulator/Cargo.toml", "[dependencies]\nplant.workspace = true\n[[bench]]\nname = \"bench\"\n"),
+        ("bench/Cargo.toml", "[dependencies]\nemulator.workspace = true\n"),
+    ],
+};
+
+fn edge(room: &str, other: &str) -> String {
+    format!(
+        "{room} must not know {other} (house-style, The house): move what both need, or assemble them elsewhere"
+    )
+}
+
+/// What the controller may take from `plant`: the nominal numbers, and which axis is which.
+const NOMINAL: &[&str] = &["RigParameters", "Axis", "parameters"];
+
+/// The controller reads the rig's nominal numbers and nothing else of the plant.
+pub(super) const NOMINAL_NUMBERS_ONLY: Rule = Rule {
+    name: "nominal-numbers-only",
+    applies: |path| path.starts_with("controller/src/") && is_rust(path),
+    check: |file| {
+        // Over lines, because a list in braces may be broken.
+        let mut problems = Vec::new();
+        for (at, _) in file.text.match_indices("plant::") {
+            let before = &file.text[..at];
+            let comment = before.rsplit('\n').next().unwrap_or_default().trim_start().starts_with("//");
+            if comment || before.ends_with(|c: char| c.is_alphanumeric() || c == '_') {
+                continue;
+            }
+            let after = &file.text[at + "plant::".len()..];
+            let list = after.strip_prefix('{').map_or_else(
+                || after.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default(),
+                |list| list.split('}').next().unwrap_or_default(),
+            );
+            let names = list.split(',').map(|name| name.split("::").next().unwrap_or_default().trim());
+            let foreign: Vec<_> = names.filter(|name| !name.is_empty() && !NOMINAL.contains(name)).collect();
+            if !foreign.is_empty() || list.trim().is_empty() {
+                let advice = format!(
+                    "the controller takes only {} from plant: read the bus, or the rig file",
+                    NOMINAL.join(", ")
+                );
+                problems.push(Problem { line: before.matches('\n').count() + 1, advice });
+            }
+        }
+        problems
+    },
+    bad: &[
+        ("controller/src/a.rs", "//! A.\nuse plant::Plant;\n", 2),
+        ("controller/src/a.rs", "use plant::{\n    Axis,\n    Truth,\n};\n", 1),
+        ("controller/src/a.rs", "use plant::*;\n", 1),
+        ("controller/src/a.rs", "fn f() {\n    let p = plant::Plant::new();\n}\n", 2),
+    ],
+    good: &[
+        (
+            "controller/src/a.rs",
+            "use plant::{Axis, RigParameters, parameters::VALVE_POINTS};\n// plant::Plant\n",
+        ),
+        (
+            "controller/src/a.rs",
+            "const N: usize = plant::parameters::VALVE_POINTS;\nuse power_plant::Boiler;\n",
+        ),
+        ("emulator/src/a.rs", "use plant::Plant;\n"),
+    ],
+};
+
+/// What has no place in physics: clock, thread, file, output.
+const IMPURE: &[&str] = &[
+    "std::time",
+    "std::thread",
+    "std::fs",
+    "std::io",
+    "std::net",
+    "std::env",
+    "println!",
+    "print!",
+    "dbg!",
+    "Instant::now",
+    "SystemTime",
+];
+
+/// `plant` computes and does nothing else.
+pub(super) const PURE_PLANT: Rule = Rule {
+    name: "pure-plant",
+    applies: |path| path.starts_with("plant/src/") && is_rust(path),
+    check: |file| {
+        file.each_line(|line| {
+            let code = line.split("//").next().unwrap_or_default();
+            let found = IMPURE.iter().find(|word| code.contains(*word))?;
+            Some(format!(
+                "plant has no {found} (house-style, The house): hand it the value, or do it in the emulator"
+            ))
+        })
+    },
+    bad: &[
+        ("plant/src/a.rs", "//! A.\nuse std::time::Duration;\n", 2),
+        ("plant/src/a/b.rs", "fn f() { println!(\"x\"); }\n", 1),
+        ("plant/src/a.rs", "    std::fs::read(p)\n", 1),
+    ],
+    good: &[
+        ("plant/src/a.rs", "//! Knows no std::time.\nuse std::fmt; // and no println!\n"),
+        ("plant/tests/a.rs", "println!(\"x\");\n"),
+    ],
+};
+
+/// Units that a name may end with, before a statistic.
+const UNITS: &[&str] = &[
+    "m", "mm", "m2", "m3", "s", "ms", "us", "ns", "n", "pa", "bar", "kg", "k", "j", "w", "hz", "rad", "deg",
+    "percent", "kib", "counts", "per_s", "per_s2", "per_h", "per_m", "per_n", "per_pa", "per_kg",
+];
+/// Statistics that may follow the unit.
+const STATISTICS: &[&str] = &["min", "max", "mean", "rms", "p50", "p90", "p99", "p999", "p9999"];
+/// Names of quantities without a unit, or whose unit stands beside them.
+const DIMENSIONLESS: &[&str] = &[
+    "opening",               // of a valve, -1 to 1
+    "valve",                 // the same, of both axes
+    "spool",                 // position of a valve's spool, -1 to 1
+    "velocity_feed_forward", // share
+    "loss",                  // probability
+    "factor",                // of a DBC signal, whose unit is a field beside it
+    "offset",                // the same
+    "min",                   // the same, and of a key of the parameter table
+    "max",                   // the same
+    "value",                 // of a reading, whose unit its sensor has
+];
+
+/// A public number says its unit in its name.
+pub(super) const UNITS_IN_NAMES: Rule = Rule {
+    name: "units",
+    // Names on the command line are words of its users; its help tells the unit.
+    applies: |path| is_rust(path) && path.contains("/src/") && !path.ends_with("/cli.rs"),
+    check: |file| {
+        file.each_line(|line| {
+            let (name, kind) = line.trim_start().strip_prefix("pub ")?.split_once(": ")?;
+            let field = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+            let float = kind.split(|c: char| !c.is_alphanumeric()).any(|word| word == "f64");
+            if !field || !float || DIMENSIONLESS.contains(&name) || has_unit(name) {
+                return None;
+            }
+            Some(format!("end '{name}' with its unit, as supply_pressure_pa does, or add it to DIMENSIONLESS of this rule"))
+        })
+    },
+    bad: &[
+        ("a/src/b.rs", "//! B.\n    pub pressure: f64,\n", 2),
+        ("a/src/b.rs", "    pub ends: [Option<f64>; 2],\n", 1),
+        ("a/src/b.rs", "    pub atoms: Vec<f64>,\n", 1),
+    ],
+    good: &[
+        (
+            "a/src/b.rs",
+            "    pub pressure_pa: f64,\n    pub rod_velocity_m_per_s: [f64; 2],\n    pub opening: f64,\n",
+        ),
+        ("a/src/b.rs", "    pub wakeup_ns_p99: f64,\n    pub count: u64,\n    pub fn f(x: f64) -> f64 {\n"),
+        ("a/src/cli.rs", "    pub bus_grace: f64,\n"),
+        ("a/tests/b.rs", "    pub pressure: f64,\n"),
+    ],
+};
+
+fn has_unit(name: &str) -> bool {
+    let name = STATISTICS.iter().find_map(|suffix| name.strip_suffix(&format!("_{suffix}"))).unwrap_or(name);
+    UNITS.iter().any(|unit| name.ends_with(&format!("_{unit}")))
+}
+
+/// Longest line of Rust, in characters.
+const LONGEST_LINE: usize = 130;
+/// Files whose longer lines are rows of a table.
+const TABLES: &[&str] = &["plant/src/parameters/table.rs"];
+
+/// A line fits the screen; rustfmt breaks code, not comments and texts.
+pub(super) const LINE_LENGTH: Rule = Rule {
+    name: "line-length",
+    applies: |path| is_rust(path) && !TABLES.contains(&path),
+    check: |file| {
+        file.each_line(|line| {
+            let length = line.chars().count();
+            // A text that is told in one piece cannot be broken without a continuation in its midst.
+            let one_text = line.trim_start().starts_with(['"', 'b']) || line.contains(" = \"");
+            (length > LONGEST_LINE && !(one_text && line.matches('"').count() == 2))
+                .then(|| format!("{length} characters, {LONGEST_LINE} at most: break the line"))
+        })
+    },
+    bad: &[(
+        "a.rs",
+        "//! A.\n// 3456789 123456789 123456789 123456789 123456789 123456789 123456789 123456789 123456789 123456789 123456789 \
+         123456789 123456789 1\n",
+        2,
+    )],
+    good: &[
+        (
+            "a.rs",
+            "// ────────────────────────────────────────────────────────────────────────────────────────────────────────── ä\n",
+        ),
+        (
+            "a.rs",
+            "const A: &str = \"789 123456789 123456789 123456789 123456789 123456789 123456789 123456789 123456789 123456789 \
+             123456789 123456789 1\";\n",
+        ),
+    ],
+};

@@ -1,0 +1,292 @@
+//! On real SocketCAN: Debian's kernel in a virtual machine runs emulator and controller on `vcan0`, and can-utils record,
+//! send and disturb.
+//!
+//! `scripts/vcan-vm` builds static binaries, boots the guest and brings the files back. The guest is emulated and uneven:
+//! cycles are skipped in it, and what is tested is that each of them is accounted for, never how fast anything was. Nothing
+//! here is ever skipped; without network for the first download the test fails.
+
+use protocol::can::CanFrame;
+use protocol::frames::{Frame, MainChainState};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, MutexGuard};
+use std::time::Duration;
+use system_tests::process::{Ended, Running};
+
+/// Limit for one machine, static build and first download of QEMU and kernel included.
+const LIMIT: Duration = Duration::from_secs(20 * 60);
+
+/// One machine at a time: two would stall one another.
+fn only_one() -> MutexGuard<'static, ()> {
+    static MACHINE: Mutex<()> = Mutex::new(());
+    // A test that failed leaves no machine behind.
+    MACHINE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate stands in the workspace")
+}
+
+fn python() -> PathBuf {
+    let python = std::env::var_os("AIRBENCH_PYTHON")
+        .map_or_else(|| root().join("target/tools/venv/bin/python"), PathBuf::from);
+    assert!(
+        python.exists(),
+        "{} is missing: run scripts/test, which makes the Python environment with cantools",
+        python.display()
+    );
+    python
+}
+
+/// Runs a job in a machine of its own.
+fn in_machine(out: &Path, arguments: &[&str]) -> Ended {
+    let mut command = Command::new(root().join("scripts/vcan-vm"));
+    // The guest's programs are built by vcan-vm as it wants them, whatever this test was built with.
+    command.env_remove("CARGO_TARGET_DIR").arg("--out").arg(out).args(arguments);
+    let ended = Running::start("scripts/vcan-vm", &mut command).wait_within(LIMIT);
+    eprintln!("{}", ended.stderr);
+    ended
+}
+
+fn json(path: &Path) -> Value {
+    let text = fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn count(value: &Value, pointer: &str) -> u64 {
+    value
+        .pointer(pointer)
+        .and_then(Value::as_u64)
+        .unwrap_or_else(|| panic!("no count at {pointer} in {value:#}"))
+}
+
+#[test]
+fn candump_recorded_what_the_runs_files_say() {
+    let _machine = only_one();
+    let folder = tempfile::tempdir().unwrap();
+    python(); // tells at once what is missing
+    in_machine(folder.path(), &[]).expect_code(0);
+
+    let run = folder.path().join("run");
+    let summary = json(&run.join("summary.json"));
+    assert_eq!(summary["ended_because"], "the controllers are done");
+    assert!(count(&summary, "/cycles") > 5000 && count(&summary, "/frames_received") > 0);
+    assert_eq!(count(&summary, "/frames_malformed"), 0);
+    assert_eq!(json(&run.join("controller.json"))["chain_state"], "done");
+
+    let log = folder.path().join("candump.log");
+    let told = compare(&log, &run).unwrap_or_else(|complaint| panic!("{complaint}"));
+    eprintln!("compared: {told}");
+    let told: Value = serde_json::from_str(&told).unwrap();
+    // On a machine that is busy otherwise most cycles may be skipped; what was sent is compared all the same.
+    assert!(count(&told, "/frames") > 5000 && count(&told, "/sensor_frames") > 2000, "{told:#}");
+    assert_eq!(count(&told, "/sensor_values"), 4 * count(&told, "/sensor_frames"));
+    assert_eq!(count(&told, "/valve_values"), 2 * count(&summary, "/cycles"));
+    assert!(
+        count(&told, "/valve_values_not_zero") > 1000,
+        "the valve hardly moved: its column shows nothing"
+    );
+    assert_eq!(count(&told, "/skipped_cycles"), count(&summary, "/skipped"));
+    assert_eq!(told["last_main_chain"], "done");
+
+    comparison_notices_every_alteration(&log, &run);
+}
+
+/// What `compare_candump.py` says of candump's log and a run's folder; its complaint when they do not agree.
+fn compare(log: &Path, run: &Path) -> Result<String, String> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/compare_candump.py");
+    let mut command = Command::new(python());
+    command.args(["-W", "error"]).arg(script).arg(root().join("protocol/rig.dbc")).arg(log).arg(run);
+    let output = command.output().unwrap();
+    let [told, complaint] =
+        [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+    if output.status.success() { Ok(told) } else { Err(complaint) }
+}
+
+/// Alters one thing at a time in the files that agree: one count of one signal, one frame, one cell, one counter.
+fn comparison_notices_every_alteration(log: &Path, run: &Path) {
+    let measurement = run.join("measurement.csv");
+    let bus_log = run.join("bus.log");
+    let summary = run.join("summary.json");
+    let line_of = |path: &Path, what: &str, from: f64| -> usize {
+        let text = fs::read_to_string(path).unwrap();
+        let lines: Vec<_> = text.lines().collect();
+        let from = (lines.len() as f64 * from) as usize;
+        from + lines[from..].iter().position(|line| line.contains(what)).unwrap()
+    };
+    // In the middle of the run everything moves.
+    let middle = |path: &Path, what: &str| line_of(path, what, 0.5);
+    // Position is the low bytes: one count more or less in the first.
+    let one_count = |line: &str| {
+        let at = line.find("#").unwrap() + 1;
+        let count = u8::from_str_radix(&line[at..at + 2], 16).unwrap() ^ 1;
+        format!("{}{count:02X}{}", &line[..at], &line[at + 2..])
+    };
+    let cell = |column: usize, step: f64| {
+        move |line: &str| {
+            let mut cells: Vec<_> = line.split(',').map(str::to_owned).collect();
+            cells[column] = (cells[column].parse::<f64>().unwrap() + step).to_string();
+            cells.join(",")
+        }
+    };
+    let gone = |_: &str| String::new();
+    let one = |line: usize| line..line + 1;
+    type Change<'a> = &'a dyn Fn(&str) -> String;
+    // The row of a skipped cycle has no frame that could contradict it, so a sensor's column is altered over many rows.
+    let alterations: [(&Path, Range<usize>, Change<'_>, &str); 8] = [
+        (log, one(middle(log, " 120#")), &one_count, "bus.log"),
+        (log, one(middle(log, " 121#")), &gone, "121"),
+        (log, one(middle(log, " 111#")), &gone, "111"),
+        (&bus_log, one(middle(&bus_log, " 110#")), &one_count, "110"),
+        (&measurement, 4000..4500, &cell(2, 0.5 / 65535.0), "drive_position_m"),
+        (&measurement, 4000..4500, &cell(9, 1e6 / 16383.0), "load_pressure_a_Pa"),
+        (&measurement, one(5000), &cell(1, 1.0 / 2047.0), "drive_valve"),
+        (
+            &summary,
+            one(line_of(&summary, "\"frames_received\"", 0.0)),
+            &|line| line.replace(": ", ": 1"),
+            "heard",
+        ),
+    ];
+    for (path, range, change, hint) in alterations {
+        let good = fs::read_to_string(path).unwrap();
+        let mut lines: Vec<_> = good.lines().map(str::to_owned).collect();
+        for line in &mut lines[range.clone()] {
+            let changed = change(line);
+            assert_ne!(changed, *line);
+            *line = changed;
+        }
+        lines.retain(|line| !line.is_empty());
+        fs::write(path, lines.join("\n") + "\n").unwrap();
+        let complaint = compare(log, run).expect_err(&format!("{hint}: the alteration was not noticed"));
+        assert!(complaint.contains(hint), "{} {range:?}: {complaint}", path.display());
+        fs::write(path, good).unwrap();
+    }
+    compare(log, run).expect("the files are as they were");
+}
+
+/// Exit codes by name, from the job's file.
+fn codes(run: &Path) -> BTreeMap<String, i32> {
+    let text = fs::read_to_string(run.join("codes")).unwrap();
+    text.lines()
+        .map(|line| {
+            let (name, code) = line.split_once(' ').unwrap();
+            (name.to_owned(), code.parse().unwrap())
+        })
+        .collect()
+}
+
+/// The frames of a candump log that `rig.dbc` knows.
+fn known_frames(log: &Path) -> Vec<Frame> {
+    let text = fs::read_to_string(log).unwrap();
+    text.lines()
+        .filter_map(|line| {
+            let (id, hex) = line.rsplit_once(' ').unwrap().1.split_once('#').unwrap();
+            let id = u16::from_str_radix(id, 16).ok().filter(|_| id.len() == 3)?;
+            let data: Option<Vec<_>> = (0..hex.len())
+                .step_by(2)
+                .map(|at| u8::from_str_radix(hex.get(at..at + 2)?, 16).ok())
+                .collect();
+            Frame::decode(&CanFrame::new(id, &data?)).ok()
+        })
+        .collect()
+}
+
+#[test]
+fn foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
+    let _machine = only_one();
+    let folder = tempfile::tempdir().unwrap();
+    let payload = tempfile::tempdir().unwrap();
+    fs::copy(root().join("scripts/vm/job-foreign"), payload.path().join("job-foreign")).unwrap();
+    let payload = payload.path().to_str().unwrap();
+    in_machine(folder.path(), &["--binaries", "--payload", payload, "--", "sh", "/airbench/job-foreign"])
+        .expect_code(0);
+    let run = folder.path().join("run");
+
+    let expected = [
+        ("controller-lockstep", 2), // a barrier is asked for on a bus that has none
+        ("controller-no-interface", 3),
+        ("down-controller", 0),
+        ("down-emulator", 0),
+        ("emulator-interface-down", 3),
+        ("emulator-lockstep", 2),
+        ("emulator-no-interface", 3),
+        ("foreign-controller", 0),
+        ("foreign-emulator", 0),
+    ];
+    assert_eq!(codes(&run), expected.map(|(name, code)| (name.to_owned(), code)).into());
+    foreign_frames_are_counted(&run);
+    the_emergency_stop_of_cansend_trips_the_rig(&run, &folder.path().join("candump.log"));
+    the_bus_that_went_down_was_counted(&run);
+}
+
+/// 300 frames of cangen on an identifier that nobody knows, an extended one and a remote request; two malformed commands.
+fn foreign_frames_are_counted(run: &Path) {
+    for file in ["summary.json", "controller.json"] {
+        let report = json(&run.join("foreign").join(file));
+        let ignored =
+            (count(&report, "/frames_ignored/unknown"), count(&report, "/frames_ignored/malformed"));
+        assert_eq!(ignored, (302, 2), "{file}");
+        assert_eq!(count(&report, "/bus/dropped_on_receive"), 0, "{file}");
+    }
+    let summary = json(&run.join("foreign/summary.json"));
+    assert_eq!(count(&summary, "/drive_commands/two_sources"), 0, "malformed commands are no second source");
+}
+
+fn the_emergency_stop_of_cansend_trips_the_rig(run: &Path, log: &Path) {
+    let summary = json(&run.join("foreign/summary.json"));
+    let events = summary["events"].as_array().unwrap();
+    assert_eq!(events.iter().filter(|event| event["kind"] == "emergency-stop").count(), 1, "{events:?}");
+
+    let frames = known_frames(log);
+    let tripped = frames.iter().position(|frame| matches!(frame, Frame::ConsoleEmergencyStop(_))).unwrap();
+    let stopped = |frames: &[Frame]| -> Vec<bool> {
+        frames
+            .iter()
+            .filter_map(|frame| match frame {
+                Frame::RigStatus(status) => Some(status.emergency_stop),
+                _ => None,
+            })
+            .collect()
+    };
+    let (before, after) = (stopped(&frames[..tripped]), stopped(&frames[tripped..]));
+    assert!(before.len() > 10 && before.iter().all(|stopped| !stopped), "{before:?}");
+    // The status on the way when the stop was sent may still be of before.
+    assert!(after.len() > 10 && after[1..].iter().all(|stopped| *stopped), "{after:?}");
+    let aborted = frames[tripped..].iter().any(
+        |frame| matches!(frame, Frame::DriveChainStatus(status) if status.main_chain == MainChainState::Aborted),
+    );
+    assert!(aborted, "the drive's main chain did not go to aborted");
+
+    let truth = fs::read_to_string(run.join("foreign/truth.csv")).unwrap();
+    let column =
+        truth.lines().next().unwrap().split(',').position(|name| name == "supply_pressure_Pa").unwrap();
+    let supply_pa = |line: &str| -> f64 { line.split(',').nth(column).unwrap().parse().unwrap() };
+    let first = supply_pa(truth.lines().nth(1).unwrap());
+    let last = supply_pa(truth.lines().last().unwrap());
+    // The supply node decays with 50 ms from 7 bar to 1.01325 bar; seconds later nothing of it is left.
+    assert!((first - 7e5).abs() < 1.0 && (last - 101_325.0).abs() < 100.0, "{first} Pa, then {last} Pa");
+}
+
+fn the_bus_that_went_down_was_counted(run: &Path) {
+    for file in ["summary.json", "controller.json"] {
+        let report = json(&run.join("down").join(file));
+        assert_eq!((count(&report, "/bus/disconnects"), count(&report, "/bus/reconnects")), (1, 1), "{file}");
+        assert!(count(&report, "/bus/sent") > 0, "{file}");
+    }
+    let summary = json(&run.join("down/summary.json"));
+    assert!(count(&summary, "/bus/dropped_on_send") > 0);
+    let kinds: Vec<_> =
+        summary["events"].as_array().unwrap().iter().map(|event| event["kind"].clone()).collect();
+    let place = |wanted: Value| {
+        kinds.iter().position(|kind| *kind == wanted).unwrap_or_else(|| panic!("no {wanted} in {kinds:?}"))
+    };
+    // The valve shuts while the bus is gone, and follows again when it is back.
+    let drive = |what: &str| serde_json::json!({ what: "drive" });
+    let order = [place(drive("command-stale")), place("bus-back".into()), place(drive("command-fresh"))];
+    assert!(place("bus-lost".into()) < order[0] && order.is_sorted(), "{kinds:?}");
+}
