@@ -1,36 +1,44 @@
 //! The short table at the end of a run.
 
 use crate::join::Joined;
+use crate::thresholds;
 use serde_json::Value;
 use std::fmt::Write as _;
 
 /// The summary for a terminal: figures in the units that people use, bounds with whether they were kept.
 #[must_use]
 pub fn table(joined: &Joined) -> String {
-    let summary = &joined.summary;
+    let figure = |key: &str| joined.figure(key);
     let mut rows: Vec<(String, String)> = Vec::new();
     let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
-    row("position error, dynamic", millimetres(&summary["position_error_dynamic_m"]));
-    row("position error, static", millimetres(&summary["position_error_static_m"]));
-    row("cycles", format!("{} ({} skipped)", summary["cycles"], summary["skipped"]));
-    row("overruns", summary["overruns"].to_string());
-    row("frames lost", summary["frames_lost"].to_string());
-    row("wake-up latency p50 / p99 / max", latency(&summary["wakeup_ns"]));
-    row("round trip p50 / p99 / max", latency(&summary["round_trip_ns"]));
-    if let Some(thresholds) = summary["thresholds"].as_object() {
+    row("position error, dynamic", millimetres(figure("position_error_dynamic_m")));
+    row("position error, static", millimetres(figure("position_error_static_m")));
+    row("cycles", format!("{} ({} skipped)", count(figure("cycles")), count(figure("skipped"))));
+    row("overruns", count(figure("overruns")));
+    row("frames lost", count(figure("frames_lost")));
+    row("wake-up latency p50 / p99 / max", latency(figure("wakeup_ns")));
+    row("round trip p50 / p99 / max", latency(figure("round_trip_ns")));
+    if let Some(thresholds) = figure("thresholds").as_object() {
         for (name, entry) in thresholds {
-            let kept = if entry["kept"] == Value::Bool(true) { "kept" } else { "BROKEN" };
+            let kept = if thresholds::is_kept(entry) { "kept" } else { "BROKEN" };
             let bound = entry["bound"].as_f64().unwrap_or_default();
             row(&format!("bound: {name}"), format!("at most {bound}: {kept}"));
         }
     }
-    row("ended", text(&summary["ended_because"]));
+    row("ended", text(figure("ended_because")));
+    for reason in figure("not_passed_because").as_array().into_iter().flatten() {
+        row("not passed because", text(reason));
+    }
     row("passed", if joined.passed() { "yes" } else { "NO" }.to_owned());
     let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     rows.iter().fold(String::new(), |mut out, (name, value)| {
         let _ = writeln!(out, "  {name:width$}  {value}"); // writing to a string cannot fail
         out
     })
+}
+
+fn count(value: &Value) -> String {
+    value.as_u64().map_or_else(|| "unknown".to_owned(), |count| count.to_string())
 }
 
 fn millimetres(value: &Value) -> String {

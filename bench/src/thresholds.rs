@@ -39,10 +39,10 @@ pub fn judge(passed: &toml::Table, summary: &Map<String, Value>) -> Result<Map<S
     judged.collect()
 }
 
-/// Whether all judged bounds were kept.
+/// Whether a judged bound was kept.
 #[must_use]
-pub fn all_kept(judged: &Map<String, Value>) -> bool {
-    judged.values().all(|entry| entry["kept"] == Value::Bool(true))
+pub fn is_kept(entry: &Value) -> bool {
+    entry["kept"] == Value::Bool(true)
 }
 
 fn number(value: &toml::Value) -> Option<f64> {
@@ -59,6 +59,10 @@ fn figure<'a>(summary: &'a Map<String, Value>, key: &str) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn all_kept(judged: &Map<String, Value>) -> bool {
+        judged.values().all(is_kept)
+    }
 
     fn judged(passed: &str) -> Result<Map<String, Value>, SummaryError> {
         let summary =

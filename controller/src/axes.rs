@@ -8,11 +8,9 @@ use crate::linearisation::Linearisation;
 use crate::main_chain::MainChain;
 use crate::position_p::PositionP;
 use crate::set_point::SetPoint;
-use protocol::frames::{ChainStatus, ChainValues, MainChainState, Sensors, ValveCommand};
-
-/// Values of the alive counter and of the echo.
-const ALIVE_RANGE: u8 = 16;
-const ECHO_RANGE: u64 = 4096;
+use protocol::frames::{
+    ALIVE_RANGE, ChainStatus, ChainValues, ECHO_RANGE, MainChainState, Sensors, ValveCommand,
+};
 
 /// What the drive did in a cycle, for `controller.csv`.
 #[derive(Clone, Copy, Debug)]
@@ -68,8 +66,13 @@ impl DriveAxis {
             wanted_velocity_m_per_s: wanted,
             opening,
         });
-        self.alive = (self.alive + 1) % ALIVE_RANGE;
+        self.alive = next_alive(self.alive);
         ValveCommand { opening, alive: self.alive, echo: echo(cycle), enable: set_point.is_some() }
+    }
+
+    /// The console ends the experiment: the valve shuts.
+    pub fn abort(&mut self) {
+        self.chain.abort();
     }
 
     /// The rig's time began again.
@@ -127,12 +130,14 @@ impl DriveAxis {
 #[derive(Default)]
 pub struct LoadAxis {
     alive: u8,
+    position_m: f64,
 }
 
 impl LoadAxis {
     /// The command that answers the sensors of `cycle`.
-    pub fn command(&mut self, cycle: u64) -> ValveCommand {
-        self.alive = (self.alive + 1) % ALIVE_RANGE;
+    pub fn command(&mut self, cycle: u64, sensors: &Sensors) -> ValveCommand {
+        self.position_m = sensors.position_m;
+        self.alive = next_alive(self.alive);
         ValveCommand { opening: 0.0, alive: self.alive, echo: echo(cycle), enable: false }
     }
 
@@ -141,6 +146,21 @@ impl LoadAxis {
     pub fn status(&self, drive: MainChainState) -> ChainStatus {
         ChainStatus { main_chain: drive, ok: true, ..ChainStatus::default() }
     }
+
+    /// Values for the bus: where the axis is, which is where it shall be.
+    #[must_use]
+    pub fn values(&self) -> ChainValues {
+        ChainValues {
+            averaged_position_m: self.position_m,
+            position_set_point_m: self.position_m,
+            ..ChainValues::default()
+        }
+    }
+}
+
+/// The alive counter of the next command.
+fn next_alive(alive: u8) -> u8 {
+    ((u64::from(alive) + 1) % ALIVE_RANGE) as u8
 }
 
 /// Low bits of the cycle that a command answers.

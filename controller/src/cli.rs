@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::bus::BusUrl;
 use protocol::exit::EXIT_CODE_HELP;
+use protocol::run_folder;
 use std::path::PathBuf;
 
 /// Controls the axes of the rig over a CAN bus.
@@ -42,8 +43,8 @@ pub struct RunArguments {
     /// Experiment file: motion, repetitions, algorithm and gains.
     #[arg(long)]
     pub experiment: PathBuf,
-    /// Folder for the controller's files; made if missing.
-    #[arg(long, default_value = "runs/latest")]
+    /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
+    #[arg(long, default_value_os_t = run_folder::new_folder())]
     pub out: PathBuf,
     /// real: answer frames as they arrive; lockstep: join the barrier.
     #[arg(long, value_enum, default_value_t = Pace::Real)]

@@ -7,7 +7,7 @@
 //!        │ rig restarted            │                    │                       ▼
 //!        └──────────────────────────┴────────────────────┴──────────────── FinalSettling ──► Done
 //!
-//!   any ── emergency stop ──► Aborted (valve shut)
+//!   any ── emergency stop, or abort by the console ──► Aborted (valve shut; the controllers end)
 //! ```
 //!
 //! Time is the rig's: cycles of 1 ms by number, so that cycles that the rig skipped pass for the experiment too, and the
@@ -55,12 +55,17 @@ impl MainChain {
     /// Moves on at `cycle` with the measured position, and tells the set-point; `None` shuts the valve.
     pub fn advance(&mut self, cycle: u64, position_m: f64, emergency_stop: bool) -> Option<SetPoint> {
         if emergency_stop {
-            self.state = State::Aborted;
+            self.abort();
         }
         while let Some(next) = self.decide(cycle, position_m) {
             self.state = next;
         }
         self.set_point(cycle)
+    }
+
+    /// Somebody ends the experiment.
+    pub fn abort(&mut self) {
+        self.state = State::Aborted;
     }
 
     /// The rig's time began again: so does the chain.
@@ -215,6 +220,14 @@ mod tests {
             assert_eq!(chain.state(), MainChainState::WaitingForRig);
             assert_eq!(chain.advance(0, 0.25, false).unwrap().position_m, 0.25);
         }
+    }
+
+    #[test]
+    fn an_abort_shuts_the_valve() {
+        let mut chain = chain(1, false);
+        edges(&mut chain, 0.1, 2000);
+        chain.abort();
+        assert_eq!((chain.advance(2000, 0.1, false), chain.state()), (None, MainChainState::Aborted));
     }
 
     #[test]

@@ -16,6 +16,8 @@ const PATIENCE: Duration = Duration::from_millis(20);
 const SILENCE: Duration = Duration::from_millis(200);
 /// Silence after Done that counts as the rig's end.
 const DONE_SILENCE: Duration = Duration::from_secs(1);
+/// Cycles after an abort during which the valve is still told to stay shut and the record goes on.
+const ABORT_CYCLES: u64 = 2000;
 /// Answers that the allocation count leaves out at the start.
 const WARM_UP: u64 = 1000;
 /// Period of the answers, ns.
@@ -30,6 +32,8 @@ pub enum End {
     Interrupted,
     /// The bus was gone, or no sensors came, for longer than the grace time.
     BusGone,
+    /// The experiment was aborted, by an emergency stop or by the console.
+    Aborted,
     /// Lockstep: a member was not done in time.
     LockstepTimeout,
 }
@@ -82,12 +86,12 @@ pub fn run_real(
             watch = Some(realtime::allocations::watch());
         }
         let woke_ns = clock.now().as_nanos();
-        let mut arrived_ns = woke_ns;
         let mut heard = false;
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
             heard = true;
+            // Every frame's own waiting counts, so that a stall shows with all the frames that waited for its end.
             if frame.standard_id() == Some(DRIVE_SENSORS.id) {
-                arrived_ns = stamp_ns;
+                paced.wakeup_ns.record(woke_ns.saturating_sub(stamp_ns));
             }
             station.take(&frame);
         }
@@ -96,7 +100,6 @@ pub fn run_real(
             if let Some(last_ns) = last_answer_ns.replace(woke_ns) {
                 paced.period_error_ns.record(PERIOD_NS.abs_diff(woke_ns.saturating_sub(last_ns)));
             }
-            paced.wakeup_ns.record(woke_ns.saturating_sub(arrived_ns));
         }
         if interrupt.came() {
             break End::Interrupted;
@@ -118,6 +121,9 @@ pub fn run_real(
             if silent {
                 station.tell(News::SensorsSilent);
             }
+        }
+        if station.aborted_for() > ABORT_CYCLES {
+            break End::Aborted;
         }
         if quiet > DONE_SILENCE && station.drive().state() == MainChainState::Done {
             break End::RigEnded;
@@ -162,6 +168,9 @@ pub fn run_lockstep(
                     }
                     station.answer(bus);
                     bus.done(control.cycle);
+                    if station.aborted_for() > ABORT_CYCLES {
+                        break End::Aborted;
+                    }
                 }
                 Kind::TimedOut => break End::LockstepTimeout,
                 _ => {}

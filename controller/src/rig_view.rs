@@ -11,10 +11,8 @@
 //! ```
 
 use plant::Axis;
-use protocol::frames::{RigStatus, Sensors, Tick};
+use protocol::frames::{ALIVE_RANGE, RigStatus, Sensors, Tick};
 
-/// Low bits of the cycle number that sensors carry.
-const ALIVE_RANGE: u64 = 16;
 /// The tick counts skipped cycles modulo this.
 const SKIPPED_RANGE: u64 = 1 << 16;
 
@@ -87,15 +85,20 @@ impl RigView {
 
     /// Takes a tick.
     pub fn take_tick(&mut self, tick: &Tick) -> TickNews {
-        let cycle = u64::from(tick.cycle);
-        // The ending tick speaks of the cycle that will not come; a late frame may be one ahead of a usual one.
-        let restarted = self.account.is_some() && self.cycle.is_some_and(|known| cycle + ALIVE_RANGE < known);
+        // The tick's counter wraps after 49.7 days, ours does not: what counts is the way from the cycle that we know.
+        let ahead = self.cycle.map(|known| i64::from(tick.cycle.wrapping_sub(known as u32).cast_signed()));
+        // Sensors that follow a lost tick may have brought us one round of their counter ahead.
+        let restarted = self.account.is_some() && ahead.is_some_and(|ahead| ahead < -(ALIVE_RANGE as i64));
         if restarted {
-            self.account = None;
-            self.skipped = 0;
+            // Of the old rig, nothing but the counts holds.
+            *self = Self { received: self.received, lost: self.lost, ..Self::default() };
         }
+        let cycle = match (self.cycle, ahead) {
+            (Some(known), Some(ahead)) => known.saturating_add_signed(ahead),
+            _ => u64::from(tick.cycle),
+        };
+        self.settle_account(tick, cycle);
         self.cycle = Some(cycle);
-        self.settle_account(tick);
         match (restarted, tick.ending) {
             (true, _) => TickNews::Restarted,
             (_, true) => TickNews::Ending,
@@ -103,11 +106,13 @@ impl RigView {
         }
     }
 
-    fn settle_account(&mut self, tick: &Tick) {
+    fn settle_account(&mut self, tick: &Tick, cycle: u64) {
         let more = (SKIPPED_RANGE + u64::from(tick.skipped) - self.skipped % SKIPPED_RANGE) % SKIPPED_RANGE;
-        self.skipped += more;
+        // A stall of more than a minute wraps the tick's count; the cycles that passed tell how often.
+        let passed = self.cycle.map_or(0, |known| cycle.saturating_sub(known));
+        self.skipped += more + passed.saturating_sub(more) / SKIPPED_RANGE * SKIPPED_RANGE;
         let comes_first = tick.catch_up || tick.ending;
-        let sent = (u64::from(tick.cycle) + u64::from(!comes_first)).saturating_sub(self.skipped);
+        let sent = (cycle + u64::from(!comes_first)).saturating_sub(self.skipped);
         if let Some(last) = self.account {
             for axis in Axis::ALL {
                 let came = *self.received.of(axis) - *last.received.clone().of(axis);
@@ -235,6 +240,37 @@ mod tests {
                 view.take_tick(&tick(cycle as u32, skipped));
             }
         }
+    }
+
+    #[test]
+    fn a_stall_of_more_cycles_than_the_tick_can_count_loses_nothing() {
+        let mut view = RigView::default();
+        play(&mut view, 0..101, &[]);
+        let skipped = (100_000 % SKIPPED_RANGE) as u16;
+        view.take_tick(&Tick { catch_up: true, ..tick(100_101, skipped) });
+        play_with_skipped(&mut view, 100_101..100_201, skipped);
+        assert_eq!((view.lost().drive, view.skipped()), (0, 100_000));
+    }
+
+    #[test]
+    fn the_cycle_goes_on_when_the_ticks_counter_wraps() {
+        let mut view = RigView::default();
+        let last = u64::from(u32::MAX);
+        view.take_tick(&tick(u32::MAX - 5, 0));
+        (last - 4..=last + 5).for_each(|cycle| {
+            Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
+        });
+        assert_eq!(view.take_tick(&tick(4, 0)), TickNews::Usual);
+        assert_eq!((view.fresh_sensors(Axis::Drive).unwrap().0, view.lost().drive), (last + 5, 0));
+    }
+
+    #[test]
+    fn an_emergency_stop_of_the_old_rig_is_not_the_new_ones() {
+        let mut view = RigView::default();
+        play(&mut view, 0..5001, &[]);
+        view.take_status(RigStatus { emergency_stop: true, ..RigStatus::default() });
+        view.take_tick(&tick(0, 0));
+        assert!(!view.emergency_stop());
     }
 
     #[test]

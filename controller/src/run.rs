@@ -13,7 +13,7 @@ use crossbeam_channel::bounded;
 use plant::RigParameters;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
-use protocol::frames::MainChainState;
+use protocol::frames::{DRIVE_CHAIN_VALUES, MainChainState};
 use protocol::run_folder::{LineFile, SCHEMA_VERSION, write_json};
 use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request};
 use serde::Serialize;
@@ -64,6 +64,7 @@ struct Report {
     title: String,
     position_p: PositionP,
     started_unix_s: Option<f64>,
+    ended_well: bool,
     ended_because: &'static str,
     chain_state: &'static str,
     repetitions_done: u32,
@@ -96,6 +97,13 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let rig_toml = read(&arguments.rig)?;
     let rig = RigParameters::from_toml(&rig_toml, &arguments.rig.display().to_string())
         .map_err(|error| RunError::Input(error.to_string()))?;
+    let (stroke_m, most_m) = (rig.cylinder().stroke_m, DRIVE_CHAIN_VALUES.signals[0].max);
+    if stroke_m > most_m {
+        let file = arguments.rig.display();
+        return Err(RunError::Input(format!(
+            "{file}: cylinder.stroke_mm: {stroke_m} m; rig.dbc carries positions of at most {most_m} m"
+        )));
+    }
     let experiment = DriveExperiment::from_toml(
         &read(&arguments.experiment)?,
         &arguments.experiment.display().to_string(),
@@ -105,8 +113,8 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         .map_err(|error| RunError::Output(format!("{}: {error}", arguments.out.display())))?;
     let table = LineFile::create(&arguments.out.join("controller.csv"))
         .map_err(|error| RunError::Output(error.to_string()))?;
-    let interrupt = Interrupt::watch(Exit::Interrupted as i32)
-        .map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
+    let interrupt =
+        Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
     let mut bus =
         bus::open(&arguments.bus, Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns)))?;
 
@@ -198,8 +206,11 @@ fn save(
 ) -> Result<Exit, RunError> {
     let Finished { paced, grants, bus, .. } = &finished;
     let done = finished.state == MainChainState::Done || arguments.repeat;
+    let aborted = (Exit::BoundBroken, "aborted, by an emergency stop or by the console");
     let (exit, ended_because) = match paced.end {
         _ if output_failed => (Exit::BadInput, "the output could not be written"),
+        End::Aborted => aborted,
+        End::RigEnded if finished.state == MainChainState::Aborted => aborted,
         End::RigEnded if done => (Exit::Good, "done, and the rig has ended"),
         End::RigEnded => (Exit::BusFailed, "the rig ended before the experiment was done"),
         End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved"),
@@ -234,6 +245,7 @@ fn save(
         title: experiment.title.clone(),
         position_p: experiment.position_p,
         started_unix_s: real.then_some(unix_s.as_secs_f64()),
+        ended_well: exit == Exit::Good,
         ended_because,
         chain_state: finished.state.name(),
         repetitions_done: finished.repetitions,

@@ -14,7 +14,7 @@ use crossbeam_channel::Sender;
 use plant::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
-use protocol::frames::{DecodeError, Frame, MainChainState};
+use protocol::frames::{DecodeError, Frame, MainChainState, RunControl, RunControlCommand};
 
 /// Period of status and values, in cycles.
 const SLOW_PERIOD: u64 = 10;
@@ -22,6 +22,7 @@ const SLOW_PERIOD: u64 = 10;
 const DRIVE_STATUS_PHASE: u64 = 2;
 const DRIVE_VALUES_PHASE: u64 = 3;
 const LOAD_STATUS_PHASE: u64 = 7;
+const LOAD_VALUES_PHASE: u64 = 8;
 
 /// What a station tells a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -69,8 +70,10 @@ pub struct Station {
     load: LoadAxis,
     outlets: Outlets,
     ignored: IgnoredFrames,
-    told_state: MainChainState,
+    /// State last told to the bus with each axis's status.
+    told_state: [MainChainState; 2],
     answered: u64,
+    aborted_for: u64,
     records_dropped: u64,
     ending: bool,
 }
@@ -85,8 +88,9 @@ impl Station {
             load: LoadAxis::default(),
             outlets,
             ignored: IgnoredFrames::default(),
-            told_state: MainChainState::WaitingForRig,
+            told_state: [MainChainState::WaitingForRig; 2],
             answered: 0,
+            aborted_for: 0,
             records_dropped: 0,
             ending: false,
         }
@@ -107,6 +111,7 @@ impl Station {
                     self.tell(News::RigRestarted);
                 }
             },
+            Ok(Frame::RunControl(RunControl { command: RunControlCommand::Abort, .. })) => self.drive.abort(),
             Ok(_) => {}
             Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
                 self.ignored.unknown += 1;
@@ -125,32 +130,42 @@ impl Station {
             let command = self.drive.command(cycle, &sensors, self.view.emergency_stop());
             send(bus, &Frame::DriveValveCommand(command));
             self.answered += 1;
+            let aborted = self.drive.state() == MainChainState::Aborted;
+            self.aborted_for = if aborted { self.aborted_for + 1 } else { 0 };
             self.record();
             self.send_drive_chain(cycle, bus);
         }
-        if let Some((cycle, _)) = self.view.fresh_sensors(Axis::Load) {
-            send(bus, &Frame::LoadValveCommand(self.load.command(cycle)));
-            if cycle % SLOW_PERIOD == LOAD_STATUS_PHASE {
-                send(bus, &Frame::LoadChainStatus(self.load.status(self.drive.state())));
-            }
+        if let Some((cycle, sensors)) = self.view.fresh_sensors(Axis::Load) {
+            send(bus, &Frame::LoadValveCommand(self.load.command(cycle, &sensors)));
+            self.send_load_chain(cycle, bus);
         }
         drive.is_some()
     }
 
     fn send_drive_chain(&mut self, cycle: u64, bus: &mut dyn Bus) {
         let state = self.drive.state();
-        let changed = state != self.told_state;
+        let changed = std::mem::replace(&mut self.told_state[Axis::Drive.index()], state) != state;
         if changed {
-            self.told_state = state;
             self.tell(News::State(state, cycle));
         }
         if changed || cycle % SLOW_PERIOD == DRIVE_STATUS_PHASE {
             send(bus, &Frame::DriveChainStatus(self.drive.status()));
         }
-        if cycle % SLOW_PERIOD == DRIVE_VALUES_PHASE
+        if (changed || cycle % SLOW_PERIOD == DRIVE_VALUES_PHASE)
             && let Some(values) = self.drive.values()
         {
             send(bus, &Frame::DriveChainValues(values));
+        }
+    }
+
+    fn send_load_chain(&mut self, cycle: u64, bus: &mut dyn Bus) {
+        let state = self.drive.state();
+        let changed = std::mem::replace(&mut self.told_state[Axis::Load.index()], state) != state;
+        if changed || cycle % SLOW_PERIOD == LOAD_STATUS_PHASE {
+            send(bus, &Frame::LoadChainStatus(self.load.status(state)));
+        }
+        if changed || cycle % SLOW_PERIOD == LOAD_VALUES_PHASE {
+            send(bus, &Frame::LoadChainValues(self.load.values()));
         }
     }
 
@@ -197,6 +212,12 @@ impl Station {
     #[must_use]
     pub fn answered(&self) -> u64 {
         self.answered
+    }
+
+    /// Cycles answered since the experiment was aborted; 0 while it is not.
+    #[must_use]
+    pub fn aborted_for(&self) -> u64 {
+        self.aborted_for
     }
 
     /// Rows lost to a full queue.

@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::bus::BusUrl;
 use protocol::exit::EXIT_CODE_HELP;
 use protocol::frames::{DRIVE_VALVE_COMMAND, LOAD_VALVE_COMMAND};
+use protocol::run_folder;
 use realtime::OverrunPolicy;
 use std::path::PathBuf;
 
@@ -40,8 +41,8 @@ pub struct RunArguments {
     /// Experiment file, of which the rig's initial state is read.
     #[arg(long)]
     pub experiment: Option<PathBuf>,
-    /// Folder for the run's files; made if missing.
-    #[arg(long, default_value = "runs/latest")]
+    /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
+    #[arg(long, default_value_os_t = run_folder::new_folder())]
     pub out: PathBuf,
     /// End after this much simulated time; without it, when the controllers are done.
     #[arg(long, value_parser = seconds)]

@@ -73,25 +73,28 @@ impl CommandIntake {
 
     /// Latches what acts over `cycle`, the last command taken being the one that counts.
     pub fn latch(&mut self, cycle: u64, live: &LiveCycles) -> Option<Change> {
-        let disputed = self.sources.two_sources(cycle);
-        if disputed != self.disputed {
-            self.disputed = disputed;
-            self.counters.two_sources += u64::from(disputed);
-            return Some(if disputed { Change::TwoSources } else { Change::OneSource });
-        }
         let too_old =
             |command: &ValveCommand| live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES);
-        if self.acting.as_ref().is_some_and(too_old) {
+        let expired = self.acting.as_ref().is_some_and(too_old);
+        if expired {
             self.acting = None;
-            self.expired = true;
             self.counters.expired += 1;
+        }
+        let disputed = self.sources.two_sources(cycle);
+        let quarrel_changed = disputed != self.disputed;
+        self.disputed = disputed;
+        self.counters.two_sources += u64::from(quarrel_changed && disputed);
+        // One message a cycle is enough: the quarrel explains more than the age.
+        if quarrel_changed {
+            self.expired |= expired;
+            return Some(if disputed { Change::TwoSources } else { Change::OneSource });
+        }
+        if expired {
+            self.expired = true;
             return Some(Change::Expired);
         }
-        if self.acting.is_some() && self.expired {
-            self.expired = false;
-            return Some(Change::Fresh);
-        }
-        None
+        let fresh = self.acting.is_some() && std::mem::take(&mut self.expired);
+        fresh.then_some(Change::Fresh)
     }
 
     /// Valve opening that acts, in -1 to 1.
@@ -182,6 +185,25 @@ mod tests {
         assert_eq!(bench.intake.opening(), 0.0);
         assert_eq!(bench.cycle(Some(0.25)), Some(Change::Fresh));
         assert_eq!(bench.intake.opening(), 0.25);
+    }
+
+    #[test]
+    fn a_command_that_grew_stale_in_a_quarrel_does_not_act_when_it_ends() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        for _ in 0..30 {
+            let intruder = ValveCommand { opening: 1.0, alive: 15 - bench.alive, echo: 0, enable: true };
+            let intruder = ValveCommand { echo: (bench.cycle - 1) as u16, ..intruder };
+            bench.intake.take(intruder, bench.cycle, &bench.live);
+            bench.cycle(Some(0.5));
+        }
+        // Both fall silent: the quarrel and the command's life end within the same few cycles.
+        for _ in 0..30 {
+            bench.cycle(None);
+            let age = bench.intake.age_cycles(&bench.live);
+            assert!(bench.intake.opening() == 0.0 || age.is_some_and(|age| age <= STALE_AFTER_CYCLES));
+        }
+        assert!(bench.intake.stale());
     }
 
     #[test]

@@ -40,6 +40,8 @@ pub enum EventKind {
     Unlinked,
     /// Linking was refused because the eye is not within the gap.
     LinkRefused,
+    /// Weights that the rig file does not allow were asked for.
+    WeightsRefused,
     /// A frame that `rig.dbc` does not allow was ignored; only the first of a kind is told.
     Malformed {
         /// Its identifier with the kernel's flags.
@@ -85,6 +87,9 @@ impl fmt::Display for Event {
             EventKind::Unlinked => write!(f, "rods parted"),
             EventKind::LinkRefused => {
                 write!(f, "link refused: the load eye is not within the gap of the carriage")
+            }
+            EventKind::WeightsRefused => {
+                write!(f, "weights refused: more than mass.added_limit_kg of the rig file")
             }
             EventKind::Malformed { raw_id } => write!(
                 f,

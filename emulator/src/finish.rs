@@ -34,7 +34,7 @@ pub(crate) fn finish(
             .map_err(|error| RunError::output(&path, &error))?;
     }
     let path = arguments.out.join("summary.json");
-    let summary = summarise(outcome, written, reason, exit == Exit::Good);
+    let summary = summarise(outcome, written, started.epoch_offset_ns, reason, exit == Exit::Good);
     tell(&summary, &arguments.out);
     write_json(&path, &summary).map_err(|error| RunError::output(&path, &error))?;
     Ok(exit)
@@ -49,6 +49,12 @@ fn tell(summary: &Summary, folder: &Path) {
         "emulator: {frames_sent} frames sent, {frames_received} received, {frames_lost} lost by their counters, \
          {frames_malformed} malformed, {stale_commands} stale commands"
     );
+    if summary.records_dropped > 0 {
+        eprintln!(
+            "emulator: {} records did not reach the files: the disk was too slow",
+            summary.records_dropped
+        );
+    }
     if summary.wakeup_ns.count > 0 {
         eprintln!("emulator: wake-up {}", summary.wakeup_ns);
         eprintln!("emulator: round trip {}", summary.round_trip_ns);
@@ -56,7 +62,13 @@ fn tell(summary: &Summary, folder: &Path) {
     eprintln!("emulator: files in {}", folder.display());
 }
 
-fn summarise(outcome: LoopOutcome, written: WriterReport, ended_because: String, passed: bool) -> Summary {
+fn summarise(
+    outcome: LoopOutcome,
+    written: WriterReport,
+    epoch_offset_ns: u64,
+    ended_because: String,
+    passed: bool,
+) -> Summary {
     let LoopOutcome { paced, figures, bus, host: bus_host } = outcome;
     let [drive_commands, load_commands] = figures.commands;
     let both = [drive_commands, load_commands];
@@ -71,6 +83,7 @@ fn summarise(outcome: LoopOutcome, written: WriterReport, ended_because: String,
         schema_version: SCHEMA_VERSION,
         position_error_dynamic_m: None,
         position_error_static_m: None,
+        bus_log_cycle_zero_s: (paced.cycle_zero_ns + epoch_offset_ns) as f64 * 1e-9,
         cycles: paced.cycles,
         skipped: figures.skipped,
         overruns: loops.map_or(0, |statistics| statistics.overruns),
@@ -108,6 +121,9 @@ fn verdict(end: &End) -> (Exit, String) {
         End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
         End::OutputFailed => (Exit::BadInput, "the output could not be written".into()),
         End::BusGone => (Exit::BusFailed, "the bus was gone for too long; see --bus-grace".into()),
+        End::SecondRig => {
+            (Exit::BusFailed, "another rig is on this bus already; stop it, or choose another --bus".into())
+        }
         End::NobodyJoined => (
             Exit::BusFailed,
             "not all members joined the barrier in time; start 'controller run --pace lockstep', or see --members".into(),

@@ -2,6 +2,7 @@
 
 use crate::experiment::RigSection;
 use crate::run::RunError;
+use crate::wire_limits;
 use plant::{Plant, RigParameters};
 use std::path::Path;
 
@@ -28,6 +29,10 @@ impl Inputs {
         let rig_toml = read(rig)?;
         let parameters = RigParameters::from_toml(&rig_toml, &rig.display().to_string())
             .map_err(|error| RunError::Input(error.to_string()))?;
+        wire_limits::check(&parameters).map_err(|misfit| {
+            let line = line_of_key(&rig_toml, misfit.table, misfit.key);
+            RunError::Input(format!("{}: {misfit}", place(rig, line)))
+        })?;
         let experiment_toml = experiment.map(read).transpose()?;
         let section = match (&experiment_toml, experiment) {
             (Some(text), Some(path)) => {
@@ -36,21 +41,26 @@ impl Inputs {
             _ => RigSection::default(),
         };
         let plant = Plant::new(&parameters, &section.setup()).map_err(|error| {
-            let file = experiment.map_or("default setup".into(), |path| path.display().to_string());
-            let line = experiment_toml.as_deref().and_then(|text| line_of_key(text, &error.to_string()));
-            let place = line.map_or(file.clone(), |line| format!("{file}:{line}"));
-            RunError::Input(format!("{place}: [rig] {error}"))
+            let message = error.to_string();
+            let key = message.split(' ').next().unwrap_or_default();
+            let line = experiment_toml.as_deref().and_then(|text| line_of_key(text, "rig", key));
+            let file = experiment.unwrap_or(Path::new("default setup"));
+            RunError::Input(format!("{}: [rig] {message}", place(file, line)))
         })?;
         Ok(Self { rig_toml, experiment_toml, section, rig: parameters, plant })
     }
 }
 
-/// Line, from 1, of the key that `message` begins with; `None` when the file leaves it at its default.
-fn line_of_key(text: &str, message: &str) -> Option<usize> {
-    let key = message.split(' ').next()?;
-    let table = text.lines().position(|line| line.trim() == "[rig]")?;
-    let within = text.lines().skip(table).position(|line| line.trim_start().starts_with(key))?;
-    Some(table + within + 1)
+/// `file:line`, or the file alone.
+fn place(file: &Path, line: Option<usize>) -> String {
+    line.map_or_else(|| file.display().to_string(), |line| format!("{}:{line}", file.display()))
+}
+
+/// Line, from 1, of `key` in `[table]`; `None` when the file leaves it at its default.
+fn line_of_key(text: &str, table: &str, key: &str) -> Option<usize> {
+    let head = text.lines().position(|line| line.trim() == format!("[{table}]"))?;
+    let within = text.lines().skip(head).position(|line| line.trim_start().starts_with(key))?;
+    Some(head + within + 1)
 }
 
 fn read(path: &Path) -> Result<String, RunError> {

@@ -8,7 +8,7 @@
 //! | [`station`] | one cycle: sensors out, commands in, records, step |
 //! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
 //! | [`commands`], [`sources`], [`live_cycles`] | which command acts, who sends it, how old it is |
-//! | [`telegrams`] | the frames that the rig sends |
+//! | [`telegrams`], [`wire_limits`] | the frames that the rig sends, and whether its numbers fit them |
 //! | [`recording`] | the queues out of the 1 ms path, and the files |
 //! | `finish` | histograms, summary, exit code |
 //! | [`run`], [`inputs`], [`experiment`], [`summary`], [`host_thread`], [`cli`] | around it |
@@ -28,3 +28,4 @@ pub mod sources;
 pub mod station;
 pub mod summary;
 pub mod telegrams;
+pub mod wire_limits;

@@ -10,8 +10,7 @@
 //!   echo 9 at cycle 13: age 1            echo 11: never sent
 //! ```
 
-/// Cycles that a 12-bit echo can tell apart.
-pub const ECHO_RANGE: u32 = 4096;
+use protocol::frames::ECHO_RANGE;
 
 /// The last [`ECHO_RANGE`] cycles, and which of them were sent.
 pub struct LiveCycles {
@@ -30,7 +29,7 @@ impl LiveCycles {
     /// The cycles from `first` on, `count` of them, were skipped.
     pub fn skipped(&mut self, first: u64, count: u64) {
         // More than the whole range says the same as the whole range.
-        for cycle in first..first + count.min(u64::from(ECHO_RANGE)) {
+        for cycle in first..first + count.min(ECHO_RANGE) {
             self.sent_count[slot(cycle)] = None;
         }
     }
@@ -56,7 +55,7 @@ impl Default for LiveCycles {
 }
 
 fn slot(cycle: u64) -> usize {
-    (cycle % u64::from(ECHO_RANGE)) as usize
+    (cycle % ECHO_RANGE) as usize
 }
 
 #[cfg(test)]

@@ -109,6 +109,12 @@ impl Recorder {
         self.dropped += hand_over(&self.events, event, self.waits);
     }
 
+    /// Whether a cycle can be recorded now.
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        !self.cycles.is_full()
+    }
+
     /// Records lost to full queues.
     #[must_use]
     pub fn dropped(&self) -> u64 {

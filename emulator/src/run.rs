@@ -11,7 +11,7 @@ use crate::cli::RunArguments;
 use crate::finish::finish;
 use crate::host_thread::HostThread;
 use crate::inputs::Inputs;
-use crate::pace::{self, Limits, Pace, Paced, Shared};
+use crate::pace::{self, Limits, Pace, Paced, Ride, Shared};
 use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::station::{Station, StationFigures, StationParts};
@@ -21,7 +21,7 @@ use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock};
 use protocol::exit::Exit;
-use protocol::run_folder::{SCHEMA_VERSION, write_json};
+use protocol::run_folder::{SCHEMA_VERSION, clear_results, write_json};
 use realtime::{Clock, Grants, Interrupt, MonotonicClock, PeriodicConfig, Request};
 use std::io;
 use std::path::Path;
@@ -78,23 +78,32 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     if lockstep && matches!(arguments.bus, BusUrl::Can { .. }) {
         return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
     }
+    // Everything that can be refused is looked at before the folder is touched: it may hold an earlier run.
     let inputs = Inputs::read(&arguments.rig, arguments.experiment.as_deref())?;
+    let periodic = loop_config(arguments)?;
     let shared = Shared { interrupt: watch_interrupt()?, ..Shared::default() };
 
-    let started = RunStart::now(lockstep);
-    let (recorder, records) = recording::queues(lockstep);
-    let writer = open_folder(arguments, &inputs, &started)?;
     // Simulated time in lockstep, where the log must not show the machine's clock.
     let simulated_ns = Arc::new(AtomicU64::new(0));
     let (mut bus, host) = open_bus(arguments, stamp_clock(lockstep, &simulated_ns))?;
+    let started = RunStart::now(lockstep);
+    let writer = match open_folder(arguments, &inputs, &started) {
+        Ok(writer) => writer,
+        Err(error) => {
+            host.map(HostThread::stop);
+            return Err(error);
+        }
+    };
+    let (recorder, records) = recording::queues(lockstep);
 
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let for_writer = &shared;
         let writer = scope.spawn(move || writer.run(&records, for_writer));
         let bus = bus.as_mut();
-        let rig_loop =
-            scope.spawn(|| rig_loop(arguments, &inputs, &started, recorder, bus, &simulated_ns, &shared));
+        let work =
+            RigWork { arguments, inputs: &inputs, started: &started, simulated_ns: &simulated_ns, periodic };
+        let rig_loop = scope.spawn(|| work.run(recorder, bus, &shared));
         tell_progress(&rig_loop, &shared);
         let outcome = join(rig_loop);
         let written = join(writer);
@@ -110,8 +119,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
 /// # Errors
 /// [`RunError::Input`] when the system takes no handler.
 pub fn watch_interrupt() -> Result<Interrupt, RunError> {
-    Interrupt::watch(Exit::Interrupted as i32)
-        .map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
+    Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }
 
 /// When a run's clock started, in the clocks that its files speak.
@@ -119,7 +127,7 @@ pub(crate) struct RunStart {
     /// Seconds since 1970; `None` in lockstep.
     pub(crate) unix_s: Option<f64>,
     /// What turns the run's clock into the stamps of `bus.log`.
-    epoch_offset_ns: u64,
+    pub(crate) epoch_offset_ns: u64,
     pub(crate) began: Instant,
 }
 
@@ -143,42 +151,41 @@ pub(crate) struct LoopOutcome {
     pub(crate) host: Option<HostReport>,
 }
 
-fn rig_loop(
-    arguments: &RunArguments,
-    inputs: &Inputs,
-    started: &RunStart,
-    recorder: Recorder,
-    bus: &mut dyn Bus,
-    simulated_ns: &AtomicU64,
-    shared: &Shared,
-) -> Result<LoopOutcome, RunError> {
-    let grants = acquire_realtime(arguments);
-    describe(arguments, inputs, started, &grants)?;
-    let mut station = Station::new(StationParts {
-        plant: inputs.plant.clone(),
-        sensors: Sensors::new(&inputs.rig, arguments.seed),
-        recorder,
-        bench_frames: !arguments.no_bench_frames,
-        lockstep: arguments.pace == Pace::Lockstep,
-    });
-    let limits = Limits {
-        cycles: arguments.seconds.map(|seconds| (seconds * 1000.0).round() as u64),
-        bus_grace: Duration::from_secs_f64(arguments.bus_grace),
-        join: Duration::from_secs_f64(arguments.join_timeout),
-    };
-    let paced = match arguments.pace {
-        Pace::Real => {
-            pace::run_real(&mut station, bus, MonotonicClock, loop_config(arguments)?, &limits, shared)
-        }
-        Pace::Lockstep => pace::run_lockstep(&mut station, bus, simulated_ns, &limits, shared)?,
-    };
-    // Taking the figures drops the station and with it the queues' sending ends, which lets the writer finish.
-    Ok(LoopOutcome {
-        paced,
-        figures: station.into_figures(),
-        bus: *bus.counters(),
-        host: bus.host_report().cloned(),
-    })
+/// What the rig loop's thread is made of.
+struct RigWork<'a> {
+    arguments: &'a RunArguments,
+    inputs: &'a Inputs,
+    started: &'a RunStart,
+    simulated_ns: &'a AtomicU64,
+    periodic: PeriodicConfig,
+}
+
+impl RigWork<'_> {
+    fn run(self, recorder: Recorder, bus: &mut dyn Bus, shared: &Shared) -> Result<LoopOutcome, RunError> {
+        let Self { arguments, inputs, started, simulated_ns, periodic } = self;
+        let grants = acquire_realtime(arguments);
+        describe(arguments, inputs, started, &grants)?;
+        let mut station = Station::new(StationParts {
+            plant: inputs.plant.clone(),
+            sensors: Sensors::new(&inputs.rig, arguments.seed),
+            recorder,
+            bench_frames: !arguments.no_bench_frames,
+            lockstep: arguments.pace == Pace::Lockstep,
+        });
+        let limits = Limits {
+            cycles: arguments.seconds.map(|seconds| (seconds * 1000.0).round() as u64),
+            bus_grace: Duration::from_secs_f64(arguments.bus_grace),
+            join: Duration::from_secs_f64(arguments.join_timeout),
+        };
+        let ride = Ride { station: &mut station, bus, limits: &limits, shared };
+        let paced = match arguments.pace {
+            Pace::Real => pace::real::run(ride, MonotonicClock, periodic),
+            Pace::Lockstep => pace::lockstep::run(ride, simulated_ns)?,
+        };
+        // Taking the figures drops the station and with it the queues' sending ends, which lets the writer finish.
+        let host = bus.host_report().cloned();
+        Ok(LoopOutcome { paced, figures: station.into_figures(), bus: *bus.counters(), host })
+    }
 }
 
 fn loop_config(arguments: &RunArguments) -> Result<PeriodicConfig, RunError> {
@@ -243,7 +250,9 @@ fn stamp_clock(lockstep: bool, simulated_ns: &Arc<AtomicU64>) -> StampClock {
 
 fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) -> Result<Writer, RunError> {
     let folder = arguments.out.as_path();
-    std::fs::create_dir_all(folder).map_err(|error| RunError::output(folder, &error))?;
+    std::fs::create_dir_all(folder)
+        .and_then(|()| clear_results(folder))
+        .map_err(|error| RunError::output(folder, &error))?;
     let interface = match &arguments.bus {
         BusUrl::Can { interface } => interface.as_str(),
         BusUrl::Unix { .. } => EMBEDDED_INTERFACE,
@@ -292,7 +301,9 @@ fn tell_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
             told = Instant::now();
             let seconds = shared.cycle.load(Ordering::Relaxed) as f64 / 1000.0;
             let skipped = shared.skipped.load(Ordering::Relaxed);
-            eprintln!("emulator: {seconds:.0} s simulated, {skipped} cycles skipped");
+            let heard = shared.controller_heard.load(Ordering::Relaxed);
+            let waiting = if heard { "" } else { ", no valve command heard yet" };
+            eprintln!("emulator: {seconds:.0} s simulated, {skipped} cycles skipped{waiting}");
         }
     }
 }

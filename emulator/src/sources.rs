@@ -13,12 +13,12 @@
 //! Four breaks within 20 cycles latch the fault; it goes when none was seen for 20 cycles, which is what one sender
 //! falling silent brings about (bus.md, Frames).
 
+use protocol::frames::ALIVE_RANGE;
+
 /// Cycles that a break is remembered, and that a fault lasts without one.
 pub const SILENCE_CYCLES: u64 = 20;
 /// Breaks within [`SILENCE_CYCLES`] that latch the fault: a restart makes one, two in quick succession two.
 const BREAKS_TO_LATCH: usize = 4;
-/// Values of the counter.
-const COUNTER_RANGE: u64 = 16;
 
 /// What a frame's counter said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,12 +49,12 @@ impl SourceWatch {
             // counter says nothing about loss.
             Some((_, seen)) if cycle - seen > SILENCE_CYCLES => Step::Continues { lost: 0 },
             Some((last, seen)) => {
-                let ahead = (COUNTER_RANGE + u64::from(alive) - u64::from(last)) % COUNTER_RANGE;
+                let ahead = (ALIVE_RANGE + u64::from(alive) - u64::from(last)) % ALIVE_RANGE;
                 // A frame may come late into the next cycle, so one more than the cycles that passed.
                 let allowed = cycle - seen + 1;
                 match ahead {
                     // Sixteen lost frames look like none; the cycles that passed tell them apart.
-                    0 if cycle - seen >= COUNTER_RANGE => Step::Continues { lost: COUNTER_RANGE - 1 },
+                    0 if cycle - seen >= ALIVE_RANGE => Step::Continues { lost: ALIVE_RANGE - 1 },
                     1.. if ahead <= allowed => Step::Continues { lost: ahead - 1 },
                     _ => Step::Breaks,
                 }

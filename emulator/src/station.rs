@@ -12,16 +12,20 @@
 
 use crate::commands::{Change, CommandCounters, CommandIntake};
 use crate::event::{Event, EventKind};
-use crate::live_cycles::{ECHO_RANGE, LiveCycles};
+use crate::live_cycles::LiveCycles;
 use crate::recording::{CycleRecord, FrameRecord, Recorder};
-use crate::telegrams::{self, CommandState, SLOW_PERIOD, STATUS_PHASE};
+use crate::telegrams::{self, CommandState, SLOW_PERIOD, STATUS_PHASE, SaturatedSensors};
 use plant::{Axis, AxisReadings, Inputs, Plant, Sensors};
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ChainStatus, DecodeError, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
+    ChainStatus, DecodeError, ECHO_RANGE, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
 };
 use realtime::Recorder as Histogram;
+use std::time::Duration;
+
+/// Longest wait for room in the recorder's queue, in ms; a writer that is slower than this has failed.
+const LONGEST_WAIT_MS: u32 = 2000;
 
 /// What a station is made of.
 pub struct StationParts {
@@ -76,6 +80,10 @@ pub struct Station {
     skipped: u64,
     bus_was_up: bool,
     frames: FrameCounters,
+    /// Who holds the emergency stop: console, drive, load. It is released when nobody does.
+    stopped_by: [bool; 3],
+    /// Sensors that saturated since the last status.
+    saturated: [SaturatedSensors; 2],
     /// When the drive's sensors of a cycle were sent, by the cycle's low bits; 0 where not.
     sent_ns: Box<[u64; ECHO_RANGE as usize]>,
     round_trip: Histogram,
@@ -103,6 +111,8 @@ impl Station {
             skipped: 0,
             bus_was_up: true,
             frames: FrameCounters::default(),
+            stopped_by: [false; 3],
+            saturated: [SaturatedSensors::default(); 2],
             sent_ns: Box::new([0; ECHO_RANGE as usize]),
             round_trip: Histogram::new(),
             chains_done: [None; 2],
@@ -118,15 +128,33 @@ impl Station {
         self.live.skipped(first, count);
         self.tell(first + count, EventKind::Skipped { cycles: count });
         for cycle in first..first + count {
-            self.readings = self.sensors.sample(&self.plant, &self.inputs);
+            self.wait_for_writer();
+            self.sample();
             self.advance(cycle);
+        }
+    }
+
+    /// After a stall longer than the queue, waiting for the writer costs nothing that is not lost already.
+    fn wait_for_writer(&self) {
+        for _ in 0..LONGEST_WAIT_MS {
+            if self.recorder.has_room() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn sample(&mut self) {
+        self.readings = self.sensors.sample(&self.plant, &self.inputs);
+        for (saturated, readings) in self.saturated.iter_mut().zip(&self.readings) {
+            saturated.note(readings);
         }
     }
 
     /// Samples the sensors of `cycle` and sends what is due. `after_miss` sends the tick first, so that receivers know
     /// which cycle the sensors are of.
     pub fn publish(&mut self, cycle: u64, after_miss: bool, bus: &mut dyn Bus) {
-        self.readings = self.sensors.sample(&self.plant, &self.inputs);
+        self.sample();
         let [drive, load] = &self.readings;
         let drive = Frame::DriveSensors(telegrams::sensors(drive, cycle));
         let load = Frame::LoadSensors(telegrams::sensors(load, cycle));
@@ -134,7 +162,7 @@ impl Station {
             self.send(&telegrams::tick(cycle, self.skipped, true, self.lockstep, false), bus);
         }
         let sent_ns = self.send(&drive, bus);
-        self.sent_ns[(cycle % u64::from(ECHO_RANGE)) as usize] = sent_ns.unwrap_or(0);
+        self.sent_ns[(cycle % ECHO_RANGE) as usize] = sent_ns.unwrap_or(0);
         self.live.sent(cycle);
         self.send(&load, bus);
         if cycle.is_multiple_of(SLOW_PERIOD) && !after_miss {
@@ -145,7 +173,8 @@ impl Station {
                 stale: self.commands.each_ref().map(CommandIntake::stale),
                 two_sources: self.commands.each_ref().map(CommandIntake::disputed),
             };
-            self.send(&telegrams::status(&self.plant, &self.readings, commands), bus);
+            let saturated = std::mem::take(&mut self.saturated);
+            self.send(&telegrams::status(&self.plant, &saturated, commands), bus);
         }
         if bus.is_up() != self.bus_was_up {
             self.bus_was_up = bus.is_up();
@@ -170,11 +199,9 @@ impl Station {
             Ok(Frame::LoadValveCommand(command)) => {
                 self.commands[1].take(command, cycle, &self.live);
             }
-            Ok(
-                Frame::ConsoleEmergencyStop(stop)
-                | Frame::DriveEmergencyStop(stop)
-                | Frame::LoadEmergencyStop(stop),
-            ) => self.obey_emergency_stop(stop, cycle),
+            Ok(Frame::ConsoleEmergencyStop(stop)) => self.obey_emergency_stop(0, stop, cycle),
+            Ok(Frame::DriveEmergencyStop(stop)) => self.obey_emergency_stop(1, stop, cycle),
+            Ok(Frame::LoadEmergencyStop(stop)) => self.obey_emergency_stop(2, stop, cycle),
             Ok(Frame::DriveChainStatus(status)) => self.note_chain(0, status),
             Ok(Frame::LoadChainStatus(status)) => self.note_chain(1, status),
             Ok(Frame::HandForce(hand)) if self.bench_frames => {
@@ -183,8 +210,9 @@ impl Station {
             }
             Ok(Frame::Link(link)) if self.bench_frames => self.obey_link(link.request, cycle),
             Ok(Frame::Weights(weights)) if self.bench_frames => {
-                // rig.dbc allows what the plant allows, which a test holds.
-                let _ = self.plant.set_added_mass_kg(weights.added_mass_kg);
+                if self.plant.set_added_mass_kg(weights.added_mass_kg).is_err() {
+                    self.tell(cycle, EventKind::WeightsRefused);
+                }
             }
             Ok(
                 Frame::DriveSensors(_)
@@ -217,7 +245,9 @@ impl Station {
         for axis in Axis::ALL {
             let intake = &mut self.commands[axis as usize];
             let change = intake.latch(cycle, &self.live);
-            self.inputs.valve[axis as usize] = plant::quantise_valve(intake.opening());
+            // Commands count as 0 while the emergency stop is tripped, and the record shows what acts.
+            let opening = if self.plant.emergency_stop() { 0.0 } else { intake.opening() };
+            self.inputs.valve[axis as usize] = plant::quantise_valve(opening);
             if let Some(change) = change {
                 self.tell(cycle, change_event(change, axis));
             }
@@ -254,11 +284,13 @@ impl Station {
         self.chains_done[axis] = Some(status.main_chain == MainChainState::Done);
     }
 
-    fn obey_emergency_stop(&mut self, stop: EmergencyStop, cycle: u64) {
-        if stop.release && self.plant.emergency_stop() {
+    fn obey_emergency_stop(&mut self, sender: usize, stop: EmergencyStop, cycle: u64) {
+        self.stopped_by[sender] = !stop.release;
+        let stopped = self.stopped_by.contains(&true);
+        if !stopped && self.plant.emergency_stop() {
             self.plant.release_emergency_stop();
             self.tell(cycle, EventKind::EmergencyStopReleased);
-        } else if !stop.release && !self.plant.emergency_stop() {
+        } else if stopped && !self.plant.emergency_stop() {
             self.plant.trip_emergency_stop();
             self.tell(cycle, EventKind::EmergencyStop);
         }
@@ -290,6 +322,18 @@ impl Station {
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.plant.state().is_finite()
+    }
+
+    /// Frames by what became of them.
+    #[must_use]
+    pub fn frame_counters(&self) -> FrameCounters {
+        self.frames
+    }
+
+    /// Whether any valve command was accepted.
+    #[must_use]
+    pub fn controller_heard(&self) -> bool {
+        self.commands.iter().any(|intake| intake.counters().accepted > 0)
     }
 
     /// Cycles computed without being sent.

@@ -87,6 +87,8 @@ pub struct Summary {
     pub position_error_dynamic_m: Option<f64>,
     /// Largest mean |error| over the last 0.2 s of each rest; the controllers know it.
     pub position_error_static_m: Option<f64>,
+    /// When cycle 0 was due, in s of the time stamps of `bus.log`; cycle k was due k ms later.
+    pub bus_log_cycle_zero_s: f64,
     /// Cycles begun, skipped ones included.
     pub cycles: u64,
     /// Cycles computed late and not sent.

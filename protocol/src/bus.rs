@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Both kinds are sockets that carry one `struct can_frame` a packet, so one peer serves both; what differs
-//! is how the socket is opened ([`can_link`], [`unix_link`]). The wire of the embedded bus, its injected loss
+//! is how the socket is opened (`can_link`, `unix_link`). The wire of the embedded bus, its injected loss
 //! and the lockstep barrier live in [`host`] and nowhere else.
 //!
 //! A bus takes its stamps from a clock that is handed to it ([`StampClock`]), so that it knows neither a
@@ -16,9 +16,11 @@
 mod can_link;
 pub mod control;
 pub mod host;
+mod host_report;
 mod hosted_rig;
 pub mod lockstep;
 mod packets;
+mod socket_file;
 mod socket_peer;
 mod unix_link;
 mod url;
@@ -110,7 +112,7 @@ pub struct BusCounters {
 
 /// A CAN bus as a peer sees it. Nothing here blocks but [`Bus::wait_readable`], and [`Bus::receive`] in a barrier.
 pub trait Bus: Send {
-    /// Puts a frame on the bus and tells when, in ns of the bus's clock.
+    /// Puts a frame on the bus and tells when it was handed over, in ns of the bus's clock.
     ///
     /// # Errors
     /// [`SendError`] when the frame was dropped; it is counted and never queued for later, since a command that

@@ -3,7 +3,7 @@
 //! The same 16 bytes travel on a SocketCAN socket and on the embedded bus, so that a frame has one
 //! form in this project and a foreign client that speaks `struct can_frame` needs no translation.
 //!
-//! Source: Linux `include/uapi/linux/can.h`.
+//! Source: Linux `include/uapi/linux/can.h`; for the text, `lib.c` of can-utils.
 
 use std::fmt;
 
@@ -16,6 +16,10 @@ pub const EXTENDED_FLAG: u32 = 0x8000_0000;
 pub const REMOTE_FLAG: u32 = 0x4000_0000;
 /// Flag of an error frame.
 pub const ERROR_FLAG: u32 = 0x2000_0000;
+/// Bits of an 11-bit identifier.
+const STANDARD_MASK: u32 = 0x7FF;
+/// Bits of a 29-bit identifier, and of an error frame's class.
+const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
 
 /// A classic CAN frame: identifier with the kernel's flags, and 0 to 8 bytes of data.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -90,14 +94,19 @@ impl CanFrame {
 }
 
 impl fmt::Display for CanFrame {
-    /// As candump writes it: `123#0011AABB`.
+    /// As `candump -L` writes it: `123#0011AABB`, with 8 digits for 29 bits; `123#R` is a remote request, and an error
+    /// frame keeps its flag: `20000004#...`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.standard_id() {
-            Some(id) => write!(f, "{id:03X}#")?,
-            None => write!(f, "{:08X}#", self.can_id & !EXTENDED_FLAG)?,
+        if self.can_id & ERROR_FLAG != 0 {
+            write!(f, "{:08X}#", self.can_id & (ERROR_FLAG | EXTENDED_MASK))?;
+        } else if self.can_id & EXTENDED_FLAG != 0 {
+            write!(f, "{:08X}#", self.can_id & EXTENDED_MASK)?;
+        } else {
+            write!(f, "{:03X}#", self.can_id & STANDARD_MASK)?;
         }
         if self.can_id & REMOTE_FLAG != 0 {
-            return write!(f, "R");
+            // A request carries no data, but may tell how much it asks for.
+            return if self.len == 0 { write!(f, "R") } else { write!(f, "R{}", self.len) };
         }
         self.data().iter().try_for_each(|byte| write!(f, "{byte:02X}"))
     }
@@ -140,8 +149,19 @@ mod tests {
 
     #[test]
     fn text_is_that_of_candump() {
-        assert_eq!(CanFrame::new(0x11, &[0xAB, 1]).to_string(), "011#AB01");
-        assert_eq!(CanFrame::from_raw(EXTENDED_FLAG | 0x110, &[]).to_string(), "00000110#");
-        assert_eq!(CanFrame::from_raw(REMOTE_FLAG | 0x110, &[]).standard_id(), None);
+        let both = EXTENDED_FLAG | REMOTE_FLAG;
+        // The texts are those of sprint_canframe in can-utils' lib.c.
+        for (raw_id, data, text) in [
+            (0x11, &[0xAB, 1][..], "011#AB01"),
+            (EXTENDED_FLAG | 0x110, &[], "00000110#"),
+            (EXTENDED_FLAG | 0x1FFF_FFFF, &[7], "1FFFFFFF#07"),
+            (REMOTE_FLAG | 0x110, &[], "110#R"),
+            (REMOTE_FLAG | 0x110, &[0; 5], "110#R5"),
+            (both | 0x110, &[], "00000110#R"),
+            (ERROR_FLAG | 0x4, &[0, 0x40], "20000004#0040"),
+            (ERROR_FLAG | EXTENDED_FLAG | 0x4, &[], "20000004#"),
+        ] {
+            assert_eq!(CanFrame::from_raw(raw_id, data).to_string(), text);
+        }
     }
 }

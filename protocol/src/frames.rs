@@ -27,6 +27,11 @@ use crate::checksum;
 
 include!(concat!(env!("OUT_DIR"), "/rig_frames.rs"));
 
+/// Values of the counter `alive` in commands and sensors: it counts modulo this.
+pub const ALIVE_RANGE: u64 = 16;
+/// Values of the `echo` in a command: the cycle number that it answers, modulo this.
+pub const ECHO_RANGE: u64 = 4096;
+
 /// What `rig.dbc` says about one message.
 #[derive(Debug, PartialEq)]
 pub struct MessageSpec {

@@ -6,12 +6,39 @@
 use std::fs::File;
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Version of the JSON files; goes up when a key changes its meaning or goes.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// Lines are written together up to this many bytes.
 const BATCH_BYTES: usize = 256 << 10;
+
+/// Name of a new run's folder, by the time in seconds since 1970 and the process that asks.
+#[must_use]
+pub fn new_folder() -> PathBuf {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    PathBuf::from(format!("runs/{}-{}", now.as_secs(), std::process::id()))
+}
+
+/// Files that programs write at the end of a run, or at its start in one go: what is left of an earlier run is none of this
+/// one's. The tables are not among them, since each is made anew by its writer's start.
+pub const RESULTS: &[&str] =
+    &["run.json", "summary.json", "controller.json", "picture.svg", "emulator.hlog", "controller.hlog"];
+
+/// Removes what an earlier run left of [`RESULTS`] in `folder`, so that two runs are never taken for one.
+///
+/// # Errors
+/// What the system says, with the file's name.
+pub fn clear_results(folder: &Path) -> io::Result<()> {
+    for path in RESULTS.iter().map(|name| folder.join(name)) {
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(named(&path, &error)),
+            _ => {}
+        }
+    }
+    Ok(())
+}
 
 /// A file that grows by whole lines.
 pub struct LineFile {
@@ -83,4 +110,34 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> io::Result<()> 
 
 fn named(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_of_an_earlier_run_go_and_everything_else_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let others = ["bus.log", "notes.txt"];
+        for name in RESULTS.iter().chain(&others) {
+            std::fs::write(folder.path().join(name), "of an earlier run").unwrap();
+        }
+        // Twice, because a folder without results is as good.
+        for _ in 0..2 {
+            clear_results(folder.path()).unwrap();
+            let mut left: Vec<_> =
+                std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+            left.sort();
+            assert_eq!(left, others);
+        }
+    }
+
+    #[test]
+    fn a_result_that_cannot_be_removed_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("summary.json")).unwrap();
+        let message = clear_results(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("summary.json: "), "{message}");
+    }
 }

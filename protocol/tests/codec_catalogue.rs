@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use protocol::frames::{BIT_RATE_PER_S, MESSAGES};
+use protocol::frames::{ALIVE_RANGE, BIT_RATE_PER_S, ECHO_RANGE, MESSAGES};
 
 /// Identifier, name, sender, period in ms (0: event) and bytes.
 const CONTRACT: [(u16, &str, &str, u32, u8); 23] = [
@@ -43,6 +43,18 @@ fn messages_are_those_of_the_contract() {
 fn valve_commands_alone_carry_a_checksum() {
     let with: Vec<_> = MESSAGES.iter().filter(|m| m.checksum_start.is_some()).map(|m| m.name).collect();
     assert_eq!(with, ["DriveValveCommand", "LoadValveCommand"]);
+}
+
+#[test]
+fn counters_and_echoes_have_as_many_values_as_their_bits() {
+    for (name, range, users) in [("alive", ALIVE_RANGE, 4), ("echo", ECHO_RANGE, 2)] {
+        let signals: Vec<_> =
+            MESSAGES.iter().flat_map(|m| m.signals).filter(|signal| signal.name == name).collect();
+        assert_eq!(signals.len(), users, "{name}");
+        for signal in signals {
+            assert_eq!((1 << signal.length, signal.raw_min, signal.raw_max), (range, 0, range as i64 - 1));
+        }
+    }
 }
 
 #[test]

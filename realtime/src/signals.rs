@@ -1,7 +1,7 @@
 //! Ctrl-C and SIGTERM as a flag that a loop looks at.
 //!
-//! The first one sets the flag, so that the loop ends at its next cycle and everything is saved; a second one of the
-//! same kind ends the process at once, for whoever does not want to wait.
+//! The loop ends at its next cycle and everything is saved, however many signals follow: Ctrl-C reaches a process through its
+//! terminal and again through whoever started it. There is no forced end here; Ctrl-\ is for a process that hangs.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -14,15 +14,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Starts watching; `exit_code` is what a second signal ends the process with.
+    /// Starts watching.
     ///
     /// # Errors
     /// What the system says when it takes no handler.
-    pub fn watch(exit_code: i32) -> io::Result<Self> {
+    pub fn watch() -> io::Result<Self> {
         let interrupt = Self::default();
         for signal in [SIGINT, SIGTERM] {
-            // In this order: the shutdown looks at the flag that the handler after it sets.
-            flag::register_conditional_shutdown(signal, exit_code, Arc::clone(&interrupt.0))?;
             flag::register(signal, Arc::clone(&interrupt.0))?;
         }
         Ok(interrupt)
@@ -44,11 +42,14 @@ impl Interrupt {
 mod tests {
     use super::*;
 
+    /// A second signal once ended the process with its rows unsaved: both kinds shared the flag that armed a forced end.
     #[test]
-    fn a_signal_sets_the_flag_and_the_process_goes_on() {
-        let interrupt = Interrupt::watch(130).unwrap();
+    fn however_many_signals_come_they_only_set_the_flag() {
+        let interrupt = Interrupt::watch().unwrap();
         assert!(!interrupt.came());
-        signal_hook::low_level::raise(SIGTERM).unwrap();
-        assert!(interrupt.came());
+        for signal in [SIGINT, SIGTERM, SIGINT, SIGTERM] {
+            signal_hook::low_level::raise(signal).unwrap();
+            assert!(interrupt.came());
+        }
     }
 }

@@ -7,8 +7,8 @@ Nothing of airbench takes part: candump.log was written by can-utils and is deco
 - bus.log with candump.log: the same frames, for each identifier in the same order;
 - every DriveSensors and LoadSensors frame with the row of its cycle in measurement.csv, signal by signal;
 - every row without a frame with the skipped cycles that ticks and summary.json tell;
-- the valve columns with the commands of bus.log, which the emulator wrote in the order in which it took them, under
-  the rules of the contract: the last command taken acts, and one that answers a cycle more than 20 sent cycles back does not;
+- the valve columns with the commands of bus.log by their stamps, under the rules of the contract: the last command that
+  arrived before cycle k was due acts in it, and one that answers a cycle more than 20 sent cycles back does not;
 - the counters of summary.json and controller.json with the number of frames in candump.log, and with the gaps in it.
 
 The values of measurement.csv are counts times a step, and so are cantools': they may differ by the rounding of the two products,
@@ -29,6 +29,10 @@ SENSOR_COLUMNS = {"position": "position_m", "force": "force_N", "pressure_a": "p
 AXES = {"DriveSensors": "drive", "LoadSensors": "load"}
 COMMANDS = {"DriveValveCommand": "drive", "LoadValveCommand": "load"}
 STALE_AFTER_CYCLES = 20
+CYCLE_NS = 1_000_000
+# The log truncates stamps to 1 us, and summary.json tells cycle 0 as a double of seconds since 1970, 0.24 us apart: a command
+# this close to the moment when a cycle was due may have come before or after it.
+UNDECIDED_NS = 3000
 ULPS = 4 * sys.float_info.epsilon
 
 
@@ -47,6 +51,8 @@ class Frame:
         match = LINE.match(line)
         check(match, f"{place}: not a line of candump -L with a frame of rig.dbc: {line!r}")
         self.place = place
+        seconds, fraction = match[1].split(".")
+        self.stamp_ns = int(seconds) * 1_000_000_000 + int(fraction) * 1000
         self.id = int(match[3], 16)
         self.hex = match[4]
         message = database.get_message_by_frame_id(self.id)
@@ -168,63 +174,66 @@ class Latch:
         return float(self.acting["opening"])
 
 
-def compare_valves(own, rows):
-    """The valve columns are the commands of bus.log: those that stand before the sensors of cycle k + 1 act in row k."""
-    latches = {axis: Latch() for axis in COMMANDS.values()}
-    sent_before = {"count": 0}
-    compared = moving = 0
-    done = 0  # rows below are compared
+def compare_valves(own, rows, cycle_zero_ns):
+    """The valve columns are the commands of bus.log: the last one that came before cycle k was due acts in row k."""
+    sent = sorted({cycle for cycle, frame in cycles_of(own) if frame.name == "DriveSensors"})
+    counts = [0, 0]
+    for name, axis in COMMANDS.items():
+        commands = [frame for frame in own if frame.name == name]
+        for index, ours in enumerate(counts_of_axis(commands, axis, sent, rows, cycle_zero_ns)):
+            counts[index] += ours
+    return counts
 
-    def rows_up_to(end, latched):
-        nonlocal compared, moving, done
-        for cycle in range(done, end):
-            for axis, opening in latched.items():
-                ours = float(rows[cycle][f"{axis}_valve"])
-                check(
-                    abs(ours - opening) <= ULPS,
-                    f"cycle {cycle}: {axis}_valve is {ours!r} in measurement.csv, the command says {opening!r}",
-                )
-                compared += 1
-                moving += ours != 0.0
-        done = max(done, end)
 
-    acting = {axis: 0.0 for axis in latches}
-    current = None
-    for cycle, frame in with_commands(own):
-        if frame.name == "DriveSensors":
-            if current is not None:
-                # Everything taken since the last sensors acts in that cycle, and is held over skipped ones.
-                acting = {axis: latch.opening(sent_before) for axis, latch in latches.items()}
-            rows_up_to(cycle, acting)
-            for skipped in range(max(0, cycle - 4096) if current is None else current + 1, cycle):
-                sent_before.pop(skipped % 4096, None)
-            sent_before["count"] += 1
-            sent_before[cycle % 4096] = sent_before["count"]
-            current = cycle
-        elif frame.name == "Tick" and frame.values["ending"]:
-            acting = {axis: latch.opening(sent_before) for axis, latch in latches.items()}
-            rows_up_to(cycle, acting)
-            break
-        elif frame.name in COMMANDS:
-            latches[COMMANDS[frame.name]].take(frame.values, sent_before)
-    check(done == len(rows), f"the farewell speaks of {done} cycles, measurement.csv has {len(rows)} rows")
+def counts_of_axis(commands, axis, sent, rows, cycle_zero_ns):
+    latch, sent_before, taken, moving, waited = Latch(), {"count": 0}, 0, 0, 0
+    compared = sent[0] if sent else len(rows)
+    for cycle in range(compared):
+        check(float(rows[cycle][f"{axis}_valve"]) == 0, f"cycle {cycle}: {axis}_valve is open before the first sensors")
+    for place, cycle in enumerate(sent):
+        after_last = sent[place - 1] + 1 if place else max(0, cycle - 4096)
+        for skipped in range(after_last, cycle):
+            sent_before.pop(skipped % 4096, None)
+        sent_before["count"] += 1
+        sent_before[cycle % 4096] = sent_before["count"]
+        due_ns = cycle_zero_ns + cycle * CYCLE_NS
+        while taken < len(commands) and commands[taken].stamp_ns < due_ns - UNDECIDED_NS:
+            latch.take(commands[taken].values, sent_before)
+            taken += 1
+        # What acts in this cycle is held over the skipped ones that follow.
+        until = sent[place + 1] if place + 1 < len(sent) else len(rows)
+        ours = float(rows[cycle][f"{axis}_valve"])
+        differs = abs(ours - latch.opening(sent_before)) > ULPS
+        held_on = differs and place and ours == float(rows[cycle - 1][f"{axis}_valve"])
+        waited += bool(held_on)
+        while not held_on and abs(ours - latch.opening(sent_before)) > ULPS:
+            undecided = taken < len(commands) and commands[taken].stamp_ns < due_ns + UNDECIDED_NS
+            check(undecided, f"cycle {cycle}: {axis}_valve is {ours!r} in measurement.csv, the command says {latch.opening(sent_before)!r}")
+            latch.take(commands[taken].values, sent_before)
+            taken += 1
+        for held in range(cycle, until):
+            same = abs(float(rows[held][f"{axis}_valve"]) - ours) <= ULPS
+            check(same, f"cycle {held}: {axis}_valve changed in a skipped cycle")
+            compared += 1
+            moving += ours != 0.0
+    # A frame is never taken before one that came ahead of it, and a thread held up between the two clocks of a stamp (which an
+    # emulated machine does) stamps too late: then the frames behind it wait a cycle more than their stamps say.
+    check(waited <= len(sent) // 200, f"{waited} {axis} commands of {len(sent)} cycles acted later than their stamps say")
     return compared, moving
-
-
-def with_commands(log):
-    """The frames of cycles_of with the commands between them, whose cycle is of no matter."""
-    numbered = iter(cycles_of(log))
-    for frame in log:
-        if frame.name in AXES or frame.name == "Tick":
-            yield next(numbered)
-        else:
-            yield None, frame
 
 
 def gaps_of(log, name):
     """Commands that the sender counted and that are not in the log."""
     counters = [frame.values["alive"] for frame in log if frame.name == name]
     return sum((after - before - 1) % 16 for before, after in zip(counters, counters[1:]))
+
+
+def unheard_by_controllers(log):
+    """Frames of the rig before the first command, and after the first farewell."""
+    first = next((index for index, frame in enumerate(log) if frame.name in COMMANDS), len(log))
+    farewell = next((i for i, frame in enumerate(log) if frame.name == "Tick" and frame.values["ending"]), len(log))
+    unheard = log[:first] + log[farewell + 1 :]
+    return sum(frame.sender == "Rig" for frame in unheard)
 
 
 def main():
@@ -254,7 +263,7 @@ def main():
         all(summary[f"{axis}_commands"]["two_sources"] == 0 for axis in COMMANDS.values()),
         "two sources: this script does not model that fault",
     )
-    valves, moving = compare_valves(own, rows)
+    valves, moving = compare_valves(own, rows, round(summary["bus_log_cycle_zero_s"] * 1e9))
 
     # A sender counts its commands, sent or not: a gap is a command that never came onto the bus, and its sender says so.
     gaps = sum(gaps_of(recorded, name) for name in COMMANDS)
@@ -275,9 +284,15 @@ def main():
             from_others,
         ),
         ("sent by the controllers", controller["bus"]["sent"], from_others),
-        ("heard or lost by the controllers", controller["bus"]["received"] + controller["bus"]["dropped_on_receive"], from_rig),
     ]:
         check(ours == theirs, f"frames {what}: {ours} counted, {theirs} in candump.log")
+    # The controllers may connect after the rig's first frames, and leave with its first farewell.
+    heard = controller["bus"]["received"] + controller["bus"]["dropped_on_receive"]
+    missed = unheard_by_controllers(recorded)
+    check(
+        from_rig - missed <= heard <= from_rig,
+        f"frames heard or lost by the controllers: {heard} counted, {from_rig} in candump.log, {missed} of them excused",
+    )
     states = [frame.values["main_chain"] for frame in recorded if frame.name == "DriveChainStatus"]
     names = database.get_message_by_name("DriveChainStatus").get_signal_by_name("main_chain").choices
     print(

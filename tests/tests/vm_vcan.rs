@@ -215,7 +215,7 @@ fn foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
         ("emulator-interface-down", 3),
         ("emulator-lockstep", 2),
         ("emulator-no-interface", 3),
-        ("foreign-controller", 0),
+        ("foreign-controller", 1), // aborted by the emergency stop
         ("foreign-emulator", 0),
     ];
     assert_eq!(codes(&run), expected.map(|(name, code)| (name.to_owned(), code)).into());

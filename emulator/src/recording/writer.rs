@@ -4,8 +4,8 @@
 //! process that is killed leaves files that read to their last line. When a write fails (a full disk, a folder that
 //! went away), the run is asked to end, and what was written stays.
 
-use super::{Records, candump, tables};
-use crate::event::Event;
+use super::{FrameRecord, Records, candump, tables};
+use crate::event::{Event, EventKind};
 use crate::pace::Shared;
 use protocol::run_folder::LineFile;
 use std::io;
@@ -17,10 +17,14 @@ use std::time::{Duration, Instant};
 const POLL_PERIOD: Duration = Duration::from_millis(4);
 /// Longest time that a recorded line stays in memory.
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
-/// Events told on the terminal; `run.json`'s neighbour `summary.json` holds them all.
-const EVENTS_TOLD: usize = 40;
-/// Events kept for the summary.
+/// Events told on the terminal, and kept for the summary.
+const EVENTS_TOLD: usize = 100;
 const EVENTS_KEPT: usize = 1000;
+/// The same for late wake-ups, of which a bad machine makes thousands.
+const SKIPS_TOLD: usize = 10;
+const SKIPS_KEPT: usize = 1000;
+/// How long a frame waits for those that were read later but arrived earlier: longer than any stall of note.
+const FRAME_DELAY_NS: u64 = 250_000_000;
 
 /// What the writer has to know of the run.
 pub struct WriterSetup {
@@ -57,6 +61,9 @@ pub struct Writer {
     bus_log: LineFile,
     measurement: LineFile,
     truth: LineFile,
+    pending: Vec<FrameRecord>,
+    events_told: usize,
+    skips_told: usize,
     report: WriterReport,
 }
 
@@ -71,7 +78,9 @@ impl Writer {
             (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
         tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
         tables::write_truth_head(truth.lines())?;
-        Ok(Self { setup, bus_log, measurement, truth, report: WriterReport::default() })
+        let pending = Vec::new();
+        let report = WriterReport::default();
+        Ok(Self { setup, bus_log, measurement, truth, pending, events_told: 0, skips_told: 0, report })
     }
 
     /// Writes until the sending ends are gone and the queues are empty.
@@ -81,7 +90,10 @@ impl Writer {
         loop {
             // Asked before draining: what was sent before the ends went is drained below.
             let finished = records.senders_gone();
-            let drained = self.drain(records);
+            let mut drained = self.drain(records);
+            if finished {
+                drained = drained.and_then(|()| self.write_frames(0));
+            }
             let flushed = if finished || last_flush.elapsed() > FLUSH_PERIOD {
                 last_flush = Instant::now();
                 self.flush()
@@ -107,27 +119,48 @@ impl Writer {
             self.measurement.write_when_full()?;
             self.truth.write_when_full()?;
         }
-        for record in records.frames.try_iter() {
-            let (interface, offset) = (&self.setup.interface, self.setup.epoch_offset_ns);
-            candump::write_line(self.bus_log.lines(), interface, offset, &record)?;
-            self.report.frames += 1;
-            self.bus_log.write_when_full()?;
-        }
+        self.pending.extend(records.frames.try_iter());
+        self.write_frames(FRAME_DELAY_NS)?;
         for event in records.events.try_iter() {
             self.tell(event);
         }
         Ok(())
     }
 
+    /// Writes the frames that are older than the newest by `delay_ns`, in the order of their stamps. A command is read a
+    /// cycle after it arrived, and later after a stall; players of the log want time to go forward.
+    fn write_frames(&mut self, delay_ns: u64) -> io::Result<()> {
+        // Stable: frames of one stamp keep the order in which they were handed over.
+        self.pending.sort_by_key(|record| record.stamp_ns);
+        let Some(newest) = self.pending.last() else { return Ok(()) };
+        let until_ns = newest.stamp_ns.saturating_sub(delay_ns);
+        let ready = self.pending.partition_point(|record| record.stamp_ns <= until_ns);
+        let (interface, offset) = (&self.setup.interface, self.setup.epoch_offset_ns);
+        for record in self.pending.drain(..ready) {
+            candump::write_line(self.bus_log.lines(), interface, offset, &record)?;
+            self.report.frames += 1;
+            self.bus_log.write_when_full()?;
+        }
+        Ok(())
+    }
+
+    /// Tells and keeps the event. Late wake-ups have a quota of their own, so that they hide nothing else.
     fn tell(&mut self, event: Event) {
         self.report.event_count += 1;
-        if self.report.events.len() < EVENTS_KEPT {
+        let late = matches!(event.kind, EventKind::Skipped { .. });
+        let (told, most_told, most_kept) = if late {
+            (&mut self.skips_told, SKIPS_TOLD, SKIPS_KEPT)
+        } else {
+            (&mut self.events_told, EVENTS_TOLD, EVENTS_KEPT)
+        };
+        *told += 1;
+        if *told <= most_kept {
             self.report.events.push(event);
         }
-        match self.report.events.len() {
-            count if count < EVENTS_TOLD => eprintln!("emulator: {event}"),
-            EVENTS_TOLD => eprintln!("emulator: {event}; further events stand in summary.json only"),
-            _ => {}
+        if *told < most_told {
+            eprintln!("emulator: {event}");
+        } else if *told == most_told {
+            eprintln!("emulator: {event}; further ones of this kind stand in summary.json only");
         }
     }
 

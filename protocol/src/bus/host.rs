@@ -2,29 +2,28 @@
 //!
 //! One thread, one epoll. A peer that does not read fills its socket's queue; what does not fit is dropped there
 //! and counted by peer and identifier, so that it can be held against the gaps that the peer sees. A frame that the
-//! wire loses ([`super::wire`]) is lost for all and counted by identifier. In lockstep, [`super::lockstep`]
-//! decides when frames are delivered.
-//!
-//! The socket is guarded by a lock file beside it: whoever holds the lock may remove a stale socket; a second host is
-//! refused. The lock goes with the process that holds it, however it ends.
+//! wire loses (`wire`) is lost for all and counted by identifier. In lockstep, [`super::lockstep`]
+//! decides when frames are delivered. The socket's file and its lock are in `socket_file`.
 
+use super::BusError;
 use super::control::{Control, Kind, Role};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
 use super::packets::{Inbox, Outbox, Wait};
+use super::socket_file::SocketFile;
 use super::url::{BusUrl, WireOptions};
 use super::wire::Wire;
-use super::{BusError, unix_link};
 use crate::can::{CAN_FRAME_BYTES, CanFrame};
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
-use rustix::fs::{FlockOperation, Mode, OFlags};
-use rustix::net::{AddressFamily, SendFlags, SocketAddrUnix, SocketFlags, SocketType};
+use rustix::net::SendFlags;
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
 use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+pub use super::host_report::{FramesById, HostReport, PeerReport};
 
 /// Wall time after which the barrier is broken by a member that is not done (bus.md, Lockstep).
 pub const BARRIER_TIMEOUT: Duration = Duration::from_secs(5);
@@ -38,33 +37,6 @@ const EVENTS_A_TURN: usize = 32;
 const LISTENER: u64 = u64::MAX;
 /// The rig that lives in the host's process.
 const RIG_HERE: PeerId = u64::MAX - 1;
-
-/// Frames by identifier, as candump writes it.
-pub type FramesById = BTreeMap<String, u64>;
-
-/// What the host saw of one peer.
-#[derive(Clone, Debug, Default, serde::Serialize)]
-pub struct PeerReport {
-    /// Name in the barrier, else the process number.
-    pub name: String,
-    /// Frames taken from the peer.
-    pub frames_received: u64,
-    /// Frames that its full queue did not take, by identifier.
-    pub dropped_at_queue: FramesById,
-}
-
-/// What the host counted.
-#[derive(Clone, Debug, Default, serde::Serialize)]
-pub struct HostReport {
-    /// Frames that reached the wire, lost ones included.
-    pub frames: u64,
-    /// Frames that the wire lost on purpose, by identifier.
-    pub injected_loss: FramesById,
-    /// Packets that were neither frame nor control packet.
-    pub malformed: u64,
-    /// The peers in the order in which they came.
-    pub peers: Vec<PeerReport>,
-}
 
 struct Peer {
     socket: OwnedFd,
@@ -86,8 +58,8 @@ pub(super) enum ForRig {
 
 /// The embedded bus, bound to its socket and not yet serving.
 pub struct Host {
-    listener: OwnedFd,
-    path: PathBuf,
+    // First, so that no peer comes back to a host that is going.
+    socket_file: SocketFile,
     epoll: OwnedFd,
     peers: BTreeMap<PeerId, Peer>,
     next_peer: PeerId,
@@ -97,31 +69,23 @@ pub struct Host {
     inbox: Inbox,
     for_rig: Option<VecDeque<ForRig>>,
     report: HostReport,
-    // Last, so that the lock outlives the socket file, which `drop` removes.
-    _lock: OwnedFd,
 }
 
 impl Host {
     /// Takes the bus at `path` into service, with a barrier when `barrier` says so.
     ///
     /// # Errors
-    /// [`BusError::HostExists`] when a live host serves it; [`BusError::Open`] when folder, lock or socket cannot be made.
+    /// [`BusError::HostExists`] when a live host serves it; [`BusError::Open`] when folder, lock or socket cannot be made, or
+    /// when the default folder is not this user's alone.
     pub fn bind(path: &Path, wire: WireOptions, barrier: Option<BarrierConfig>) -> Result<Self, BusError> {
-        let url = BusUrl::Unix { path: path.into(), wire }.to_string();
-        let opened = |error: io::Error| BusError::Open {
-            url: url.clone(),
+        let socket_file = SocketFile::bind(path, wire)?;
+        let epoll = listening(&socket_file).map_err(|error| BusError::Open {
+            url: BusUrl::Unix { path: path.into(), wire }.to_string(),
             reason: error.to_string(),
-            remedy: "choose a socket path in a folder that you may write, with --bus unix:///PATH",
-        };
-        make_private_folder(path).map_err(opened)?;
-        let (lock, lock_path) = open_lock(path).map_err(opened)?;
-        if rustix::fs::flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
-            return Err(BusError::HostExists { url, lock: lock_path.display().to_string() });
-        }
-        let (listener, epoll) = listen(path).map_err(opened)?;
+            remedy: "raise the limit of open files, see 'ulimit -n'",
+        })?;
         Ok(Self {
-            listener,
-            path: path.into(),
+            socket_file,
             epoll,
             peers: BTreeMap::new(),
             next_peer: 0,
@@ -131,7 +95,6 @@ impl Host {
             inbox: Inbox::new(),
             for_rig: None,
             report: HostReport::default(),
-            _lock: lock,
         })
     }
 
@@ -156,7 +119,7 @@ impl Host {
         };
         for event in events {
             match event.data.u64() {
-                LISTENER => self.accept(),
+                LISTENER => self.let_in(),
                 peer => self.take_from(peer),
             }
         }
@@ -194,9 +157,14 @@ impl Host {
         &self.report
     }
 
-    fn accept(&mut self) {
-        let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
-        let Ok(socket) = rustix::net::accept_with(&self.listener, flags) else { return };
+    /// Takes everyone who waits.
+    fn let_in(&mut self) {
+        while let Some(socket) = self.socket_file.accept() {
+            self.add_peer(socket);
+        }
+    }
+
+    fn add_peer(&mut self, socket: OwnedFd) {
         // The kernel caps this at net.core.wmem_max; a smaller queue only loses earlier, and counts it.
         let _ = rustix::net::sockopt::set_socket_send_buffer_size(&socket, PEER_QUEUE_BYTES);
         let process = rustix::net::sockopt::socket_peercred(&socket)
@@ -272,7 +240,10 @@ impl Host {
     fn deliver(&mut self, frame: &CanFrame, from: PeerId) {
         self.report.frames += 1;
         if self.wire.loses_next() {
-            count(&mut self.report.injected_loss, frame);
+            self.report.injected_loss.count(frame);
+            if let Some(barrier) = &mut self.barrier {
+                barrier.lost(frame, None);
+            }
             return;
         }
         let bytes = frame.to_bytes();
@@ -285,7 +256,10 @@ impl Host {
             if self.barrier.as_ref().is_some_and(|barrier| barrier.must_not_lose(*id)) {
                 peer.post(&bytes);
             } else if !peer.send(&bytes) {
-                count(&mut self.report.peers[peer.report].dropped_at_queue, frame);
+                self.report.peers[peer.report].dropped_at_queue.count(frame);
+                if let Some(barrier) = &mut self.barrier {
+                    barrier.lost(frame, Some(*id));
+                }
             }
         }
     }
@@ -329,13 +303,6 @@ impl Host {
     }
 }
 
-impl Drop for Host {
-    fn drop(&mut self) {
-        // Gone already is as good as removed.
-        let _ = std::fs::remove_file(&self.path);
-    }
-}
-
 impl Peer {
     /// Sends without blocking; false when the queue did not take the packet.
     fn send(&self, bytes: &[u8]) -> bool {
@@ -370,60 +337,10 @@ impl Peer {
     }
 }
 
-fn count(table: &mut FramesById, frame: &CanFrame) {
-    let id = frame.standard_id().map_or_else(|| format!("{:08X}", frame.raw_id()), |id| format!("{id:03X}"));
-    *table.entry(id).or_default() += 1;
-}
-
-/// Makes the socket's folder for this user alone; one that exists is left as it is.
-fn make_private_folder(path: &Path) -> io::Result<()> {
-    use std::os::unix::fs::DirBuilderExt;
-    match path.parent() {
-        Some(folder) if !folder.exists() => {
-            std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder)
-        }
-        _ => Ok(()),
-    }
-}
-
-fn open_lock(path: &Path) -> io::Result<(OwnedFd, PathBuf)> {
-    // Added, not in place of an extension: buses `rig.a` and `rig.b` are two.
-    let mut lock_path = path.as_os_str().to_owned();
-    lock_path.push(".lock");
-    let lock_path = PathBuf::from(lock_path);
-    let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC | OFlags::NOFOLLOW;
-    let lock = rustix::fs::open(&lock_path, flags, Mode::RUSR | Mode::WUSR)?;
-    Ok((lock, lock_path))
-}
-
-fn listen(path: &Path) -> io::Result<(OwnedFd, OwnedFd)> {
-    // We hold the lock, so a socket file that is still there belongs to a host that is gone. Anything else stays.
-    match std::fs::symlink_metadata(path) {
-        Ok(found) if std::os::unix::fs::FileTypeExt::is_socket(&found.file_type()) => {
-            std::fs::remove_file(path)?
-        }
-        Ok(_) => {
-            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "the path is taken by another file"));
-        }
-        Err(_) => {}
-    }
-    let listener = rustix::net::socket_with(
-        AddressFamily::UNIX,
-        SocketType::SEQPACKET,
-        SocketFlags::CLOEXEC | SocketFlags::NONBLOCK,
-        None,
-    )?;
-    rustix::net::bind(&listener, &SocketAddrUnix::new(path)?)?;
-    rustix::fs::chmod(path, Mode::RUSR | Mode::WUSR)?;
-    rustix::net::listen(&listener, 64)?;
+/// An epoll set that tells of new peers: of each once, so that one who cannot be let in does not keep the host turning.
+fn listening(socket_file: &SocketFile) -> io::Result<OwnedFd> {
     let epoll = epoll::create(epoll::CreateFlags::CLOEXEC)?;
-    epoll::add(&epoll, &listener, epoll::EventData::new_u64(LISTENER), epoll::EventFlags::IN)?;
-    Ok((listener, epoll))
-}
-
-/// Whether somebody serves the embedded bus at `path` now.
-#[must_use]
-pub fn is_served(path: &Path) -> bool {
-    use super::socket_peer::Link as _;
-    unix_link::UnixLink::new(path).connect().is_ok()
+    let flags = epoll::EventFlags::IN | epoll::EventFlags::ET;
+    epoll::add(&epoll, socket_file, epoll::EventData::new_u64(LISTENER), flags)?;
+    Ok(epoll)
 }

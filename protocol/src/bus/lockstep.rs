@@ -13,14 +13,21 @@
 //!
 //! Frames of one release are sorted by identifier, then by the sender's name, then by the order of posting: the log
 //! does not depend on which process was faster, nor on how many processes the controllers are. A foreign controller
-//! knows nothing of this: it counts as done when a command on its identifier echoes the cycle.
+//! knows nothing of this: it counts as done when a command on its identifier echoes the cycle, or when the sensors that it
+//! would answer were lost on the way to it: it cannot answer what it never saw.
 //!
 //! This file decides; [`super::host`] reads, writes and keeps the time.
 
 use super::control::Role;
 use crate::can::CanFrame;
-use crate::frames::Frame;
+use crate::frames::{
+    DRIVE_SENSORS, DRIVE_VALVE_COMMAND, ECHO_RANGE, Frame, LOAD_SENSORS, LOAD_VALVE_COMMAND,
+};
 use std::collections::BTreeMap;
+
+/// The sensors that each command answers, both by identifier.
+const ANSWERS: [(u16, u16); 2] =
+    [(DRIVE_VALVE_COMMAND.id, DRIVE_SENSORS.id), (LOAD_VALVE_COMMAND.id, LOAD_SENSORS.id)];
 
 /// A connection of the host, by the order in which it was accepted.
 pub(super) type PeerId = u64;
@@ -57,6 +64,20 @@ struct Member {
     done: bool,
 }
 
+/// A foreign controller, one for each of [`BarrierConfig::echo_ids`].
+struct Stranger {
+    command_id: u16,
+    /// Who has echoed a cycle before; `None` until somebody does.
+    peer: Option<PeerId>,
+    done: bool,
+}
+
+impl Stranger {
+    fn answers(&self, sensors: &CanFrame) -> bool {
+        ANSWERS.iter().any(|(command, id)| *command == self.command_id && sensors.standard_id() == Some(*id))
+    }
+}
+
 struct Posted {
     frame: CanFrame,
     from: PeerId,
@@ -65,27 +86,27 @@ struct Posted {
 
 /// State of the barrier.
 pub(super) struct Barrier {
-    config: BarrierConfig,
+    /// Controllers that have to join by name before the first cycle.
+    expected: usize,
     phase: Phase,
     cycle: u32,
     rig: Option<PeerId>,
     members: BTreeMap<PeerId, Member>,
-    /// For each of `config.echo_ids`, whether its echo of this cycle was seen.
-    echoed: Vec<bool>,
+    strangers: Vec<Stranger>,
     from_rig: Vec<Posted>,
     from_others: Vec<Posted>,
 }
 
 impl Barrier {
     pub(super) fn new(config: BarrierConfig) -> Self {
-        let echoed = vec![false; config.echo_ids.len()];
+        let stranger = |command_id| Stranger { command_id, peer: None, done: false };
         Self {
-            config,
+            expected: config.members,
             phase: Phase::Gathering,
             cycle: 0,
             rig: None,
             members: BTreeMap::new(),
-            echoed,
+            strangers: config.echo_ids.into_iter().map(stranger).collect(),
             from_rig: Vec::new(),
             from_others: Vec::new(),
         }
@@ -93,7 +114,7 @@ impl Barrier {
 
     /// Members in the barrier, the rig not counted.
     pub(super) fn member_count(&self) -> usize {
-        self.members.len() + self.echoed.len()
+        self.members.len() + self.strangers.len()
     }
 
     /// All connections in the barrier.
@@ -138,7 +159,7 @@ impl Barrier {
             Some(member) => member.name.clone(),
             None => {
                 if self.phase == Phase::MembersAct {
-                    self.note_echo(&frame);
+                    self.note_echo(&frame, from);
                 }
                 String::new()
             }
@@ -146,17 +167,31 @@ impl Barrier {
         self.from_others.push(Posted { frame, from, sender });
     }
 
-    fn note_echo(&mut self, frame: &CanFrame) {
-        let Some(index) = self.config.echo_ids.iter().position(|id| frame.standard_id() == Some(*id)) else {
+    fn note_echo(&mut self, frame: &CanFrame, from: PeerId) {
+        let Some(stranger) =
+            self.strangers.iter_mut().find(|stranger| frame.standard_id() == Some(stranger.command_id))
+        else {
             return;
         };
         let echo = match Frame::decode(frame) {
             Ok(Frame::DriveValveCommand(command) | Frame::LoadValveCommand(command)) => command.echo,
             _ => return,
         };
-        // The echo carries the low 12 bits of the cycle number.
-        if u32::from(echo) == self.cycle & 0xFFF {
-            self.echoed[index] = true;
+        if u64::from(echo) == u64::from(self.cycle) % ECHO_RANGE {
+            (stranger.peer, stranger.done) = (Some(from), true);
+        }
+    }
+
+    /// A frame of this release was lost: for everyone, or at the queue of one peer. Whoever would have answered it is done
+    /// with this cycle; as long as nobody has answered, a stranger's queue may be that of the one who would.
+    pub(super) fn lost(&mut self, frame: &CanFrame, at: Option<PeerId>) {
+        // What is delivered while the members act is the rig's; everything else answers nothing.
+        if self.phase != Phase::MembersAct {
+            return;
+        }
+        for stranger in self.strangers.iter_mut().filter(|stranger| stranger.answers(frame)) {
+            let reached = at.is_some_and(|at| stranger.peer.is_some_and(|peer| peer != at));
+            stranger.done |= !reached;
         }
     }
 
@@ -179,8 +214,8 @@ impl Barrier {
         }
         let joined = self.members.values().find(|member| !member.done).map(|member| member.name.clone());
         joined.or_else(|| {
-            let index = self.echoed.iter().position(|echoed| !echoed)?;
-            Some(format!("echo on {:#05x}", self.config.echo_ids[index]))
+            let stranger = self.strangers.iter().find(|stranger| !stranger.done)?;
+            Some(format!("echo on {:#05x}", stranger.command_id))
         })
     }
 
@@ -190,7 +225,7 @@ impl Barrier {
             Phase::Gathering => {
                 let rig = self.rig?;
                 let strangers = connected.saturating_sub(self.members.len() + 1);
-                if self.members.len() < self.config.members || strangers < self.echoed.len() {
+                if self.members.len() < self.expected || strangers < self.strangers.len() {
                     return None;
                 }
                 self.phase = Phase::RigActs;
@@ -208,7 +243,7 @@ impl Barrier {
                     return None;
                 }
                 self.members.values_mut().for_each(|member| member.done = false);
-                self.echoed.fill(false);
+                self.strangers.iter_mut().for_each(|stranger| stranger.done = false);
                 self.cycle += 1;
                 self.phase = Phase::RigActs;
                 Some(Release { frames: sorted(&mut self.from_others), go: vec![rig], cycle: self.cycle })
@@ -312,18 +347,63 @@ mod tests {
         assert_eq!(barrier.member_count(), 1);
     }
 
-    #[test]
-    fn a_foreign_controller_is_done_when_its_command_echoes_the_cycle() {
-        let mut barrier = Barrier::new(BarrierConfig { members: 0, echo_ids: vec![0x110] });
+    const STRANGER: PeerId = 5;
+
+    /// A barrier of a rig and a foreign drive controller, in cycle 0, with the rig's sensors under way.
+    fn started_with_stranger() -> Barrier {
+        let mut barrier = Barrier::new(BarrierConfig { members: 0, echo_ids: vec![DRIVE_VALVE_COMMAND.id] });
         barrier.join(RIG, Role::Rig, "rig".into());
         assert!(barrier.release(1).is_none(), "released before the stranger connected");
         barrier.release(2).unwrap();
-        barrier.done(RIG, 0);
+        sensors_under_way(&mut barrier);
+        barrier
+    }
+
+    fn sensors_under_way(barrier: &mut Barrier) {
+        barrier.done(RIG, barrier.cycle);
         barrier.release(2).unwrap();
+        assert!(barrier.release(2).is_none(), "nobody has answered yet");
+    }
+
+    fn answer(barrier: &mut Barrier, echo: u16) {
+        let command = ValveCommand { opening: 0.0, alive: 0, echo, enable: true };
+        barrier.post(STRANGER, Frame::DriveValveCommand(command).encode().unwrap());
+    }
+
+    #[test]
+    fn a_foreign_controller_is_done_when_its_command_echoes_the_cycle() {
+        let mut barrier = started_with_stranger();
         for (echo, released) in [(9, false), (0, true)] {
-            let command = ValveCommand { opening: 0.0, alive: 0, echo, enable: true };
-            barrier.post(5, Frame::DriveValveCommand(command).encode().unwrap());
+            answer(&mut barrier, echo);
             assert_eq!(barrier.release(2).is_some(), released, "echo {echo}");
         }
+    }
+
+    #[test]
+    fn a_foreign_controller_is_done_when_the_sensors_that_it_answers_are_lost() {
+        for (lost, at, released) in [
+            (DRIVE_SENSORS.id, None, true),
+            (DRIVE_SENSORS.id, Some(STRANGER), true),
+            // A listener that does not read is none of its business, nor are the other axis and the tick.
+            (DRIVE_SENSORS.id, Some(STRANGER + 1), false),
+            (LOAD_SENSORS.id, None, false),
+            (0x130, None, false),
+        ] {
+            let mut barrier = started_with_stranger();
+            answer(&mut barrier, 0);
+            barrier.release(2).unwrap();
+            // Lost between the members' turn and the rig's sensors: somebody else's frame.
+            barrier.lost(&frame(lost), at);
+            sensors_under_way(&mut barrier);
+            barrier.lost(&frame(lost), at);
+            assert_eq!(barrier.release(2).is_some(), released, "{lost:#x} lost at {at:?}");
+        }
+    }
+
+    #[test]
+    fn as_long_as_nobody_answered_any_strangers_queue_may_be_the_one() {
+        let mut barrier = started_with_stranger();
+        barrier.lost(&frame(DRIVE_SENSORS.id), Some(STRANGER + 1));
+        assert!(barrier.release(2).is_some());
     }
 }

@@ -49,11 +49,12 @@ pub(super) struct Inbox {
     packets: [Packet; BATCH],
     count: usize,
     next: usize,
+    newest_ns: u64,
 }
 
 impl Inbox {
     pub(super) const fn new() -> Self {
-        Self { packets: [NO_PACKET; BATCH], count: 0, next: 0 }
+        Self { packets: [NO_PACKET; BATCH], count: 0, next: 0, newest_ns: 0 }
     }
 
     /// The oldest packet not yet taken. A packet of length 0 says that the peer is gone.
@@ -124,24 +125,26 @@ impl Inbox {
         self.count = usize::try_from(count).map_err(|_| io::Error::last_os_error())?;
         for (packet, header) in self.packets.iter_mut().zip(&headers[..self.count]) {
             // SAFETY: the kernel has just filled this header and the control buffer that it points to.
-            let age_ns = unsafe { note(packet, header) };
-            packet.stamp_ns = clock(age_ns);
+            let arrived = unsafe { note(packet, header) };
+            // The queue is in order of arrival; so are its stamps, whatever the two clocks of a stamp did.
+            packet.stamp_ns = stamp_of(arrived, clock).max(self.newest_ns);
+            self.newest_ns = packet.stamp_ns;
         }
         Ok(())
     }
 }
 
-/// Notes what the kernel said of one received packet, whose bytes are in place; tells its age, 0 without a stamp.
+/// Notes what the kernel said of one received packet, whose bytes are in place; tells its stamp of the wall clock.
 ///
 /// # Safety
 /// `header` was filled by `recvmmsg`, and its control buffer is alive.
-unsafe fn note(packet: &mut Packet, header: &libc::mmsghdr) -> u64 {
+unsafe fn note(packet: &mut Packet, header: &libc::mmsghdr) -> Option<libc::timespec> {
     let truncated = header.msg_hdr.msg_flags & libc::MSG_TRUNC != 0;
     // A truncated packet is longer than any we know; saying so by its length makes it malformed.
     packet.len = if truncated { LONGEST_PACKET } else { header.msg_len as usize };
     packet.own_echo = header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0;
     packet.overflow = None;
-    let mut age_ns = 0;
+    let mut arrived = None;
     // SAFETY: the CMSG macros walk the control buffer within msg_controllen; each payload is read unaligned with the type
     // that its level and kind define.
     unsafe {
@@ -149,7 +152,7 @@ unsafe fn note(packet: &mut Packet, header: &libc::mmsghdr) -> u64 {
         while !message.is_null() {
             match ((*message).cmsg_level, (*message).cmsg_type) {
                 (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => {
-                    age_ns = age_of(libc::CMSG_DATA(message).cast::<libc::timespec>().read_unaligned());
+                    arrived = Some(libc::CMSG_DATA(message).cast::<libc::timespec>().read_unaligned());
                 }
                 (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => {
                     packet.overflow = Some(libc::CMSG_DATA(message).cast::<u32>().read_unaligned());
@@ -159,7 +162,24 @@ unsafe fn note(packet: &mut Packet, header: &libc::mmsghdr) -> u64 {
             message = libc::CMSG_NXTHDR(&raw const header.msg_hdr, message);
         }
     }
-    age_ns
+    arrived
+}
+
+/// When a packet arrived, by `clock`. Two clocks make it up; a thread that is held up between reading the one and the other
+/// would stamp the packet too late, so a reading that took long is made again.
+fn stamp_of(arrived: Option<libc::timespec>, clock: &dyn Fn(u64) -> u64) -> u64 {
+    const LONGEST_READING_NS: u64 = 20_000;
+    const READINGS: usize = 4;
+    let Some(arrived) = arrived else { return clock(0) };
+    let mut stamp_ns = 0;
+    for _ in 0..READINGS {
+        let began_ns = clock(0);
+        stamp_ns = clock(age_of(arrived));
+        if clock(0).saturating_sub(began_ns) < LONGEST_READING_NS {
+            break;
+        }
+    }
+    stamp_ns
 }
 
 /// How long before now `stamp` of the wall clock was, in ns. A wall clock that was stepped in between can make a

@@ -240,12 +240,14 @@ fn enter_barrier(socket: &OwnedFd, join: &Control) -> rustix::io::Result<()> {
 impl<L: Link> Bus for SocketPeer<L> {
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError> {
         let bytes = frame.to_bytes();
+        // Before the frame leaves: a host of higher priority may run, and its answer arrive, before the call returns.
+        let handed_over_ns = (self.clock)(0);
         let result = if self.joined.is_some() { self.post(&bytes) } else { self.send_packet(&bytes) };
         match result {
             Ok(()) => self.counters.sent += 1,
             Err(_) => self.counters.dropped_on_send += 1,
         }
-        result.map(|()| (self.clock)(0))
+        result.map(|()| handed_over_ns)
     }
 
     fn receive(&mut self) -> Received {
@@ -312,5 +314,39 @@ impl<L: Link> Bus for SocketPeer<L> {
     fn done(&mut self, cycle: u32) {
         // A failure shows as a bus that is down, and as a time-out of the barrier.
         let _ = self.post(&Control::new(Kind::Done, cycle).to_bytes()).and_then(|()| self.flush());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::WireOptions;
+    use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
+
+    /// One end of a pair of sockets.
+    struct PairLink(OwnedFd);
+
+    impl Link for PairLink {
+        const HAS_BARRIER: bool = true;
+        const COUNTS_OVERFLOW: bool = false;
+        const REMEDY: &'static str = "";
+
+        fn connect(&self) -> io::Result<OwnedFd> {
+            self.0.try_clone()
+        }
+    }
+
+    /// Taken afterwards, stamps once came late by the time that the host preempted the sender, and round trips too short.
+    #[test]
+    fn a_frame_is_stamped_before_it_is_on_its_way() {
+        let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+        let (ours, host) = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, flags, None).unwrap();
+        let at_host = host.try_clone().unwrap();
+        // A clock that shows the bytes that have reached the host.
+        let clock = Box::new(move |_age_ns| rustix::io::ioctl_fionread(&at_host).unwrap());
+        let url = BusUrl::Unix { path: "/pair".into(), wire: WireOptions::default() };
+        let mut peer = SocketPeer::open(PairLink(ours), &url, clock).unwrap();
+        assert_eq!(peer.send(&CanFrame::new(0x110, &[])), Ok(0));
+        assert_eq!(rustix::io::ioctl_fionread(&host).unwrap(), CAN_FRAME_BYTES as u64);
     }
 }

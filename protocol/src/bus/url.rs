@@ -3,8 +3,9 @@
 //! The options after `?` describe the wire of the embedded bus and count for its host alone; a peer that
 //! only connects carries them without effect.
 
+use std::ffi::OsString;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// A bus by name.
@@ -60,11 +61,16 @@ impl BusUrl {
     /// the user's own under the temporary folder.
     #[must_use]
     pub fn default_embedded() -> Self {
-        let folder = std::env::var_os("XDG_RUNTIME_DIR").map_or_else(
-            || std::env::temp_dir().join(format!("airbench-{}", rustix::process::getuid().as_raw())),
-            |runtime| Path::new(&runtime).join("airbench"),
-        );
-        Self::Unix { path: folder.join("bus0"), wire: WireOptions::default() }
+        let path = default_folder(std::env::var_os("XDG_RUNTIME_DIR")).join("bus0");
+        Self::Unix { path, wire: WireOptions::default() }
+    }
+}
+
+/// Folder of the default bus. A runtime folder that is empty or relative counts as none, as the XDG specification says.
+fn default_folder(runtime: Option<OsString>) -> PathBuf {
+    match runtime.map(PathBuf::from).filter(|runtime| runtime.is_absolute()) {
+        Some(runtime) => runtime.join("airbench"),
+        None => std::env::temp_dir().join(format!("airbench-{}", rustix::process::getuid().as_raw())),
     }
 }
 
@@ -127,6 +133,16 @@ mod tests {
         }
         let url = BusUrl::default_embedded();
         assert_eq!(url.to_string().parse(), Ok(url));
+    }
+
+    #[test]
+    fn without_an_absolute_runtime_folder_the_default_bus_is_in_a_folder_of_the_users_own() {
+        assert_eq!(default_folder(Some("/run/user/7".into())), PathBuf::from("/run/user/7/airbench"));
+        let own = default_folder(None);
+        assert!(own.is_absolute() && own != std::env::temp_dir(), "{}", own.display());
+        for none in ["", "relative"] {
+            assert_eq!(default_folder(Some(none.into())), own, "XDG_RUNTIME_DIR={none:?}");
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! Nothing here depends on speed. That a frame does *not* come is shown by a later frame, the fence, which comes first.
 
 mod barrier;
+mod echo;
 mod losses;
 mod malformed;
 mod peers;

@@ -1,7 +1,7 @@
 //! The socket's file and its lock: whose it is, who may use it, and who may remove it.
 
 use crate::support::*;
-use protocol::bus::host::{self, Host};
+use protocol::bus::host::Host;
 use protocol::bus::{BusError, WireOptions};
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -19,10 +19,10 @@ fn the_socket_is_for_its_user_alone_and_goes_with_its_host() {
     let host = RunningHost::plain(&path);
     assert!(fs::symlink_metadata(&path).unwrap().file_type().is_socket());
     assert_eq!((mode(&path), mode(&folder)), (0o600, 0o700));
-    assert!(host::is_served(&path));
+    assert!(is_served(&path));
     host.stop();
     assert!(!path.exists());
-    assert!(!host::is_served(&path));
+    assert!(!is_served(&path));
 }
 
 #[test]
@@ -30,7 +30,7 @@ fn a_socket_that_a_dead_host_left_is_taken_over() {
     let place = Place::new();
     // Closing a listener leaves its file, just as a host that was killed does.
     drop(UnixListener::bind(place.socket()).unwrap());
-    assert!(place.socket().exists() && !host::is_served(&place.socket()));
+    assert!(place.socket().exists() && !is_served(&place.socket()));
     let host = RunningHost::plain(&place.socket());
     let [mut one, mut two] = connected(&place.socket());
     one.send(&numbered(1, 1)).unwrap();

@@ -103,6 +103,11 @@ pub(crate) fn raw_socket() -> OwnedFd {
     rustix::net::socket_with(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None).unwrap()
 }
 
+/// Whether somebody serves the bus at `path` now.
+pub(crate) fn is_served(path: &Path) -> bool {
+    rustix::net::connect(raw_socket(), &SocketAddrUnix::new(path).unwrap()).is_ok()
+}
+
 /// Sends one packet as it is.
 pub(crate) fn send_raw(socket: &OwnedFd, bytes: &[u8]) {
     assert_eq!(rustix::net::send(socket, bytes, SendFlags::NOSIGNAL).unwrap(), bytes.len());

@@ -1,0 +1,127 @@
+//! The rig on the machine's clock: one cycle each millisecond.
+
+use super::{CYCLE, End, Paced, Ride};
+use crate::commands::STALE_AFTER_CYCLES;
+use protocol::bus::{Bus, Received};
+use protocol::can::CanFrame;
+use realtime::{Clock, PeriodicConfig, PeriodicLoop};
+use std::time::{Duration, Instant};
+
+/// How long after the farewell the answers to the last cycles may still come in.
+const FAREWELL: Duration = Duration::from_millis(30);
+/// How often the farewell is said in that time: a frame may be lost.
+const FAREWELLS: u32 = 3;
+/// Frames that may arrive between a cycle's start and a late loop's reading; they belong to the next cycle.
+const EARLY_FRAMES: usize = 256;
+/// Cycles that a watched section leaves out at the start: first touches of memory, first frames of each kind.
+const WARM_UP_CYCLES: u64 = 1000;
+/// Cycles within which a rig that meets another one on its bus knows that it is the later one.
+const NEWCOMER_CYCLES: u64 = 10 * STALE_AFTER_CYCLES;
+
+/// Runs the rig on `clock`.
+pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Paced {
+    let start = clock.now() + CYCLE;
+    let mut periodic = PeriodicLoop::new(clock, config, start);
+    let mut inbox = Inbox::new();
+    let mut bus_lost_at: Option<u64> = None;
+    let mut cycles = 0;
+    let mut watch = None;
+    let grace_cycles = ride.limits.bus_grace.as_millis() as u64;
+    let end = loop {
+        let cycle = match periodic.next_cycle() {
+            Ok(cycle) => cycle,
+            Err(overrun) => break End::Overrun(overrun),
+        };
+        let index = cycle.index;
+        if watch.is_none() && index >= WARM_UP_CYCLES {
+            watch = Some(realtime::allocations::watch());
+        }
+        let Ride { station, bus, .. } = &mut ride;
+        station.miss(index - cycle.skipped, cycle.skipped);
+        station.publish(index, cycle.skipped > 0, *bus);
+        inbox.take_before(cycle.scheduled.as_nanos(), *bus, |frame, stamp_ns| {
+            station.take(frame, stamp_ns, index);
+        });
+        station.act(index);
+        cycles = index + 1;
+        bus_lost_at = if bus.is_up() { None } else { bus_lost_at.or(Some(index)) };
+        if bus_lost_at.is_some_and(|lost| index - lost > grace_cycles) {
+            break End::BusGone;
+        }
+        if index < NEWCOMER_CYCLES && station.frame_counters().second_rig > 0 {
+            break End::SecondRig;
+        }
+        if let Some(end) = ride.after_cycle(cycles) {
+            break end;
+        }
+        periodic.end_of_work();
+    };
+    let allocations = watch.map(|watch| {
+        drop(watch);
+        realtime::allocations::counted()
+    });
+    // A rig with a fault is silent; one that came second leaves the first one's controllers alone.
+    if !matches!(end, End::NotFinite | End::SecondRig) {
+        say_farewell(&mut ride, &mut inbox, cycles);
+    }
+    let cycle_zero_ns = start.as_nanos();
+    Paced { end, cycles, cycle_zero_ns, statistics: Some(periodic.into_statistics()), allocations }
+}
+
+fn say_farewell(ride: &mut Ride<'_>, inbox: &mut Inbox, cycles: u64) {
+    let Ride { station, bus, .. } = ride;
+    for _ in 0..FAREWELLS {
+        station.publish_end(cycles, *bus);
+        let until = Instant::now() + FAREWELL / FAREWELLS;
+        while let Some(left) = until.checked_duration_since(Instant::now()) {
+            inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| station.take(frame, stamp_ns, cycles));
+            bus.wait_readable(left);
+        }
+    }
+}
+
+/// Sorts frames by cycle: what arrived after a cycle's start waits for the next one, however late the loop reads.
+struct Inbox {
+    early: [Option<(CanFrame, u64)>; EARLY_FRAMES],
+    count: usize,
+}
+
+impl Inbox {
+    fn new() -> Self {
+        Self { early: [None; EARLY_FRAMES], count: 0 }
+    }
+
+    fn take_before(&mut self, before_ns: u64, bus: &mut dyn Bus, mut take: impl FnMut(&CanFrame, u64)) {
+        let waiting = std::mem::take(&mut self.count);
+        for slot in 0..waiting {
+            if let Some((frame, stamp_ns)) = self.early[slot].take() {
+                self.sort(frame, stamp_ns, before_ns, &mut take);
+            }
+        }
+        // A full shelf leaves the rest in the kernel's queue, which has the stamps.
+        while self.count < EARLY_FRAMES {
+            match bus.receive() {
+                Received::Frame(frame, stamp_ns) => self.sort(frame, stamp_ns, before_ns, &mut take),
+                Received::Barrier(_) => {}
+                Received::Nothing => break,
+            }
+        }
+    }
+
+    fn sort(
+        &mut self,
+        frame: CanFrame,
+        stamp_ns: u64,
+        before_ns: u64,
+        take: &mut impl FnMut(&CanFrame, u64),
+    ) {
+        // Frames keep their order: what follows one that waits, waits too. Two clocks make up a stamp, and a thread that is
+        // held up between them stamps a frame later than the one behind it.
+        if stamp_ns < before_ns && self.count == 0 {
+            take(&frame, stamp_ns);
+        } else {
+            self.early[self.count] = Some((frame, stamp_ns));
+            self.count += 1;
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! What the host of the embedded bus counts: frames, and every loss by identifier.
+//!
+//! Counting is on the way of a frame, so it keeps identifiers as numbers; they become names when a report is written.
+
+use crate::can::CanFrame;
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
+
+/// Frames by identifier. Written by the names that candump gives identifiers, `110`; what is no plain data frame by all
+/// eight digits, the kernel's flags included.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FramesById(BTreeMap<u32, u64>);
+
+impl FramesById {
+    /// Counts one frame.
+    pub fn count(&mut self, frame: &CanFrame) {
+        *self.0.entry(frame.raw_id()).or_default() += 1;
+    }
+
+    /// Whether nothing was counted.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Frames of each identifier, by its name.
+    #[must_use]
+    pub fn by_name(&self) -> BTreeMap<String, u64> {
+        let name =
+            |raw_id: u32| if raw_id < 0x800 { format!("{raw_id:03X}") } else { format!("{raw_id:08X}") };
+        self.0.iter().map(|(raw_id, frames)| (name(*raw_id), *frames)).collect()
+    }
+}
+
+impl Serialize for FramesById {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.by_name().serialize(serializer)
+    }
+}
+
+/// What the host saw of one peer.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct PeerReport {
+    /// Name in the barrier, else the process number.
+    pub name: String,
+    /// Frames taken from the peer.
+    pub frames_received: u64,
+    /// Frames that its full queue did not take, by identifier.
+    pub dropped_at_queue: FramesById,
+}
+
+/// What the host counted.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct HostReport {
+    /// Frames that reached the wire, lost ones included.
+    pub frames: u64,
+    /// Frames that the wire lost on purpose, by identifier.
+    pub injected_loss: FramesById,
+    /// Packets that were neither frame nor control packet.
+    pub malformed: u64,
+    /// The peers in the order in which they came.
+    pub peers: Vec<PeerReport>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::can::{EXTENDED_FLAG, REMOTE_FLAG};
+
+    #[test]
+    fn identifiers_are_written_by_name_and_in_the_names_order() {
+        let mut frames = FramesById::default();
+        for raw_id in [0x7FF, REMOTE_FLAG | 0x110, 0x11, EXTENDED_FLAG | 0x110, 0x11] {
+            frames.count(&CanFrame::from_raw(raw_id, &[]));
+        }
+        let report = HostReport { frames: 5, injected_loss: frames, ..HostReport::default() };
+        assert_eq!(
+            serde_json::to_string(&report).unwrap(),
+            r#"{"frames":5,"injected_loss":{"011":2,"40000110":1,"7FF":1,"80000110":1},"malformed":0,"peers":[]}"#
+        );
+    }
+}

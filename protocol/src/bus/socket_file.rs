@@ -1,0 +1,191 @@
+//! The socket of the embedded bus as a file: its folder, its lock, and the listener that lets peers in.
+//!
+//! The socket is guarded by a lock file beside it: whoever holds the lock may remove a stale socket; a second host is
+//! refused. The lock goes with the process that holds it, however it ends.
+
+use super::BusError;
+use super::url::{BusUrl, WireOptions};
+use rustix::fs::{FlockOperation, Mode, OFlags};
+use rustix::io::Errno;
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
+use rustix::process::Uid;
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+/// Connections that wait to be accepted.
+const BACKLOG: i32 = 64;
+
+/// The socket's file, taken into service; goes with the value.
+pub(super) struct SocketFile {
+    listener: OwnedFd,
+    /// Held for the moment in which the process has no descriptor left; `None` when not even this could be had again.
+    spare: Option<OwnedFd>,
+    path: PathBuf,
+    // Last, so that the lock outlives the socket file, which `drop` removes.
+    _lock: OwnedFd,
+}
+
+impl SocketFile {
+    /// Makes folder, lock and socket at `path`; `wire` is for the error's text.
+    pub(super) fn bind(path: &Path, wire: WireOptions) -> Result<Self, BusError> {
+        let url = BusUrl::Unix { path: path.into(), wire }.to_string();
+        let refused = |error: io::Error, remedy: &'static str| BusError::Open {
+            url: url.clone(),
+            reason: error.to_string(),
+            remedy,
+        };
+        let opened = |error: io::Error| {
+            refused(error, "choose a socket path in a folder that you may write, with --bus unix:///PATH")
+        };
+        if let Some(folder) = path.parent() {
+            make_private(folder).map_err(opened)?;
+            if is_default(path) {
+                check_private(folder, rustix::process::getuid()).map_err(|error| {
+                    refused(error, "remove that folder, or choose another with --bus unix:///PATH")
+                })?;
+            }
+        }
+        let (lock, lock_path) = open_lock(path).map_err(opened)?;
+        if rustix::fs::flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
+            return Err(BusError::HostExists { url, lock: lock_path.display().to_string() });
+        }
+        let listener = listen(path).map_err(opened)?;
+        Ok(Self { listener, spare: spare(), path: path.into(), _lock: lock })
+    }
+
+    /// The next peer that waits, non-blocking; `None` when none does, or none can be taken.
+    ///
+    /// With no descriptor left, the spare one is given up to take the peer and turn it away at once: it sees its end and tries
+    /// again, and the listener does not stay readable, which would keep the host turning without rest.
+    pub(super) fn accept(&mut self) -> Option<OwnedFd> {
+        loop {
+            match rustix::net::accept_with(&self.listener, SocketFlags::CLOEXEC | SocketFlags::NONBLOCK) {
+                Ok(peer) => {
+                    self.spare = self.spare.take().or_else(spare);
+                    return Some(peer);
+                }
+                Err(Errno::MFILE | Errno::NFILE) => {
+                    self.spare.take()?;
+                    let turned_away =
+                        rustix::net::accept_with(&self.listener, SocketFlags::CLOEXEC).map(drop);
+                    self.spare = spare();
+                    // The kernel looks for a descriptor first: nobody may have waited.
+                    turned_away.ok()?;
+                }
+                Err(Errno::CONNABORTED | Errno::INTR) => {}
+                Err(_) => return None,
+            }
+        }
+    }
+}
+
+impl AsFd for SocketFile {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.listener.as_fd()
+    }
+}
+
+impl Drop for SocketFile {
+    fn drop(&mut self) {
+        // Gone already is as good as removed.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+fn spare() -> Option<OwnedFd> {
+    rustix::fs::open("/dev/null", OFlags::RDONLY | OFlags::CLOEXEC, Mode::empty()).ok()
+}
+
+fn is_default(path: &Path) -> bool {
+    matches!(BusUrl::default_embedded(), BusUrl::Unix { path: default, .. } if default == path)
+}
+
+/// Makes the folder for this user alone; one that exists is left as it is.
+fn make_private(folder: &Path) -> io::Result<()> {
+    if folder.exists() {
+        return Ok(());
+    }
+    std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder)
+}
+
+/// Refuses a folder that somebody else made or may write. The default's name can be foreseen, and in a temporary folder
+/// anybody can make it first; a folder that was named with `--bus` is the user's own choice.
+fn check_private(folder: &Path, user: Uid) -> io::Result<()> {
+    let found = std::fs::symlink_metadata(folder)?;
+    let problem = if !found.is_dir() {
+        "is no folder"
+    } else if found.uid() != user.as_raw() {
+        "belongs to another user"
+    } else if found.mode() & 0o022 != 0 {
+        "can be written by others"
+    } else {
+        return Ok(());
+    };
+    Err(io::Error::new(io::ErrorKind::PermissionDenied, format!("{} {problem}", folder.display())))
+}
+
+fn open_lock(path: &Path) -> io::Result<(OwnedFd, PathBuf)> {
+    // Added, not in place of an extension: buses `rig.a` and `rig.b` are two.
+    let mut lock_path = path.as_os_str().to_owned();
+    lock_path.push(".lock");
+    let lock_path = PathBuf::from(lock_path);
+    let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC | OFlags::NOFOLLOW;
+    let lock = rustix::fs::open(&lock_path, flags, Mode::RUSR | Mode::WUSR)?;
+    Ok((lock, lock_path))
+}
+
+fn listen(path: &Path) -> io::Result<OwnedFd> {
+    // We hold the lock, so a socket file that is still there belongs to a host that is gone. Anything else stays.
+    match std::fs::symlink_metadata(path) {
+        Ok(found) if found.file_type().is_socket() => std::fs::remove_file(path)?,
+        Ok(_) => {
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "the path is taken by another file"));
+        }
+        Err(_) => {}
+    }
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let listener = rustix::net::socket_with(AddressFamily::UNIX, SocketType::SEQPACKET, flags, None)?;
+    rustix::net::bind(&listener, &SocketAddrUnix::new(path)?)?;
+    rustix::fs::chmod(path, Mode::RUSR | Mode::WUSR)?;
+    rustix::net::listen(&listener, BACKLOG)?;
+    Ok(listener)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::process::getuid;
+    use std::fs::Permissions;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn problem(folder: &Path, user: Uid) -> String {
+        check_private(folder, user).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_default_folder_that_others_made_or_may_write_is_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("airbench");
+        make_private(&folder).unwrap();
+        check_private(&folder, getuid()).unwrap();
+        let another = Uid::from_raw(getuid().as_raw() + 1);
+        assert!(problem(&folder, another).ends_with("airbench belongs to another user"));
+        for mode in [0o720, 0o702] {
+            std::fs::set_permissions(&folder, Permissions::from_mode(mode)).unwrap();
+            assert!(problem(&folder, getuid()).ends_with("can be written by others"), "{mode:o}");
+        }
+        // A link would lead wherever its maker likes, later too.
+        let link = place.path().join("link");
+        std::os::unix::fs::symlink(place.path(), &link).unwrap();
+        assert!(problem(&link, getuid()).ends_with("is no folder"));
+    }
+
+    #[test]
+    fn only_the_default_bus_has_the_default_folder() {
+        let BusUrl::Unix { path, .. } = BusUrl::default_embedded() else { unreachable!("it is embedded") };
+        assert!(is_default(&path));
+        assert!(!is_default(Path::new("/somewhere/else/bus0")));
+    }
+}

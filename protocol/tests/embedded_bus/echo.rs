@@ -1,0 +1,114 @@
+//! A foreign controller in lockstep: it joins by its echo, and neither a lossy wire nor its own full queue holds the barrier.
+
+use crate::support::*;
+use protocol::bus::control::{Kind, Role};
+use protocol::bus::lockstep::BarrierConfig;
+use protocol::bus::{Bus, Received, WireOptions};
+use protocol::can::CanFrame;
+use protocol::frames::{ALIVE_RANGE, DRIVE_VALVE_COMMAND, ECHO_RANGE, Frame, Sensors, ValveCommand};
+
+fn host(place: &Place, loss: f64) -> RunningHost {
+    let barrier = BarrierConfig { members: 0, echo_ids: vec![DRIVE_VALVE_COMMAND.id] };
+    RunningHost::start(&place.socket(), WireOptions { loss, seed: 3 }, Some(barrier))
+}
+
+fn sensors(cycle: u32) -> CanFrame {
+    let alive = (u64::from(cycle) % ALIVE_RANGE) as u8;
+    Frame::DriveSensors(Sensors { alive, ..Sensors::default() }).encode().unwrap()
+}
+
+fn command(cycle: u64) -> CanFrame {
+    let (alive, echo) = ((cycle % ALIVE_RANGE) as u8, (cycle % ECHO_RANGE) as u16);
+    let command = ValveCommand { opening: 0.0, alive, echo, enable: true };
+    Frame::DriveValveCommand(command).encode().unwrap()
+}
+
+/// Waits for the rig's turn, and counts the commands that came before it.
+fn commands_until_go(rig: &mut dyn Bus, cycle: u32) -> u32 {
+    let mut commands = 0;
+    loop {
+        match next(rig) {
+            Received::Frame(..) => commands += 1,
+            Received::Barrier(control) => {
+                assert!(matches!(control.kind, Kind::Go { .. }) && control.cycle == cycle, "{control:?}");
+                return commands;
+            }
+            Received::Nothing => unreachable!("next waits"),
+        }
+    }
+}
+
+fn rig_on(place: &Place) -> Box<dyn Bus> {
+    let mut rig = open(&place.socket());
+    rig.join_lockstep(Role::Rig, "rig").unwrap();
+    rig
+}
+
+/// A stranger that never saw the sensors of a cycle once held the barrier until its time-out.
+#[test]
+fn lost_frames_do_not_hold_the_barrier_of_a_stranger() {
+    const CYCLES: u32 = 500;
+    let place = Place::new();
+    let host = host(&place, 0.05);
+    let mut rig = rig_on(&place);
+    let mut stranger = open(&place.socket());
+    let answered = std::thread::scope(|scope| {
+        // Answers sensors as they come, and knows the cycle by the counter alone, which jumps over what is lost.
+        let answers = scope.spawn(|| {
+            let (mut cycle, mut answers) = (0, 0);
+            loop {
+                let (frame, _) = next_frame(stranger.as_mut());
+                if frame.standard_id() == Some(FENCE_ID) {
+                    return answers;
+                }
+                let Ok(Frame::DriveSensors(sensors)) = Frame::decode(&frame) else { panic!("{frame}") };
+                cycle += u64::from(sensors.alive).wrapping_sub(cycle) % ALIVE_RANGE;
+                stranger.send(&command(cycle)).unwrap();
+                answers += 1;
+            }
+        });
+        let mut commands = commands_until_go(rig.as_mut(), 0);
+        for cycle in 0..CYCLES {
+            rig.send(&sensors(cycle)).unwrap();
+            rig.done(cycle);
+            commands += commands_until_go(rig.as_mut(), cycle + 1);
+        }
+        // Of so many fences one gets through; without sensors nobody is done with this cycle, and nobody has to be.
+        for _ in 0..20 {
+            rig.send(&CanFrame::new(FENCE_ID, &[])).unwrap();
+        }
+        rig.done(CYCLES);
+        let answers = answers.join().unwrap();
+        let lost = host.stop().injected_loss.by_name();
+        assert_eq!(answers + lost["120"], u64::from(CYCLES));
+        assert_eq!(u64::from(commands) + lost["110"], answers);
+        answers
+    });
+    // Binomial: 475 expected, standard deviation 5; five of them.
+    assert!((450..500).contains(&answered), "{answered} of {CYCLES} answered");
+}
+
+/// One that answers and then stops reading, as a program in a debugger does, lets the others go on.
+#[test]
+fn the_full_queue_of_a_stranger_does_not_hold_the_barrier() {
+    /// Far more than a queue of 2 MiB holds at some 750 bytes a frame, twice over for the kernel's doubling.
+    const FRAMES: usize = 14_000;
+    let place = Place::new();
+    let host = host(&place, 0.0);
+    let mut rig = rig_on(&place);
+    let mut stranger = open(&place.socket());
+    commands_until_go(rig.as_mut(), 0);
+    rig.send(&sensors(0)).unwrap();
+    rig.done(0);
+    assert_eq!(next_frame(stranger.as_mut()).0, sensors(0));
+    stranger.send(&command(0)).unwrap();
+    commands_until_go(rig.as_mut(), 1);
+    for number in 0..FRAMES {
+        rig.send(&numbered(0x100, number)).unwrap();
+    }
+    rig.send(&sensors(1)).unwrap();
+    rig.done(1);
+    commands_until_go(rig.as_mut(), 2);
+    let dropped = host.stop().peers[1].dropped_at_queue.by_name();
+    assert_eq!(dropped["120"], 1, "{dropped:?}");
+}

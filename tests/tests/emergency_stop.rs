@@ -1,0 +1,83 @@
+//! Emergency stop over the bus: who stops must release, the record shows what acts, and the run ends by itself.
+
+use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
+use system_tests::launch::Pace;
+use system_tests::records::{Table, json};
+use system_tests::scene::{RESTLESS, Scene};
+
+const BOUND_BROKEN: i32 = 1;
+/// The carriage moves by then.
+const TRIP: u32 = 900;
+const FOREIGN_RELEASE: u32 = 1400;
+const RELEASE: u32 = 1900;
+const CYCLES: usize = 2600;
+
+fn stop(release: bool) -> EmergencyStop {
+    EmergencyStop { reason: EmergencyStopReason::Operator, release }
+}
+
+/// What the console and the load controller say in a cycle.
+fn said_in(cycle: u32) -> Option<Frame> {
+    match cycle {
+        TRIP => Some(Frame::ConsoleEmergencyStop(stop(false))),
+        FOREIGN_RELEASE => Some(Frame::LoadEmergencyStop(stop(true))),
+        RELEASE => Some(Frame::ConsoleEmergencyStop(stop(true))),
+        _ => None,
+    }
+}
+
+/// Runs with a member that stops and releases, for the whole of it.
+fn run() -> Scene {
+    let scene = Scene::new(RESTLESS);
+    let seconds = CYCLES as f64 * 1e-3;
+    let options = format!("--members 2 --seconds {seconds}");
+    let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
+    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
+    scene.peer().take_part("console", |peer, cycle, _| {
+        if let Some(frame) = said_in(cycle) {
+            peer.send(&frame.encode().expect("the frames above are in range").to_bytes());
+        }
+    });
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait();
+    scene
+}
+
+#[test]
+fn a_stop_is_released_by_its_sender_alone_and_the_record_shows_the_valve_that_acts() {
+    let scene = run();
+    let truth = Table::read(&scene.path("emulator/truth.csv"));
+    let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+    let (supply, valve) = (truth.column("supply_pressure_Pa"), measurement.column("drive_valve"));
+    // Said in cycle k, heard at k + 1 (bus.md, Lockstep).
+    let (tripped, released) = (TRIP as usize + 1, RELEASE as usize + 1);
+    assert!(valve[..tripped].iter().any(|opening| *opening != 0.0), "the axis was moving before");
+    assert!(
+        valve[tripped..].iter().all(|opening| *opening == 0.0),
+        "the valve that acts is shut from the trip on"
+    );
+    // Discharge with 0.05 s: after 0.5 s what is left of 6 bar is 6 bar e^-10, 27 Pa.
+    let discharged = supply[FOREIGN_RELEASE as usize];
+    assert!((discharged - 101_325.0).abs() < 50.0, "supply is {discharged} Pa");
+    let still = supply[released];
+    assert!(still <= discharged, "a release by another sender changed the supply to {still} Pa");
+    // Recovery with 0.3 s: after 0.69 s of it nine tenths of the way are done.
+    assert!(supply[CYCLES - 1] > 600_000.0, "supply came back to {} Pa only", supply[CYCLES - 1]);
+}
+
+#[test]
+fn the_controllers_end_an_aborted_experiment_by_themselves() {
+    let scene = Scene::new(RESTLESS);
+    let emulator = scene.emulator(Pace::Lockstep).with("--members 2 --seconds 10").start();
+    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
+    scene.peer().take_part("console", |peer, cycle, _| {
+        if cycle == TRIP {
+            peer.send(&Frame::ConsoleEmergencyStop(stop(false)).encode().expect("in range").to_bytes());
+        }
+    });
+    let _ = controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
+    let _ = emulator.wait();
+    let report = json(&scene.path("controller/controller.json"));
+    assert_eq!(report["chain_state"], "aborted");
+    assert_eq!(report["ended_well"], false);
+}
