@@ -9,6 +9,9 @@ use protocol::run_folder;
 use realtime::OverrunPolicy;
 use std::path::PathBuf;
 
+/// FIFO priority of the rig loop; above most of the system, below the kernel's own threads at 99.
+pub const DEFAULT_FIFO_PRIORITY: u8 = 80;
+
 /// Emulates the servo-pneumatic rig on a CAN bus.
 #[derive(Debug, Parser)]
 #[command(name = "emulator", version, about, after_help = EXIT_CODE_HELP)]
@@ -66,7 +69,7 @@ pub struct RunArguments {
     #[arg(long, default_value_t = OverrunPolicy::CatchUp)]
     pub overrun: OverrunPolicy,
     /// FIFO priority of the rig loop, 1 to 98; the bus host gets one more.
-    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(1..=98))]
+    #[arg(long, default_value_t = DEFAULT_FIFO_PRIORITY, value_parser = clap::value_parser!(u8).range(1..=98))]
     pub fifo_priority: u8,
     /// CPU that the rig loop is pinned to; not pinned without it.
     #[arg(long)]

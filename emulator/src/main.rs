@@ -1,7 +1,7 @@
 //! Process 1: the plant behind a bus, in real time.
 
 use clap::Parser;
-use emulator::cli::{BusArguments, Cli, Command};
+use emulator::cli::{BusArguments, Cli, Command, DEFAULT_FIFO_PRIORITY};
 use emulator::run::{self, RunError};
 use protocol::bus::BusUrl;
 use protocol::bus::host::Host;
@@ -37,7 +37,10 @@ fn host_bus(arguments: &BusArguments) -> Result<Exit, RunError> {
         return Err(RunError::Input("only an embedded bus, unix:///PATH, needs a host".into()));
     };
     let interrupt = run::watch_interrupt()?;
-    let host = emulator::host_thread::HostThread::start(Host::bind(path, *wire, None)?, Some(81));
+    let host = emulator::host_thread::HostThread::start(
+        Host::bind(path, *wire, None)?,
+        Some(DEFAULT_FIFO_PRIORITY + 1),
+    );
     eprintln!("emulator: hosting {}; Ctrl-C ends it", arguments.bus);
     let began = Instant::now();
     let time_up = || arguments.seconds.is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds);

@@ -199,13 +199,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
     if arguments.pace == Pace::Lockstep || arguments.no_realtime {
         return Grants::default();
     }
-    let grants = realtime::acquire(&Request {
-        fifo_priority: Some(arguments.fifo_priority),
-        cpu: arguments.cpu,
-        lock_memory: true,
-        dma_latency: true,
-        timer_slack: true,
-    });
+    let grants = realtime::acquire(&Request::for_a_loop(arguments.fifo_priority, arguments.cpu));
     grants.refusals().iter().for_each(|refusal| eprintln!("emulator: warning: {refusal}"));
     grants
 }

@@ -49,6 +49,20 @@ pub struct Request {
     pub timer_slack: bool,
 }
 
+impl Request {
+    /// Everything that a 1 ms loop wants.
+    #[must_use]
+    pub fn for_a_loop(fifo_priority: u8, cpu: Option<usize>) -> Self {
+        Self {
+            fifo_priority: Some(fifo_priority),
+            cpu,
+            lock_memory: true,
+            dma_latency: true,
+            timer_slack: true,
+        }
+    }
+}
+
 /// What the system gave, and what it refused. Dropping it gives the DMA latency back; the rest stays.
 #[derive(Debug, Default)]
 pub struct Grants {
