@@ -20,4 +20,5 @@ pub mod peer;
 pub mod process;
 pub mod records;
 pub mod scene;
+pub mod skip;
 pub mod turn;

@@ -6,6 +6,7 @@ use system_tests::launch::Pace;
 use system_tests::process::Ended;
 use system_tests::records::{Table, bus_log_to_last_whole_line, count, expect_whole_lines, json};
 use system_tests::scene::{RESTLESS, Scene};
+use system_tests::skip;
 use system_tests::turn;
 
 const BAD_INPUT: i32 = 2;
@@ -55,7 +56,7 @@ fn a_full_disk_ends_the_run_and_keeps_whole_lines() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let Some(disk) = SmallDisk::mount(scene.path("disk")) else {
-        eprintln!("SKIPPED a_full_disk_ends_the_run_and_keeps_whole_lines: mounting a tmpfs needs root");
+        skip::tell("a_full_disk_ends_the_run_and_keeps_whole_lines", "mounting a tmpfs needs root");
         return;
     };
     let folder = disk.path.join("run");
