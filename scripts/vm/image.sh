@@ -59,7 +59,7 @@ gather_base() {
 # Starts $out/vm/initramfs.cpio with the base.
 build_base_image() {
     local sum image
-    staging=$(mktemp -d "$cache/staging.XXXXXX")
+    staging=$(mktemp -d -p "$cache")
     gather_base "$staging"
     sum=$(cd "$staging" && find . -type f -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -c 1-16)
     image=$cache/base-$kernel-$sum.cpio

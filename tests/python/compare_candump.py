@@ -186,7 +186,7 @@ def compare_valves(own, rows, cycle_zero_ns):
 
 
 def counts_of_axis(commands, axis, sent, rows, cycle_zero_ns):
-    latch, sent_before, taken, moving, waited = Latch(), {"count": 0}, 0, 0, 0
+    latch, sent_before, taken, moving = Latch(), {"count": 0}, 0, 0
     compared = sent[0] if sent else len(rows)
     for cycle in range(compared):
         check(float(rows[cycle][f"{axis}_valve"]) == 0, f"cycle {cycle}: {axis}_valve is open before the first sensors")
@@ -203,10 +203,7 @@ def counts_of_axis(commands, axis, sent, rows, cycle_zero_ns):
         # What acts in this cycle is held over the skipped ones that follow.
         until = sent[place + 1] if place + 1 < len(sent) else len(rows)
         ours = float(rows[cycle][f"{axis}_valve"])
-        differs = abs(ours - latch.opening(sent_before)) > ULPS
-        held_on = differs and place and ours == float(rows[cycle - 1][f"{axis}_valve"])
-        waited += bool(held_on)
-        while not held_on and abs(ours - latch.opening(sent_before)) > ULPS:
+        while abs(ours - latch.opening(sent_before)) > ULPS:
             undecided = taken < len(commands) and commands[taken].stamp_ns < due_ns + UNDECIDED_NS
             check(undecided, f"cycle {cycle}: {axis}_valve is {ours!r} in measurement.csv, the command says {latch.opening(sent_before)!r}")
             latch.take(commands[taken].values, sent_before)
@@ -216,9 +213,6 @@ def counts_of_axis(commands, axis, sent, rows, cycle_zero_ns):
             check(same, f"cycle {held}: {axis}_valve changed in a skipped cycle")
             compared += 1
             moving += ours != 0.0
-    # A frame is never taken before one that came ahead of it, and a thread held up between the two clocks of a stamp (which an
-    # emulated machine does) stamps too late: then the frames behind it wait a cycle more than their stamps say.
-    check(waited <= len(sent) // 200, f"{waited} {axis} commands of {len(sent)} cycles acted later than their stamps say")
     return compared, moving
 
 

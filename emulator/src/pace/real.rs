@@ -115,9 +115,8 @@ impl Inbox {
         before_ns: u64,
         take: &mut impl FnMut(&CanFrame, u64),
     ) {
-        // Frames keep their order: what follows one that waits, waits too. Two clocks make up a stamp, and a thread that is
-        // held up between them stamps a frame later than the one behind it.
-        if stamp_ns < before_ns && self.count == 0 {
+        // Stamps of one peer never go back, so what follows a frame that waits, waits too.
+        if stamp_ns < before_ns {
             take(&frame, stamp_ns);
         } else {
             self.early[self.count] = Some((frame, stamp_ns));
