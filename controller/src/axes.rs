@@ -2,11 +2,12 @@
 //!
 //! The drive is position controlled; the load axis holds its valve shut. They know each other only through the bus.
 
+use crate::algorithm::{Algorithm, Ready};
+use crate::algorithms::position_p::PositionP;
 use crate::experiment::DriveExperiment;
 use crate::figures::PositionFigures;
 use crate::linearisation::Linearisation;
 use crate::main_chain::MainChain;
-use crate::position_p::PositionP;
 use crate::set_point::SetPoint;
 use protocol::frames::{
     ALIVE_RANGE, ChainStatus, ChainValues, ECHO_RANGE, MainChainState, Sensors, ValveCommand,
@@ -32,7 +33,7 @@ pub struct DriveRecord {
 /// Controller of the drive axis.
 pub struct DriveAxis {
     chain: MainChain,
-    algorithm: PositionP,
+    parameters: [f64; 2],
     linearisation: Linearisation,
     figures: PositionFigures,
     last: Option<DriveRecord>,
@@ -43,16 +44,16 @@ impl DriveAxis {
     /// A controller that waits for its rig.
     #[must_use]
     pub fn new(experiment: DriveExperiment, linearisation: Linearisation, forever: bool) -> Self {
-        let algorithm = experiment.position_p;
+        let parameters = [experiment.position_p.gain_per_s, experiment.position_p.velocity_feed_forward];
         let chain = MainChain::new(experiment, forever);
-        Self { chain, algorithm, linearisation, figures: PositionFigures::default(), last: None, alive: 0 }
+        Self { chain, parameters, linearisation, figures: PositionFigures::default(), last: None, alive: 0 }
     }
 
     /// The command that answers the sensors of `cycle`.
     pub fn command(&mut self, cycle: u64, sensors: &Sensors, emergency_stop: bool) -> ValveCommand {
         let position_m = sensors.position_m;
         let set_point = self.chain.advance(cycle, position_m, emergency_stop);
-        let wanted = set_point.map_or(0.0, |point| self.algorithm.velocity_m_per_s(&point, position_m));
+        let wanted = set_point.map_or(0.0, |point| self.wanted_velocity_m_per_s(&point, position_m));
         let opening = self.linearisation.opening(wanted);
         match (&set_point, self.chain.state()) {
             (Some(point), MainChainState::Experiment) => self.figures.take(point, position_m),
@@ -68,6 +69,16 @@ impl DriveAxis {
         });
         self.alive = next_alive(self.alive);
         ValveCommand { opening, alive: self.alive, echo: echo(cycle), enable: set_point.is_some() }
+    }
+
+    fn wanted_velocity_m_per_s(&self, set_point: &SetPoint, position_m: f64) -> f64 {
+        let ready = Ready {
+            position_m,
+            set_position_m: set_point.position_m,
+            set_velocity_m_per_s: set_point.velocity_m_per_s,
+            ..Ready::default()
+        };
+        PositionP.step(&ready, &self.parameters)
     }
 
     /// The console ends the experiment: the valve shuts.

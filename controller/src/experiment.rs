@@ -13,9 +13,8 @@
 //!
 //! `[rig]` is the emulator's and `[passed]` the report's; they may hold what they like.
 
-use crate::position_p::PositionP;
 use crate::set_point::{MotionLaw, Move, Profile};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 /// `[drive]` of an experiment file, checked.
@@ -30,7 +29,16 @@ pub struct DriveExperiment {
     /// How long the axis must stand still before and after, s.
     pub settling_s: f64,
     /// The algorithm's parameters.
-    pub position_p: PositionP,
+    pub position_p: PositionGains,
+}
+
+/// Gains of the position control.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PositionGains {
+    /// Velocity for each error, 1/s; 0 to 200.
+    pub gain_per_s: f64,
+    /// Share of the set-point's rate that is fed forward; 0 to 2.
+    pub velocity_feed_forward: f64,
 }
 
 #[derive(Deserialize)]
@@ -58,7 +66,7 @@ struct Drive {
     position_p: Gains,
 }
 
-/// [`PositionP`] with the place of each value.
+/// [`PositionGains`] with the place of each value.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Gains {
@@ -105,7 +113,7 @@ impl DriveExperiment {
         check.range("drive.repetitions", repetitions, f64::from(*repetitions.as_ref()), 1.0, 1e6, "times")?;
         check.range("drive.settling_s", &drive.settling_s, *drive.settling_s.as_ref(), 0.0, 60.0, "s")?;
         let Gains { gain_per_s, velocity_feed_forward } = &drive.position_p;
-        let position_p = PositionP {
+        let position_p = PositionGains {
             gain_per_s: *gain_per_s.as_ref(),
             velocity_feed_forward: *velocity_feed_forward.as_ref(),
         };

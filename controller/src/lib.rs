@@ -9,10 +9,13 @@
 //! | [`rig_view`] | cycle numbers, lost frames |
 //! | [`main_chain`] | from a rig at rest through the experiment to done |
 //! | [`set_point`] | profiles and motion laws |
-//! | [`axes`], [`position_p`], [`linearisation`] | the axis controllers, the algorithm, the inverse valve characteristic |
+//! | [`axes`], [`linearisation`] | the axis controllers, the inverse valve characteristic |
+//! | [`algorithm`], [`algorithms`], [`parameters`] | what an algorithm is, those shipped, their parameters |
 //! | [`figures`] | dynamic and static error |
 //! | [`run`], [`recording`], [`experiment`], [`cli`] | around it |
 
+pub mod algorithm;
+pub mod algorithms;
 pub mod axes;
 pub mod cli;
 pub mod experiment;
@@ -20,7 +23,7 @@ pub mod figures;
 pub mod linearisation;
 pub mod main_chain;
 pub mod pace;
-pub mod position_p;
+pub mod parameters;
 pub mod recording;
 pub mod rig_view;
 pub mod run;

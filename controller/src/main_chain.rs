@@ -153,7 +153,7 @@ fn initial_way(from_m: f64, to_m: f64) -> Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::position_p::PositionP;
+    use crate::experiment::PositionGains;
 
     fn chain(repetitions: u32, forever: bool) -> MainChain {
         let moves = vec![Move { to_m: 0.4, duration_s: 3.0, rest_s: 1.0 }];
@@ -162,7 +162,7 @@ mod tests {
             profile: Profile::new(MotionLaw::Bestehorn, 0.1, moves),
             repetitions,
             settling_s: 0.5,
-            position_p: PositionP { gain_per_s: 40.0, velocity_feed_forward: 1.0 },
+            position_p: PositionGains { gain_per_s: 40.0, velocity_feed_forward: 1.0 },
         };
         MainChain::new(experiment, forever)
     }

@@ -2,10 +2,9 @@
 
 use crate::axes::DriveAxis;
 use crate::cli::{Pace, RunArguments};
-use crate::experiment::{DriveExperiment, ExperimentError};
+use crate::experiment::{DriveExperiment, ExperimentError, PositionGains};
 use crate::linearisation::Linearisation;
 use crate::pace::{self, End, Paced};
-use crate::position_p::PositionP;
 use crate::recording;
 use crate::rig_view::PerAxis;
 use crate::station::{IgnoredFrames, News, Outlets, Station};
@@ -62,7 +61,7 @@ struct Report {
     command_line: Vec<String>,
     version: &'static str,
     title: String,
-    position_p: PositionP,
+    position_p: PositionGains,
     started_unix_s: Option<f64>,
     ended_well: bool,
     ended_because: &'static str,

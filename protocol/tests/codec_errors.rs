@@ -148,12 +148,12 @@ fn each_malformed_frame_is_refused_by_name() {
         ),
         (raw(0x10A, &[8, 0]), "DriveEmergencyStop.reason has raw value 8; its value table ends at 7"),
         (
-            raw(0x150, &[0x08, 0, 0, 0, 0]),
-            "DriveChainStatus.main_chain has raw value 8; its value table ends at 7",
+            raw(0x150, &[0x0A, 0, 0, 0, 0]),
+            "DriveChainStatus.main_chain has raw value 10; its value table ends at 9",
         ),
         (
-            raw(0x152, &[0x70, 0, 0, 0, 0]),
-            "LoadChainStatus.force_chain has raw value 7; its value table ends at 6",
+            raw(0x152, &[0x80, 0, 0, 0, 0]),
+            "LoadChainStatus.force_chain has raw value 8; its value table ends at 7",
         ),
         (raw(0x160, &[255, 1]), "RunControl.command has raw value 255; its value table ends at 2"),
     ];

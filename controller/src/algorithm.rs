@@ -1,0 +1,81 @@
+//! What a control algorithm is: from what the pre-controller has made ready to the velocity that the rod shall have.
+//!
+//! ```text
+//!   sensors, set-points ──► pre-controller ──► Ready ──► Algorithm ──► wanted rod velocity ──► post-controller ──► opening
+//! ```
+//!
+//! Everything is in the axis's own extension: positions grow as the own rod comes out, and a positive result extends it,
+//! which raises the own force sensor's reading when something is in the way. So one algorithm serves both axes.
+//! An algorithm holds its state and nothing else: parameters come with each step, since they may change while running.
+//! It neither allocates nor blocks; that its result is a number is checked behind it.
+
+use crate::parameters::Parameter;
+use plant::RigParameters;
+
+/// What the pre-controller has made ready. The C interface has the same layout: numbers of 8 bytes, in this order.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ready {
+    /// Time between two steps of the algorithm, s.
+    pub period_s: f64,
+    /// Extension of the own rod, m.
+    pub position_m: f64,
+    /// Its rate, filtered, m/s.
+    pub velocity_m_per_s: f64,
+    /// The rate of that, filtered, m/s^2.
+    pub acceleration_m_per_s2: f64,
+    /// Own force sensor, filtered, N, compression positive.
+    pub force_n: f64,
+    /// Absolute pressure of the cap-side chamber, filtered, Pa.
+    pub pressure_a_pa: f64,
+    /// Absolute pressure of the rod-side chamber, filtered, Pa.
+    pub pressure_b_pa: f64,
+    /// Absolute pressure of the supply as the rig tells it, Pa.
+    pub supply_pressure_pa: f64,
+    /// Set-point of the extension, m.
+    pub set_position_m: f64,
+    /// Its rate, m/s.
+    pub set_velocity_m_per_s: f64,
+    /// The rate of that, m/s^2.
+    pub set_acceleration_m_per_s2: f64,
+    /// Set-point of the force, N.
+    pub set_force_n: f64,
+    /// Its rate, N/s.
+    pub set_force_rate_n_per_s: f64,
+    /// What the valve could do of the last result, m/s: differs from it when the post-controller limited it. For integral parts,
+    /// which must stop where the valve stops.
+    pub applied_velocity_m_per_s: f64,
+}
+
+/// A control algorithm of one axis.
+pub trait Algorithm: Send {
+    /// Begins anew from what is: no integral, no memory. The axis has been without control before.
+    fn reset(&mut self, ready: &Ready, parameters: &[f64]);
+
+    /// The velocity that the own rod shall have, m/s.
+    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64;
+}
+
+/// What an algorithm controls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quantity {
+    /// The extension.
+    Position,
+    /// The force between rod and carriage.
+    Force,
+}
+
+/// An algorithm that can be asked for by name.
+pub struct Kind {
+    /// Name in a program file.
+    pub name: &'static str,
+    /// One sentence for lists.
+    pub about: &'static str,
+    /// What it controls.
+    pub controls: Quantity,
+    /// Its parameters, in the order of the slices.
+    pub parameters: &'static [Parameter],
+    /// Makes one, for a rig of these nominal numbers.
+    pub make: fn(&RigParameters) -> Box<dyn Algorithm>,
+}

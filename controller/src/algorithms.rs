@@ -1,0 +1,29 @@
+//! The algorithms that can be asked for by name. A new one is a file beside these and a line in [`SHIPPED`].
+
+pub mod position_p;
+
+use crate::algorithm::Kind;
+
+/// All of them.
+pub const SHIPPED: &[Kind] = &[position_p::KIND];
+
+/// The algorithm called `name`.
+#[must_use]
+pub fn by_name(name: &str) -> Option<&'static Kind> {
+    SHIPPED.iter().find(|kind| kind.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_its_own_and_every_default_is_allowed() {
+        for (place, kind) in SHIPPED.iter().enumerate() {
+            assert!(SHIPPED[..place].iter().all(|other| other.name != kind.name), "{}", kind.name);
+            kind.parameters.iter().for_each(|parameter| {
+                parameter.check(parameter.default).unwrap_or_else(|error| panic!("{}: {error}", kind.name));
+            });
+        }
+    }
+}
