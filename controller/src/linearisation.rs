@@ -53,6 +53,18 @@ impl Linearisation {
         if velocity_m_per_s == 0.0 { 0.0 } else { magnitude.copysign(velocity_m_per_s) }
     }
 
+    /// The velocity, m/s, that an opening stands for: the inverse of [`Linearisation::opening`], 0 within the dead band.
+    #[must_use]
+    pub fn velocity(&self, opening: f64) -> f64 {
+        let retracting = usize::from(opening < 0.0);
+        let magnitude = opening.abs();
+        let point = (1..POINTS).find(|point| magnitude <= self.opening[*point]).unwrap_or(POINTS - 1);
+        let (low, high) = (self.opening[point - 1], self.opening[point]);
+        let share = ((magnitude - low) / (high - low)).min(1.0);
+        let kv = self.kv[point - 1] + share * (self.kv[point] - self.kv[point - 1]);
+        (kv / self.kv_per_velocity[retracting]).copysign(opening)
+    }
+
     fn inverse(&self, kv: f64) -> f64 {
         for point in 1..POINTS {
             let (low, high) = (self.kv[point - 1], self.kv[point]);
@@ -90,6 +102,13 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn velocity_is_the_inverse_of_the_opening(velocity in -0.6..0.6_f64) {
+            let linearisation = Linearisation::new(&RigParameters::baseline());
+            let there_and_back = linearisation.velocity(linearisation.opening(velocity));
+            prop_assert!((there_and_back - velocity).abs() < 1e-12, "{there_and_back}");
+        }
+
         #[test]
         fn the_opening_grows_with_the_velocity_and_stays_within_the_valve(
             slow in -3.0..3.0_f64, more in 0.0..1.0_f64,

@@ -16,6 +16,8 @@ pub struct SetPoint {
     pub position_m: f64,
     /// Its rate, m/s.
     pub velocity_m_per_s: f64,
+    /// The rate of that, m/s^2.
+    pub acceleration_m_per_s2: f64,
     /// Whether the set-point moves; at rest both error figures are judged otherwise.
     pub moving: bool,
 }
@@ -24,7 +26,26 @@ impl SetPoint {
     /// A set-point that stays.
     #[must_use]
     pub fn at_rest(position_m: f64) -> Self {
-        Self { position_m, velocity_m_per_s: 0.0, moving: false }
+        Self { position_m, velocity_m_per_s: 0.0, acceleration_m_per_s2: 0.0, moving: false }
+    }
+}
+
+/// A force set-point and its rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceSetPoint {
+    /// Force between rod and carriage, N, compression positive.
+    pub force_n: f64,
+    /// Its rate, N/s.
+    pub rate_n_per_s: f64,
+    /// Whether the set-point moves.
+    pub moving: bool,
+}
+
+impl ForceSetPoint {
+    /// A set-point that stays.
+    #[must_use]
+    pub fn at_rest(force_n: f64) -> Self {
+        Self { force_n, rate_n_per_s: 0.0, moving: false }
     }
 }
 
@@ -108,6 +129,7 @@ impl Profile {
                 return SetPoint {
                     position_m: from_m + way_m * s,
                     velocity_m_per_s: way_m * ds_dz / part.duration_s,
+                    acceleration_m_per_s2: 0.0,
                     moving: true,
                 };
             }

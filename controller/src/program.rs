@@ -1,0 +1,232 @@
+//! The program of one axis, composed in a file: which tasks run, in which multiple of the cycle, with which algorithm and
+//! parameters.
+//!
+//! ```text
+//!   sensors ──► pre-controller ──► algorithm ──► post-controller ──► opening
+//!               every n cycles     every m       every k cycles      held in between
+//! ```
+//!
+//! The algorithm is one of [`crate::algorithms`] or a shared library; a second one, with the multiple of its own, may be there for
+//! the force chain, which relieves the linked system and lets a hand move the axis. Every number is a [`Variable`]: it
+//! has a name such as `algorithm.gain_per_s` and may change between two cycles.
+//!
+//! [`file`] reads the file.
+
+pub mod file;
+
+use crate::algorithm::{Algorithm, Quantity, Ready};
+use crate::parameters::{OutOfRange, Parameter};
+use crate::post_controller::{Output, PostController};
+use crate::pre_controller::{Geometry, PreController};
+use crate::set_point::{ForceSetPoint, SetPoint};
+use protocol::frames::Sensors;
+use std::ops::Range;
+
+/// Multiple of the basic cycle of a task; the first parameter of each.
+pub const EVERY_CYCLES: Parameter =
+    Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms");
+/// Seconds of one cycle.
+const CYCLE_S: f64 = 1e-3;
+/// Longest time between two steps that a filter or an algorithm is told, in cycles: a stall is no reason for a jump.
+const LONGEST_PERIOD: u64 = 100;
+
+/// A parameter of a program under its full name.
+#[derive(Clone, Debug)]
+pub struct Variable {
+    /// Task and name, such as `algorithm.gain_per_s`.
+    pub name: String,
+    /// Unit, range, default, meaning.
+    pub parameter: Parameter,
+}
+
+/// What the axis shall do in a cycle, in rig coordinates; an algorithm looks at what it controls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demand {
+    /// Position.
+    pub position: SetPoint,
+    /// Force.
+    pub force: ForceSetPoint,
+}
+
+/// Which algorithm has the axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hand {
+    /// The user's.
+    User,
+    /// The force chain's.
+    ForceChain,
+}
+
+/// An algorithm in its task.
+struct Slot {
+    algorithm: Box<dyn Algorithm>,
+    controls: Quantity,
+    values: Range<usize>,
+    /// Cycle of its last step; `None` when it must begin anew.
+    stepped: Option<u64>,
+    wanted_m_per_s: f64,
+}
+
+/// The result of an algorithm that is no number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the algorithm's result is no number")]
+pub struct NotANumber;
+
+/// The program of one axis.
+pub struct Program {
+    pre: PreController,
+    post: PostController,
+    user: Slot,
+    force_chain: Option<Slot>,
+    variables: Vec<Variable>,
+    values: Vec<f64>,
+    pre_values: Range<usize>,
+    post_values: Range<usize>,
+    ready: Ready,
+    observed: Option<u64>,
+    post_stepped: Option<u64>,
+    output: Output,
+}
+
+impl Program {
+    /// Takes the sensors of `cycle`: the pre-controller's task.
+    pub fn observe(&mut self, cycle: u64, sensors: &Sensors, supply_pressure_pa: f64) {
+        let parameters = &self.values[self.pre_values.clone()];
+        let Some(passed) = due(self.observed, cycle, parameters) else { return };
+        self.observed = Some(cycle);
+        self.ready.supply_pressure_pa = supply_pressure_pa;
+        self.pre.step(sensors, passed as f64 * CYCLE_S, parameters, &mut self.ready);
+    }
+
+    /// The opening for `demand`, from the algorithm that has the axis.
+    ///
+    /// # Errors
+    /// [`NotANumber`] when the algorithm gives none; it must not be asked again.
+    pub fn control(&mut self, cycle: u64, demand: &Demand, hand: Hand) -> Result<Output, NotANumber> {
+        let geometry = self.pre.geometry();
+        let direction = geometry.direction();
+        let ready = &mut self.ready;
+        ready.set_position_m = geometry.extension_m(demand.position.position_m);
+        ready.set_velocity_m_per_s = direction * demand.position.velocity_m_per_s;
+        ready.set_acceleration_m_per_s2 = direction * demand.position.acceleration_m_per_s2;
+        ready.set_force_n = demand.force.force_n;
+        ready.set_force_rate_n_per_s = demand.force.rate_n_per_s;
+        let (slot, other) = match (hand, &mut self.force_chain) {
+            (Hand::ForceChain, Some(slot)) => (slot, Some(&mut self.user)),
+            (_, other) => (&mut self.user, other.as_mut()),
+        };
+        if let Some(other) = other {
+            other.stepped = None;
+        }
+        slot.step(cycle, ready, &self.values)?;
+        let wanted = slot.wanted_m_per_s;
+        let parameters = &self.values[self.post_values.clone()];
+        if due(self.post_stepped, cycle, parameters).is_some() {
+            self.post_stepped = Some(cycle);
+            self.output = self.post.step(wanted, parameters);
+            self.ready.applied_velocity_m_per_s = self.output.applied_velocity_m_per_s;
+        }
+        Ok(self.output)
+    }
+
+    /// The valve is shut: whatever has the axis next begins anew.
+    pub fn shut(&mut self) {
+        self.user.stepped = None;
+        if let Some(slot) = &mut self.force_chain {
+            slot.stepped = None;
+        }
+        self.post_stepped = None;
+        self.output = Output::default();
+        self.ready.applied_velocity_m_per_s = 0.0;
+    }
+
+    /// The rig's time began again: nothing that was seen holds.
+    pub fn restart(&mut self) {
+        self.shut();
+        self.pre.reset();
+        self.observed = None;
+    }
+
+    /// What was measured, in the axis's own extension.
+    #[must_use]
+    pub fn ready(&self) -> &Ready {
+        &self.ready
+    }
+
+    /// Where the axis lies.
+    #[must_use]
+    pub fn geometry(&self) -> &Geometry {
+        self.pre.geometry()
+    }
+
+    /// Takes what the position sensor reads too much, m.
+    pub fn set_offset(&mut self, offset_m: f64) {
+        self.pre.set_offset(offset_m);
+    }
+
+    /// The velocity that the algorithm wants, m/s, own extension.
+    #[must_use]
+    pub fn wanted_m_per_s(&self, hand: Hand) -> f64 {
+        match (hand, &self.force_chain) {
+            (Hand::ForceChain, Some(slot)) => slot.wanted_m_per_s,
+            _ => self.user.wanted_m_per_s,
+        }
+    }
+
+    /// What the user's algorithm controls.
+    #[must_use]
+    pub fn controls(&self) -> Quantity {
+        self.user.controls
+    }
+
+    /// All variables, in the order of their values.
+    #[must_use]
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Values of the variables.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Place of the variable called `name`.
+    #[must_use]
+    pub fn place(&self, name: &str) -> Option<usize> {
+        self.variables.iter().position(|variable| variable.name == name)
+    }
+
+    /// Changes the variable at `place`; acts from the next cycle on.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] when it does not allow the value; it keeps its own.
+    pub fn set(&mut self, place: usize, value: f64) -> Result<(), OutOfRange> {
+        self.values[place] = self.variables[place].parameter.check(value)?;
+        Ok(())
+    }
+}
+
+impl Slot {
+    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<(), NotANumber> {
+        let (every, parameters) = values[self.values.clone()].split_at(1);
+        let Some(passed) = due(self.stepped, cycle, every) else { return Ok(()) };
+        ready.period_s = passed as f64 * CYCLE_S;
+        if self.stepped.is_none() {
+            ready.period_s = every[0] * CYCLE_S;
+            self.algorithm.reset(ready, parameters);
+        }
+        self.stepped = Some(cycle);
+        let wanted = self.algorithm.step(ready, parameters);
+        self.wanted_m_per_s = if wanted.is_finite() { wanted } else { 0.0 };
+        if wanted.is_finite() { Ok(()) } else { Err(NotANumber) }
+    }
+}
+
+/// Cycles since the last step of a task if it is due at `cycle`; its multiple is its first parameter.
+fn due(last: Option<u64>, cycle: u64, parameters: &[f64]) -> Option<u64> {
+    let every = parameters[0] as u64;
+    let Some(last) = last else { return Some(1) };
+    let passed = cycle.saturating_sub(last);
+    (passed >= every).then(|| passed.clamp(1, LONGEST_PERIOD.max(every)))
+}

@@ -1,0 +1,311 @@
+//! Reads a program file.
+//!
+//! ```toml
+//! title = "P with velocity feed-forward, as in the paper"
+//! [pre-controller]
+//! velocity_filter_hz = 60.0
+//! [algorithm]
+//! name = "position-p"
+//! gain_per_s = 25.0
+//! [post-controller]
+//! linearisation = "choked-exhaust"
+//! [force-chain]                    # optional: the algorithm that the force chain uses
+//! name = "force-manual"
+//! ```
+//!
+//! What is left out takes the default of its table.
+
+use super::{EVERY_CYCLES, Program, Slot, Variable};
+use crate::algorithms;
+use crate::linearisation::Linearisation;
+use crate::parameters::Parameter;
+use crate::post_controller::{self, Output, PostController};
+use crate::pre_controller::{self, Geometry, PreController};
+use plant::{Axis, RigParameters};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// A program file that cannot be used: file, line, key, value and what is allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct ProgramError(String);
+
+type Section = BTreeMap<String, Spanned<toml::Value>>;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct File {
+    title: String,
+    #[serde(default)]
+    pre_controller: Section,
+    algorithm: Spanned<Section>,
+    #[serde(default)]
+    post_controller: Section,
+    force_chain: Option<Spanned<Section>>,
+}
+
+/// A program file as it was read, for records.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Source {
+    /// The file.
+    pub path: PathBuf,
+    /// Its title.
+    pub title: String,
+    /// Its text.
+    pub text: String,
+}
+
+impl Source {
+    /// Reads the file.
+    ///
+    /// # Errors
+    /// [`ProgramError`] when it cannot be read or is no TOML of this form.
+    pub fn read(path: &Path) -> Result<Self, ProgramError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| ProgramError(format!("cannot read {}: {error}", path.display())))?;
+        let mut source = Self { path: path.into(), title: String::new(), text };
+        source.title = source.parse()?.title;
+        Ok(source)
+    }
+
+    fn parse(&self) -> Result<File, ProgramError> {
+        toml::from_str(&self.text).map_err(|error| ProgramError(format!("{}: {error}", self.path.display())))
+    }
+
+    /// The program of `axis` that the file describes, for a rig of these nominal numbers.
+    ///
+    /// # Errors
+    /// [`ProgramError`] with file, line, key, value and what is allowed.
+    pub fn program(&self, axis: Axis, rig: &RigParameters) -> Result<Program, ProgramError> {
+        let file = self.parse()?;
+        let mut reader = Reader { source: self, rig, variables: Vec::new(), values: Vec::new() };
+        let pre_values =
+            reader.section("pre-controller", file.pre_controller, &pre_controller::PARAMETERS)?;
+        let user = reader.slot("algorithm", file.algorithm)?;
+        let mut section = file.post_controller;
+        let kind = reader.take_text("post-controller.linearisation", section.remove("linearisation"))?;
+        let linearisation = match kind.as_ref().map(|kind| kind.as_ref().as_str()) {
+            None | Some("choked-exhaust") => Linearisation::new(rig),
+            Some(other) => {
+                let place = kind.as_ref().map_or(0, |kind| kind.span().start);
+                return Err(reader.error(
+                    place,
+                    &format!("post-controller.linearisation = \"{other}\"; there is \"choked-exhaust\""),
+                ));
+            }
+        };
+        let post_values = reader.section("post-controller", section, &post_controller::PARAMETERS)?;
+        let force_chain = file.force_chain.map(|section| reader.slot("force-chain", section)).transpose()?;
+        let Reader { variables, values, .. } = reader;
+        Ok(Program {
+            pre: PreController::new(Geometry::new(axis, rig.cylinder().stroke_m)),
+            post: PostController::new(linearisation),
+            user,
+            force_chain,
+            variables,
+            values,
+            pre_values,
+            post_values,
+            ready: crate::algorithm::Ready::default(),
+            observed: None,
+            post_stepped: None,
+            output: Output::default(),
+        })
+    }
+}
+
+/// Collects variables and their values, section by section.
+struct Reader<'a> {
+    source: &'a Source,
+    rig: &'a RigParameters,
+    variables: Vec<Variable>,
+    values: Vec<f64>,
+}
+
+impl Reader<'_> {
+    fn error(&self, place: usize, problem: &str) -> ProgramError {
+        let text = &self.source.text;
+        let line = 1 + text[..place.min(text.len())].matches('\n').count();
+        ProgramError(format!("{}:{line}: {problem}", self.source.path.display()))
+    }
+
+    /// Takes the values of `table` out of the section called `name`; what is left in it is nobody's.
+    fn section(
+        &mut self,
+        name: &str,
+        mut section: Section,
+        table: &[Parameter],
+    ) -> Result<Range<usize>, ProgramError> {
+        let first = self.values.len();
+        for parameter in table {
+            let value = match section.remove(parameter.name.as_ref()) {
+                None => parameter.default,
+                Some(entry) => {
+                    let place = entry.span().start;
+                    let value = number(entry.as_ref()).ok_or_else(|| {
+                        self.error(
+                            place,
+                            &format!("{name}.{} = {}: not a number", parameter.name, entry.as_ref()),
+                        )
+                    })?;
+                    parameter.check(value).map_err(|error| self.error(place, &format!("{name}.{error}")))?
+                }
+            };
+            self.values.push(value);
+            self.variables
+                .push(Variable { name: format!("{name}.{}", parameter.name), parameter: parameter.clone() });
+        }
+        if let Some((key, entry)) = section.first_key_value() {
+            let known: Vec<_> = table.iter().map(|parameter| parameter.name.as_ref()).collect();
+            let problem = format!("{name}.{key}: no such parameter; there are {}", known.join(", "));
+            return Err(self.error(entry.span().start, &problem));
+        }
+        Ok(first..self.values.len())
+    }
+
+    fn slot(&mut self, name: &str, section: Spanned<Section>) -> Result<Slot, ProgramError> {
+        let place = section.span().start;
+        let mut section = section.into_inner();
+        let asked = self.take_text(&format!("{name}.name"), section.remove("name"))?;
+        let names = || algorithms::SHIPPED.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
+        let Some(asked) = asked else {
+            return Err(self.error(place, &format!("[{name}] has no name; there are {}", names())));
+        };
+        let kind = algorithms::by_name(asked.as_ref()).ok_or_else(|| {
+            let problem = format!("{name}.name = \"{}\"; there are {}", asked.as_ref(), names());
+            self.error(asked.span().start, &problem)
+        })?;
+        let table: Vec<_> = std::iter::once(&EVERY_CYCLES).chain(kind.parameters).cloned().collect();
+        let values = self.section(name, section, &table)?;
+        Ok(Slot {
+            algorithm: (kind.make)(self.rig),
+            controls: kind.controls,
+            values,
+            stepped: None,
+            wanted_m_per_s: 0.0,
+        })
+    }
+
+    fn take_text(
+        &self,
+        key: &str,
+        entry: Option<Spanned<toml::Value>>,
+    ) -> Result<Option<Spanned<String>>, ProgramError> {
+        let Some(entry) = entry else { return Ok(None) };
+        let span = entry.span();
+        match entry.into_inner() {
+            toml::Value::String(text) => Ok(Some(Spanned::new(span, text))),
+            other => Err(self.error(span.start, &format!("{key} = {other}: not a text in quotes"))),
+        }
+    }
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::program::{Demand, Hand};
+    use crate::set_point::{ForceSetPoint, SetPoint};
+    use protocol::frames::Sensors;
+
+    const GOOD: &str = r#"title = "t"
+[pre-controller]
+velocity_filter_hz = 50.0
+[algorithm]
+name = "position-p"
+every_cycles = 2
+gain_per_s = 20
+[post-controller]
+linearisation = "choked-exhaust"
+opening_limit = 0.5
+"#;
+
+    fn source(text: &str) -> Source {
+        Source { path: "p.toml".into(), title: "t".into(), text: text.into() }
+    }
+
+    fn program(text: &str) -> Result<Program, ProgramError> {
+        source(text).program(Axis::Drive, &RigParameters::baseline())
+    }
+
+    #[test]
+    fn what_is_left_out_takes_its_default() {
+        let program = program(GOOD).unwrap();
+        let value = |name| program.values()[program.place(name).unwrap()];
+        assert_eq!(value("algorithm.gain_per_s"), 20.0);
+        assert_eq!(value("algorithm.every_cycles"), 2.0);
+        assert_eq!(value("algorithm.velocity_feed_forward"), 1.0);
+        assert_eq!(value("pre-controller.velocity_filter_hz"), 50.0);
+        assert_eq!(value("post-controller.dead_zone_m_per_s"), 0.0);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_file_line_key_value_and_what_is_allowed() {
+        for (good, bad, hints) in [
+            (
+                "gain_per_s = 20",
+                "gain_per_s = 300",
+                ["p.toml:7", "algorithm.gain_per_s = 300", "0 to 200 1/s"],
+            ),
+            ("gain_per_s = 20", "gain_per_s = nan", ["p.toml:7", "NaN", "0 to 200"]),
+            ("gain_per_s = 20", "gain = 20", ["p.toml:7", "algorithm.gain: no such", "gain_per_s"]),
+            ("gain_per_s = 20", "gain_per_s = \"20\"", ["p.toml:7", "gain_per_s", "not a number"]),
+            ("\"position-p\"", "\"position-q\"", ["p.toml:5", "position-q", "position-p"]),
+            ("\"choked-exhaust\"", "\"magic\"", ["p.toml:9", "magic", "choked-exhaust"]),
+            ("name = \"position-p\"\n", "", ["p.toml", "[algorithm] has no name", "position-p"]),
+            ("[post-controller]", "[past-controller]", ["p.toml", "past-controller", "post-controller"]),
+        ] {
+            assert!(GOOD.contains(good));
+            let Err(error) = program(&GOOD.replace(good, bad)) else { panic!("{bad} was taken") };
+            for hint in hints {
+                assert!(error.to_string().contains(hint), "'{hint}' is missing in: {error}");
+            }
+        }
+    }
+
+    fn wanted(program: &mut Program, cycle: u64, position_m: f64) -> f64 {
+        program.observe(cycle, &Sensors { position_m, ..Sensors::default() }, 7e5);
+        let demand = Demand { position: SetPoint::at_rest(0.2), force: ForceSetPoint::at_rest(0.0) };
+        let _ = program.control(cycle, &demand, Hand::User).unwrap();
+        program.wanted_m_per_s(Hand::User)
+    }
+
+    #[test]
+    fn the_algorithm_runs_in_its_own_multiple_which_may_change() {
+        let mut program = program(GOOD).unwrap();
+        let mut run = |from: u64| -> Vec<bool> {
+            (from..from + 6)
+                .map(|cycle| {
+                    let now = 20.0 * (0.2 - 0.001 * cycle as f64);
+                    (wanted(&mut program, cycle, 0.001 * cycle as f64) - now).abs() < 1e-12
+                })
+                .collect()
+        };
+        assert_eq!(run(0), [true, false, true, false, true, false]);
+        let place = program.place("algorithm.every_cycles").unwrap();
+        program.set(place, 3.0).unwrap();
+        let fresh: Vec<_> = (6..13)
+            .map(|cycle| {
+                let now = 20.0 * (0.2 - 0.001 * cycle as f64);
+                (wanted(&mut program, cycle, 0.001 * cycle as f64) - now).abs() < 1e-12
+            })
+            .collect();
+        assert_eq!(fresh, [false, true, false, false, true, false, false]);
+    }
+
+    #[test]
+    fn a_parameter_changes_between_two_cycles_and_a_bad_value_changes_nothing() {
+        let mut program = program(GOOD).unwrap();
+        assert!((wanted(&mut program, 0, 0.1) - 2.0).abs() < 1e-12);
+        let place = program.place("algorithm.gain_per_s").unwrap();
+        program.set(place, 10.0).unwrap();
+        assert!(program.set(place, 1e9).is_err());
+        assert!((wanted(&mut program, 2, 0.1) - 1.0).abs() < 1e-12);
+    }
+}
