@@ -10,12 +10,11 @@
 //! (facts: 0.2 us against 9 us with a blocked receiver). A full queue loses the record and counts it.
 
 pub mod candump;
-pub mod tables;
 pub mod writer;
 
 use crate::event::Event;
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
-use plant::{AxisReadings, Truth};
+use plant::tables::CycleRecord;
 use protocol::can::CanFrame;
 use std::sync::{Arc, Weak};
 
@@ -25,19 +24,6 @@ const CYCLE_QUEUE: usize = 16 * 1024;
 const FRAME_QUEUE: usize = 8 * CYCLE_QUEUE;
 /// Events that fit the queue.
 const EVENT_QUEUE: usize = 4096;
-
-/// One row of `measurement.csv` and of `truth.csv`.
-#[derive(Clone, Debug)]
-pub struct CycleRecord {
-    /// Cycle number; the row's time is this many milliseconds.
-    pub cycle: u64,
-    /// Valve openings acting over the cycle, drive and load, -1 to 1.
-    pub valve: [f64; 2],
-    /// Sensors sampled at the cycle's start, drive and load.
-    pub readings: [AxisReadings; 2],
-    /// What only a simulation knows.
-    pub truth: Truth,
-}
 
 /// One line of `bus.log`.
 #[derive(Clone, Copy, Debug)]

@@ -13,8 +13,9 @@
 use crate::commands::{Change, CommandCounters, CommandIntake};
 use crate::event::{Event, EventKind};
 use crate::live_cycles::LiveCycles;
-use crate::recording::{CycleRecord, FrameRecord, Recorder};
+use crate::recording::{FrameRecord, Recorder};
 use crate::telegrams::{self, CommandState, SLOW_PERIOD, STATUS_PHASE, SaturatedSensors};
+use plant::tables::CycleRecord;
 use plant::{Axis, AxisReadings, Inputs, Plant, Sensors};
 use protocol::bus::Bus;
 use protocol::can::CanFrame;

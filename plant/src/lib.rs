@@ -16,6 +16,7 @@
 //! | `integrator.rs` | the substep that puts them together |
 //! | `truth.rs` | the list of all terms at an instant |
 //! | `sensors.rs` | noise, rounding, saturation |
+//! | `tables.rs` | rows of the measurement file and of the true states |
 //!
 //! ```
 //! use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
@@ -47,6 +48,7 @@ mod sensors;
 mod setup;
 mod state;
 mod supply;
+pub mod tables;
 mod truth;
 mod valve;
 

@@ -4,9 +4,10 @@
 //! process that is killed leaves files that read to their last line. When a write fails (a full disk, a folder that
 //! went away), the run is asked to end, and what was written stays.
 
-use super::{FrameRecord, Records, candump, tables};
+use super::{FrameRecord, Records, candump};
 use crate::event::{Event, EventKind};
 use crate::pace::Shared;
+use plant::tables;
 use protocol::run_folder::LineFile;
 use std::io;
 use std::path::PathBuf;

@@ -1,11 +1,24 @@
 //! Rows of `measurement.csv` (what sensors and valves show) and `truth.csv` (what only a simulation knows).
 //!
 //! Columns of the first are those of rig-model.md, no others. Numbers are written with the fewest digits that read back
-//! to the same bits.
+//! to the same bits. Whoever owns the plant, emulator or rehearsal, writes the same files.
 
-use crate::recording::CycleRecord;
-use plant::Truth;
+use crate::sensors::AxisReadings;
+use crate::truth::Truth;
 use std::io::{self, Write};
+
+/// One row of `measurement.csv` and of `truth.csv`.
+#[derive(Clone, Debug)]
+pub struct CycleRecord {
+    /// Cycle number; the row's time is this many milliseconds.
+    pub cycle: u64,
+    /// Valve openings acting over the cycle, drive and load, -1 to 1.
+    pub valve: [f64; 2],
+    /// Sensors sampled at the cycle's start, drive and load.
+    pub readings: [AxisReadings; 2],
+    /// What only a simulation knows.
+    pub truth: Truth,
+}
 
 /// Columns of `measurement.csv` after `time_s`, for one axis; each is prefixed with `drive_` or `load_`.
 const AXIS_COLUMNS: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
