@@ -17,6 +17,8 @@
 //! | `truth.rs` | the list of all terms at an instant |
 //! | `sensors.rs` | noise, rounding, saturation |
 //!
+//! [`scene`] is what people do to it: setup, hands, emergency stop, linkage and weights, as an experiment file tells.
+//!
 //! ```
 //! use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
 //!
@@ -43,6 +45,7 @@ mod linkage;
 mod motion;
 pub mod parameters;
 mod plant;
+pub mod scene;
 mod sensors;
 mod setup;
 mod state;
@@ -52,6 +55,7 @@ mod valve;
 
 pub use parameters::{ParameterError, RigParameters};
 pub use plant::{LinkRefused, Plant};
+pub use scene::{People, Scene, SceneError};
 pub use sensors::{AxisReadings, Reading, Sensors};
 pub use setup::{Setup, SetupError};
 pub use state::{Axis, AxisState, Inputs, State};
