@@ -8,10 +8,6 @@ use controller::linearisation::Linearisation;
 use controller::plugin::{Plugin, load_tried_by};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
 use realtime::{MonotonicClock, allocations};
-use std::sync::Mutex;
-
-/// The allocations of all threads are counted together.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn example() -> Plugin {
     load_tried_by(&trier(), &Libraries::new().example(), &RigParameters::baseline()).unwrap()
@@ -89,7 +85,6 @@ fn it_brings_the_drive_to_its_set_point_and_the_anti_wind_up_keeps_it_from_overs
 
 #[test]
 fn a_step_through_the_library_allocates_nothing() {
-    let _alone = ONE_AT_A_TIME.lock();
     let plugin = example();
     let values = defaults(&plugin);
     let mut guarded = Guarded::new(Box::new(plugin), Some(Box::new(MonotonicClock)));
