@@ -11,6 +11,7 @@
 //! | [`set_point`] | profiles and motion laws |
 //! | [`axes`], [`linearisation`] | the axis controllers, the inverse valve characteristic |
 //! | [`algorithm`], [`algorithms`], [`parameters`] | what an algorithm is, those shipped, their parameters |
+//! | [`plugin`], [`guard`] | algorithms from shared libraries, the watch over every algorithm |
 //! | [`figures`] | dynamic and static error |
 //! | [`run`], [`recording`], [`experiment`], [`cli`] | around it |
 
@@ -20,10 +21,12 @@ pub mod axes;
 pub mod cli;
 pub mod experiment;
 pub mod figures;
+pub mod guard;
 pub mod linearisation;
 pub mod main_chain;
 pub mod pace;
 pub mod parameters;
+pub mod plugin;
 pub mod post_controller;
 pub mod pre_controller;
 pub mod program;
