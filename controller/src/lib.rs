@@ -8,6 +8,7 @@
 //! | [`pace`] | what moves it: the rig's frames, or the barrier |
 //! | [`rig_view`] | cycle numbers, lost frames |
 //! | [`main_chain`] | from a rig at rest through the experiment to done |
+//! | [`chains`] | the sequence chains of one axis: main, force, matching, emergency stop |
 //! | [`set_point`] | profiles and motion laws |
 //! | [`axes`], [`linearisation`] | the axis controllers, the inverse valve characteristic |
 //! | [`algorithm`], [`algorithms`], [`parameters`] | what an algorithm is, those shipped, their parameters |
@@ -18,6 +19,7 @@
 pub mod algorithm;
 pub mod algorithms;
 pub mod axes;
+pub mod chains;
 pub mod cli;
 pub mod experiment;
 pub mod figures;
