@@ -221,7 +221,8 @@ fn an_own_stop_holds_though_the_rig_says_nothing_of_it() {
 
 #[test]
 fn a_release_is_not_taken_while_its_cause_lasts() {
-    let cases: [(Fault, fn(&mut StopInputs)); 2] = [
+    type Lasts = fn(&mut StopInputs);
+    let cases: [(Fault, Lasts); 2] = [
         (Fault::PartnerLost, |inputs| inputs.partner_fresh = false),
         (Fault::SensorLoss, |inputs| inputs.sensors_fresh = false),
     ];

@@ -1,11 +1,13 @@
 //! Tests of the main chain alone, and of two that talk to each other.
 
+mod edges;
+mod partner;
+
 use super::*;
 use crate::chains::duo::{Duo, One, short};
 use crate::chains::settled::ControlError;
 use crate::chains::{AfterStop, Console, Partner};
 use MainChainState as S;
-use proptest::prelude::*;
 use protocol::frames::ChainStatus;
 
 const RUNNING: [S; 6] =
@@ -30,17 +32,6 @@ fn both_in(state: S) -> Duo {
     duo.run(20);
     assert_eq!(duo.states(), [state; 2], "{:?}", duo.axes[0].seen);
     duo
-}
-
-/// Keeps both in a waiting state by taking what the first axis's condition needs.
-fn hold(duo: &mut Duo, index: usize, state: S) {
-    match state {
-        S::Preparing => duo.axes[index].prepared = false,
-        S::Settling | S::FinalSettling => {
-            duo.axes[index].error = ControlError::Position { error_m: 0.1 };
-        }
-        _ => {}
-    }
 }
 
 #[test]
@@ -332,205 +323,6 @@ fn a_fault_of_the_axis_ends_every_state_and_trips() {
 }
 
 #[test]
-fn a_partner_that_falls_silent_is_lost_after_a_hundred_cycles() {
-    for state in RUNNING {
-        let mut duo = both_in(state);
-        let silent_from = duo.cycle;
-        // Neither may go on in the meantime.
-        hold(&mut duo, 0, state);
-        duo.axes[1].alive = false;
-        while duo.axes[0].state() != S::Fault {
-            duo.step();
-            assert!(duo.cycle < silent_from + 1000, "{state}");
-        }
-        assert_eq!(duo.faults()[0], Some(Fault::PartnerLost), "{state}");
-        let cycles = duo.cycle - silent_from;
-        assert!((100..=104).contains(&cycles), "{state}: {cycles}");
-        duo.run(300);
-        assert_eq!(duo.axes[0].stop_state(), EmergencyStopChainState::WaitingForRelease);
-    }
-}
-
-#[test]
-fn a_lost_partner_cannot_be_released_before_it_is_heard() {
-    let mut duo = both_in(S::Experiment);
-    duo.axes[1].heard = false;
-    duo.run(500);
-    assert_eq!(duo.faults(), [Some(Fault::PartnerLost), None]);
-    duo.console.release = true;
-    duo.run(1000);
-    assert_eq!(duo.axes[0].stop.holds(), Some(Fault::PartnerLost));
-    duo.axes[1].heard = true;
-    duo.run(1000);
-    assert_eq!(duo.axes[0].stop.holds(), Some(Fault::PartnerLost), "the release came too early");
-    duo.console.release = true;
-    duo.run(400);
-    assert_eq!(duo.states(), [S::InitialPositioning; 2]);
-}
-
-#[test]
-fn status_frames_may_be_lost_for_a_while() {
-    let mut duo = Duo::new(&short());
-    for round in 0..60 {
-        duo.axes[round % 2].heard = false;
-        duo.run(90);
-        duo.axes[round % 2].heard = true;
-        duo.run(10);
-    }
-    assert_eq!((duo.states(), duo.faults()), ([S::Done; 2], [None; 2]));
-}
-
-#[test]
-fn a_partner_may_be_silent_when_done() {
-    let mut duo = both_in(S::Done);
-    duo.axes[1].alive = false;
-    duo.run(1000);
-    assert_eq!(duo.axes[0].state(), S::Done);
-}
-
-#[test]
-fn a_partner_that_is_never_heard_is_missing_after_ten_seconds() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1].alive = false;
-    duo.run(10_001);
-    assert_eq!(duo.axes[0].state(), S::WaitingForRig);
-    duo.step();
-    assert_eq!(duo.faults()[0], Some(Fault::PartnerMissing));
-}
-
-#[test]
-fn a_partner_without_sensors_is_not_ok() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1].sensors = false;
-    duo.run(10_002);
-    assert_eq!(duo.faults()[0], Some(Fault::PartnerNotOk));
-}
-
-#[test]
-fn a_partner_with_another_experiment_is_named_so() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1] = One::new(MainConfig { experiment: 8, ..short() });
-    duo.run(10_002);
-    assert_eq!(duo.faults()[0], Some(Fault::PartnerOtherExperiment));
-}
-
-#[test]
-fn a_partner_that_comes_late_is_waited_for() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1].alive = false;
-    duo.run(9000);
-    duo.axes[1].alive = true;
-    duo.run(5000);
-    assert_eq!(duo.states(), [S::Done; 2]);
-}
-
-#[test]
-fn a_partner_that_begins_anew_is_a_fault() {
-    for state in RUNNING {
-        let mut duo = both_in(state);
-        hold(&mut duo, 0, state);
-        duo.axes[1] = One::new(short());
-        duo.run(4);
-        if state == S::InitialPositioning {
-            assert_eq!(duo.states(), [state; 2], "it just began: the other joins");
-            continue;
-        }
-        assert_eq!(duo.faults()[0], Some(Fault::PartnerRestarted), "{state}");
-        duo.run(100);
-        assert_eq!(duo.states(), [S::Fault, S::Aborted], "{state}");
-    }
-}
-
-#[test]
-fn an_axis_that_does_not_settle_ends_in_a_fault_of_that_name() {
-    for (state, fault) in [
-        (S::Preparing, Fault::PreparationTimeout),
-        (S::Settling, Fault::SettlingTimeout),
-        (S::FinalSettling, Fault::SettlingTimeout),
-    ] {
-        let mut duo = Duo::new(&short());
-        duo.axes[1].prepared = true;
-        if state == S::FinalSettling {
-            duo.run_to(S::Experiment);
-        }
-        hold(&mut duo, 0, state);
-        duo.run_to(state);
-        let since = duo.cycle;
-        duo.run_to(S::Fault);
-        assert_eq!(duo.faults()[0], Some(fault));
-        // 2 s beyond the 0.3 s that settling takes.
-        let expected = if state == S::Preparing { 2000 } else { 2300 };
-        let cycles = duo.cycle - since;
-        assert!(cycles.abs_diff(expected) <= 2, "{state}: {cycles}");
-        duo.run(3);
-        assert_eq!(duo.states()[1], S::Aborted);
-    }
-}
-
-#[test]
-fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
-    // The partner's chain is held in each state by a length of its own that nobody knows of.
-    let endless = 1e4;
-    let slow = |state| match state {
-        S::InitialPositioning => MainConfig { start_m: Some(0.1 + 0.1 * endless), ..short() },
-        S::InitialForce => MainConfig { own: Lengths { initial_force_s: endless, ..short().own }, ..short() },
-        S::Experiment => MainConfig { own: Lengths { experiment_s: endless, ..short().own }, ..short() },
-        S::Preparing => {
-            MainConfig { prepares: true, own: Lengths { prepare_s: endless, ..short().own }, ..short() }
-        }
-        _ => MainConfig { settling_timeout_s: endless, ..short() },
-    };
-    for state in RUNNING {
-        let mut duo = Duo::new(&short());
-        duo.axes[1] = One::new(slow(state));
-        duo.axes[1].prepared = state != S::Preparing;
-        if state == S::FinalSettling {
-            duo.run_to(S::Experiment);
-        }
-        if matches!(state, S::Settling | S::FinalSettling) {
-            hold(&mut duo, 1, state);
-        }
-        duo.run_to(state);
-        let since = duo.cycle;
-        duo.run_to(S::Fault);
-        assert_eq!(duo.faults()[0], Some(Fault::PartnerNotOk), "{state}");
-        let own_s = match state {
-            S::InitialPositioning => short().approach_longest_s,
-            S::Preparing => 0.0,
-            S::InitialForce => 0.2,
-            S::Experiment => 1.0,
-            _ => 0.3,
-        };
-        let cycles = (duo.cycle - since) as f64 * 1e-3;
-        assert!((cycles - own_s - 2.1).abs() < 0.01, "{state}: {cycles} s");
-    }
-}
-
-#[test]
-fn a_slow_partner_is_waited_for_when_its_length_is_known() {
-    let long = Lengths { experiment_s: 6.0, ..short().own };
-    let mut duo = Duo::new(&MainConfig { either: long, ..short() });
-    duo.axes[1] = One::new(MainConfig { own: long, either: long, ..short() });
-    duo.run(9000);
-    assert_eq!(duo.states(), [S::Done; 2]);
-}
-
-#[test]
-fn two_axes_that_hunt_each_other_do_not_wait_for_ever() {
-    let mut duo = Duo::new(&short());
-    duo.run_to(S::Settling);
-    for round in 0..10 {
-        // Each is settled for a moment while the other is not.
-        for index in [0, 1] {
-            let error_m = if round % 2 == index { 0.1 } else { 0.0 };
-            duo.axes[index].error = ControlError::Position { error_m };
-        }
-        duo.run(550);
-    }
-    assert!(duo.states().contains(&S::Fault), "{:?}", duo.states());
-}
-
-#[test]
 fn a_restarted_rig_restarts_the_chain_from_every_state() {
     let ends: [fn(&mut Duo); 2] =
         [|duo| duo.console.abort = true, |duo| duo.axes[0].fault = Some(Fault::SensorLoss)];
@@ -570,87 +362,4 @@ fn a_cause_tells_people_why() {
         MainCause::Fault(Fault::PartnerLost).to_string(),
         "partner-lost: the other axis's controller fell silent for 100 ms: see whether it still runs"
     );
-}
-
-/// Where the diagram's edges lead, besides those from any state.
-fn follows(from: S) -> &'static [S] {
-    match from {
-        S::WaitingForRig => &[S::InitialPositioning],
-        S::InitialPositioning => &[S::Preparing],
-        S::Preparing => &[S::InitialForce],
-        S::InitialForce => &[S::Settling],
-        S::Settling => &[S::Experiment],
-        S::Experiment => &[S::FinalSettling],
-        S::FinalSettling => &[S::InitialPositioning, S::Done],
-        S::Done => &[],
-        S::Aborted | S::Fault => &[S::InitialPositioning],
-    }
-}
-
-prop_compose! {
-    fn any_inputs()(
-        cycles in prop_oneof![4 => 1_u64..30, 1 => 0_u64..3000],
-        own in prop_oneof![9 => Just(true), 1 => Just(false)],
-        position_m in prop_oneof![9 => Just(0.1), 1 => -1.0..1.0, 1 => Just(f64::NAN)],
-        prepared: bool,
-        partner in (0_u8..10, any::<bool>(), 0_u8..3, 0_u64..150, 0_u8..5),
-        stop in prop_oneof![9 => Just(0_u8), 1 => 0_u8..5],
-        console in 0_u8..60,
-        fault in 0_usize..400,
-    ) -> (u64, MainInputs) {
-        let (state, ok, repetition, age, stop_chain) = partner;
-        let status = ChainStatus {
-            main_chain: S::from_raw(state).unwrap(),
-            ok,
-            repetition,
-            emergency_stop_chain: EmergencyStopChainState::from_raw(stop_chain / 4).unwrap(),
-            ..ChainStatus::default()
-        };
-        (cycles, MainInputs {
-            cycle: 0,
-            own: own.then_some(OwnAxis { position_m, error: ControlError::None }),
-            prepared,
-            partner: Partner { status: Some(status), values: None, heard: Some(age) },
-            emergency_stop: EmergencyStopChainState::from_raw(stop).unwrap(),
-            console: Console { start: console < 10, abort: console == 10, release: false },
-            fault: Fault::ALL.get(fault).copied(),
-        })
-    }
-}
-
-proptest! {
-    #[test]
-    fn whatever_comes_only_the_diagrams_edges_are_gone(
-        row in prop::collection::vec(any_inputs(), 1..400),
-        follow in any::<bool>(),
-    ) {
-        let mut chain = MainChain::new(MainConfig { repetitions: Some(2), ..short() });
-        let (mut cycle, mut before) = (0, S::WaitingForRig);
-        for (cycles, mut inputs) in row {
-            cycle += cycles;
-            inputs.cycle = cycle;
-            inputs.partner.heard = inputs.partner.heard.map(|age| cycle.saturating_sub(age));
-            if follow {
-                // A partner that goes along gets further than chance does.
-                let status = ChainStatus { main_chain: before, ok: true, repetition: 0, ..ChainStatus::default() };
-                inputs.partner.status = Some(status);
-            }
-            let output = chain.advance(&inputs);
-            let shut = matches!(output.state, S::WaitingForRig | S::Aborted | S::Fault);
-            prop_assert_eq!(output.phase == Phase::Shut, shut);
-            prop_assert_eq!(output.fault.is_some(), output.state == S::Fault);
-            if matches!(output.state, S::Aborted | S::Fault) {
-                prop_assert!(!output.ok);
-            }
-            if inputs.emergency_stop != EmergencyStopChainState::Ready || inputs.console.abort || inputs.fault.is_some() {
-                prop_assert!(matches!(output.state, S::Aborted | S::Fault));
-            }
-            let allowed = output.state == before
-                || follows(before).contains(&output.state)
-                || (output.state == S::Aborted && before != S::Fault)
-                || output.state == S::Fault;
-            prop_assert!(allowed, "{before} -> {}", output.state);
-            before = output.state;
-        }
-    }
 }

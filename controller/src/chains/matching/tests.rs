@@ -109,7 +109,8 @@ fn nothing_is_averaged_before_rest_and_linkage() {
 
 #[test]
 fn what_moves_while_averaging_breaks_it_off() {
-    let cases: [(fn(&mut Play), MatchingCause, u64); 5] = [
+    type Spoil = fn(&mut Play);
+    let cases: [(Spoil, MatchingCause, u64); 5] = [
         (|play| play.inputs.linked = false, MatchingCause::NotLinked, 1),
         (|play| play.inputs.position_m += 0.31e-3, MatchingCause::Moved, 1),
         (|play| play.drive_m += 0.31e-3, MatchingCause::Moved, 20),
