@@ -220,7 +220,6 @@ impl MainChain {
     }
 
     fn enter_waiting_for_rig(&mut self, cause: MainCause, now: u64) {
-        self.settled.clear();
         self.repetition = 0;
         self.started = false;
         self.set(State::WaitingForRig { since: None }, cause, now);

@@ -211,3 +211,71 @@ fn two_axes_that_hunt_each_other_do_not_wait_for_ever() {
     }
     assert!(duo.states().contains(&S::Fault), "{:?}", duo.states());
 }
+
+/// An aborted pair on the way back, whose second axis is held up for `cycles` by its sensors.
+fn recovering_apart(cycles: u64) -> Duo {
+    let mut duo = both_in(S::Experiment);
+    duo.stop_and_release();
+    duo.axes[1].sensors = false;
+    duo.run_to(S::InitialPositioning);
+    duo.run(cycles);
+    assert_eq!(duo.states()[1], S::Aborted);
+    duo.axes[1].sensors = true;
+    duo
+}
+
+#[test]
+fn a_partner_that_is_a_little_later_on_the_way_back_is_waited_for() {
+    let mut duo = recovering_apart(90);
+    duo.run(6000);
+    assert_eq!(duo.states(), [S::Done; 2]);
+}
+
+#[test]
+fn a_partner_that_stays_aborted_on_the_way_back_ends_it_until_a_person_starts() {
+    let mut duo = recovering_apart(110);
+    assert_eq!(duo.states(), [S::Aborted; 2]);
+    assert_eq!(duo.axes[0].main.entered().cause, MainCause::PartnerAborted);
+    // The second still goes by itself, is left alone, and gives up too.
+    duo.run(1000);
+    assert_eq!(duo.states(), [S::Aborted; 2]);
+    duo.console.start = true;
+    duo.run(6000);
+    assert_eq!(duo.states(), [S::Done; 2]);
+}
+
+#[test]
+fn both_go_on_with_the_later_repetition() {
+    let mut duo = Duo::new(&MainConfig { repetitions: Some(9), ..short() });
+    duo.run_to(S::Experiment);
+    duo.stop_and_release();
+    for (index, repetition) in [(0, 6), (1, 7)] {
+        duo.axes[index].main.repetition = repetition;
+    }
+    duo.run(300);
+    assert_eq!(duo.states(), [S::InitialPositioning; 2]);
+    assert_eq!([0, 1].map(|index| duo.axes[index].output.unwrap().repetition), [7; 2]);
+}
+
+#[test]
+fn nobody_goes_back_before_the_partners_emergency_stop_chain_is_ready() {
+    use EmergencyStopChainState as Stop;
+    for (emergency_stop_chain, state) in [
+        (Stop::Recovering, S::Aborted),
+        (Stop::WaitingForStart, S::Aborted),
+        (Stop::Ready, S::InitialPositioning),
+    ] {
+        let mut duo = both_in(S::Experiment);
+        duo.console_holds = true;
+        duo.step();
+        let cycle = duo.cycle;
+        let status = ChainStatus { main_chain: S::Aborted, emergency_stop_chain, ..ChainStatus::default() };
+        let output = duo.axes[0].main.advance(&MainInputs {
+            cycle,
+            own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
+            partner: Partner { status: Some(status), values: None, heard: Some(cycle) },
+            ..MainInputs::default()
+        });
+        assert_eq!(output.state, state, "{emergency_stop_chain}");
+    }
+}
