@@ -258,24 +258,47 @@ fn both_go_on_with_the_later_repetition() {
 }
 
 #[test]
-fn nobody_goes_back_before_the_partners_emergency_stop_chain_is_ready() {
+fn nobody_goes_back_before_the_partner_has_ended_and_its_emergency_stop_chain_is_ready() {
     use EmergencyStopChainState as Stop;
-    for (emergency_stop_chain, state) in [
-        (Stop::Recovering, S::Aborted),
-        (Stop::WaitingForStart, S::Aborted),
-        (Stop::Ready, S::InitialPositioning),
+    for (main_chain, emergency_stop_chain, state) in [
+        (S::Aborted, Stop::Recovering, S::Aborted),
+        (S::Aborted, Stop::WaitingForStart, S::Aborted),
+        (S::Experiment, Stop::Ready, S::Aborted),
+        (S::Aborted, Stop::Ready, S::InitialPositioning),
+        (S::Fault, Stop::Ready, S::InitialPositioning),
     ] {
         let mut duo = both_in(S::Experiment);
         duo.console_holds = true;
         duo.step();
         let cycle = duo.cycle;
-        let status = ChainStatus { main_chain: S::Aborted, emergency_stop_chain, ..ChainStatus::default() };
+        let status = ChainStatus { main_chain, emergency_stop_chain, ..ChainStatus::default() };
         let output = duo.axes[0].main.advance(&MainInputs {
             cycle,
             own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
             partner: Partner { status: Some(status), values: None, heard: Some(cycle) },
             ..MainInputs::default()
         });
-        assert_eq!(output.state, state, "{emergency_stop_chain}");
+        assert_eq!(output.state, state, "{main_chain} {emergency_stop_chain}");
+    }
+}
+
+#[test]
+fn a_partner_that_had_ended_before_ends_the_waiting_for_the_rig_too() {
+    for (main_chain, cause) in [(S::Aborted, MainCause::PartnerAborted), (S::Fault, MainCause::PartnerFault)]
+    {
+        let mut chain = MainChain::new(short());
+        for cycle in 0..102 {
+            let status = ChainStatus { main_chain, ..ChainStatus::default() };
+            let output = chain.advance(&MainInputs {
+                cycle,
+                own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
+                partner: Partner { status: Some(status), values: None, heard: Some(cycle) },
+                ..MainInputs::default()
+            });
+            // A rig that began anew has both in waiting, and the last status may be of before.
+            let expected = if cycle > 100 { S::Aborted } else { S::WaitingForRig };
+            assert_eq!(output.state, expected, "cycle {cycle}");
+        }
+        assert_eq!(chain.entered().cause, cause);
     }
 }
