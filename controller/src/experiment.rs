@@ -209,3 +209,6 @@ impl Recording {
         Ok(Self { every_cycles })
     }
 }
+
+#[cfg(test)]
+mod tests;

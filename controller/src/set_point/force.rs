@@ -224,3 +224,6 @@ impl Row<Segment> {
         matches!(self.segment(index), Some(Segment::Load { .. }))
     }
 }
+
+#[cfg(test)]
+mod tests;
