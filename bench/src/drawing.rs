@@ -29,7 +29,7 @@ const RIGHT: u32 = 24;
 /// Heights, in pixels.
 const TITLE: u32 = 28;
 const LINE: u32 = 19;
-const STRIP: u32 = 42;
+const STRIP: u32 = 58;
 const PANEL_HEAD: u32 = 24;
 const PANEL_BODY: u32 = 172;
 const TIME_LABEL: u32 = 20;
@@ -152,7 +152,7 @@ impl Picture {
     /// States by name: in their band where they fit, else below it where there is room.
     fn draw_strip(&self, area: &Area<'_>, bands: &[&Band]) -> Result<(), Failure> {
         const FONT: f64 = 13.0;
-        let mut free_below = 0.0;
+        let mut free_below = [0.0; 2];
         for (place, band) in bands.iter().enumerate() {
             let (from, to) = (self.column(band.span.from_s), self.column(band.span.to_s));
             let (left, right) = (LEFT as f64 + from, LEFT as f64 + to);
@@ -167,11 +167,12 @@ impl Picture {
             if width + 4.0 < right - left {
                 let style = style.pos(Pos::new(HPos::Center, VPos::Center));
                 area.draw_text(&band.label, &style, ((0.5 * (left + right)) as i32, 11))?;
-            } else if left >= free_below {
+            } else if let Some(row) = free_below.iter().position(|free| left >= *free) {
                 let start = left.min(WIDTH as f64 - width - 4.0);
-                area.draw(&PathElement::new([(left as i32, 20), (left as i32, 25)], BLACK.mix(0.5)))?;
-                area.draw_text(&band.label, &style, (start as i32, 26))?;
-                free_below = start + width + 8.0;
+                let y = 24 + 16 * row as i32;
+                area.draw(&PathElement::new([(left as i32, 20), (left as i32, y + 12)], BLACK.mix(0.5)))?;
+                area.draw_text(&band.label, &style, (start as i32 + 3, y))?;
+                free_below[row] = start + width + 10.0;
             }
         }
         Ok(())
@@ -196,6 +197,8 @@ impl Picture {
             .configure_mesh()
             .x_labels(14)
             .y_labels(6)
+            .x_label_formatter(&|time| tick(*time, self.range.length_s()))
+            .y_label_formatter(&|value| tick(*value, high - low))
             .label_style(("sans-serif", 13))
             .max_light_lines(0)
             .bold_line_style(BLACK.mix(0.15))
@@ -210,6 +213,18 @@ impl Picture {
             }
         }
         Ok(())
+    }
+}
+
+/// A number on an axis of this length: with the digits that tell its neighbours apart.
+fn tick(value: f64, length_value: f64) -> String {
+    let digits = (1.0 - length_value.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let text = format!("{value:.digits$}");
+    // Rounding may leave a zero its sign.
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
+        text.replace('-', "")
+    } else {
+        text
     }
 }
 
@@ -306,6 +321,19 @@ mod tests {
         assert!(thin.len() <= 2 * (COLUMNS as usize + 1));
         assert!(thin.contains(&(31.416, 7.0)));
         assert!(thin.is_sorted_by(|one, other| one.0 <= other.0));
+    }
+
+    #[test]
+    fn ticks_have_the_digits_that_tell_them_apart() {
+        for (value, length, expected) in [
+            (400.0, 330.0, "400"),
+            (-1e-17, 0.4, "0.00"),
+            (4.65, 0.6, "4.65"),
+            (5.0, 9.5, "5.0"),
+            (-20.0, 90.0, "-20"),
+        ] {
+            assert_eq!(tick(value, length), expected);
+        }
     }
 
     #[test]

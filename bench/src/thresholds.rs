@@ -125,7 +125,7 @@ fn refusal(key: &str, bound: &toml::Value, problem: &str) -> SummaryError {
 /// Whether a run may have a figure of this key.
 fn is_known(key: &str) -> bool {
     let at_top = |name: &&str| if name.ends_with('.') { key.starts_with(*name) } else { key == *name };
-    TOP.iter().any(|name| at_top(name)) || figures::definition(key).is_some()
+    TOP.iter().any(at_top) || figures::definition(key).is_some()
 }
 
 /// Whether a judged bound was kept.
