@@ -113,7 +113,8 @@ impl Picture {
             self.bands.iter().filter(|band| band.span.common(&self.range).is_some()).collect();
         let strip = if bands.is_empty() { 8 } else { STRIP };
         let head = TITLE + LINE * lines.len() as u32 + 4;
-        let body = panels.len().max(1) as u32 * (PANEL_HEAD + PANEL_BODY) + TIME_LABEL;
+        let height = |panel: &Panel| head_height(panel) + PANEL_BODY;
+        let body = panels.iter().map(height).sum::<u32>() + TIME_LABEL;
         let root = SVGBackend::with_string(text, (WIDTH, head + strip + body)).into_drawing_area();
         root.fill(&WHITE)?;
         let font = |size: f64| ("sans-serif", size).into_text_style(&root);
@@ -128,9 +129,11 @@ impl Picture {
         let (_, rest) = root.split_vertically(head);
         let (strip, rest) = rest.split_vertically(strip);
         self.draw_strip(&strip, &bands)?;
-        let (panel_area, foot) = rest.split_vertically(body - TIME_LABEL);
-        for (area, panel) in panel_area.split_evenly((panels.len().max(1), 1)).iter().zip(&panels) {
-            self.draw_panel(area, panel, &bands)?;
+        let mut foot = rest;
+        for panel in &panels {
+            let (area, below) = foot.split_vertically(height(panel));
+            self.draw_panel(&area, panel, &bands)?;
+            foot = below;
         }
         let centred = font(14.0).pos(Pos::new(HPos::Center, VPos::Top));
         foot.draw_text(&self.time_name, &centred, ((LEFT + (WIDTH - LEFT - RIGHT) / 2) as i32, 0))?;
@@ -179,7 +182,7 @@ impl Picture {
     }
 
     fn draw_panel(&self, area: &Area<'_>, panel: &Panel, bands: &[&Band]) -> Result<(), Failure> {
-        let (head, body) = area.split_vertically(PANEL_HEAD);
+        let (head, body) = area.split_vertically(head_height(panel));
         draw_legend(&head, panel)?;
         let (low, high) = value_range(panel);
         let mut chart = ChartBuilder::on(&body)
@@ -236,19 +239,42 @@ fn draw_line(chart: &mut Chart<'_, '_>, curve: &Curve, samples: Vec<(f64, f64)>)
     Ok(())
 }
 
+/// Height of the font of legends.
+const LEGEND_FONT: f64 = 14.0;
+
+/// Where each curve's entry of the legend stands, in pixels from the left and in rows: behind the title as far as there is room.
+fn legend_places(panel: &Panel) -> Vec<(i32, i32)> {
+    let width = |text: &str| text.chars().count() as f64 * LEGEND_FONT * LETTER;
+    let start = f64::from(LEFT) + width(&panel.title) + 28.0;
+    let (mut x, mut row) = (start, 0);
+    let place = |curve: &Curve| {
+        let length = 28.0 + width(&curve.name);
+        if x > start && x + length > f64::from(WIDTH - RIGHT) {
+            (x, row) = (start, row + 1);
+        }
+        let place = (x as i32, row);
+        x += length + 20.0;
+        place
+    };
+    panel.curves.iter().map(place).collect()
+}
+
+/// Height of a panel's title and legend.
+fn head_height(panel: &Panel) -> u32 {
+    let rows = legend_places(panel).last().map_or(0, |(_, row)| *row);
+    PANEL_HEAD + LINE * rows.unsigned_abs()
+}
+
 /// The panel's title on the left, its curves' names behind it.
 fn draw_legend(area: &Area<'_>, panel: &Panel) -> Result<(), Failure> {
-    const FONT: f64 = 14.0;
-    let style = ("sans-serif", FONT).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
-    let width = |text: &str| text.chars().count() as f64 * FONT * LETTER;
+    let style = ("sans-serif", LEGEND_FONT).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
     area.draw_text(&panel.title, &style, (LEFT as i32, 14))?;
-    let mut x = LEFT as f64 + width(&panel.title) + 28.0;
-    for curve in &panel.curves {
+    for (curve, (x, row)) in panel.curves.iter().zip(legend_places(panel)) {
+        let y = 14 + LINE as i32 * row;
         let line =
             ShapeStyle { color: curve.colour.to_rgba(), filled: false, stroke_width: curve.width.max(2) };
-        area.draw(&PathElement::new([(x as i32, 14), (x as i32 + 22, 14)], line))?;
-        area.draw_text(&curve.name, &style, (x as i32 + 28, 14))?;
-        x += 28.0 + width(&curve.name) + 20.0;
+        area.draw(&PathElement::new([(x, y), (x + 22, y)], line))?;
+        area.draw_text(&curve.name, &style, (x + 28, y))?;
     }
     Ok(())
 }
@@ -340,6 +366,20 @@ mod tests {
     fn a_pause_breaks_the_line() {
         let samples: Series = [(0.0, 1.0), (0.001, 1.0), (0.5, 2.0), (0.501, 2.0)].into_iter().collect();
         assert_eq!(pieces(&samples).len(), 2);
+    }
+
+    #[test]
+    fn a_long_legend_goes_on_in_the_next_row() {
+        let curve =
+            |name: &str| Curve { name: name.into(), colour: BLUE, width: 1, samples: Series::default() };
+        let panel = |count: usize| Panel {
+            title: "force".into(),
+            curves: vec![curve("20261120-074233-load-step"); count],
+        };
+        let rows = |count| legend_places(&panel(count)).iter().map(|(_, row)| *row).collect::<Vec<_>>();
+        assert_eq!((rows(4), rows(5)), (vec![0; 4], vec![0, 0, 0, 0, 1]));
+        let in_the_picture = |(x, _): &(i32, i32)| *x + 213 <= WIDTH as i32;
+        assert!(legend_places(&panel(9)).iter().all(in_the_picture));
     }
 
     #[test]
