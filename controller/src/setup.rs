@@ -5,9 +5,9 @@ use crate::axis::{AxisController, AxisParts, ForcePlan, Plan, PlannedChange, Pre
 use crate::chains::main::{Lengths, MainConfig, approach_s};
 use crate::chains::matching;
 use crate::chains::settled::Bounds;
-use crate::chains::{AfterStop, force, main};
+use crate::chains::{force, main};
 use crate::cli::FileArguments;
-use crate::experiment::{AfterEmergencyStop, AxisExperiment, During, Experiment, Prepare, SetPoints, Start};
+use crate::experiment::{AxisExperiment, During, Experiment, Prepare, SetPoints};
 use crate::program::file::Source;
 use crate::program::{Program, Task};
 use crate::run::RunError;
@@ -189,15 +189,8 @@ impl Inputs {
             settling_s: run.settling_s,
             settling_timeout_s: run.settling_timeout_s,
             partner_timeout_s: main::PARTNER_TIMEOUT_S,
-            start: match run.start {
-                Start::ByItself => main::Start::ByItself,
-                Start::OnStart => main::Start::OnStart,
-            },
-            after_emergency_stop: match run.after_emergency_stop {
-                AfterEmergencyStop::End => AfterStop::End,
-                AfterEmergencyStop::Restart => AfterStop::Restart,
-                AfterEmergencyStop::OnStart => AfterStop::OnStart,
-            },
+            start: run.start,
+            after_emergency_stop: run.after_emergency_stop,
             settled: Bounds::of(program.task(Task::Settled)),
         }
     }
