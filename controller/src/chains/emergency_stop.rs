@@ -1,11 +1,11 @@
 //! Emergency stop chain of one axis controller: from the trip to ready again, and the stop that this controller itself holds.
 //!
 //! ```text
-//!            rig tripped, a frame, own fault            at standstill,               not tripped any more,
-//!            (from any but tripped)                     100 cycles at least          nothing held here
+//!            rig tripped, a frame                       at standstill,               not tripped any more,
+//!            (own fault: from any)                      100 cycles at least          nothing held here
 //!   Ready ─────────────────────────────────► Tripped ───────────────────► Waiting- ──────────────────────► Recovering
 //!     ▲                                         ▲      or 1 s             ForRelease                           │
-//!     │                                         └─── tripped again ────────── ▲ ── (from any but tripped)      │
+//!     │                                         └─── rig tripped, a frame ◄─── Recovering, WaitingForStart     │
 //!     │      RunControl start                                                                                  │
 //!     ├────────────────────────── WaitingForStart ◄───────────────────── on-start ─────────────────────────────┤
 //!     │                                                      check valves open, supply up, for 0.2 s           │
