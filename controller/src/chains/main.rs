@@ -25,7 +25,7 @@
 //! | partner silent | initial positioning to final settling | 100 cycles after its last status |
 //! | partner began anew | initial positioning to final settling | in the cycle that tells |
 //! | own condition not met | preparing, settling, final settling | `settling_timeout_s` beyond the state's own length |
-//! | partner not OK, the own condition met | initial positioning to final settling | the same beyond the longer length, and 100 cycles |
+//! | partner not OK, own condition met | initial positioning to final settling | the same beyond the longer length, and 0.1 s |
 //! | partner never heard at the start | waiting for the rig | `partner_timeout_s` after the own sensors |
 //!
 //! From aborted and fault the chain goes on when the emergency stop chain has been through and is ready again, or, when there was
