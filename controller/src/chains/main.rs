@@ -25,13 +25,13 @@
 //! | partner silent | initial positioning to final settling | 100 cycles after its last status |
 //! | partner began anew | initial positioning to final settling | in the cycle that tells |
 //! | own condition not met | preparing, settling, final settling | `settling_timeout_s` beyond the state's own length |
-//! | partner not OK though the own condition is met | initial positioning to final settling | the same beyond the longer of both lengths, and 100 cycles |
+//! | partner not OK, own condition met | initial positioning to final settling | the same beyond the longer length, and 0.1 s |
 //! | partner never heard at the start | waiting for the rig | `partner_timeout_s` after the own sensors |
 //!
 //! From aborted and fault the chain goes on when the emergency stop chain has been through and is ready again, or, when there was
-//! no emergency stop, on `RunControl` start; both not with [`AfterStop::End`](super::AfterStop::End). It begins with the initial positioning
-//! from where the carriage is, so the set-point does not jump, and repeats the repetition that was cut off, or
-//! the partner's if that is a later one.
+//! no emergency stop, on `RunControl` start; both not with [`AfterStop::End`](super::AfterStop::End). It begins with the
+//! initial positioning from where the carriage is, so the set-point does not jump, and repeats the repetition that was cut
+//! off, or the partner's if that is a later one.
 //!
 //! Stillness has its own file: [`settled`](super::settled).
 
