@@ -5,7 +5,8 @@
 //! ```
 //!
 //! F_c: force_n. v_s: velocity_scale_m_per_s, around which the sign is smoothed: 76 % of the force at v_s, 96 % at 2 v_s,
-//! nothing at standstill, where the axis therefore creeps instead of sticking. F_base: base_force_n. v, a: actual values, rig coordinates.
+//! nothing at standstill, where the axis therefore creeps instead of sticking. F_base: base_force_n. v, a: actual values, rig
+//! coordinates.
 
 use super::{Kind, Load};
 use crate::parameters::Parameter;
