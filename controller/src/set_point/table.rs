@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Times begin at 0 and grow; positions begin where the row stands. Smooth is a piecewise cubic through the points whose rate at
-//! a point is the harmonic mean of the slopes on either side (0 at a turn and at both ends), so that it never leaves the span of two
-//! neighbouring points; position and rate are continuous, the acceleration jumps at the points.
+//! a point is the harmonic mean of the slopes on either side (0 at a turn and at both ends), so that it never leaves the span of
+//! two neighbouring points; position and rate are continuous, the acceleration jumps at the points.
 //!
 //! Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300 (the mean, here unweighted).
 
@@ -172,7 +172,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("way.csv"), csv).unwrap();
         let text = format!(
-            "title = \"t\"\n[drive]\nprogram = \"p\"\nstart_m = 0.1\n[[drive.set-point]]\nlaw = \"table\"\nfile = \"way.csv\"\n{keys}"
+            "title = 't'\n[drive]\nprogram = 'p'\nstart_m = 0.1\n[[drive.set-point]]\nlaw = 'table'\nfile = 'way.csv'\n{keys}"
         );
         let experiment = Experiment::from_toml(&text, &folder.path().join("e.toml"), 0.5);
         experiment.map(|experiment| experiment.drive.unwrap().set_points).map_err(|error| error.to_string())
@@ -256,7 +256,9 @@ mod tests {
 
     #[test]
     fn a_missing_table_is_named() {
-        let text = "title = \"t\"\n[drive]\nprogram = \"p\"\nstart_m = 0.1\n[[drive.set-point]]\nlaw = \"table\"\nfile = \"no.csv\"\n";
+        let axis =
+            "[drive]\nprogram = 'p'\nstart_m = 0.1\n[[drive.set-point]]\nlaw = 'table'\nfile = 'no.csv'\n";
+        let text = &format!("title = 't'\n{axis}");
         let message = Experiment::from_toml(text, Path::new("e.toml"), 0.5).unwrap_err().to_string();
         assert!(message.contains("e.toml:7") && message.contains("cannot read no.csv"), "{message}");
     }
