@@ -57,6 +57,7 @@ pub struct Rehearsal {
     records: Receiver<AxisRecord>,
     news: Receiver<News>,
     cycle: u64,
+    closing: bool,
     told: Option<News>,
 }
 
@@ -104,6 +105,7 @@ impl Rehearsal {
             records,
             news,
             cycle: 0,
+            closing: false,
             told: None,
         })
     }
@@ -116,6 +118,8 @@ impl Rehearsal {
         // Added to none, for the signs of zero that the emulator has.
         (HandForces::default() + hands).put_into(&mut self.inputs);
         let readings = self.sensors.sample(&self.plant, &self.inputs);
+        // The rig's last cycle is the one in which it hears that all are done; nobody answers it.
+        self.closing = self.station.done();
         self.publish(cycle, &readings);
         // What the controllers sent in the last cycle arrives before this one acts.
         let stops = std::mem::take(&mut self.wire.stops);
@@ -125,7 +129,9 @@ impl Rehearsal {
             outcome.into_iter().for_each(|outcome| tell(cycle, outcome));
         }
         self.wire.latch();
-        self.station.answer(&mut self.wire);
+        if !self.closing {
+            self.station.answer(&mut self.wire);
+        }
         for axis in Axis::ALL {
             let command = self.wire.latched[axis.index()].filter(|command| command.enable);
             let opening =
@@ -210,7 +216,7 @@ impl Rehearsal {
     /// Whether the controllers are done, or stopped for good.
     #[must_use]
     pub fn ended(&self) -> bool {
-        self.station.done() || self.station.stopped_for() > STOPPED_CYCLES
+        self.closing || self.station.stopped_for() > STOPPED_CYCLES
     }
 }
 
