@@ -3,7 +3,7 @@
 use crate::axes::DriveAxis;
 use crate::cli::{Pace, RunArguments};
 use crate::experiment::{DriveExperiment, ExperimentError, PositionGains};
-use crate::linearisation::Linearisation;
+use crate::linearisation::{Law, Linearisation};
 use crate::pace::{self, End, Paced};
 use crate::recording;
 use crate::rig_view::PerAxis;
@@ -121,7 +121,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (news_sender, news) = bounded(NEWS_QUEUE);
     let waits = arguments.pace == Pace::Lockstep;
     let outlets = Outlets { records: record_sender, news: news_sender, waits };
-    let drive = DriveAxis::new(experiment.clone(), Linearisation::new(&rig), arguments.repeat);
+    let drive = DriveAxis::new(experiment.clone(), Linearisation::new(&rig, Law::ChokedExhaust), arguments.repeat);
     let started = Instant::now();
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
