@@ -4,6 +4,9 @@ pub mod position_cascade;
 pub mod position_p;
 pub mod position_pid;
 
+#[cfg(test)]
+mod laws;
+
 use crate::algorithm::Kind;
 
 /// All of them.

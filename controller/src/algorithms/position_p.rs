@@ -26,7 +26,7 @@ const GAIN: usize = 0;
 const FEED_FORWARD: usize = 1;
 const REST_ZONE: usize = 2;
 static PARAMETERS: [Parameter; 3] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 25.0, "velocity for each error"),
+    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 20.0, "velocity for each error"),
     Parameter::new(
         ("velocity_feed_forward", ""),
         [0.0, 2.0],
@@ -36,7 +36,7 @@ static PARAMETERS: [Parameter; 3] = [
     Parameter::new(
         ("rest_zone_m", "m"),
         [0.0, 0.01],
-        0.0,
+        5e-4,
         "error within which a standing rod is left alone",
     ),
 ];
@@ -70,5 +70,9 @@ mod tests {
         let ready =
             Ready { set_position_m: 0.2, set_velocity_m_per_s: 0.1, position_m: 0.19, ..Ready::default() };
         assert_eq!(PositionP::default().step(&ready, &[40.0, 0.5, 0.0]), 40.0 * (0.2 - 0.19) + 0.05);
+    }
+    #[test]
+    fn what_every_algorithm_must_keep() {
+        crate::algorithms::laws::check(&KIND);
     }
 }
