@@ -12,6 +12,7 @@
 //! | [`set_point`] | profiles and motion laws |
 //! | [`axes`], [`linearisation`] | the axis controllers, the inverse valve characteristic |
 //! | [`algorithm`], [`algorithms`], [`parameters`] | what an algorithm is, those shipped, their parameters |
+//! | [`rest_zone`], [`tune`] | when a rod is left alone, figures and margins of a position program |
 //! | [`plugin`], [`guard`] | algorithms from shared libraries, the watch over every algorithm |
 //! | [`figures`] | dynamic and static error |
 //! | [`run`], [`recording`], [`experiment`], [`cli`] | around it |
@@ -38,3 +39,4 @@ pub mod rig_view;
 pub mod run;
 pub mod set_point;
 pub mod station;
+pub mod tune;
