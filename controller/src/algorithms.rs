@@ -1,11 +1,16 @@
 //! The algorithms that can be asked for by name. A new one is a file beside these and a line in [`SHIPPED`].
 
+pub mod position_cascade;
 pub mod position_p;
+pub mod position_pid;
+
+#[cfg(test)]
+mod laws;
 
 use crate::algorithm::Kind;
 
 /// All of them.
-pub const SHIPPED: &[Kind] = &[position_p::KIND];
+pub const SHIPPED: &[Kind] = &[position_p::KIND, position_cascade::KIND, position_pid::KIND];
 
 /// The algorithm called `name`.
 #[must_use]

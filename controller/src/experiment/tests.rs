@@ -49,7 +49,7 @@ fn a_good_file_is_read() {
     let expected = RunSection {
         repetitions: 3,
         start: Start::OnStart,
-        after_emergency_stop: crate::chains::AfterStop::Restart,
+        after_emergency_stop: AfterStop::Restart,
         ..RunSection::default()
     };
     assert_eq!(experiment.run, expected);

@@ -24,7 +24,7 @@ use super::{EVERY_CYCLES, GivingWay, Program, Slot, Variable};
 use crate::algorithm::{Algorithm, Quantity};
 use crate::chains::{force, matching, settled};
 use crate::guard::Guarded;
-use crate::linearisation::Linearisation;
+use crate::linearisation::{Law, Linearisation};
 use crate::parameters::Parameter;
 use crate::post_controller::{self, Output, PostController};
 use crate::pre_controller::{self, Geometry, PreController};
@@ -233,15 +233,16 @@ impl Reader<'_> {
 
     fn linearisation(&self, asked: Option<Spanned<toml::Value>>) -> Result<Linearisation, ProgramError> {
         let asked = self.take_text("post-controller.linearisation", asked)?;
-        match asked.as_ref().map(|asked| asked.as_ref().as_str()) {
-            None | Some("choked-exhaust") => Ok(Linearisation::new(self.rig)),
-            Some(other) => {
-                let place = asked.as_ref().map_or(0, |asked| asked.span().start);
+        let law = match &asked {
+            None => Law::ChokedExhaust,
+            Some(asked) => Law::by_name(asked.as_ref()).ok_or_else(|| {
+                let names = Law::ALL.map(Law::name).join(", ");
                 let problem =
-                    format!("post-controller.linearisation = \"{other}\"; there is \"choked-exhaust\"");
-                Err(self.error(place, &problem))
-            }
-        }
+                    format!("post-controller.linearisation = \"{}\"; there are {names}", asked.as_ref());
+                self.error(asked.span().start, &problem)
+            })?,
+        };
+        Ok(Linearisation::new(self.rig, law))
     }
 
     fn take_text(
