@@ -4,10 +4,9 @@
 
 use crate::algorithm::{Algorithm, Ready};
 use crate::algorithms::position_p::PositionP;
-use crate::experiment::DriveExperiment;
 use crate::figures::PositionFigures;
 use crate::linearisation::Linearisation;
-use crate::main_chain::MainChain;
+use crate::main_chain::{Course, MainChain};
 use crate::set_point::SetPoint;
 use protocol::frames::{
     ALIVE_RANGE, ChainStatus, ChainValues, ECHO_RANGE, MainChainState, Sensors, ValveCommand,
@@ -43,8 +42,12 @@ pub struct DriveAxis {
 impl DriveAxis {
     /// A controller that waits for its rig.
     #[must_use]
-    pub fn new(experiment: DriveExperiment, linearisation: Linearisation, forever: bool) -> Self {
-        let parameters = [experiment.position_p.gain_per_s, experiment.position_p.velocity_feed_forward];
+    pub fn new(
+        experiment: Course,
+        parameters: [f64; 2],
+        linearisation: Linearisation,
+        forever: bool,
+    ) -> Self {
         let chain = MainChain::new(experiment, forever);
         Self { chain, parameters, linearisation, figures: PositionFigures::default(), last: None, alive: 0 }
     }

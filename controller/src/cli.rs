@@ -20,6 +20,18 @@ pub struct Cli {
 pub enum Command {
     /// Run an experiment: position the drive axis, hold the load's valve shut.
     Run(Box<RunArguments>),
+    /// Try an algorithm from a shared library and print what it offers.
+    CheckLibrary(Library),
+    /// Try it in this very process, which it may end; `check-library` and program files start this.
+    #[command(hide = true)]
+    ProbeLibrary(Library),
+}
+
+/// An algorithm as a file.
+#[derive(Args, Debug)]
+pub struct Library {
+    /// Shared library, built against airbench_algorithm.h.
+    pub file: PathBuf,
 }
 
 /// How the controllers are paced.

@@ -1,209 +1,211 @@
-//! The part of an experiment file that concerns the controllers: motion, repetitions, algorithm.
+//! An experiment file: what both axes shall do, in which order, with which programs, and what is recorded.
 //!
 //! ```toml
-//! [drive]
-//! law = "bestehorn"
-//! start_m = 0.1
-//! moves = [{ to_m = 0.4, duration_s = 3.0, rest_s = 1.0 }]
+//! title = "load-step"
+//! about = "Positioning under a load step: Fig. 9 of the paper"
+//! number = 9                       # 1 to 255: its name on the bus
 //!
-//! [drive.position-p]
-//! gain_per_s = 40.0
-//! velocity_feed_forward = 1.0
+//! [run]                            # both axes; the values here are the defaults
+//! repetitions = 1
+//! settling_s = 0.5
+//! settling_timeout_s = 10.0
+//! start = "by-itself"              # or "on-start"
+//! after_emergency_stop = "end"     # or "restart", "on-start"
+//!
+//! [drive]                          # see the module axis, and for the laws the module set_point::law
+//! program = "position-p"
+//! start_m = 0.1
+//! [[drive.set-point]]
+//! law = "bestehorn"
+//! to_m = 0.4
+//! duration_s = 3.0
+//!
+//! [load]                           # absent: its valve is held shut
+//! program = "force-p"
+//! initial_force_n = 100.0
+//! [[load.set-point]]
+//! law = "step"
+//! to_n = 300.0
+//! duration_s = 3.0
+//!
+//! [recording]
+//! every_cycles = 1
 //! ```
 //!
 //! `[rig]` is the emulator's and `[passed]` the report's; they may hold what they like.
 
-use crate::set_point::{MotionLaw, Move, Profile};
-use serde::{Deserialize, Serialize};
-use toml::Spanned;
+pub mod axis;
+pub mod section;
 
-/// `[drive]` of an experiment file, checked.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DriveExperiment {
-    /// What the experiment is called.
+pub use axis::{AxisExperiment, Change, During, Prepare, ProgramReference, SetPoints};
+pub use section::ExperimentError;
+
+use crate::parameters::Parameter;
+use section::{Section, Source};
+use std::path::Path;
+
+/// An experiment, checked.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    /// What it is called.
     pub title: String,
-    /// The drive's motion.
-    pub profile: Profile,
-    /// How often it is driven through.
+    /// A sentence about it; may be empty.
+    pub about: String,
+    /// Its name on the bus, 1 to 255.
+    pub number: u8,
+    /// What both axes keep to.
+    pub run: RunSection,
+    /// What the drive does; `None`: its valve is held shut.
+    pub drive: Option<AxisExperiment>,
+    /// What the load axis does; `None`: its valve is held shut.
+    pub load: Option<AxisExperiment>,
+    /// What is recorded.
+    pub recording: Recording,
+    /// `[rig]`, unread.
+    pub rig: toml::Table,
+    /// `[passed]`, unread.
+    pub passed: toml::Table,
+}
+
+/// `[run]`: what both axes keep to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunSection {
+    /// How often it is driven through, each from initial positioning on.
     pub repetitions: u32,
-    /// How long the axis must stand still before and after, s.
+    /// How long an axis must stand still before and after, s.
     pub settling_s: f64,
-    /// The algorithm's parameters.
-    pub position_p: PositionGains,
+    /// How long a waiting state of the chains may take before it is given up, s.
+    pub settling_timeout_s: f64,
+    /// What starts the experiment once both axes have settled.
+    pub start: Start,
+    /// What follows an emergency stop.
+    pub after_emergency_stop: AfterEmergencyStop,
 }
 
-/// Gains of the position control.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PositionGains {
-    /// Velocity for each error, 1/s; 0 to 200.
-    pub gain_per_s: f64,
-    /// Share of the set-point's rate that is fed forward; 0 to 2.
-    pub velocity_feed_forward: f64,
+/// What starts the experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Nothing more than that both axes have settled.
+    ByItself,
+    /// The console's start.
+    OnStart,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    title: String,
-    drive: Drive,
-    #[serde(rename = "rig", default)]
-    _rig: toml::Table,
-    #[serde(rename = "passed", default)]
-    _passed: toml::Table,
+/// What follows an emergency stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AfterEmergencyStop {
+    /// The run ends.
+    End,
+    /// The experiment starts over once the rig has recovered.
+    Restart,
+    /// It starts over when the console says start.
+    OnStart,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Drive {
-    law: MotionLaw,
-    start_m: Spanned<f64>,
-    moves: Vec<Spanned<Move>>,
-    #[serde(default = "once")]
-    repetitions: Spanned<u32>,
-    #[serde(default = "half_a_second")]
-    settling_s: Spanned<f64>,
-    #[serde(rename = "position-p")]
-    position_p: Gains,
+/// `[recording]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Recording {
+    /// Cycles between two rows of an axis's file.
+    pub every_cycles: u32,
 }
 
-/// [`PositionGains`] with the place of each value.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Gains {
-    gain_per_s: Spanned<f64>,
-    velocity_feed_forward: Spanned<f64>,
-}
+static NUMBER: Parameter = Parameter::new(("number", ""), [1.0, 255.0], 1.0, "name on the bus");
+static REPETITIONS: Parameter =
+    Parameter::new(("repetitions", "times"), [1.0, 1e6], 1.0, "how often it is driven through");
+static SETTLING: Parameter =
+    Parameter::new(("settling_s", "s"), [0.0, 60.0], 0.5, "how long it stands still before and after");
+static SETTLING_TIMEOUT: Parameter = Parameter::new(
+    ("settling_timeout_s", "s"),
+    [0.1, 3600.0],
+    10.0,
+    "how long a waiting state may take before it is given up",
+);
+static EVERY: Parameter =
+    Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "cycles between two rows");
 
-fn once() -> Spanned<u32> {
-    Spanned::new(0..0, 1)
-}
-
-fn half_a_second() -> Spanned<f64> {
-    Spanned::new(0..0, 0.5)
-}
-
-/// An experiment that cannot be run: file, line, key, value and what is allowed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct ExperimentError(String);
-
-impl DriveExperiment {
-    /// The drive's part of the experiment in `text`, for a stroke of `stroke_m`. `file` is for messages.
+impl Experiment {
+    /// The experiment in `text`, for a stroke of `stroke_m`. `file` is for messages, and tables are read beside it.
     ///
     /// # Errors
-    /// [`ExperimentError`] for TOML that does not parse, unknown or missing keys, and values out of range.
-    pub fn from_toml(text: &str, file: &str, stroke_m: f64) -> Result<Self, ExperimentError> {
-        let parsed: File =
-            toml::from_str(text).map_err(|error| ExperimentError(format!("{file}: {error}")))?;
-        let drive = parsed.drive;
-        let check = Check { text, file };
-        check.range("drive.start_m", &drive.start_m, *drive.start_m.as_ref(), 0.0, stroke_m, "m")?;
-        if drive.moves.is_empty() {
-            return Err(ExperimentError(format!(
-                "{file}: drive.moves is empty; at least one move is needed"
-            )));
-        }
-        for part in &drive.moves {
-            let values = part.as_ref();
-            check.range("drive.moves.to_m", part, values.to_m, 0.0, stroke_m, "m")?;
-            check.range("drive.moves.duration_s", part, values.duration_s, 0.01, 3600.0, "s")?;
-            check.range("drive.moves.rest_s", part, values.rest_s, 0.0, 3600.0, "s")?;
-        }
-        let repetitions = &drive.repetitions;
-        check.range("drive.repetitions", repetitions, f64::from(*repetitions.as_ref()), 1.0, 1e6, "times")?;
-        check.range("drive.settling_s", &drive.settling_s, *drive.settling_s.as_ref(), 0.0, 60.0, "s")?;
-        let Gains { gain_per_s, velocity_feed_forward } = &drive.position_p;
-        let position_p = PositionGains {
-            gain_per_s: *gain_per_s.as_ref(),
-            velocity_feed_forward: *velocity_feed_forward.as_ref(),
+    /// [`ExperimentError`] for TOML that does not parse, unknown or missing keys, values out of range, and bad tables.
+    pub fn from_toml(text: &str, file: &Path, stroke_m: f64) -> Result<Self, ExperimentError> {
+        let source = Source::parse(text, file)?;
+        let mut root = source.root();
+        let title = root.needed_text("title", "what the experiment is called")?.text;
+        let about = root.text("about")?.map_or_else(String::new, |about| about.text);
+        // Within 1 to 255 by its range.
+        let number = root.whole_or_default(&NUMBER)? as u8;
+        let run = RunSection::read(root.section("run")?)?;
+        let mut axis = |key, usual| {
+            let section = root.section(key)?;
+            section.map(|section| AxisExperiment::read(section, usual, stroke_m)).transpose()
         };
-        let key = "drive.position-p.gain_per_s";
-        check.range(key, gain_per_s, position_p.gain_per_s, 0.0, 200.0, "1/s")?;
-        let key = "drive.position-p.velocity_feed_forward";
-        check.range(key, velocity_feed_forward, position_p.velocity_feed_forward, 0.0, 2.0, "(no unit)")?;
-        Ok(Self {
-            title: parsed.title,
-            profile: Profile::new(
-                drive.law,
-                drive.start_m.into_inner(),
-                drive.moves.into_iter().map(Spanned::into_inner).collect(),
-            ),
-            repetitions: drive.repetitions.into_inner(),
-            settling_s: drive.settling_s.into_inner(),
-            position_p,
-        })
-    }
-}
-
-struct Check<'a> {
-    text: &'a str,
-    file: &'a str,
-}
-
-impl Check<'_> {
-    fn range<T>(
-        &self,
-        key: &str,
-        place: &Spanned<T>,
-        value: f64,
-        least: f64,
-        most: f64,
-        unit: &str,
-    ) -> Result<(), ExperimentError> {
-        // NaN is in no range.
-        if (least..=most).contains(&value) {
-            return Ok(());
+        let drive = axis("drive", crate::algorithm::Quantity::Position)?;
+        let load = axis("load", crate::algorithm::Quantity::Force)?;
+        let recording = Recording::read(root.section("recording")?)?;
+        let [rig, passed] = [root.opaque("rig")?, root.opaque("passed")?];
+        root.finish()?;
+        if drive.is_none() && load.is_none() {
+            return Err(root.wrong("[drive] or [load] is needed: nothing moves without"));
         }
-        let line = 1 + self.text[..place.span().start.min(self.text.len())].matches('\n').count();
-        Err(ExperimentError(format!(
-            "{}:{line}: {key} = {value} {unit}; allowed is {least} to {most} {unit}",
-            self.file
-        )))
+        Ok(Self { title, about, number, run, drive, load, recording, rig, passed })
+    }
+
+    /// How long one repetition takes, s: the longer of both axes.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        let axes = [&self.drive, &self.load].into_iter().flatten();
+        axes.map(|axis| axis.set_points.duration_s()).fold(0.0, f64::max)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const GOOD: &str = r#"title = "t"
-[rig]
-carriage_position_m = 0.1
-[drive]
-law = "modified-sine"
-start_m = 0.1
-moves = [{ to_m = 0.4, duration_s = 3.0, rest_s = 1.0 }]
-[drive.position-p]
-gain_per_s = 40.0
-velocity_feed_forward = 1.0
-[passed]
-anything = 1
-"#;
-
-    #[test]
-    fn a_good_file_is_read_with_its_defaults() {
-        let experiment = DriveExperiment::from_toml(GOOD, "e.toml", 0.5).unwrap();
-        assert_eq!((experiment.repetitions, experiment.settling_s), (1, 0.5));
-        assert_eq!(experiment.profile.duration_s(), 4.0);
-        assert_eq!(experiment.position_p.gain_per_s, 40.0);
-    }
-
-    #[test]
-    fn a_bad_value_is_told_with_file_line_key_value_and_range() {
-        for (good, bad, hints) in [
-            ("start_m = 0.1", "start_m = 0.6", ["e.toml:6", "drive.start_m = 0.6 m", "0 to 0.5 m"]),
-            ("to_m = 0.4", "to_m = -1.0", ["e.toml:7", "to_m = -1 m", "0 to 0.5 m"]),
-            ("duration_s = 3.0", "duration_s = 0.0", ["e.toml:7", "duration_s = 0 s", "0.01 to 3600 s"]),
-            ("gain_per_s = 40.0", "gain_per_s = nan", ["gain_per_s = NaN 1/s", "0 to 200", "e.toml:9"]),
-            ("gain_per_s", "gain", ["e.toml", "line 9", "unknown field `gain`"]),
-            ("law = \"modified-sine\"", "law = \"jerk\"", ["e.toml", "jerk", "bestehorn"]),
-        ] {
-            assert!(GOOD.contains(good));
-            let message =
-                DriveExperiment::from_toml(&GOOD.replace(good, bad), "e.toml", 0.5).unwrap_err().to_string();
-            for hint in hints {
-                assert!(message.contains(hint), "'{hint}' is missing in: {message}");
-            }
+impl RunSection {
+    fn read(section: Option<Section<'_>>) -> Result<Self, ExperimentError> {
+        let Some(mut section) = section else { return Ok(Self::default()) };
+        let run = Self {
+            repetitions: section.whole_or_default(&REPETITIONS)?,
+            settling_s: section.number_or_default(&SETTLING)?,
+            settling_timeout_s: section.number_or_default(&SETTLING_TIMEOUT)?,
+            start: section
+                .choice("start", &[("by-itself", Start::ByItself), ("on-start", Start::OnStart)])?,
+            after_emergency_stop: section.choice(
+                "after_emergency_stop",
+                &[
+                    ("end", AfterEmergencyStop::End),
+                    ("restart", AfterEmergencyStop::Restart),
+                    ("on-start", AfterEmergencyStop::OnStart),
+                ],
+            )?,
+        };
+        if run.settling_timeout_s <= run.settling_s {
+            let Self { settling_s, settling_timeout_s, .. } = run;
+            let said = format!(
+                "settling_timeout_s = {settling_timeout_s} s; allowed is above settling_s, which is {settling_s} s"
+            );
+            return Err(section.wrong_at("settling_timeout_s", &said));
         }
+        section.finish()?;
+        Ok(run)
+    }
+}
+
+impl Default for RunSection {
+    fn default() -> Self {
+        Self {
+            repetitions: 1,
+            settling_s: SETTLING.default,
+            settling_timeout_s: SETTLING_TIMEOUT.default,
+            start: Start::ByItself,
+            after_emergency_stop: AfterEmergencyStop::End,
+        }
+    }
+}
+
+impl Recording {
+    fn read(section: Option<Section<'_>>) -> Result<Self, ExperimentError> {
+        let Some(mut section) = section else { return Ok(Self { every_cycles: 1 }) };
+        let every_cycles = section.whole_or_default(&EVERY)?;
+        section.finish()?;
+        Ok(Self { every_cycles })
     }
 }

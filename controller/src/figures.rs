@@ -67,8 +67,7 @@ mod tests {
     #[test]
     fn moving_and_resting_errors_are_kept_apart() {
         let mut figures = PositionFigures::default();
-        let moving =
-            SetPoint { position_m: 0.2, velocity_m_per_s: 0.1, acceleration_m_per_s2: 0.0, moving: true };
+        let moving = SetPoint { position_m: 0.2, velocity_m_per_s: 0.1, moving: true, ..SetPoint::default() };
         [0.19, 0.25, 0.2].iter().for_each(|position| figures.take(&moving, *position));
         // The rest starts 3 mm off and creeps: only its last 200 samples count.
         (0..500).for_each(|_| figures.take(&SetPoint::at_rest(0.2), 0.203));

@@ -13,8 +13,7 @@
 //! Time is the rig's: cycles of 1 ms by number, so that cycles that the rig skipped pass for the experiment too, and the
 //! chain runs on the virtual clock of its tests.
 
-use crate::experiment::DriveExperiment;
-use crate::set_point::{MotionLaw, Move, Profile, SetPoint};
+use crate::set_point::{Motion, SetPoint, SmoothWay};
 use protocol::frames::MainChainState;
 
 /// Speed of the initial positioning on average, m/s: gentle beside any experiment.
@@ -28,7 +27,7 @@ const CYCLE_S: f64 = 1e-3;
 #[derive(Clone, Debug, PartialEq)]
 enum State {
     WaitingForRig,
-    InitialPositioning { since: u64, way: Profile },
+    InitialPositioning { since: u64, way: SmoothWay, duration_s: f64 },
     Settling { since: u64 },
     Experiment { since: u64, repetition: u32 },
     FinalSettling { since: u64 },
@@ -36,10 +35,21 @@ enum State {
     Aborted,
 }
 
+/// What the chain drives through.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// The drive's motion.
+    pub motion: Motion,
+    /// How often it is driven through.
+    pub repetitions: u32,
+    /// How long the axis must stand still before and after, s.
+    pub settling_s: f64,
+}
+
 /// The chain.
 #[derive(Debug)]
 pub struct MainChain {
-    experiment: DriveExperiment,
+    experiment: Course,
     /// Repeat the experiment until the rig ends.
     forever: bool,
     state: State,
@@ -48,7 +58,7 @@ pub struct MainChain {
 impl MainChain {
     /// A chain that waits for the rig.
     #[must_use]
-    pub fn new(experiment: DriveExperiment, forever: bool) -> Self {
+    pub fn new(experiment: Course, forever: bool) -> Self {
         Self { experiment, forever, state: State::WaitingForRig }
     }
 
@@ -78,17 +88,17 @@ impl MainChain {
         let settled = |since| elapsed_s(since, cycle) >= self.experiment.settling_s;
         match &self.state {
             State::WaitingForRig => {
-                let way = initial_way(position_m, self.experiment.profile.start_m());
-                Some(State::InitialPositioning { since: cycle, way })
+                let (way, duration_s) = initial_way(position_m, self.experiment.motion.start_m());
+                Some(State::InitialPositioning { since: cycle, way, duration_s })
             }
-            State::InitialPositioning { since, way } => {
-                (elapsed_s(*since, cycle) >= way.duration_s()).then_some(State::Settling { since: cycle })
+            State::InitialPositioning { since, duration_s, .. } => {
+                (elapsed_s(*since, cycle) >= *duration_s).then_some(State::Settling { since: cycle })
             }
             State::Settling { since } => {
                 settled(*since).then_some(State::Experiment { since: cycle, repetition: 0 })
             }
             State::Experiment { since, repetition } => {
-                if elapsed_s(*since, cycle) < self.experiment.profile.duration_s() {
+                if elapsed_s(*since, cycle) < self.experiment.motion.duration_s() {
                     return None;
                 }
                 let repetition = repetition + 1;
@@ -105,10 +115,10 @@ impl MainChain {
     }
 
     fn set_point(&self, cycle: u64) -> Option<SetPoint> {
-        let profile = &self.experiment.profile;
+        let profile = &self.experiment.motion;
         match &self.state {
             State::WaitingForRig | State::Aborted => None,
-            State::InitialPositioning { since, way } => Some(way.at(elapsed_s(*since, cycle))),
+            State::InitialPositioning { since, way, .. } => Some(way.position(elapsed_s(*since, cycle))),
             State::Settling { .. } => Some(SetPoint::at_rest(profile.start_m())),
             State::Experiment { since, .. } => Some(profile.at(elapsed_s(*since, cycle))),
             State::FinalSettling { .. } | State::Done => Some(profile.at(profile.duration_s())),
@@ -145,25 +155,18 @@ fn elapsed_s(since: u64, cycle: u64) -> f64 {
 }
 
 /// A gentle way from where the carriage is to where the experiment starts.
-fn initial_way(from_m: f64, to_m: f64) -> Profile {
+fn initial_way(from_m: f64, to_m: f64) -> (SmoothWay, f64) {
     let duration_s = ((to_m - from_m).abs() / INITIAL_SPEED_M_PER_S).max(SHORTEST_INITIAL_S);
-    Profile::new(MotionLaw::Bestehorn, from_m, vec![Move { to_m, duration_s, rest_s: 0.0 }])
+    (SmoothWay::new(from_m, to_m, duration_s), duration_s)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::PositionGains;
 
     fn chain(repetitions: u32, forever: bool) -> MainChain {
-        let moves = vec![Move { to_m: 0.4, duration_s: 3.0, rest_s: 1.0 }];
-        let experiment = DriveExperiment {
-            title: "t".into(),
-            profile: Profile::new(MotionLaw::Bestehorn, 0.1, moves),
-            repetitions,
-            settling_s: 0.5,
-            position_p: PositionGains { gain_per_s: 40.0, velocity_feed_forward: 1.0 },
-        };
+        let motion = Motion::along(SmoothWay::new(0.1, 0.4, 3.0)).then_rest(1.0);
+        let experiment = Course { motion, repetitions, settling_s: 0.5 };
         MainChain::new(experiment, forever)
     }
 

@@ -1,10 +1,14 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
+use crate::algorithms::position_p;
 use crate::axes::DriveAxis;
 use crate::cli::{Pace, RunArguments};
-use crate::experiment::{DriveExperiment, ExperimentError, PositionGains};
+use crate::experiment::section::Source;
+use crate::experiment::{Experiment, ExperimentError, RunSection, SetPoints};
 use crate::linearisation::Linearisation;
+use crate::main_chain::Course;
 use crate::pace::{self, End, Paced};
+use crate::parameters::Parameter;
 use crate::recording;
 use crate::rig_view::PerAxis;
 use crate::station::{IgnoredFrames, News, Outlets, Station};
@@ -103,11 +107,9 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
             "{file}: cylinder.stroke_mm: {stroke_m} m; rig.dbc carries positions of at most {most_m} m"
         )));
     }
-    let experiment = DriveExperiment::from_toml(
-        &read(&arguments.experiment)?,
-        &arguments.experiment.display().to_string(),
-        rig.cylinder().stroke_m,
-    )?;
+    let text = read(&arguments.experiment)?;
+    let experiment = Experiment::from_toml(&text, &arguments.experiment, rig.cylinder().stroke_m)?;
+    let (course, gains) = provisional_course(&experiment, &arguments.experiment)?;
     std::fs::create_dir_all(&arguments.out)
         .map_err(|error| RunError::Output(format!("{}: {error}", arguments.out.display())))?;
     let table = LineFile::create(&arguments.out.join("controller.csv"))
@@ -121,7 +123,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (news_sender, news) = bounded(NEWS_QUEUE);
     let waits = arguments.pace == Pace::Lockstep;
     let outlets = Outlets { records: record_sender, news: news_sender, waits };
-    let drive = DriveAxis::new(experiment.clone(), Linearisation::new(&rig), arguments.repeat);
+    let drive = DriveAxis::new(course, gains.values(), Linearisation::new(&rig), arguments.repeat);
     let started = Instant::now();
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
@@ -130,8 +132,51 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         let work = scope.spawn(|| work(arguments, drive, outlets, bus.as_mut(), &interrupt));
         let finished = join(work);
         let (told, failure) = join(writer);
-        save(arguments, &experiment, started, finished?, told, failure.is_some())
+        save(arguments, (experiment.title, gains), started, finished?, told, failure.is_some())
     })
+}
+
+/// Gains of the position control.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct PositionGains {
+    gain_per_s: f64,
+    velocity_feed_forward: f64,
+}
+
+impl PositionGains {
+    fn values(self) -> [f64; 2] {
+        [self.gain_per_s, self.velocity_feed_forward]
+    }
+}
+
+static EVERY: Parameter =
+    Parameter::new(("every_cycles", "cycles"), [1.0, 1.0], 1.0, "cycles between two steps");
+
+/// Provisional, until axes take whole experiments and programs: the drive's motion, and two gains out of its program.
+fn provisional_course(experiment: &Experiment, file: &Path) -> Result<(Course, PositionGains), RunError> {
+    let drive = experiment.drive.as_ref();
+    let Some((drive, SetPoints::Positions(motion))) = drive.map(|drive| (drive, &drive.set_points)) else {
+        return Err(RunError::Input(format!(
+            "{}: [drive] with set-points of position is needed",
+            file.display()
+        )));
+    };
+    let path = drive.program_path(file);
+    let text = read(&path)?;
+    let source = Source::parse(&text, &path)?;
+    let mut algorithm = source
+        .root()
+        .section("algorithm")?
+        .ok_or_else(|| RunError::Input(format!("{}: [algorithm] is missing", path.display())))?;
+    algorithm.choice("name", &[(position_p::KIND.name, ())])?;
+    algorithm.whole_or_default(&EVERY)?;
+    let [gain, feed_forward] = position_p::KIND.parameters else { unreachable!("position-p has two gains") };
+    let gain_per_s = algorithm.number_or_default(gain)?;
+    let velocity_feed_forward = algorithm.number_or_default(feed_forward)?;
+    algorithm.finish()?;
+    let RunSection { repetitions, settling_s, .. } = experiment.run;
+    let course = Course { motion: motion.clone(), repetitions, settling_s };
+    Ok((course, PositionGains { gain_per_s, velocity_feed_forward }))
 }
 
 struct Finished {
@@ -191,7 +236,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
 
 fn save(
     arguments: &RunArguments,
-    experiment: &DriveExperiment,
+    (title, position_p): (String, PositionGains),
     started: Instant,
     finished: Finished,
     news: Vec<News>,
@@ -235,8 +280,8 @@ fn save(
         schema_version: SCHEMA_VERSION,
         command_line: std::env::args().collect(),
         version: env!("CARGO_PKG_VERSION"),
-        title: experiment.title.clone(),
-        position_p: experiment.position_p,
+        title,
+        position_p,
         started_unix_s: real.then_some(unix_s.as_secs_f64()),
         ended_well: exit == Exit::Good,
         ended_because,

@@ -41,7 +41,7 @@ pub struct RunArguments {
     /// Rig file with the plant's numbers.
     #[arg(long)]
     pub rig: PathBuf,
-    /// Experiment file, of which the rig's initial state is read.
+    /// Experiment file, of which `[rig]` is read: initial state, hands, and what people do when.
     #[arg(long)]
     pub experiment: Option<PathBuf>,
     /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
@@ -83,6 +83,9 @@ pub struct RunArguments {
     /// Ignore frames of the bench: hand force, link, weights.
     #[arg(long)]
     pub no_bench_frames: bool,
+    /// Take commands from standard input, one a line: emergency stop, linkage, weights, hands; 'help' lists them.
+    #[arg(long)]
+    pub console: bool,
     /// How long the bus may be gone before the run ends, in s.
     #[arg(long, default_value = "5", value_parser = seconds)]
     pub bus_grace: f64,

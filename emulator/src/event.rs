@@ -1,6 +1,7 @@
 //! What a run has to tell a person, each with its cycle.
 
 use plant::Axis;
+use plant::scene::{HandForces, Outcome};
 use serde::Serialize;
 use std::fmt;
 
@@ -34,14 +35,30 @@ pub enum EventKind {
     EmergencyStop,
     /// Somebody released it.
     EmergencyStopReleased,
+    /// The rig released its own stop, and somebody else holds it still.
+    EmergencyStopStillHeld,
     /// The rods were linked.
     Linked,
     /// The rods were parted.
     Unlinked,
     /// Linking was refused because the eye is not within the gap.
     LinkRefused,
+    /// No try at linking succeeded in the time that the experiment gives it.
+    LinkGivenUp,
+    /// Weights were put on the carriage or taken off.
+    Weights {
+        /// Weights in all, kg.
+        added_mass_kg: f64,
+    },
     /// Weights that the rig file does not allow were asked for.
     WeightsRefused,
+    /// The console's hand pushes otherwise than before.
+    ConsoleHand {
+        /// In +x on the carriage, N.
+        carriage_n: f64,
+        /// In +x on the load's eye, N.
+        load_eye_n: f64,
+    },
     /// A frame that `rig.dbc` does not allow was ignored; only the first of a kind is told.
     Malformed {
         /// Its identifier with the kernel's flags.
@@ -56,6 +73,28 @@ pub enum EventKind {
     BusLost,
     /// The bus came back.
     BusBack,
+}
+
+impl From<Outcome> for EventKind {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Stopped => Self::EmergencyStop,
+            Outcome::Released => Self::EmergencyStopReleased,
+            Outcome::StillHeld => Self::EmergencyStopStillHeld,
+            Outcome::Linked => Self::Linked,
+            Outcome::LinkRefused => Self::LinkRefused,
+            Outcome::LinkGivenUp => Self::LinkGivenUp,
+            Outcome::Unlinked => Self::Unlinked,
+            Outcome::Weights { added_mass_kg } => Self::Weights { added_mass_kg },
+            Outcome::WeightsRefused => Self::WeightsRefused,
+        }
+    }
+}
+
+impl From<HandForces> for EventKind {
+    fn from(HandForces { carriage_n, load_eye_n }: HandForces) -> Self {
+        Self::ConsoleHand { carriage_n, load_eye_n }
+    }
 }
 
 fn axis_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, S::Error> {
@@ -83,13 +122,26 @@ impl fmt::Display for Event {
             }
             EventKind::EmergencyStop => write!(f, "emergency stop"),
             EventKind::EmergencyStopReleased => write!(f, "emergency stop released"),
+            EventKind::EmergencyStopStillHeld => {
+                write!(f, "the rig released its emergency stop; another still holds it")
+            }
             EventKind::Linked => write!(f, "rods linked"),
             EventKind::Unlinked => write!(f, "rods parted"),
             EventKind::LinkRefused => {
                 write!(f, "link refused: the load eye is not within the gap of the carriage")
             }
+            EventKind::LinkGivenUp => {
+                write!(f, "link given up: the load eye never came within the gap of the carriage")
+            }
+            EventKind::Weights { added_mass_kg } => write!(f, "weights on the carriage: {added_mass_kg} kg"),
             EventKind::WeightsRefused => {
                 write!(f, "weights refused: more than mass.added_limit_kg of the rig file")
+            }
+            EventKind::ConsoleHand { carriage_n, load_eye_n } => {
+                write!(
+                    f,
+                    "the console's hand pushes the carriage with {carriage_n} N, the load eye with {load_eye_n} N"
+                )
             }
             EventKind::Malformed { raw_id } => write!(
                 f,

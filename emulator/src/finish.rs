@@ -118,6 +118,7 @@ fn verdict(end: &End) -> (Exit, String) {
     match end {
         End::ControllersDone => (Exit::Good, "the controllers are done".into()),
         End::TimeUp => (Exit::Good, "the time asked for is up".into()),
+        End::Quit => (Exit::Good, "ended at the console".into()),
         End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
         End::OutputFailed => (Exit::BadInput, "the output could not be written".into()),
         End::BusGone => (Exit::BusFailed, "the bus was gone for too long; see --bus-grace".into()),

@@ -1,9 +1,8 @@
 //! What a run reads before it starts: rig file and experiment file, checked, with messages a person can act on.
 
-use crate::experiment::RigSection;
 use crate::run::RunError;
 use crate::wire_limits;
-use plant::{Plant, RigParameters};
+use plant::{Plant, RigParameters, Scene};
 use std::path::Path;
 
 /// Everything that was read.
@@ -12,8 +11,8 @@ pub struct Inputs {
     pub rig_toml: String,
     /// The experiment file as it stands.
     pub experiment_toml: Option<String>,
-    /// Its `[rig]`.
-    pub section: RigSection,
+    /// Its `[rig]`: setup, hands, and what people do when.
+    pub scene: Scene,
     /// The rig's numbers.
     pub rig: RigParameters,
     /// The plant in its initial state.
@@ -34,20 +33,17 @@ impl Inputs {
             RunError::Input(format!("{}: {misfit}", place(rig, line)))
         })?;
         let experiment_toml = experiment.map(read).transpose()?;
-        let section = match (&experiment_toml, experiment) {
-            (Some(text), Some(path)) => {
-                RigSection::from_toml(text, &path.display().to_string()).map_err(RunError::Input)?
-            }
-            _ => RigSection::default(),
+        let scene = match (&experiment_toml, experiment) {
+            (Some(text), Some(path)) => Scene::from_toml(text, &path.display().to_string(), &parameters)
+                .map_err(|error| RunError::Input(error.to_string()))?,
+            _ => Scene::default(),
         };
-        let plant = Plant::new(&parameters, &section.setup()).map_err(|error| {
-            let message = error.to_string();
-            let key = message.split(' ').next().unwrap_or_default();
-            let line = experiment_toml.as_deref().and_then(|text| line_of_key(text, "rig", key));
+        // What the file says is checked; a default may not suit a rig of another size.
+        let plant = Plant::new(&parameters, &scene.setup()).map_err(|error| {
             let file = experiment.unwrap_or(Path::new("default setup"));
-            RunError::Input(format!("{}: [rig] {message}", place(file, line)))
+            RunError::Input(format!("{}: [rig] {error}", file.display()))
         })?;
-        Ok(Self { rig_toml, experiment_toml, section, rig: parameters, plant })
+        Ok(Self { rig_toml, experiment_toml, scene, rig: parameters, plant })
     }
 }
 

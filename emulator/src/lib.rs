@@ -11,12 +11,13 @@
 //! | [`telegrams`], [`wire_limits`] | the frames that the rig sends, and whether its numbers fit them |
 //! | [`recording`] | the queues out of the 1 ms path, and the files |
 //! | `finish` | histograms, summary, exit code |
-//! | [`run`], [`inputs`], [`experiment`], [`summary`], [`host_thread`], [`cli`] | around it |
+//! | [`console`] | what a person types |
+//! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
 
 pub mod cli;
 pub mod commands;
+pub mod console;
 pub mod event;
-pub mod experiment;
 mod finish;
 pub mod host_thread;
 pub mod inputs;

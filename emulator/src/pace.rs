@@ -51,6 +51,8 @@ pub enum End {
     ControllersDone,
     /// The time that was asked for has passed.
     TimeUp,
+    /// Somebody typed quit at the console.
+    Quit,
     /// Ctrl-C or SIGTERM.
     Interrupted,
     /// The writer could not write; it has said why.
@@ -136,6 +138,8 @@ impl Ride<'_> {
             Some(End::Interrupted)
         } else if shared.output_failed.load(Ordering::Relaxed) {
             Some(End::OutputFailed)
+        } else if station.quit_asked() {
+            Some(End::Quit)
         } else if limits.cycles.is_some_and(|limit| cycles >= limit) {
             Some(End::TimeUp)
         } else {

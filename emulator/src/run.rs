@@ -8,6 +8,7 @@
 //! ```
 
 use crate::cli::RunArguments;
+use crate::console;
 use crate::finish::finish;
 use crate::host_thread::HostThread;
 use crate::inputs::Inputs;
@@ -16,7 +17,7 @@ use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::station::{Station, StationFigures, StationParts};
 use crate::summary::{Machine, RunDescription};
-use plant::Sensors;
+use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock};
@@ -165,8 +166,11 @@ impl RigWork<'_> {
         let Self { arguments, inputs, started, simulated_ns, periodic } = self;
         let grants = acquire_realtime(arguments);
         describe(arguments, inputs, started, &grants)?;
+        let limits = console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg };
         let mut station = Station::new(StationParts {
             plant: inputs.plant.clone(),
+            people: People::new(&inputs.scene),
+            console: arguments.console.then(|| console::open(limits)),
             sensors: Sensors::new(&inputs.rig, arguments.seed),
             recorder,
             bench_frames: !arguments.no_bench_frames,
@@ -255,8 +259,8 @@ fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) ->
         folder: folder.into(),
         interface: interface.into(),
         epoch_offset_ns: started.epoch_offset_ns,
-        linked: inputs.section.linked,
-        added_mass_kg: inputs.section.added_mass_kg,
+        linked: inputs.scene.linked,
+        added_mass_kg: inputs.scene.added_mass_kg,
     })
     .map_err(|error| RunError::output(folder, &error))
 }
@@ -278,7 +282,7 @@ fn describe(
         seed: arguments.seed,
         rig_toml: inputs.rig_toml.clone(),
         experiment_toml: inputs.experiment_toml.clone(),
-        rig_setup: inputs.section.clone(),
+        rig_setup: inputs.scene.clone(),
         realtime_granted: grants.granted().to_vec(),
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
         machine: Machine::read(),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   t_k  missed cycles ──► publish(k) ─────────► take(frame)* ────────────► act(k) ──► t_k+1
-//!        computed, not     sample sensors,       what arrived before t_k    latch, record,
+//!        computed, not     people, sensors,      what arrived before t_k    latch, record,
 //!        sent              send frames           (in lockstep: before Go)   step the plant
 //! ```
 //!
@@ -11,12 +11,15 @@
 //! or blocks.
 
 use crate::commands::{Change, CommandCounters, CommandIntake};
+use crate::console::Command;
 use crate::event::{Event, EventKind};
 use crate::live_cycles::LiveCycles;
 use crate::recording::{FrameRecord, Recorder};
 use crate::telegrams::{self, CommandState, SLOW_PERIOD, STATUS_PHASE, SaturatedSensors};
+use crossbeam_channel::Receiver;
+use plant::scene::{Action, HandForces, Holder};
 use plant::tables::CycleRecord;
-use plant::{Axis, AxisReadings, Inputs, Plant, Sensors};
+use plant::{Axis, AxisReadings, Inputs, People, Plant, Sensors};
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use protocol::frames::{
@@ -28,12 +31,21 @@ use std::time::Duration;
 /// Longest wait for room in the recorder's queue, in ms; a writer that is slower than this has failed.
 const LONGEST_WAIT_MS: u32 = 2000;
 
+/// Places of the hands that push.
+const SCRIPT: usize = 0;
+const BUS: usize = 1;
+const CONSOLE: usize = 2;
+
 /// What a station is made of.
 pub struct StationParts {
     /// The plant in its initial state.
     pub plant: Plant,
     /// Its sensors.
     pub sensors: Sensors,
+    /// Who does what to it by hand.
+    pub people: People,
+    /// What is typed at the console, if it is open.
+    pub console: Option<Receiver<Command>>,
     /// Where cycles, frames and events go.
     pub recorder: Recorder,
     /// Whether frames of the bench (hand force, link, weights) are obeyed.
@@ -72,6 +84,11 @@ pub struct Station {
     plant: Plant,
     sensors: Sensors,
     inputs: Inputs,
+    people: People,
+    console: Option<Receiver<Command>>,
+    quit_asked: bool,
+    /// Hands of the script, of the bus and of the console; their sum acts.
+    hands: [HandForces; 3],
     commands: [CommandIntake; 2],
     live: LiveCycles,
     recorder: Recorder,
@@ -81,8 +98,6 @@ pub struct Station {
     skipped: u64,
     bus_was_up: bool,
     frames: FrameCounters,
-    /// Who holds the emergency stop: console, drive, load. It is released when nobody does.
-    stopped_by: [bool; 3],
     /// Sensors that saturated since the last status.
     saturated: [SaturatedSensors; 2],
     /// When the drive's sensors of a cycle were sent, by the cycle's low bits; 0 where not.
@@ -95,7 +110,7 @@ impl Station {
     /// Puts the rig on its bus, before cycle 0.
     #[must_use]
     pub fn new(parts: StationParts) -> Self {
-        let StationParts { plant, mut sensors, recorder, bench_frames, lockstep } = parts;
+        let StationParts { plant, mut sensors, people, console, recorder, bench_frames, lockstep } = parts;
         let inputs = Inputs::default();
         // Replaced by the first cycle's own sample; a scratch value has no meaning, and costs a draw of noise.
         let readings = sensors.sample(&plant, &inputs);
@@ -103,6 +118,10 @@ impl Station {
             plant,
             sensors,
             inputs,
+            people,
+            console,
+            quit_asked: false,
+            hands: [HandForces::default(); 3],
             commands: Default::default(),
             live: LiveCycles::new(),
             recorder,
@@ -112,7 +131,6 @@ impl Station {
             skipped: 0,
             bus_was_up: true,
             frames: FrameCounters::default(),
-            stopped_by: [false; 3],
             saturated: [SaturatedSensors::default(); 2],
             sent_ns: Box::new([0; ECHO_RANGE as usize]),
             round_trip: Histogram::new(),
@@ -130,6 +148,7 @@ impl Station {
         self.tell(first + count, EventKind::Skipped { cycles: count });
         for cycle in first..first + count {
             self.wait_for_writer();
+            self.begin(cycle);
             self.sample();
             self.advance(cycle);
         }
@@ -155,12 +174,18 @@ impl Station {
     /// Samples the sensors of `cycle` and sends what is due. `after_miss` sends the tick first, so that receivers know
     /// which cycle the sensors are of.
     pub fn publish(&mut self, cycle: u64, after_miss: bool, bus: &mut dyn Bus) {
+        self.take_typed(cycle);
+        self.begin(cycle);
         self.sample();
         let [drive, load] = &self.readings;
         let drive = Frame::DriveSensors(telegrams::sensors(drive, cycle));
         let load = Frame::LoadSensors(telegrams::sensors(load, cycle));
         if after_miss {
             self.send(&telegrams::tick(cycle, self.skipped, true, self.lockstep, false), bus);
+        }
+        // Ahead of the sensors, which wake the controllers.
+        if let Some(call) = self.people.rig_call(cycle) {
+            self.send(&telegrams::emergency_stop(call), bus);
         }
         let sent_ns = self.send(&drive, bus);
         self.sent_ns[(cycle % ECHO_RANGE) as usize] = sent_ns.unwrap_or(0);
@@ -200,20 +225,20 @@ impl Station {
             Ok(Frame::LoadValveCommand(command)) => {
                 self.commands[1].take(command, cycle, &self.live);
             }
-            Ok(Frame::ConsoleEmergencyStop(stop)) => self.obey_emergency_stop(0, stop, cycle),
-            Ok(Frame::DriveEmergencyStop(stop)) => self.obey_emergency_stop(1, stop, cycle),
-            Ok(Frame::LoadEmergencyStop(stop)) => self.obey_emergency_stop(2, stop, cycle),
+            Ok(Frame::ConsoleEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Console, stop, cycle),
+            Ok(Frame::DriveEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Drive, stop, cycle),
+            Ok(Frame::LoadEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Load, stop, cycle),
             Ok(Frame::DriveChainStatus(status)) => self.note_chain(0, status),
             Ok(Frame::LoadChainStatus(status)) => self.note_chain(1, status),
             Ok(Frame::HandForce(hand)) if self.bench_frames => {
-                self.inputs.hand_force_carriage_n = hand.carriage_n;
-                self.inputs.hand_force_load_n = hand.load_eye_n;
+                self.hands[BUS] = HandForces { carriage_n: hand.carriage_n, load_eye_n: hand.load_eye_n };
             }
-            Ok(Frame::Link(link)) if self.bench_frames => self.obey_link(link.request, cycle),
+            Ok(Frame::Link(link)) if self.bench_frames => match link.request {
+                LinkRequest::Link => self.act_by_hand(Action::Link { until_s: None }, cycle),
+                LinkRequest::Unlink => self.act_by_hand(Action::Unlink, cycle),
+            },
             Ok(Frame::Weights(weights)) if self.bench_frames => {
-                if self.plant.set_added_mass_kg(weights.added_mass_kg).is_err() {
-                    self.tell(cycle, EventKind::WeightsRefused);
-                }
+                self.act_by_hand(Action::Weights { added_mass_kg: weights.added_mass_kg }, cycle);
             }
             Ok(
                 Frame::DriveSensors(_)
@@ -257,6 +282,7 @@ impl Station {
     }
 
     fn advance(&mut self, cycle: u64) {
+        self.hold_hands();
         self.recorder.cycle(CycleRecord {
             cycle,
             valve: self.inputs.valve,
@@ -285,28 +311,41 @@ impl Station {
         self.chains_done[axis] = Some(status.main_chain == MainChainState::Done);
     }
 
-    fn obey_emergency_stop(&mut self, sender: usize, stop: EmergencyStop, cycle: u64) {
-        self.stopped_by[sender] = !stop.release;
-        let stopped = self.stopped_by.contains(&true);
-        if !stopped && self.plant.emergency_stop() {
-            self.plant.release_emergency_stop();
-            self.tell(cycle, EventKind::EmergencyStopReleased);
-        } else if stopped && !self.plant.emergency_stop() {
-            self.plant.trip_emergency_stop();
-            self.tell(cycle, EventKind::EmergencyStop);
+    fn obey_emergency_stop(&mut self, holder: Holder, stop: EmergencyStop, cycle: u64) {
+        if let Some(outcome) = self.people.emergency_stop(holder, stop.release, &mut self.plant) {
+            self.tell(cycle, outcome.into());
         }
     }
 
-    fn obey_link(&mut self, request: LinkRequest, cycle: u64) {
-        let kind = match request {
-            LinkRequest::Unlink => {
-                self.plant.unlink();
-                EventKind::Unlinked
+    /// Lets the script do what is due in `cycle`.
+    fn begin(&mut self, cycle: u64) {
+        let Self { people, plant, recorder, .. } = self;
+        let tell = |outcome| recorder.event(Event { cycle, kind: EventKind::from(outcome) });
+        self.hands[SCRIPT] = people.begin_cycle(cycle, plant, tell);
+        self.hold_hands();
+    }
+
+    fn hold_hands(&mut self) {
+        let [script, bus, console] = self.hands;
+        (script + bus + console).put_into(&mut self.inputs);
+    }
+
+    fn act_by_hand(&mut self, action: Action, cycle: u64) {
+        let Self { people, plant, recorder, .. } = self;
+        people.act(action, plant, |outcome| recorder.event(Event { cycle, kind: EventKind::from(outcome) }));
+    }
+
+    /// Takes one command of the console, if one waits: a flood of them is spread over cycles.
+    fn take_typed(&mut self, cycle: u64) {
+        let Some(Ok(command)) = self.console.as_ref().map(Receiver::try_recv) else { return };
+        match command {
+            Command::Act(action) => self.act_by_hand(action, cycle),
+            Command::Hand { on, force_n } => {
+                *self.hands[CONSOLE].on(on) = force_n;
+                self.tell(cycle, self.hands[CONSOLE].into());
             }
-            LinkRequest::Link if self.plant.link().is_ok() => EventKind::Linked,
-            LinkRequest::Link => EventKind::LinkRefused,
-        };
-        self.tell(cycle, kind);
+            Command::Quit => self.quit_asked = true,
+        }
     }
 
     fn tell(&mut self, cycle: u64, kind: EventKind) {
@@ -329,6 +368,12 @@ impl Station {
     #[must_use]
     pub fn frame_counters(&self) -> FrameCounters {
         self.frames
+    }
+
+    /// Whether somebody typed quit.
+    #[must_use]
+    pub fn quit_asked(&self) -> bool {
+        self.quit_asked
     }
 
     /// Whether any valve command was accepted.

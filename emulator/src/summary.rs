@@ -5,8 +5,8 @@
 
 use crate::commands::CommandCounters;
 use crate::event::Event;
-use crate::experiment::RigSection;
 use crate::station::FrameCounters;
+use plant::Scene;
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
 use realtime::Percentiles;
@@ -35,8 +35,8 @@ pub struct RunDescription {
     pub rig_toml: String,
     /// The experiment file as it was read; null without one.
     pub experiment_toml: Option<String>,
-    /// Initial state of the rig as used.
-    pub rig_setup: RigSection,
+    /// Initial state of the rig as used, and what people do to it when.
+    pub rig_setup: Scene,
     /// What the system granted for real time.
     pub realtime_granted: Vec<String>,
     /// What it refused, with the remedy.

@@ -2,9 +2,10 @@
 //!
 //! Tick and status are five cycles apart, so that no millisecond carries both.
 
+use plant::scene::RigCall;
 use plant::{AxisReadings, Plant};
 use protocol::can::CanFrame;
-use protocol::frames::{ALIVE_RANGE, Frame, RigStatus, Sensors, Tick};
+use protocol::frames::{ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors, Tick};
 
 /// Period of tick and status in cycles.
 pub const SLOW_PERIOD: u64 = 10;
@@ -28,6 +29,13 @@ pub fn sensors(readings: &AxisReadings, cycle: u64) -> Sensors {
 pub fn tick(cycle: u64, skipped: u64, catch_up: bool, lockstep: bool, ending: bool) -> Frame {
     // Both counters wrap as their fields in rig.dbc do.
     Frame::Tick(Tick { cycle: cycle as u32, skipped: skipped as u16, catch_up, lockstep, ending })
+}
+
+/// The rig's own emergency stop: somebody pressed its button, or released it.
+#[must_use]
+pub fn emergency_stop(call: RigCall) -> Frame {
+    let release = call == RigCall::Release;
+    Frame::RigEmergencyStop(EmergencyStop { reason: EmergencyStopReason::Operator, release })
 }
 
 /// What the rig's status needs besides plant and sensors.

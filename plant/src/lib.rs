@@ -18,6 +18,8 @@
 //! | `sensors.rs` | noise, rounding, saturation |
 //! | `tables.rs` | rows of the measurement file and of the true states |
 //!
+//! [`scene`] is what people do to it: setup, hands, emergency stop, linkage and weights, as an experiment file tells.
+//!
 //! ```
 //! use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
 //!
@@ -44,6 +46,7 @@ mod linkage;
 mod motion;
 pub mod parameters;
 mod plant;
+pub mod scene;
 mod sensors;
 mod setup;
 mod state;
@@ -54,6 +57,7 @@ mod valve;
 
 pub use parameters::{ParameterError, RigParameters};
 pub use plant::{LinkRefused, Plant};
+pub use scene::{People, Scene, SceneError};
 pub use sensors::{AxisReadings, Reading, Sensors};
 pub use setup::{Setup, SetupError};
 pub use state::{Axis, AxisState, Inputs, State};

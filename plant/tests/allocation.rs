@@ -5,7 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
+use plant::{Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
 
 thread_local! {
     /// Allocations of this thread; the test harness has threads of its own.
@@ -53,4 +53,26 @@ fn a_period_allocates_nothing() {
     }
     assert_eq!(ALLOCATIONS.with(Cell::get), counted);
     assert!(sum > 0.0);
+}
+
+#[test]
+fn people_allocate_nothing_in_a_cycle() {
+    let text = "[[rig.hand]]\non = \"carriage\"\nfrom_s = 0\nto_s = 2\nguide_to_m = 0.2\n\
+                [[rig.event]]\nat_s = 0.5\ndo = \"emergency-stop\"\n[[rig.event]]\nat_s = 1\ndo = \"release\"\n\
+                [[rig.event]]\nat_s = 1\ndo = \"link\"\nuntil_s = 1.5\n\
+                [[rig.event]]\nat_s = 1.2\ndo = \"weights\"\nadded_mass_kg = 5\n";
+    let rig = RigParameters::baseline();
+    let scene = Scene::from_toml(text, "e.toml", &rig).expect("good");
+    let mut plant = Plant::new(&rig, &scene.setup()).expect("good");
+    let mut people = People::new(&scene);
+    let counted = ALLOCATIONS.with(Cell::get);
+    let mut told = 0;
+    for cycle in 0..2000 {
+        let mut inputs = Inputs::default();
+        people.begin_cycle(cycle, &mut plant, |_| told += 1).put_into(&mut inputs);
+        told += usize::from(people.rig_call(cycle).is_some());
+        plant.step(&inputs);
+    }
+    assert_eq!(ALLOCATIONS.with(Cell::get), counted);
+    assert!(told > 5, "{told} things happened");
 }

@@ -1,9 +1,9 @@
 //! A program while it runs, and what is left of it: exit code and everything it said.
 
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -17,6 +17,7 @@ const POLL: Duration = Duration::from_millis(5);
 pub struct Running {
     name: String,
     child: Child,
+    input: Option<ChildStdin>,
     said: [Said; 2],
 }
 
@@ -48,11 +49,12 @@ impl Running {
     /// When the system does not start it.
     #[must_use]
     pub fn start(name: &str, command: &mut Command) -> Self {
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{name} does not start: {error}"));
         let stderr = Said::gather(child.stderr.take().expect("stderr is piped"));
         let stdout = Said::gather(child.stdout.take().expect("stdout is piped"));
-        Self { name: name.into(), child, said: [stderr, stdout] }
+        let input = child.stdin.take();
+        Self { name: name.into(), child, input, said: [stderr, stdout] }
     }
 
     /// Sends a signal to the program.
@@ -63,6 +65,20 @@ impl Running {
         if let Err(error) = kill_process(self.pid(), signal) {
             panic!("{} cannot be sent {signal:?}: {error}\n{}", self.name, self.stderr());
         }
+    }
+
+    /// Types a line at its standard input.
+    ///
+    /// # Panics
+    /// When nobody reads it.
+    pub fn type_line(&mut self, line: &str) {
+        let input = self.input.as_mut().expect("the input is open");
+        writeln!(input, "{line}").unwrap_or_else(|error| panic!("{} takes no '{line}': {error}", self.name));
+    }
+
+    /// Ends its standard input.
+    pub fn end_input(&mut self) {
+        self.input = None;
     }
 
     /// What it has written to standard error so far.

@@ -1,28 +1,112 @@
-//! Bestehorn sinoid: s(z) = z - sin(2 pi z) / (2 pi), with s'(z) = 1 - cos(2 pi z).
+//! Bestehorn sinoid: s(z) = z - sin(2 pi z) / (2 pi), with s'(z) = 1 - cos(2 pi z) and s''(z) = 2 pi sin(2 pi z).
 //!
 //! z: time over duration, 0 to 1. s: way over whole way, 0 to 1. Acceleration is a full sine, without a step at either end;
 //! the largest speed is twice the mean.
 //!
 //! Source: VDI 2143 part 1 (inclined sine line); [Neugebauer 2011] calls it Bestehorn sinoid.
 
+use super::law::{BOTH, Kind, Law, Moment, Shaped};
+use super::{ForceSetPoint, SetPoint};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-/// s(z) and s'(z) for z in 0 to 1.
-pub(super) fn at(z: f64) -> (f64, f64) {
-    (z - libm::sin(TAU * z) / TAU, 1.0 - libm::cos(TAU * z))
+/// In the list of laws.
+pub const KIND: Kind = Kind {
+    name: "bestehorn",
+    about: "Bestehorn sinoid to a place",
+    serves: BOTH,
+    read: |given| {
+        let to = given.place("to", "where it ends")?;
+        Ok(Arc::new(Shaped { from: given.from, to, duration_s: given.duration_s(0.01)?, shape: at }))
+    },
+};
+
+/// s(z), s'(z) and s''(z) for z in 0 to 1.
+pub(super) fn at(z: f64) -> [f64; 3] {
+    let (sine, cosine) = (libm::sin(TAU * z), libm::cos(TAU * z));
+    [z - sine / TAU, 1.0 - cosine, TAU * sine]
+}
+
+/// A way along the sinoid that fits a state of a chain: it is copied, and needs no memory of its own. In m or N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmoothWay {
+    from: f64,
+    to: f64,
+    duration_s: f64,
+}
+
+impl SmoothWay {
+    /// From one value to another in `duration_s`; no time at all is a jump.
+    #[must_use]
+    pub const fn new(from: f64, to: f64, duration_s: f64) -> Self {
+        Self { from, to, duration_s }
+    }
+
+    /// The position set-point `time_s` after its start.
+    #[must_use]
+    pub fn position(&self, time_s: f64) -> SetPoint {
+        self.at(time_s).into()
+    }
+
+    /// The force set-point `time_s` after its start.
+    #[must_use]
+    pub fn force(&self, time_s: f64) -> ForceSetPoint {
+        self.at(time_s).into()
+    }
+
+    /// Its start value.
+    #[must_use]
+    pub fn start(&self) -> f64 {
+        self.from
+    }
+}
+
+impl Law for SmoothWay {
+    fn at(&self, time_s: f64) -> Moment {
+        let Self { from, to, duration_s } = *self;
+        if time_s < 0.0 {
+            return Moment::at_rest(from);
+        }
+        if time_s >= duration_s {
+            return Moment::at_rest(to);
+        }
+        Shaped { from, to, duration_s, shape: at }.at(time_s)
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn end(&self) -> f64 {
+        self.to
+    }
+
+    fn reach(&self) -> [f64; 2] {
+        [self.from.min(self.to), self.from.max(self.to)]
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::at;
+    use super::*;
 
     #[test]
     fn it_starts_and_ends_at_rest_and_is_fastest_in_the_middle() {
-        assert_eq!(at(0.0), (0.0, 0.0));
-        let (half, fastest) = at(0.5);
+        assert_eq!(at(0.0), [0.0, 0.0, 0.0]);
+        let [half, fastest, _] = at(0.5);
         // One rounding of the sine near pi.
         assert!((half - 0.5).abs() < 1e-15 && (fastest - 2.0).abs() < 1e-15);
-        let (end, rest) = at(1.0);
-        assert!((end - 1.0).abs() < 1e-15 && rest.abs() < 1e-15);
+        let [end, rest, force] = at(1.0);
+        // The sine of the rounded 2 pi is 2.4e-16, times 2 pi.
+        assert!((end - 1.0).abs() < 1e-15 && rest.abs() < 1e-15 && force.abs() < 2e-15);
+    }
+
+    #[test]
+    fn a_smooth_way_rests_before_and_behind() {
+        let way = SmoothWay::new(0.1, 0.4, 3.0);
+        assert_eq!(way.position(-1.0), SetPoint::at_rest(0.1));
+        assert_eq!(way.position(3.0), SetPoint::at_rest(0.4));
+        assert_eq!(SmoothWay::new(0.0, 100.0, 0.0).force(0.0), ForceSetPoint::at_rest(100.0));
+        assert!(way.position(1.0).moving && way.position(1.0).velocity_m_per_s > 0.0);
     }
 }

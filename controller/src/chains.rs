@@ -1,0 +1,152 @@
+//! The sequence chains of one axis controller: state machines that say what is asked of the axis, and do nothing else.
+//!
+//! ```text
+//!   rig status, console, own trip ─► emergency_stop ─┐ state
+//!   sensors, console, partner ─────────────────────► main ─► Phase ─► axis ─┬─► force     (relieving, manual mode, names)
+//!                                     ▲                                     └─► matching  (offset of the load's sensor)
+//!                                     └───────────── prepared, fault ◄──────────┘
+//! ```
+//!
+//! Both axes run the same main chain and know each other through [`Partner`] alone: an OK flag, the states of the chains and
+//! a few values. What the partner sends in a cycle is seen in the next one.
+//!
+//! Every chain has the same form: `advance` notes what it is told, asks the pure `decide` for at most one edge, and goes it
+//! through the `enter_…` of the new state, the only writer of that state, which notes its cause. So every state lasts for at
+//! least one cycle and shows in the record. Nothing here allocates, sleeps, reads or prints.
+//!
+//! Time is the rig's: cycles of 1 ms by number. Cycles may be skipped, so all times are differences of numbers, never counts of
+//! calls.
+
+#[cfg(test)]
+mod duo;
+pub mod emergency_stop;
+pub mod fault;
+pub mod force;
+pub mod main;
+pub mod matching;
+pub mod settled;
+mod sync;
+
+pub use fault::Fault;
+
+use protocol::frames::{ChainStatus, ChainValues, RunControl, RunControlCommand};
+
+/// Seconds of one cycle.
+const CYCLE_S: f64 = 1e-3;
+
+/// Cycles after which a partner that is needed counts as lost: ten periods of its status.
+pub const PARTNER_LOST_CYCLES: u64 = 100;
+
+/// The partner as it was heard last.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Partner {
+    /// Its last status.
+    pub status: Option<ChainStatus>,
+    /// Its last values.
+    pub values: Option<ChainValues>,
+    /// Cycle in which its last status came.
+    pub heard: Option<u64>,
+}
+
+impl Partner {
+    /// The partner's status if it is not older than [`PARTNER_LOST_CYCLES`] at `cycle`.
+    ///
+    /// A status "from later" is of another rig's time and counts by its distance too.
+    #[must_use]
+    pub fn fresh(&self, cycle: u64) -> Option<&ChainStatus> {
+        let heard = self.heard.filter(|heard| cycle.abs_diff(*heard) <= PARTNER_LOST_CYCLES);
+        heard.and(self.status.as_ref())
+    }
+}
+
+/// What the console said since the last cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Console {
+    /// `RunControl` start of this experiment, or of any (number 0).
+    pub start: bool,
+    /// `RunControl` abort.
+    pub abort: bool,
+    /// `ConsoleEmergencyStop` with release.
+    pub release: bool,
+}
+
+impl Console {
+    /// Takes a `RunControl` frame; a start of another experiment than number `experiment` is not for this one.
+    pub fn take_run_control(&mut self, frame: &RunControl, experiment: u8) {
+        match frame.command {
+            RunControlCommand::Start if [0, experiment].contains(&frame.experiment) => self.start = true,
+            RunControlCommand::Abort => self.abort = true,
+            RunControlCommand::Start | RunControlCommand::None => {}
+        }
+    }
+}
+
+/// What follows when the rig has recovered from an emergency stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AfterStop {
+    /// Nothing: the run is over.
+    #[default]
+    End,
+    /// The aborted repetition begins anew by itself.
+    Restart,
+    /// It begins anew on `RunControl` start.
+    OnStart,
+}
+
+/// A state that was entered: when and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entered<State, Cause> {
+    /// The rig's cycle.
+    pub cycle: u64,
+    /// The state.
+    pub state: State,
+    /// Why.
+    pub cause: Cause,
+}
+
+/// Seconds from cycle `since` to `cycle`; 0 when it lies ahead.
+fn elapsed_s(since: u64, cycle: u64) -> f64 {
+    cycle.saturating_sub(since) as f64 * CYCLE_S
+}
+
+/// Whole cycles of a time; 0 for what is no time.
+fn cycles(seconds: f64) -> u64 {
+    (seconds / CYCLE_S).round() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_partner_is_fresh_for_a_hundred_cycles() {
+        let partner =
+            Partner { status: Some(ChainStatus::default()), heard: Some(1000), ..Partner::default() };
+        for (cycle, fresh) in [(1000, true), (1100, true), (1101, false), (900, true), (899, false)] {
+            assert_eq!(partner.fresh(cycle).is_some(), fresh, "cycle {cycle}");
+        }
+        assert!(Partner::default().fresh(0).is_none());
+    }
+
+    #[test]
+    fn a_start_is_taken_with_the_experiments_number_or_none() {
+        for (experiment, taken) in [(0, true), (9, true), (8, false)] {
+            let mut console = Console::default();
+            console.take_run_control(&RunControl { command: RunControlCommand::Start, experiment }, 9);
+            assert_eq!(console, Console { start: taken, ..Console::default() });
+        }
+    }
+
+    #[test]
+    fn an_abort_is_taken_whatever_its_number() {
+        let mut console = Console::default();
+        console.take_run_control(&RunControl { command: RunControlCommand::Abort, experiment: 8 }, 9);
+        assert_eq!(console, Console { abort: true, ..Console::default() });
+    }
+
+    #[test]
+    fn a_time_that_is_none_has_no_cycles() {
+        assert_eq!([0.0, 0.5, -1.0, f64::NAN].map(cycles), [0, 500, 0, 0]);
+    }
+}

@@ -1,0 +1,353 @@
+//! Emergency stop chain of one axis controller: from the trip to ready again, and the stop that this controller itself holds.
+//!
+//! ```text
+//!            rig tripped, a frame, own fault            at standstill,               not tripped any more,
+//!            (from any but tripped)                     100 cycles at least          nothing held here
+//!   Ready ─────────────────────────────────► Tripped ───────────────────► Waiting- ──────────────────────► Recovering
+//!     ▲                                         ▲      or 1 s             ForRelease                           │
+//!     │                                         └─── tripped again ────────── ▲ ── (from any but tripped)      │
+//!     │      RunControl start                                                                                  │
+//!     ├────────────────────────── WaitingForStart ◄───────────────────── on-start ─────────────────────────────┤
+//!     │                                                      check valves open, supply up, for 0.2 s           │
+//!     └────────────────────────────────────────────────────────── by itself, or the run ends ──────────────────┘
+//! ```
+//!
+//! The valve is shut in every state but ready, in the cycle that tells of the trip. A controller with a fault holds a stop of
+//! its own: it sends its EmergencyStop frame in that cycle and every 100 ms after, until a person has acknowledged it, and
+//! withdraws it with one frame.
+//!
+//! # The way back
+//! 1. Look at the rig: is anybody in it, does anything still move? Nothing moves by itself as long as the supply is discharged.
+//! 2. Read why: the controller's message, or `candump can0,108:7FC`. The first byte is the reason (1 operator,
+//!    2 controller-fault, 3 sensor-loss, 4 partner-lost, 5 rig-fault, 6 limit-exceeded, 7 shutdown), bit 0 of the second
+//!    the release.
+//! 3. Remove the cause. A controller does not take a release while its cause lasts (a partner that is silent, sensors that are).
+//! 4. Release at the console: `cansend can0 108#0001`. This withdraws the console's own stop too, and acknowledges those of both
+//!    controllers, which answer with `10A#…01` and `10B#…01`. Nothing came back? Go to 3, and send it again.
+//! 5. The supply recovers, and the check valves open below 0.3 s later: the rods may creep with what air is trapped.
+//! 6. With `after_emergency_stop = "restart"` the aborted repetition begins anew by itself 0.2 s after the supply is up, from where the
+//!    carriage is. With `"on-start"` it waits for `cansend can0 160#0109` (start, experiment 9; 0 names any). With `"end"`
+//!    the controllers have ended.
+//!
+//! To trip it from the console: `cansend can0 108#0100`. To end the run without an emergency stop: `cansend can0 160#0200`.
+
+use super::{AfterStop, Console, Entered, Fault, cycles, elapsed_s};
+use protocol::frames::{EmergencyStop, EmergencyStopChainState, EmergencyStopReason, RigStatus};
+use std::fmt;
+
+/// Cycles between two frames of a stop that is held.
+const REPEAT_CYCLES: u64 = 100;
+/// Shortest stay in tripped: the rig has told ten times by then whether it is tripped.
+const TRIPPED_SHORTEST_S: f64 = 0.1;
+/// Longest stay in tripped, whatever the axis still does.
+const TRIPPED_LONGEST_S: f64 = 1.0;
+/// Share of the nominal supply pressure that counts as recovered.
+const RECOVERED_SHARE: f64 = 0.9;
+/// How long the rig must have been recovered.
+const RECOVERED_S: f64 = 0.2;
+
+/// What the chain is told once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StopConfig {
+    /// What follows the recovery.
+    pub after_emergency_stop: AfterStop,
+    /// Nominal supply pressure, absolute, Pa.
+    pub supply_pressure_pa: f64,
+}
+
+/// What the chain is told each cycle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StopInputs {
+    /// The rig's cycle.
+    pub cycle: u64,
+    /// The rig's last status; `None` before the first, and best when it is older than 100 cycles too.
+    pub rig: Option<RigStatus>,
+    /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
+    pub frame: Option<EmergencyStopReason>,
+    /// What the console said since the last cycle.
+    pub console: Console,
+    /// The own axis stands still.
+    pub at_standstill: bool,
+    /// A status of the partner came lately, or none is needed.
+    pub partner_fresh: bool,
+    /// Own sensors came lately and are good.
+    pub sensors_fresh: bool,
+}
+
+/// Why a state was entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopCause {
+    /// The controller began.
+    Began,
+    /// The rig's time began anew.
+    RigRestarted,
+    /// The rig says that it is tripped.
+    Rig,
+    /// Somebody tripped it over the bus.
+    Frame(EmergencyStopReason),
+    /// This controller tripped it.
+    Own(Fault),
+    /// The axis stands still.
+    Standstill,
+    /// It did not stand still in time.
+    NoStandstill,
+    /// Everybody has released.
+    Released,
+    /// Supply and check valves are back.
+    Recovered,
+    /// The console said start.
+    Started,
+}
+
+impl fmt::Display for StopCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Began => "the controller began",
+            Self::RigRestarted => "the rig began anew",
+            Self::Rig => "the rig says that it is tripped",
+            Self::Frame(reason) => return write!(f, "tripped over the bus: {reason}"),
+            Self::Own(fault) => return write!(f, "{fault}"),
+            Self::Standstill => "the axis stands still",
+            Self::NoStandstill => "the axis did not stand still within 1 s",
+            Self::Released => "everybody has released",
+            Self::Recovered => "supply and check valves are back",
+            Self::Started => "the console said start",
+        })
+    }
+}
+
+/// A stop that this controller holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Own {
+    fault: Fault,
+    acknowledged: bool,
+}
+
+/// State of the chain; each holds what it needs and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Ready,
+    Tripped {
+        since: u64,
+        own: Option<Own>,
+    },
+    WaitingForRelease {
+        own: Option<Own>,
+    },
+    /// `up_since`: since when supply and check valves are back.
+    Recovering {
+        up_since: Option<u64>,
+    },
+    WaitingForStart,
+}
+
+/// An edge: where to, and why.
+type Edge = (EmergencyStopChainState, StopCause);
+
+/// What waits to be sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Frames {
+    None,
+    /// A stop, from this cycle on each 100.
+    Hold {
+        next: u64,
+        reason: EmergencyStopReason,
+    },
+    /// One withdrawal.
+    Release,
+}
+
+/// The chain.
+#[derive(Clone, Debug)]
+pub struct EmergencyStopChain {
+    config: StopConfig,
+    state: State,
+    frames: Frames,
+    entered: Entered<EmergencyStopChainState, StopCause>,
+}
+
+impl EmergencyStopChain {
+    /// A chain that is ready.
+    #[must_use]
+    pub fn new(config: StopConfig) -> Self {
+        let entered = Entered { cycle: 0, state: EmergencyStopChainState::Ready, cause: StopCause::Began };
+        Self { config, state: State::Ready, frames: Frames::None, entered }
+    }
+
+    /// Moves on by one edge at most. The valve is shut unless the result is ready.
+    pub fn advance(&mut self, inputs: &StopInputs) -> EmergencyStopChainState {
+        self.note(inputs);
+        if let Some((state, cause)) = self.decide(inputs) {
+            self.enter(state, cause, inputs.cycle);
+        }
+        self.state()
+    }
+
+    /// Trips the emergency stop for a fault of this controller; the first one is kept until it is released.
+    pub fn trip(&mut self, fault: Fault, cycle: u64) {
+        if self.holds().is_none() {
+            self.enter_tripped(StopCause::Own(fault), cycle);
+        }
+    }
+
+    /// The rig's time begins anew at `cycle`: so does the chain, and what it held is the old rig's.
+    pub fn restart(&mut self, cycle: u64) {
+        self.enter_ready(StopCause::RigRestarted, cycle);
+        self.frames = Frames::None;
+    }
+
+    /// The frame to send in this cycle, if any; to be asked after [`trip`](Self::trip).
+    pub fn frame_due(&mut self, cycle: u64) -> Option<EmergencyStop> {
+        match self.frames {
+            Frames::Hold { next, reason } if cycle >= next => {
+                self.frames = Frames::Hold { next: cycle + REPEAT_CYCLES, reason };
+                Some(EmergencyStop { reason, release: false })
+            }
+            // A release that came early waits until the axis stands still.
+            Frames::Release if !matches!(self.state, State::Tripped { .. }) => {
+                self.frames = Frames::None;
+                Some(EmergencyStop { reason: EmergencyStopReason::None, release: true })
+            }
+            _ => None,
+        }
+    }
+
+    /// The state.
+    #[must_use]
+    pub fn state(&self) -> EmergencyStopChainState {
+        match self.state {
+            State::Ready => EmergencyStopChainState::Ready,
+            State::Tripped { .. } => EmergencyStopChainState::Tripped,
+            State::WaitingForRelease { .. } => EmergencyStopChainState::WaitingForRelease,
+            State::Recovering { .. } => EmergencyStopChainState::Recovering,
+            State::WaitingForStart => EmergencyStopChainState::WaitingForStart,
+        }
+    }
+
+    /// The fault for which this controller holds the emergency stop.
+    #[must_use]
+    pub fn holds(&self) -> Option<Fault> {
+        self.own().filter(|own| !own.acknowledged).map(|own| own.fault)
+    }
+
+    /// The state entered last, when and why.
+    #[must_use]
+    pub fn entered(&self) -> Entered<EmergencyStopChainState, StopCause> {
+        self.entered
+    }
+
+    fn own(&self) -> Option<Own> {
+        match self.state {
+            State::Tripped { own, .. } | State::WaitingForRelease { own } => own,
+            _ => None,
+        }
+    }
+
+    /// Keeps what the inputs tell, without a change of state.
+    fn note(&mut self, inputs: &StopInputs) {
+        let up = self.is_up(inputs);
+        match &mut self.state {
+            State::Tripped { own: Some(own), .. } | State::WaitingForRelease { own: Some(own) } => {
+                let over = own.fault.is_over(inputs.partner_fresh, inputs.sensors_fresh);
+                if inputs.console.release && over {
+                    own.acknowledged = true;
+                    // Once for each of the person's frames: the bus may have lost the one before.
+                    self.frames = Frames::Release;
+                }
+            }
+            State::Recovering { up_since } => {
+                *up_since = if up { up_since.or(Some(inputs.cycle)) } else { None };
+            }
+            _ => {}
+        }
+    }
+
+    /// Check valves open and the supply near its nominal pressure.
+    fn is_up(&self, inputs: &StopInputs) -> bool {
+        let least_pa = RECOVERED_SHARE * self.config.supply_pressure_pa;
+        inputs.rig.is_some_and(|rig| !rig.check_valves_shut && rig.supply_pressure_pa >= least_pa)
+    }
+
+    /// The edge to go, if any.
+    fn decide(&self, inputs: &StopInputs) -> Option<Edge> {
+        use EmergencyStopChainState as S;
+        let rig_tripped = inputs.rig.is_some_and(|rig| rig.emergency_stop);
+        let tripped = || match inputs.frame {
+            Some(reason) => Some((S::Tripped, StopCause::Frame(reason))),
+            None => rig_tripped.then_some((S::Tripped, StopCause::Rig)),
+        };
+        match self.state {
+            State::Ready => tripped(),
+            State::Tripped { since, .. } => {
+                let [shortest, longest] = [TRIPPED_SHORTEST_S, TRIPPED_LONGEST_S].map(cycles);
+                match inputs.cycle.saturating_sub(since) {
+                    passed if passed >= longest => Some((S::WaitingForRelease, StopCause::NoStandstill)),
+                    passed if passed >= shortest && inputs.at_standstill => {
+                        Some((S::WaitingForRelease, StopCause::Standstill))
+                    }
+                    _ => None,
+                }
+            }
+            State::WaitingForRelease { .. } => {
+                let told = inputs.rig.is_some() && !rig_tripped && inputs.frame.is_none();
+                (told && self.holds().is_none()).then_some((S::Recovering, StopCause::Released))
+            }
+            State::Recovering { up_since } => tripped().or_else(|| {
+                let up_s = elapsed_s(up_since?, inputs.cycle);
+                let next = match self.config.after_emergency_stop {
+                    AfterStop::OnStart => S::WaitingForStart,
+                    AfterStop::End | AfterStop::Restart => S::Ready,
+                };
+                (cycles(up_s) >= cycles(RECOVERED_S)).then_some((next, StopCause::Recovered))
+            }),
+            State::WaitingForStart => {
+                tripped().or(inputs.console.start.then_some((S::Ready, StopCause::Started)))
+            }
+        }
+    }
+
+    fn enter(&mut self, state: EmergencyStopChainState, cause: StopCause, now: u64) {
+        match state {
+            EmergencyStopChainState::Ready => self.enter_ready(cause, now),
+            EmergencyStopChainState::Tripped => self.enter_tripped(cause, now),
+            EmergencyStopChainState::WaitingForRelease => self.enter_waiting_for_release(cause, now),
+            EmergencyStopChainState::Recovering => self.enter_recovering(cause, now),
+            EmergencyStopChainState::WaitingForStart => self.enter_waiting_for_start(cause, now),
+        }
+    }
+
+    fn enter_ready(&mut self, cause: StopCause, now: u64) {
+        self.set(State::Ready, cause, now);
+    }
+
+    fn enter_tripped(&mut self, cause: StopCause, now: u64) {
+        let own = match cause {
+            StopCause::Own(fault) => {
+                self.frames = Frames::Hold { next: now, reason: fault.reason() };
+                Some(Own { fault, acknowledged: false })
+            }
+            _ => self.own(),
+        };
+        self.set(State::Tripped { since: now, own }, cause, now);
+    }
+
+    fn enter_waiting_for_release(&mut self, cause: StopCause, now: u64) {
+        self.set(State::WaitingForRelease { own: self.own() }, cause, now);
+    }
+
+    fn enter_recovering(&mut self, cause: StopCause, now: u64) {
+        self.set(State::Recovering { up_since: None }, cause, now);
+    }
+
+    fn enter_waiting_for_start(&mut self, cause: StopCause, now: u64) {
+        self.set(State::WaitingForStart, cause, now);
+    }
+
+    fn set(&mut self, state: State, cause: StopCause, now: u64) {
+        self.state = state;
+        self.entered = Entered { cycle: now, state: self.state(), cause };
+    }
+}
+
+#[cfg(test)]
+mod tests;

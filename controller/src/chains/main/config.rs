@@ -1,0 +1,90 @@
+//! What the main chain is told once: lengths, repetitions, and how it begins and goes on.
+
+use super::{APPROACH_M_PER_S, APPROACH_SHORTEST_S};
+use crate::chains::AfterStop;
+use crate::chains::settled::Bounds;
+
+/// Seconds after which a partner that was never heard is missing.
+pub const PARTNER_TIMEOUT_S: f64 = 10.0;
+
+/// How long the states are meant to last, s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lengths {
+    /// Preparing; 0 when there is nothing to prepare.
+    pub prepare_s: f64,
+    /// Ramp to the initial force; 0 when there is none.
+    pub initial_force_s: f64,
+    /// The experiment.
+    pub experiment_s: f64,
+}
+
+/// What ends the settling before the experiment, besides being settled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// Nothing.
+    #[default]
+    ByItself,
+    /// `RunControl` start: once for all repetitions, again after an abort.
+    OnStart,
+}
+
+/// Configuration of the main chain of one axis. Both axes must be given the same, save for what is called own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MainConfig {
+    /// Number of the experiment, 1 to 255.
+    pub experiment: u8,
+    /// Whether the other axis's controller is waited for.
+    pub partner_needed: bool,
+    /// Own: where the initial positioning ends, m; `None` for an axis that is not positioned.
+    pub start_m: Option<f64>,
+    /// Own: whether preparing waits for `prepared`.
+    pub prepares: bool,
+    /// Own: how long the states are meant to last.
+    pub own: Lengths,
+    /// How long they are meant to last for the slower of both axes.
+    pub either: Lengths,
+    /// Longest initial positioning of either axis, s.
+    pub approach_longest_s: f64,
+    /// How often the experiment is run; `None`: until the rig ends.
+    pub repetitions: Option<u32>,
+    /// How long the axis must have been settled, before and after, s.
+    pub settling_s: f64,
+    /// How long each state may take beyond what it is meant to, s.
+    pub settling_timeout_s: f64,
+    /// How long a partner that was never heard is waited for, s.
+    pub partner_timeout_s: f64,
+    /// What begins the experiment.
+    pub start: Start,
+    /// What follows an emergency stop.
+    pub after_emergency_stop: AfterStop,
+    /// What counts as settled.
+    pub settled: Bounds,
+}
+
+impl Default for MainConfig {
+    fn default() -> Self {
+        Self {
+            experiment: 1,
+            partner_needed: true,
+            start_m: None,
+            prepares: false,
+            own: Lengths::default(),
+            either: Lengths::default(),
+            approach_longest_s: approach_s(0.0, 0.5),
+            repetitions: Some(1),
+            settling_s: 0.5,
+            settling_timeout_s: 10.0,
+            partner_timeout_s: PARTNER_TIMEOUT_S,
+            start: Start::default(),
+            after_emergency_stop: AfterStop::default(),
+            settled: Bounds::default(),
+        }
+    }
+}
+
+/// Seconds of the way from `from_m` to `to_m`: gentle beside any experiment.
+#[must_use]
+pub fn approach_s(from_m: f64, to_m: f64) -> f64 {
+    ((to_m - from_m).abs() / APPROACH_M_PER_S).max(APPROACH_SHORTEST_S)
+}

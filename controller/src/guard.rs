@@ -1,0 +1,259 @@
+//! The watch over every algorithm, shipped or foreign: what it returns is a number, and it returns in time.
+//!
+//! ```text
+//!            NaN or infinite            ┌────────────────────┐
+//!   runs ─────────────────────────────► │ latched fault:     │  restart (main chain alone)
+//!    ▲  one step over 20 ms             │ valve shut,        │ ──────────────────────────────► runs, after a reset
+//!    │  10 running over 1 ms            │ no more calls      │
+//!    └───────────────── each step       └────────────────────┘
+//! ```
+//!
+//! A finite result of any size passes: the post-controller limits it to what the valve can do. Time is watched where it
+//! is real; a rehearsal and a run in lockstep have no clock here, so that their results do not depend on the machine.
+//! The watch sees a step only when it has returned: for one that never does, the rig shuts its valve on commands older than 20
+//! cycles, and the barrier of a lockstep run times out.
+
+use crate::algorithm::{Algorithm, Ready};
+use realtime::{Clock, Instant};
+use std::time::Duration;
+
+/// One step longer than this is a fault: 20 cycles, after which the rig itself calls commands stale.
+pub const LONGEST_ONCE: Duration = Duration::from_millis(20);
+/// Steps longer than this, the basic cycle, are a fault when they come [`SUCCESSIVE`] running.
+pub const LONGEST_EACH: Duration = Duration::from_millis(1);
+/// How many successive steps over [`LONGEST_EACH`] are a fault.
+pub const SUCCESSIVE: u32 = 10;
+
+/// Why an algorithm is no longer asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AlgorithmFault {
+    /// Its result was NaN or infinite.
+    #[error(
+        "the algorithm's result is not a number: look for a division by zero or a square root of a negative"
+    )]
+    NotANumber,
+    /// It took too long, once or again and again.
+    #[error(
+        "the algorithm is too slow: its last call took {took:?}; at most {LONGEST_ONCE:?} once, and over {LONGEST_EACH:?} \
+         fewer than {SUCCESSIVE} times running"
+    )]
+    TooSlow {
+        /// What the call that latched took.
+        took: Duration,
+    },
+}
+
+/// An algorithm under watch.
+pub struct Guarded {
+    algorithm: Box<dyn Algorithm>,
+    clock: Option<Box<dyn Clock + Send>>,
+    /// Successive steps over [`LONGEST_EACH`].
+    slow: u32,
+    fault: Option<AlgorithmFault>,
+}
+
+impl Guarded {
+    /// Watches `algorithm`; its time only with a `clock`, which belongs to runs in real time.
+    #[must_use]
+    pub fn new(algorithm: Box<dyn Algorithm>, clock: Option<Box<dyn Clock + Send>>) -> Self {
+        Self { algorithm, clock, slow: 0, fault: None }
+    }
+
+    /// The latched fault.
+    #[must_use]
+    pub fn fault(&self) -> Option<AlgorithmFault> {
+        self.fault
+    }
+
+    /// Takes the fault away: for the chain's restart and nobody else. A [`Guarded::reset`] follows before the next step.
+    pub fn restart(&mut self) {
+        self.fault = None;
+        self.slow = 0;
+    }
+
+    /// The algorithm begins anew; a latched fault stays.
+    ///
+    /// # Errors
+    /// The fault, latched before or now: the valve is to be shut.
+    pub fn reset(&mut self, ready: &Ready, parameters: &[f64]) -> Result<(), AlgorithmFault> {
+        self.unless_latched()?;
+        let started = self.now();
+        self.algorithm.reset(ready, parameters);
+        // Only too slow at once: a reset may take longer than a step.
+        self.slow = 0;
+        match self.took(started) {
+            Some(took) if took > LONGEST_ONCE => Err(self.latch(AlgorithmFault::TooSlow { took })),
+            _ => Ok(()),
+        }
+    }
+
+    /// The wanted velocity of the own rod, m/s: a finite number.
+    ///
+    /// # Errors
+    /// The fault, latched before or now: the valve is to be shut. The algorithm is not asked again.
+    pub fn step(&mut self, ready: &Ready, parameters: &[f64]) -> Result<f64, AlgorithmFault> {
+        self.unless_latched()?;
+        let started = self.now();
+        let result = self.algorithm.step(ready, parameters);
+        let took = self.took(started);
+        if !result.is_finite() {
+            return Err(self.latch(AlgorithmFault::NotANumber));
+        }
+        if let Some(took) = took {
+            self.slow = if took > LONGEST_EACH { self.slow + 1 } else { 0 };
+            if took > LONGEST_ONCE || self.slow >= SUCCESSIVE {
+                return Err(self.latch(AlgorithmFault::TooSlow { took }));
+            }
+        }
+        Ok(result)
+    }
+
+    fn unless_latched(&self) -> Result<(), AlgorithmFault> {
+        self.fault.map_or(Ok(()), Err)
+    }
+
+    fn latch(&mut self, fault: AlgorithmFault) -> AlgorithmFault {
+        self.fault = Some(fault);
+        fault
+    }
+
+    fn now(&self) -> Option<Instant> {
+        self.clock.as_ref().map(|clock| clock.now())
+    }
+
+    fn took(&self, started: Option<Instant>) -> Option<Duration> {
+        Some(self.now()?.saturating_duration_since(started?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    /// A clock that an algorithm of the test moves on.
+    #[derive(Clone, Default)]
+    struct Moved(Arc<AtomicU64>);
+
+    impl Clock for Moved {
+        fn now(&self) -> Instant {
+            Instant::from_nanos(self.0.load(Ordering::Relaxed))
+        }
+
+        fn wait_until(&self, _deadline: Instant) {
+            unreachable!("the watch never waits");
+        }
+    }
+
+    /// Returns its first parameter and takes the second, ns; counts its calls.
+    struct Scripted {
+        clock: Moved,
+        calls: Arc<AtomicU64>,
+    }
+
+    impl Algorithm for Scripted {
+        fn reset(&mut self, ready: &Ready, parameters: &[f64]) {
+            self.step(ready, parameters);
+        }
+
+        fn step(&mut self, _ready: &Ready, parameters: &[f64]) -> f64 {
+            self.calls.fetch_add(1, Ordering::Relaxed);
+            self.clock.0.fetch_add(parameters[1] as u64, Ordering::Relaxed);
+            parameters[0]
+        }
+    }
+
+    struct Bench {
+        guarded: Guarded,
+        calls: Arc<AtomicU64>,
+    }
+
+    impl Bench {
+        fn new(timed: bool) -> Self {
+            let (clock, calls) = (Moved::default(), Arc::default());
+            let algorithm = Box::new(Scripted { clock: clock.clone(), calls: Arc::clone(&calls) });
+            let clock: Option<Box<dyn Clock + Send>> = if timed { Some(Box::new(clock)) } else { None };
+            Self { guarded: Guarded::new(algorithm, clock), calls }
+        }
+
+        fn step(&mut self, result: f64, took_ns: f64) -> Result<f64, AlgorithmFault> {
+            self.guarded.step(&Ready::default(), &[result, took_ns])
+        }
+
+        fn calls(&self) -> u64 {
+            self.calls.load(Ordering::Relaxed)
+        }
+    }
+
+    const MS: f64 = 1e6;
+
+    #[test]
+    fn what_is_not_a_number_latches_and_the_algorithm_is_not_asked_again() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let mut bench = Bench::new(false);
+            assert_eq!(bench.step(0.1, 0.0), Ok(0.1));
+            assert_eq!(bench.step(bad, 0.0), Err(AlgorithmFault::NotANumber));
+            assert_eq!(bench.step(0.1, 0.0), Err(AlgorithmFault::NotANumber));
+            assert_eq!(
+                bench.guarded.reset(&Ready::default(), &[0.0, 0.0]),
+                Err(AlgorithmFault::NotANumber),
+                "a reset does not take it away"
+            );
+            assert_eq!(bench.calls(), 2);
+            bench.guarded.restart();
+            assert_eq!((bench.guarded.fault(), bench.step(0.2, 0.0)), (None, Ok(0.2)));
+        }
+    }
+
+    #[test]
+    fn one_step_over_20_ms_latches_and_one_of_20_ms_does_not() {
+        let mut bench = Bench::new(true);
+        assert_eq!(bench.step(0.1, 20.0 * MS), Ok(0.1));
+        let took = Duration::from_nanos(20_000_001);
+        assert_eq!(bench.step(0.1, 20.0 * MS + 1.0), Err(AlgorithmFault::TooSlow { took }));
+        assert_eq!(bench.step(0.1, 0.0), Err(AlgorithmFault::TooSlow { took }));
+        assert_eq!(bench.calls(), 2);
+    }
+
+    #[test]
+    fn ten_steps_running_over_1_ms_latch_and_nine_do_not() {
+        let mut bench = Bench::new(true);
+        for _ in 0..5 {
+            (0..9).for_each(|_| assert_eq!(bench.step(0.1, 1.5 * MS), Ok(0.1)));
+            assert_eq!(bench.step(0.1, 1.0 * MS), Ok(0.1));
+        }
+        (0..9).for_each(|_| assert_eq!(bench.step(0.1, 1.5 * MS), Ok(0.1)));
+        let fault = bench.step(0.1, 1.5 * MS).unwrap_err();
+        assert_eq!(fault, AlgorithmFault::TooSlow { took: Duration::from_micros(1500) });
+        assert!(fault.to_string().contains("1.5ms"), "{fault}");
+    }
+
+    #[test]
+    fn a_reset_may_take_20_ms_and_no_more() {
+        let mut bench = Bench::new(true);
+        let mut reset = |ms: f64| bench.guarded.reset(&Ready::default(), &[0.0, ms * MS]);
+        (0..20).for_each(|_| assert_eq!(reset(19.0), Ok(())));
+        assert!(matches!(reset(21.0), Err(AlgorithmFault::TooSlow { .. })));
+    }
+
+    #[test]
+    fn without_a_clock_nothing_is_too_slow() {
+        let mut bench = Bench::new(false);
+        (0..20).for_each(|_| assert_eq!(bench.step(0.1, 1000.0 * MS), Ok(0.1)));
+    }
+
+    proptest! {
+        #[test]
+        fn only_finite_results_leave_and_only_before_the_first_fault(results in prop::collection::vec(prop::num::f64::ANY, 1..50)) {
+            let mut bench = Bench::new(true);
+            let mut faulty = false;
+            for result in results {
+                faulty |= !result.is_finite();
+                let expected = if faulty { Err(AlgorithmFault::NotANumber) } else { Ok(result) };
+                prop_assert_eq!(bench.step(result, 0.0), expected);
+            }
+        }
+    }
+}

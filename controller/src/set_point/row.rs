@@ -1,0 +1,90 @@
+//! A row of segments, one after the other.
+
+use super::law::Law;
+use std::sync::Arc;
+
+/// Sums of decimal fractions carry roundings: a segment begins a nanosecond early, so that it never misses its cycle of 1 ms.
+pub(super) const ROUNDING_S: f64 = 1e-9;
+
+/// What a row is made of.
+pub(super) trait Lasting {
+    /// How long it takes, s.
+    fn duration_s(&self) -> f64;
+    /// The value from its end on.
+    fn end(&self) -> f64;
+}
+
+impl Lasting for Arc<dyn Law> {
+    fn duration_s(&self) -> f64 {
+        self.as_ref().duration_s()
+    }
+
+    fn end(&self) -> f64 {
+        self.as_ref().end()
+    }
+}
+
+/// Segments in a row from a start value; the unit is the row's, m or N.
+#[derive(Clone, Debug)]
+pub(super) struct Row<S> {
+    start: f64,
+    segments: Vec<S>,
+    /// When each segment ends, s after the row's start.
+    until_s: Vec<f64>,
+}
+
+impl<S: Lasting> Row<S> {
+    pub(super) fn new(start: f64, segments: Vec<S>) -> Self {
+        let mut end_s = 0.0;
+        let mut ends = |segment: &S| {
+            end_s += segment.duration_s();
+            end_s
+        };
+        let until_s = segments.iter().map(&mut ends).collect();
+        Self { start, segments, until_s }
+    }
+
+    pub(super) fn push(&mut self, segment: S) {
+        self.until_s.push(self.duration_s() + segment.duration_s());
+        self.segments.push(segment);
+    }
+
+    /// Which segment `time_s` lies in.
+    pub(super) fn place(&self, time_s: f64) -> Place<'_, S> {
+        if time_s < -ROUNDING_S {
+            return Place::Before;
+        }
+        let mut begun_s = 0.0;
+        for (index, (segment, until_s)) in self.segments.iter().zip(&self.until_s).enumerate() {
+            if time_s < until_s - ROUNDING_S {
+                return Place::In { index, segment, since_s: (time_s - begun_s).max(0.0) };
+            }
+            begun_s = *until_s;
+        }
+        Place::Behind
+    }
+
+    pub(super) fn duration_s(&self) -> f64 {
+        self.until_s.last().copied().unwrap_or(0.0)
+    }
+
+    pub(super) fn segment(&self, index: usize) -> Option<&S> {
+        self.segments.get(index)
+    }
+
+    pub(super) fn start(&self) -> f64 {
+        self.start
+    }
+
+    pub(super) fn end(&self) -> f64 {
+        self.segments.last().map_or(self.start, Lasting::end)
+    }
+}
+
+/// Where in a row a time lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Place<'a, S> {
+    Before,
+    In { index: usize, segment: &'a S, since_s: f64 },
+    Behind,
+}

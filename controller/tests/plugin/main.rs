@@ -1,0 +1,16 @@
+//! Algorithms from shared libraries: the example in C from its build line to the set-point, and a table of libraries that each do
+//! one thing wrong.
+
+mod build;
+mod example;
+mod latched;
+#[allow(unreachable_pub)] // public beside the shipped algorithms
+mod position_pi;
+mod refused;
+
+/// So that `position_pi.rs` compiles as it would beside the shipped algorithms.
+use controller::{algorithm, parameters};
+
+/// Counts what the watched part of a test allocates.
+#[global_allocator]
+static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;

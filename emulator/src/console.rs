@@ -1,0 +1,216 @@
+//! The rig's console: commands of a person at standard input, one a line, for a run with `--console`.
+//!
+//! ```text
+//!   standard input ── thread: read, check, answer ── bounded queue ──► rig loop, one command a cycle, try_recv
+//! ```
+//!
+//! A command acts at the start of the cycle that takes it: what is typed is not reproducible, not even in lockstep, and stands
+//! among the events of `summary.json`. The end of the input closes the console, not the run. Starting and aborting
+//! experiments is no business of the rig: that is RunControl, on the bus.
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use plant::scene::{Action, Part};
+use protocol::frames::{HAND_FORCE, SignalSpec};
+use std::io::{self, BufRead, Read};
+
+/// Commands that may wait; a person is slower than the loop, and a file that is piped in waits for it.
+const QUEUE: usize = 16;
+/// Longest line that is read as a command, in bytes.
+const LONGEST_LINE: u64 = 200;
+
+/// What a person may type.
+pub const HELP: &str = "stop | release        the rig's own emergency stop; others release theirs
+link | unlink         the load's eye in the carriage
+weights KG            weights on the carriage, in all
+hand carriage N       a hand pushes in +x until the next such command; 0 lets go
+hand load N           the same on the load's eye
+help                  this list
+quit                  ends the run; everything is saved";
+
+/// What the console asks of the rig loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Something that a person does to the rig.
+    Act(Action),
+    /// A hand pushes from now on.
+    Hand {
+        /// On what.
+        on: Part,
+        /// In +x, N.
+        force_n: f64,
+    },
+    /// End the run.
+    Quit,
+}
+
+/// What the rig can be asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Most weights on the carriage, kg.
+    pub added_limit_kg: f64,
+}
+
+/// Opens the console on standard input.
+#[must_use]
+pub fn open(limits: Limits) -> Receiver<Command> {
+    let (sender, receiver) = bounded(QUEUE);
+    let answer = |text: &str| text.lines().for_each(|line| eprintln!("emulator: console: {line}"));
+    // It ends with its input, with the loop, or with the process: nobody can wait for a thread that reads a terminal.
+    std::thread::spawn(move || {
+        answer("open; 'help' lists the commands");
+        read(&mut io::stdin().lock(), limits, &sender, answer);
+    });
+    receiver
+}
+
+/// Reads commands until the input ends or nobody takes them any more.
+fn read(input: &mut impl BufRead, limits: Limits, queue: &Sender<Command>, mut answer: impl FnMut(&str)) {
+    while let Ok(Some(line)) = next_line(input) {
+        match line.and_then(|line| parse(&line, limits)) {
+            Ok(None) => {}
+            Ok(Some(Line::Help)) => answer(HELP),
+            Ok(Some(Line::Command(command))) if queue.send(command).is_err() => return,
+            Ok(Some(Line::Command(_))) => {}
+            Err(message) => answer(&message),
+        }
+    }
+}
+
+/// The next line, or why it is none; `None` at the end of the input.
+fn next_line(input: &mut impl BufRead) -> io::Result<Option<Result<String, String>>> {
+    let mut bytes = Vec::new();
+    if input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes)? == 0 {
+        return Ok(None);
+    }
+    let whole = bytes.ends_with(b"\n") || (bytes.len() as u64) < LONGEST_LINE;
+    if !whole {
+        input.skip_until(b'\n')?;
+        return Ok(Some(Err(format!("a line of more than {LONGEST_LINE} bytes is no command"))));
+    }
+    Ok(Some(Ok(String::from_utf8_lossy(&bytes).into_owned())))
+}
+
+#[derive(Debug, PartialEq)]
+enum Line {
+    Help,
+    Command(Command),
+}
+
+fn parse(line: &str, limits: Limits) -> Result<Option<Line>, String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let act = |action| Ok(Some(Line::Command(Command::Act(action))));
+    match words[..] {
+        [] => Ok(None),
+        ["help"] => Ok(Some(Line::Help)),
+        ["quit"] => Ok(Some(Line::Command(Command::Quit))),
+        ["stop"] => act(Action::EmergencyStop),
+        ["release"] => act(Action::Release),
+        ["link"] => act(Action::Link { until_s: None }),
+        ["unlink"] => act(Action::Unlink),
+        ["weights", kg] => {
+            act(Action::Weights { added_mass_kg: number("weights", kg, (0.0, limits.added_limit_kg), "kg")? })
+        }
+        ["hand", on @ ("carriage" | "load"), newtons] => {
+            let (on, name) = if on == "load" { (Part::LoadEye, "load_eye") } else { (Part::Carriage, on) };
+            let SignalSpec { min, max, .. } = hand_signal(name);
+            let force_n = number("hand", newtons, (*min, *max), "N")?;
+            Ok(Some(Line::Command(Command::Hand { on, force_n })))
+        }
+        ["weights", ..] => Err(format!("'{}': weights takes one number, KG", line.trim())),
+        ["hand", ..] => Err(format!("'{}': hand takes 'carriage' or 'load', and a number, N", line.trim())),
+        _ => Err(format!(
+            "'{}' is none of stop, release, link, unlink, weights KG, hand carriage N, hand load N, help, quit",
+            line.trim()
+        )),
+    }
+}
+
+fn number(what: &str, text: &str, (least, most): (f64, f64), unit: &str) -> Result<f64, String> {
+    // A NaN lies in no range.
+    let value = text.parse().ok().filter(|value: &f64| (least..=most).contains(value));
+    value.ok_or_else(|| format!("{what} '{text}': allowed are {least} to {most} {unit}"))
+}
+
+/// The console's hand can do what the bus's can.
+fn hand_signal(name: &str) -> &'static SignalSpec {
+    let signal = HAND_FORCE.signals.iter().find(|signal| signal.name == name);
+    signal.expect("rig.dbc has a force for each part that a hand can be on")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits { added_limit_kg: 20.0 };
+
+    /// Commands and answers of a whole input.
+    fn said(input: &str) -> (Vec<Command>, Vec<String>) {
+        let (sender, receiver) = bounded(QUEUE);
+        let mut answers = Vec::new();
+        read(&mut input.as_bytes(), LIMITS, &sender, |text| answers.push(text.to_owned()));
+        (receiver.try_iter().collect(), answers)
+    }
+
+    #[test]
+    fn each_line_is_a_command() {
+        let (commands, answers) = said(
+            "stop\nrelease\n\nlink\n unlink \nweights 2.5\nhand carriage -40\nhand load 1e2\nquit\nstop",
+        );
+        let expected = [
+            Command::Act(Action::EmergencyStop),
+            Command::Act(Action::Release),
+            Command::Act(Action::Link { until_s: None }),
+            Command::Act(Action::Unlink),
+            Command::Act(Action::Weights { added_mass_kg: 2.5 }),
+            Command::Hand { on: Part::Carriage, force_n: -40.0 },
+            Command::Hand { on: Part::LoadEye, force_n: 100.0 },
+            Command::Quit,
+            Command::Act(Action::EmergencyStop),
+        ];
+        assert_eq!(commands, expected);
+        assert_eq!(answers, [] as [String; 0]);
+    }
+
+    #[test]
+    fn a_bad_line_is_answered_with_what_is_allowed_and_the_next_one_counts() {
+        let cases = [
+            ("start 3", "none of stop, release"),
+            ("stop now", "'stop now'"),
+            ("weights", "one number, KG"),
+            ("weights heavy", "0 to 20 kg"),
+            ("weights 20.5", "0 to 20 kg"),
+            ("weights nan", "0 to 20 kg"),
+            ("hand 5", "'carriage' or 'load'"),
+            ("hand elbow 5", "'carriage' or 'load'"),
+            ("hand load inf", "-2000 to 2000 N"),
+            ("\u{fffd}", "none of"),
+        ];
+        for (line, hint) in cases {
+            let (commands, answers) = said(&format!("{line}\nlink\n"));
+            assert_eq!(commands.len(), 1, "{line}");
+            assert!(answers.len() == 1 && answers[0].contains(hint), "{line}: {answers:?}");
+        }
+    }
+
+    #[test]
+    fn help_names_every_command_and_an_endless_line_is_none() {
+        let (_, answers) = said("help\n");
+        for word in
+            ["stop", "release", "link", "unlink", "weights KG", "hand carriage N", "hand load N", "quit"]
+        {
+            assert!(answers[0].contains(word), "{word}");
+        }
+        let (commands, answers) = said(&format!("{}\nunlink\n", "stop ".repeat(1000)));
+        assert_eq!(commands, [Command::Act(Action::Unlink)]);
+        assert!(answers.len() == 1 && answers[0].contains("200 bytes"), "{answers:?}");
+    }
+
+    #[test]
+    fn a_loop_that_is_gone_ends_the_reading() {
+        let (sender, receiver) = bounded(QUEUE);
+        drop(receiver);
+        let mut input = "stop\nstop\n".as_bytes();
+        read(&mut input, LIMITS, &sender, |_| {});
+        assert_eq!(input, b"stop\n");
+    }
+}
