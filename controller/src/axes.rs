@@ -57,7 +57,7 @@ impl DriveAxis {
         let position_m = sensors.position_m;
         let set_point = self.chain.advance(cycle, position_m, emergency_stop);
         let wanted = set_point.map_or(0.0, |point| self.wanted_velocity_m_per_s(&point, position_m));
-        let opening = self.linearisation.opening(wanted);
+        let opening = self.linearisation.opening(wanted, &Ready::default());
         match (&set_point, self.chain.state()) {
             (Some(point), MainChainState::Experiment) => self.figures.take(point, position_m),
             _ => self.figures.end_rest(),
@@ -81,7 +81,7 @@ impl DriveAxis {
             set_velocity_m_per_s: set_point.velocity_m_per_s,
             ..Ready::default()
         };
-        PositionP.step(&ready, &self.parameters)
+        PositionP::default().step(&ready, &[self.parameters[0], self.parameters[1], 0.0])
     }
 
     /// The console ends the experiment: the valve shuts.

@@ -33,6 +33,7 @@ pub mod post_controller;
 pub mod pre_controller;
 pub mod program;
 pub mod recording;
+pub mod rest_zone;
 pub mod rig_view;
 pub mod run;
 pub mod set_point;

@@ -7,6 +7,7 @@
 //! The dead zone shuts the valve for wanted velocities below it and opens it again from one and a half times of it on, so
 //! that noise at its edge does not let the valve chatter.
 
+use crate::algorithm::Ready;
 use crate::linearisation::Linearisation;
 use crate::parameters::Parameter;
 
@@ -59,9 +60,9 @@ impl PostController {
     }
 
     /// Turns a finite wanted velocity into an opening.
-    pub fn step(&mut self, wanted_m_per_s: f64, parameters: &[f64]) -> Output {
+    pub fn step(&mut self, wanted_m_per_s: f64, ready: &Ready, parameters: &[f64]) -> Output {
         if parameters[MANUAL] >= 0.5 {
-            return self.output(parameters[MANUAL_OPENING]);
+            return self.output(parameters[MANUAL_OPENING], ready);
         }
         let dead_zone = parameters[DEAD_ZONE] * if self.shut { 1.0 + HYSTERESIS } else { 1.0 };
         self.shut = wanted_m_per_s.abs() < dead_zone;
@@ -69,27 +70,28 @@ impl PostController {
             return Output::default();
         }
         let limit = parameters[OPENING_LIMIT];
-        let opening = self.linearisation.opening(wanted_m_per_s);
+        let opening = self.linearisation.opening(wanted_m_per_s, ready);
         if opening.abs() <= limit {
-            let most = self.linearisation.velocity(opening).abs();
+            let most = self.linearisation.velocity(opening, ready).abs();
             return Output { opening, applied_velocity_m_per_s: wanted_m_per_s.clamp(-most, most) };
         }
-        self.output(opening.clamp(-limit, limit))
+        self.output(opening.clamp(-limit, limit), ready)
     }
 
-    fn output(&self, opening: f64) -> Output {
-        Output { opening, applied_velocity_m_per_s: self.linearisation.velocity(opening) }
+    fn output(&self, opening: f64, ready: &Ready) -> Output {
+        Output { opening, applied_velocity_m_per_s: self.linearisation.velocity(opening, ready) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linearisation::Law;
     use plant::RigParameters;
     use proptest::prelude::*;
 
     fn post() -> PostController {
-        PostController::new(Linearisation::new(&RigParameters::baseline()))
+        PostController::new(Linearisation::new(&RigParameters::baseline(), Law::ChokedExhaust))
     }
 
     #[test]
@@ -99,13 +101,13 @@ mod tests {
         for (wanted, open) in
             [(0.009, false), (0.014, false), (0.016, true), (0.011, true), (0.009, false), (0.011, false)]
         {
-            assert_eq!(post.step(wanted, &parameters).opening != 0.0, open, "{wanted}");
+            assert_eq!(post.step(wanted, &Ready::default(), &parameters).opening != 0.0, open, "{wanted}");
         }
     }
 
     #[test]
     fn manual_mode_overrides() {
-        let output = post().step(-3.0, &[1.0, 1.0, 0.0, 1.0, 0.25]);
+        let output = post().step(-3.0, &Ready::default(), &[1.0, 1.0, 0.0, 1.0, 0.25]);
         assert!(output.opening == 0.25 && output.applied_velocity_m_per_s > 0.0);
     }
 
@@ -114,7 +116,7 @@ mod tests {
         fn the_opening_keeps_its_limit_and_what_is_applied_never_exceeds_what_was_wanted(
             wanted in -20.0..20.0_f64, limit in 0.0..1.0_f64, dead_zone in 0.0..0.1_f64,
         ) {
-            let output = post().step(wanted, &[1.0, limit, dead_zone, 0.0, 0.0]);
+            let output = post().step(wanted, &Ready::default(), &[1.0, limit, dead_zone, 0.0, 0.0]);
             prop_assert!(output.opening.abs() <= limit);
             prop_assert!(output.applied_velocity_m_per_s.abs() <= wanted.abs() + 1e-12);
             prop_assert!(output.opening * wanted >= 0.0);

@@ -123,7 +123,7 @@ impl Program {
         let parameters = &self.values[self.post_values.clone()];
         if due(self.post_stepped, cycle, parameters).is_some() {
             self.post_stepped = Some(cycle);
-            self.output = self.post.step(wanted, parameters);
+            self.output = self.post.step(wanted, ready, parameters);
             self.ready.applied_velocity_m_per_s = self.output.applied_velocity_m_per_s;
         }
         Ok(self.output)

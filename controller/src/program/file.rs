@@ -17,7 +17,7 @@
 
 use super::{EVERY_CYCLES, Program, Slot, Variable};
 use crate::algorithms;
-use crate::linearisation::Linearisation;
+use crate::linearisation::{Law, Linearisation};
 use crate::parameters::Parameter;
 use crate::post_controller::{self, Output, PostController};
 use crate::pre_controller::{self, Geometry, PreController};
@@ -87,16 +87,16 @@ impl Source {
         let user = reader.slot("algorithm", file.algorithm)?;
         let mut section = file.post_controller;
         let kind = reader.take_text("post-controller.linearisation", section.remove("linearisation"))?;
-        let linearisation = match kind.as_ref().map(|kind| kind.as_ref().as_str()) {
-            None | Some("choked-exhaust") => Linearisation::new(rig),
-            Some(other) => {
-                let place = kind.as_ref().map_or(0, |kind| kind.span().start);
-                return Err(reader.error(
-                    place,
-                    &format!("post-controller.linearisation = \"{other}\"; there is \"choked-exhaust\""),
-                ));
-            }
+        let law = match &kind {
+            None => Law::ChokedExhaust,
+            Some(kind) => Law::by_name(kind.as_ref()).ok_or_else(|| {
+                let names = Law::ALL.map(Law::name).join(", ");
+                let problem =
+                    format!("post-controller.linearisation = \"{}\"; there are {names}", kind.as_ref());
+                reader.error(kind.span().start, &problem)
+            })?,
         };
+        let linearisation = Linearisation::new(rig, law);
         let post_values = reader.section("post-controller", section, &post_controller::PARAMETERS)?;
         let force_chain = file.force_chain.map(|section| reader.slot("force-chain", section)).transpose()?;
         let Reader { variables, values, .. } = reader;

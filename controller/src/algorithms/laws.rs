@@ -1,0 +1,85 @@
+//! What every position algorithm must keep, whatever its law: for their tests.
+
+use crate::algorithm::{Kind, Ready};
+use plant::RigParameters;
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+
+/// A result beyond this is out of proportion to any rig, m/s; P may reach 200 1/s * 0.5 m + 2 * 1 m/s.
+const BOUND_M_PER_S: f64 = 102.0;
+
+/// Anything that a rig of half a metre can be in.
+fn any_ready() -> impl Strategy<Value = Ready> {
+    let position = (0.0..0.5_f64, -1.0..1.0_f64, -50.0..50.0_f64);
+    let air = (-2000.0..2000.0_f64, 0.0..1e6_f64, 0.0..1e6_f64, 1e5..8e5_f64);
+    let set = (0.0..0.5_f64, -1.0..1.0_f64, -50.0..50.0_f64);
+    (position, air, set, -1.0..1.0_f64, 1e-3..0.1_f64).prop_map(|(position, air, set, applied, period_s)| Ready {
+        period_s,
+        position_m: position.0,
+        velocity_m_per_s: position.1,
+        acceleration_m_per_s2: position.2,
+        force_n: air.0,
+        pressure_a_pa: air.1,
+        pressure_b_pa: air.2,
+        supply_pressure_pa: air.3,
+        set_position_m: set.0,
+        set_velocity_m_per_s: set.1,
+        set_acceleration_m_per_s2: set.2,
+        set_force_n: 0.0,
+        set_force_rate_n_per_s: 0.0,
+        applied_velocity_m_per_s: applied,
+    })
+}
+
+/// Any values that the tables allow.
+fn any_parameters(kind: &Kind) -> impl Strategy<Value = Vec<f64>> {
+    kind.parameters.iter().map(|parameter| parameter.least..=parameter.most).collect::<Vec<_>>()
+}
+
+/// Results are bounded numbers, for all inputs and parameters, and a reset forgets all that was before.
+pub(super) fn check(kind: &Kind) {
+    let inputs = (proptest::collection::vec(any_ready(), 1..40), any_parameters(kind));
+    let claim = |(row, parameters): (Vec<Ready>, Vec<f64>)| {
+        let rig = RigParameters::baseline();
+        let (mut used, mut fresh) = ((kind.make)(&rig), (kind.make)(&rig));
+        used.reset(&row[0], &parameters);
+        for ready in &row {
+            let result = used.step(ready, &parameters);
+            prop_assert!(result.abs() <= BOUND_M_PER_S, "{result}");
+        }
+        used.reset(&row[0], &parameters);
+        fresh.reset(&row[0], &parameters);
+        for ready in &row {
+            let (again, first) = (used.step(ready, &parameters), fresh.step(ready, &parameters));
+            prop_assert_eq!(again.to_bits(), first.to_bits());
+        }
+        Ok(())
+    };
+    TestRunner::default().run(&inputs, claim).unwrap_or_else(|error| panic!("{}: {error}", kind.name));
+}
+
+/// After 10 s of an error that the valve does nothing about, or that it follows but the rod does not, the result turns its sign
+/// within `within_s` when the error does; with the parameters' defaults, at the edge of what an integral part may take in.
+pub(super) fn recovers(kind: &Kind, at_rest: &Ready, within_s: f64) {
+    let parameters: Vec<_> = kind.parameters.iter().map(|parameter| parameter.default).collect();
+    for error_m in [0.3, 0.0029] {
+        for stuck in [false, true] {
+            let mut algorithm = (kind.make)(&RigParameters::baseline());
+            let mut ready = Ready { set_position_m: at_rest.position_m + error_m, ..*at_rest };
+            algorithm.reset(&ready, &parameters);
+            for _ in 0..10_000 {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = if stuck { 0.0 } else { result.clamp(-0.6, 0.6) };
+                assert!(result > 0.0, "{}: {result}", kind.name);
+            }
+            ready.set_position_m = at_rest.position_m - error_m;
+            let turned = (0..10_000).position(|_| {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = if stuck { 0.0 } else { result.clamp(-0.6, 0.6) };
+                result < 0.0
+            });
+            let turned_s = turned.map(|cycles| cycles as f64 * at_rest.period_s);
+            assert!(turned_s.is_some_and(|s| s <= within_s), "{}: {turned_s:?} s", kind.name);
+        }
+    }
+}
