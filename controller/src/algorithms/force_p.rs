@@ -25,7 +25,7 @@ pub const KIND: Kind = Kind {
 const GAIN: usize = 0;
 const FEED_FORWARD: usize = 1;
 static PARAMETERS: [Parameter; 2] = [
-    Parameter::new(("gain_m_per_n_s", "m/(N s)"), [0.0, 0.1], 0.004, "velocity for each error"),
+    Parameter::new(("gain_m_per_n_s", "m/(N s)"), [0.0, 0.05], 0.012, "velocity for each error"),
     Parameter::new(
         ("velocity_feed_forward", ""),
         [0.0, 2.0],
@@ -33,11 +33,6 @@ static PARAMETERS: [Parameter; 2] = [
         "share of the own rod's velocity that is fed forward",
     ),
 ];
-
-/// A wanted velocity that no valve needs to exceed, either way, m/s.
-pub(super) fn bounded(velocity_m_per_s: f64) -> f64 {
-    velocity_m_per_s.clamp(-10.0, 10.0)
-}
 
 /// The algorithm.
 #[derive(Debug)]
@@ -47,9 +42,28 @@ impl Algorithm for ForceP {
     fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {}
 
     fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        bounded(
-            parameters[GAIN] * (ready.set_force_n - ready.force_n)
-                + parameters[FEED_FORWARD] * ready.velocity_m_per_s,
-        )
+        let velocity = parameters[GAIN] * (ready.set_force_n - ready.force_n)
+            + parameters[FEED_FORWARD] * ready.velocity_m_per_s;
+        velocity.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S)
+    }
+}
+
+/// Largest result, m/s: several times what any valve of this rig gives.
+const LARGEST_M_PER_S: f64 = 5.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algorithms::laws;
+
+    #[test]
+    fn the_error_and_the_velocity_add_up() {
+        let ready = Ready { set_force_n: 300.0, force_n: 280.0, velocity_m_per_s: -0.2, ..Ready::default() };
+        assert_eq!(ForceP.step(&ready, &[0.01, 0.5]), 0.01 * 20.0 - 0.1);
+    }
+
+    #[test]
+    fn what_every_algorithm_must_keep() {
+        laws::check(&KIND);
     }
 }

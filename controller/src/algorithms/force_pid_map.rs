@@ -25,7 +25,6 @@
 //! Source: PID in the ideal form and integrator clamping [Åström, Hägglund 1995]; the map is the outlook of
 //! [Neugebauer 2011, section 5]; c from its eqs. 1 to 4.
 
-use super::force_p::bounded;
 use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
 use crate::linearisation::Air;
 use crate::parameters::Parameter;
@@ -55,11 +54,11 @@ const FRICTION_SHARE: usize = 10;
 const DEAD_ZONE: usize = 11;
 const STANDSTILL: usize = 12;
 static PARAMETERS: [Parameter; 13] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 400.0], 60.0, "rate of force for each error"),
+    Parameter::new(("gain_per_s", "1/s"), [0.0, 400.0], 150.0, "rate of force for each error"),
     Parameter::new(
         ("integral_time_s", "s"),
         [0.0, 100.0],
-        0.15,
+        0.2,
         "time in which the integral part doubles a standing error; 0 for none",
     ),
     Parameter::new(
@@ -74,8 +73,18 @@ static PARAMETERS: [Parameter; 13] = [
         0.0,
         "time over which the error is extrapolated by its rate",
     ),
-    Parameter::new(("derivative_filter_hz", "Hz"), [1.0, 400.0], 100.0, "cut-off of the measured force's rate"),
-    Parameter::new(("reference_time_s", "s"), [0.001, 1.0], 0.04, "time constant with which a step is followed"),
+    Parameter::new(
+        ("derivative_filter_hz", "Hz"),
+        [1.0, 400.0],
+        100.0,
+        "cut-off of the measured force's rate",
+    ),
+    Parameter::new(
+        ("reference_time_s", "s"),
+        [0.001, 1.0],
+        0.032,
+        "time constant with which a step is followed",
+    ),
     Parameter::new(
         ("reference_speed_m_per_s", "m/s"),
         [0.01, 10.0],
@@ -83,7 +92,12 @@ static PARAMETERS: [Parameter; 13] = [
         "fastest rate of the reference, as the velocity that it stands for",
     ),
     Parameter::new(("valve_time_s", "s"), [0.0, 0.1], 0.012, "how much later the force comes than asked for"),
-    Parameter::new(("rate_feed_forward", ""), [0.0, 2.0], 1.0, "share of the reference's rate that is fed forward"),
+    Parameter::new(
+        ("rate_feed_forward", ""),
+        [0.0, 2.0],
+        1.0,
+        "share of the reference's rate that is fed forward",
+    ),
     Parameter::new(
         ("velocity_feed_forward", ""),
         [0.0, 2.0],
@@ -181,9 +195,126 @@ impl Algorithm for ForcePidMap {
         let force_rate = p(RATE_SHARE) * reference_rate
             + p(GAIN) * (error_n + memory.integral_n + lead_n)
             + p(FRICTION_SHARE) * friction_rate;
-        memory.result_m_per_s = bounded(
-            force_rate / stiffness_n_per_m + p(VELOCITY_SHARE) * moves * ready.velocity_m_per_s,
-        );
+        let result = force_rate / stiffness_n_per_m + p(VELOCITY_SHARE) * moves * ready.velocity_m_per_s;
+        memory.result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         memory.result_m_per_s
+    }
+}
+
+/// Largest result, m/s: several times what any valve of this rig gives.
+const LARGEST_M_PER_S: f64 = 5.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algorithms::laws;
+
+    const CYCLE_S: f64 = 1e-3;
+
+    fn defaults() -> Vec<f64> {
+        PARAMETERS.iter().map(|parameter| parameter.default).collect()
+    }
+
+    fn moving_at(velocity_m_per_s: f64) -> Ready {
+        Ready {
+            period_s: CYCLE_S,
+            position_m: 0.25,
+            velocity_m_per_s,
+            pressure_a_pa: 4e5,
+            pressure_b_pa: 4e5,
+            supply_pressure_pa: 7e5,
+            ..Ready::default()
+        }
+    }
+
+    /// A step of 200 N on a rod that moves along while the air, c v, is an integrator behind a lag of the valve's time.
+    fn step_response(change: impl Fn(&mut [f64])) -> Vec<f64> {
+        let mut parameters = defaults();
+        change(&mut parameters);
+        let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
+        let mut ready = moving_at(-0.1);
+        let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
+        algorithm.reset(&ready, &parameters);
+        let mut rate = 0.0;
+        ready.set_force_n = 200.0;
+        (0..1000)
+            .map(|_| {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = result.clamp(-0.6, 0.6);
+                let wanted = stiffness * (ready.applied_velocity_m_per_s - ready.velocity_m_per_s);
+                rate += (wanted - rate) * CYCLE_S / parameters[VALVE_TIME];
+                ready.force_n += CYCLE_S * rate;
+                ready.force_n
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_step_of_the_force_is_followed_aperiodically_within_three_time_constants() {
+        let force_n = step_response(|_| ());
+        let largest = force_n.iter().copied().fold(0.0, f64::max);
+        assert!(largest < 1.02 * 200.0, "{largest}");
+        // Three time constants leave 5 % of a step; the valve's time, and what its saturation takes, come on top.
+        let settled = force_n.iter().rposition(|force| (force - 200.0).abs() > 0.05 * 200.0).unwrap();
+        assert!((60..150).contains(&settled), "{settled} ms");
+    }
+
+    #[test]
+    fn a_motion_that_is_fed_forward_too_little_leaves_no_lasting_error() {
+        let end = *step_response(|parameters| parameters[VELOCITY_SHARE] = 0.8).last().unwrap();
+        assert!((end - 200.0).abs() < 0.1, "{end}");
+        let without = *step_response(|parameters| {
+            parameters[VELOCITY_SHARE] = 0.8;
+            parameters[INTEGRAL_TIME] = 0.0;
+        })
+        .last()
+        .unwrap();
+        // P alone: k_p e = 0.2 c 0.1 m/s.
+        assert!((without - 200.0).abs() > 0.3, "{without}");
+    }
+
+    #[test]
+    fn a_valve_that_cannot_follow_does_not_wind_it_up() {
+        let parameters = defaults();
+        for shut in [false, true] {
+            let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
+            let mut ready = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
+            algorithm.reset(&ready, &parameters);
+            for _ in 0..10_000 {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
+            }
+            // The set-point comes back below the force: the reference needs 1500 N / (v_r c), some 150 ms, and turns the result.
+            ready.set_force_n = -1500.0;
+            let turned = (0..1000).position(|_| {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
+                result < 0.0
+            });
+            assert!(turned.is_some_and(|cycles| cycles < 300), "{turned:?}");
+        }
+    }
+
+    #[test]
+    fn a_standing_rod_lets_small_errors_be_and_the_integral_fades() {
+        let parameters = defaults();
+        let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
+        let mut ready = Ready { force_n: 100.0, set_force_n: 104.0, ..moving_at(0.1) };
+        algorithm.reset(&ready, &parameters);
+        for _ in 0..100 {
+            ready.applied_velocity_m_per_s = algorithm.step(&ready, &parameters);
+        }
+        assert!(algorithm.memory.integral_n > 1.0);
+        ready.velocity_m_per_s = 0.0;
+        for _ in 0..1000 {
+            ready.applied_velocity_m_per_s = algorithm.step(&ready, &parameters);
+        }
+        // 1 s is twenty times the fading time, and thirty reference times.
+        assert!(ready.applied_velocity_m_per_s.abs() < 1e-6, "{}", ready.applied_velocity_m_per_s);
+    }
+
+    #[test]
+    fn what_every_algorithm_must_keep() {
+        laws::check(&KIND);
     }
 }
