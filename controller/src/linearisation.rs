@@ -120,20 +120,21 @@ impl Linearisation {
     /// Speed at each point of the table, m/s, never falling.
     fn speeds(&self, retracting: bool, ready: &Ready) -> [f64; POINTS] {
         match self.law {
-            Law::ChokedExhaust => self.kv_exhaust.map(|kv| kv / self.kv_per_velocity[usize::from(retracting)]),
+            Law::ChokedExhaust => {
+                self.kv_exhaust.map(|kv| kv / self.kv_per_velocity[usize::from(retracting)])
+            }
             Law::PressureCompensated => {
                 let now = self.air.at(ready);
                 let [filling, emptying] = if retracting { [now.b, now.a] } else { [now.a, now.b] };
                 // Flow for each K_V, by how much force it makes in a chamber of this volume.
                 let force = |chamber: Chamber, upstream, downstream| {
-                    self.normal_pressure_pa * chamber.area_m2 / chamber.volume_m3 * root_flow(upstream, downstream)
+                    self.normal_pressure_pa * chamber.area_m2 / chamber.volume_m3
+                        * root_flow(upstream, downstream)
                 };
                 let fill = force(filling, ready.supply_pressure_pa, filling.pressure_pa);
                 let empty = force(emptying, emptying.pressure_pa, self.exhaust_pressure_pa);
                 let stiffness = now.stiffness_n_per_m();
-                std::array::from_fn(|i| {
-                    (fill * self.kv_supply[i] + empty * self.kv_exhaust[i]) / stiffness
-                })
+                std::array::from_fn(|i| (fill * self.kv_supply[i] + empty * self.kv_exhaust[i]) / stiffness)
             }
         }
     }

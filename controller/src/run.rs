@@ -123,7 +123,12 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (news_sender, news) = bounded(NEWS_QUEUE);
     let waits = arguments.pace == Pace::Lockstep;
     let outlets = Outlets { records: record_sender, news: news_sender, waits };
-    let drive = DriveAxis::new(course, gains.values(), Linearisation::new(&rig, Law::ChokedExhaust), arguments.repeat);
+    let drive = DriveAxis::new(
+        course,
+        gains.values(),
+        Linearisation::new(&rig, Law::ChokedExhaust),
+        arguments.repeat,
+    );
     let started = Instant::now();
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.

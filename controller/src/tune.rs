@@ -127,8 +127,7 @@ pub fn attempt(mut program: Program, moves: &[Move], trial: &Trial) -> Result<Fi
     ] {
         rig = rig.with(path, &kv.map(|kv| kv * trial.loop_factor))?;
     }
-    let setup =
-        Setup { carriage_position_m: START_M, linked: false, added_mass_kg: trial.added_mass_kg };
+    let setup = Setup { carriage_position_m: START_M, linked: false, added_mass_kg: trial.added_mass_kg };
     let mut bench = Bench {
         plant: Plant::new(&rig, &setup)?,
         sensors: plant::Sensors::new(&rig, trial.seed),
@@ -190,7 +189,12 @@ struct Bench {
 
 impl Bench {
     /// Follows `way` for `duration_s`; errors of each cycle, m.
-    fn follow(&mut self, program: &mut Program, way: SmoothWay, duration_s: f64) -> Result<Vec<f64>, NotANumber> {
+    fn follow(
+        &mut self,
+        program: &mut Program,
+        way: SmoothWay,
+        duration_s: f64,
+    ) -> Result<Vec<f64>, NotANumber> {
         let cycles = (duration_s * 1e3).round() as usize;
         (0..cycles).map(|cycle| self.cycle(program, way.position(cycle as f64 * 1e-3))).collect()
     }
@@ -241,15 +245,17 @@ impl Figures {
         let mean_m = end(STATIC).iter().map(|error| error.abs()).sum::<f64>() / STATIC as f64;
         self.static_m = self.static_m.max(mean_m);
         let smooth = means(end(STILL), SMOOTH);
-        let [least, most] =
-            smooth.iter().fold([f64::MAX, f64::MIN], |[least, most], error| [least.min(*error), most.max(*error)]);
+        let [least, most] = smooth
+            .iter()
+            .fold([f64::MAX, f64::MIN], |[least, most], error| [least.min(*error), most.max(*error)]);
         self.rest_peak_to_peak_m = self.rest_peak_to_peak_m.max(most - least);
     }
 
     fn take_step(&mut self, errors_m: &[f64], direction: f64) {
         let smooth = means(errors_m, SMOOTH);
         self.overshoot_m = smooth.iter().fold(self.overshoot_m, |most, error| most.max(-direction * error));
-        let settled = smooth.iter().rposition(|error| error.abs() > SETTLED_M).map_or(0, |place| place + SMOOTH);
+        let settled =
+            smooth.iter().rposition(|error| error.abs() > SETTLED_M).map_or(0, |place| place + SMOOTH);
         self.settling_s = self.settling_s.max(settled as f64 * 1e-3);
     }
 }
@@ -273,8 +279,7 @@ mod tests {
 
     #[test]
     fn the_cascade_halves_the_dynamic_error_of_p() {
-        let figures =
-            |name| attempt(shipped(name), POINT_TO_POINT, &Trial::default()).unwrap();
+        let figures = |name| attempt(shipped(name), POINT_TO_POINT, &Trial::default()).unwrap();
         let (p, cascade) = (figures("position-p"), figures("position-cascade"));
         assert!(p.dynamic_m < 5e-3 && p.static_m < 3e-4, "{p:?}");
         assert!(cascade.dynamic_m < p.dynamic_m / 2.0 && cascade.static_m < p.static_m, "{cascade:?}");

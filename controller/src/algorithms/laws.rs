@@ -13,21 +13,23 @@ fn any_ready() -> impl Strategy<Value = Ready> {
     let position = (0.0..0.5_f64, -1.0..1.0_f64, -50.0..50.0_f64);
     let air = (-2000.0..2000.0_f64, 0.0..1e6_f64, 0.0..1e6_f64, 1e5..8e5_f64);
     let set = (0.0..0.5_f64, -1.0..1.0_f64, -50.0..50.0_f64);
-    (position, air, set, -1.0..1.0_f64, 1e-3..0.1_f64).prop_map(|(position, air, set, applied, period_s)| Ready {
-        period_s,
-        position_m: position.0,
-        velocity_m_per_s: position.1,
-        acceleration_m_per_s2: position.2,
-        force_n: air.0,
-        pressure_a_pa: air.1,
-        pressure_b_pa: air.2,
-        supply_pressure_pa: air.3,
-        set_position_m: set.0,
-        set_velocity_m_per_s: set.1,
-        set_acceleration_m_per_s2: set.2,
-        set_force_n: 0.0,
-        set_force_rate_n_per_s: 0.0,
-        applied_velocity_m_per_s: applied,
+    (position, air, set, -1.0..1.0_f64, 1e-3..0.1_f64).prop_map(|(position, air, set, applied, period_s)| {
+        Ready {
+            period_s,
+            position_m: position.0,
+            velocity_m_per_s: position.1,
+            acceleration_m_per_s2: position.2,
+            force_n: air.0,
+            pressure_a_pa: air.1,
+            pressure_b_pa: air.2,
+            supply_pressure_pa: air.3,
+            set_position_m: set.0,
+            set_velocity_m_per_s: set.1,
+            set_acceleration_m_per_s2: set.2,
+            set_force_n: 0.0,
+            set_force_rate_n_per_s: 0.0,
+            applied_velocity_m_per_s: applied,
+        }
     })
 }
 

@@ -88,7 +88,12 @@ static PARAMETERS: [Parameter; 13] = [
         1.0,
         "share of the set-point's acceleration that is fed forward as a force rate",
     ),
-    Parameter::new(("moved_mass_kg", "kg"), [0.0, 100.0], 5.0, "mass that the set-point's acceleration is told of"),
+    Parameter::new(
+        ("moved_mass_kg", "kg"),
+        [0.0, 100.0],
+        5.0,
+        "mass that the set-point's acceleration is told of",
+    ),
     Parameter::new(
         ("friction_compensation", ""),
         [0.0, 1.0],
@@ -178,7 +183,8 @@ impl Algorithm for PositionCascade {
         let air = self.air.at(ready);
         let rate_n_per_s = p(FORCE_GAIN) * (force_n - air.force_n())
             + p(ACCELERATION_FEED_FORWARD) * self.viscous_n_s_per_m * set_acceleration;
-        self.last_result_m_per_s = (velocity + rate_n_per_s / air.stiffness_n_per_m()).clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
+        self.last_result_m_per_s =
+            (velocity + rate_n_per_s / air.stiffness_n_per_m()).clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         self.last_result_m_per_s
     }
 }
