@@ -2,16 +2,32 @@
 //!
 //! | file | holds |
 //! |---|---|
+//! | [`series`] | a quantity over time: smoothing, slopes, stretches |
+//! | [`tables_read`] | a CSV table as columns of numbers and of states |
+//! | [`record`] | all tables of a run: its moves, rests and steps |
+//! | [`figures`] | what a run adds up to in named numbers, one file for each family |
 //! | [`join`] | joins what emulator and controllers left in a run's folder into one summary |
 //! | [`thresholds`] | `[passed]` of the experiment file held against the summary |
 //! | [`table`] | the summary as a short table |
-//! | [`tables_read`] | `measurement.csv` and `controller.csv` as columns |
-//! | [`picture`] | set-point, position, error, valve and pressures over time, as SVG |
+//! | [`drawing`] | panels on one time axis, as SVG |
+//! | [`picture`] | the pictures of a run: all of it, and around its step or its emergency stop |
+//! | [`runs`] | several runs: whether they are of one experiment, their figures |
+//! | [`grid`] | a table of words in Markdown and HTML |
+//! | [`compare`] | runs side by side: figures with their change, curves over each other |
+//! | [`spread`] | how much the figures of repetitions spread |
 //! | [`cli`] | the command line |
 
 pub mod cli;
+pub mod compare;
+pub mod drawing;
+pub mod figures;
+pub mod grid;
 pub mod join;
 pub mod picture;
+pub mod record;
+pub mod runs;
+pub mod series;
+pub mod spread;
 pub mod table;
 pub mod tables_read;
 pub mod thresholds;
@@ -55,11 +71,13 @@ pub enum SummaryError {
 }
 
 impl SummaryError {
-    fn read(file: &Path, reason: impl ToString) -> Self {
+    /// A file that cannot be read.
+    pub fn read(file: &Path, reason: impl ToString) -> Self {
         Self::Read { file: file.into(), reason: reason.to_string() }
     }
 
-    fn write(file: &Path, reason: impl ToString) -> Self {
+    /// A file that cannot be written.
+    pub fn write(file: &Path, reason: impl ToString) -> Self {
         Self::Write { file: file.into(), reason: reason.to_string() }
     }
 }

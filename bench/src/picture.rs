@@ -1,223 +1,228 @@
-//! The picture of a run: set-point and position, error, valve, pressures, one above the other on one time axis.
+//! The pictures of a run: `picture.svg` of all of it, `step.svg` around the largest step, `stop.svg` around an emergency stop.
 //!
-//! Drawn from `measurement.csv` and `controller.csv` alone. Colours are those of Okabe and Ito, told apart by colour-blind
-//! people; the second curve of a panel is thinner, so that black and white does. Of the samples that fall into one
-//! pixel column the smallest and the largest are drawn: no spike is lost, and a minute is as small as a second.
+//! Panels are drawn for what there is: a load axis that does nothing has none. The strip on top shows the main chain's states.
 
-use crate::{SummaryError, tables_read};
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
+use crate::SummaryError;
+use crate::drawing::{BLUE, Band, Curve, GREEN, PURPLE, Panel, Picture, VERMILION};
+use crate::figures::emergency_stop;
+use crate::record::{Record, largest_step};
+use crate::series::{Series, Span};
+use plotters::style::RGBColor;
 use std::path::Path;
-
-const SIZE: (u32, u32) = (1100, 1000);
-const BLUE: RGBColor = RGBColor(0, 114, 178);
-const VERMILION: RGBColor = RGBColor(213, 94, 0);
-const GREEN: RGBColor = RGBColor(0, 158, 115);
-/// Columns of pixels that a curve is thinned to.
-const COLUMNS: usize = 1000;
-/// Rows of pixels in a panel, and some for the width of a line.
-const ROWS: f64 = 100.0;
 
 const METRE_IN_MM: f64 = 1e3;
 const PASCAL_IN_BAR: f64 = 1e-5;
 const PER_CENT: f64 = 100.0;
+/// What a zoom shows before and after its instant.
+const BEFORE_S: f64 = 0.2;
+const AFTER_S: f64 = 0.6;
+/// A load axis that is so far from the carriage moves on its own, and is shown.
+const APART_M: f64 = 0.002;
 
-type Samples = Vec<(f64, f64)>;
-type Failure = Box<dyn std::error::Error>;
-
-struct Curve {
-    name: &'static str,
-    colour: RGBColor,
-    width: u32,
-    samples: Samples,
-}
-
-struct Panel {
-    title: &'static str,
-    curves: Vec<Curve>,
-}
-
-/// Draws `picture.svg` of the run in `folder`.
+/// Draws the pictures of a run into `folder`; returns their names.
 ///
 /// # Errors
-/// [`SummaryError`] when a table cannot be read or the picture cannot be written.
-pub fn draw(folder: &Path, has_controller: bool) -> Result<(), SummaryError> {
-    let panels = panels(folder, has_controller)?;
-    let path = folder.join("picture.svg");
-    draw_panels(&path, &panels).map_err(|error| SummaryError::write(&path, error))
+/// [`SummaryError::Write`] when a picture cannot be drawn or written.
+pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
+    let whole = whole(record);
+    let mut pictures = vec![("picture.svg", whole.clone())];
+    if let Some((what, at_s)) = step(record) {
+        pictures.push(("step.svg", zoom(&whole, &what, at_s)));
+    }
+    if let Some(at_s) = emergency_stop::first_trip_s(record) {
+        pictures.push(("stop.svg", zoom(&whole, "emergency stop", at_s)));
+    }
+    // An earlier summary may have drawn one that this one does not.
+    for name in ["step.svg", "stop.svg"] {
+        let _ = std::fs::remove_file(folder.join(name));
+    }
+    for (name, picture) in &pictures {
+        let path = folder.join(name);
+        let svg = picture.svg().map_err(|error| SummaryError::write(&path, error))?;
+        std::fs::write(&path, svg).map_err(|error| SummaryError::write(&path, error))?;
+    }
+    Ok(pictures.into_iter().map(|(name, _)| name).collect())
 }
 
-fn panels(folder: &Path, has_controller: bool) -> Result<Vec<Panel>, SummaryError> {
-    let names = ["drive_position_m", "drive_valve", "drive_pressure_a_Pa", "drive_pressure_b_Pa"];
-    let measured = tables_read::columns(&folder.join("measurement.csv"), &names)?;
-    let set_point = if has_controller {
-        tables_read::columns(&folder.join("controller.csv"), &["drive_set_point_m"])?.remove(0)
-    } else {
-        Samples::new()
+/// What steps most in a run, and when: the force, else the position.
+#[must_use]
+pub fn step(record: &Record) -> Option<(String, f64)> {
+    let spans = record.experiments();
+    let force = largest_step(record.load.numbers("set_force_N"), &spans, 10.0)
+        .map(|step| (format!("step of the force by {:.0} N", step.height_value()), step.at_s));
+    force.or_else(|| {
+        let step = largest_step(record.drive.numbers("set_position_m"), &spans, 0.002)?;
+        Some((format!("step of the position by {:.0} mm", step.height_value() * METRE_IN_MM), step.at_s))
+    })
+}
+
+fn whole(record: &Record) -> Picture {
+    let span = record.measured.numbers("drive_position_m").span();
+    let range = span.unwrap_or(Span { from_s: 0.0, to_s: 1e-3 });
+    Picture {
+        title: text(record, &["title"]).unwrap_or_else(|| "a run".into()),
+        caption: caption(record),
+        time_name: "time, s".into(),
+        range,
+        mark_s: None,
+        bands: bands(record),
+        panels: panels(record),
+    }
+}
+
+/// The same around an instant, which becomes 0.
+fn zoom(whole: &Picture, what: &str, at_s: f64) -> Picture {
+    let moved = |span: &Span| Span { from_s: span.from_s - at_s, to_s: span.to_s - at_s };
+    let mut zoom = whole.clone();
+    zoom.title = format!("{}: {what} at {at_s:.3} s", whole.title);
+    zoom.time_name = "time since then, s".into();
+    zoom.range = Span { from_s: -BEFORE_S, to_s: AFTER_S };
+    zoom.mark_s = Some(0.0);
+    zoom.bands.iter_mut().for_each(|band| band.span = moved(&band.span));
+    for curve in zoom.panels.iter_mut().flat_map(|panel| &mut panel.curves) {
+        curve.samples = curve.samples.shifted(-at_s);
+    }
+    zoom
+}
+
+fn text(record: &Record, path: &[&str]) -> Option<String> {
+    let (last, tables) = path.split_last()?;
+    let table = tables.iter().try_fold(&record.experiment, |table, key| table.get(*key)?.as_table())?;
+    table.get(*last)?.as_str().map(str::to_owned)
+}
+
+/// What the experiment says of itself, and the programs of both axes.
+fn caption(record: &Record) -> String {
+    let about = text(record, &["about"]);
+    let program = |axis: &str| text(record, &[axis, "program"]).map(|program| format!("{axis}: {program}"));
+    let programs: Vec<_> = ["drive", "load"].into_iter().filter_map(program).collect();
+    let programs = (!programs.is_empty()).then(|| programs.join("   "));
+    about.into_iter().chain(programs).collect::<Vec<_>>().join("\n")
+}
+
+/// The main chain's states.
+fn bands(record: &Record) -> Vec<Band> {
+    let states = record.leader().states("main_chain").iter();
+    let band = |entry: &crate::tables_read::StateSpan| Band {
+        label: entry.state.replace('-', " "),
+        span: entry.span,
+        is_main: entry.state == "experiment",
     };
-    let [position, valve, cap, rod] = <[Samples; 4]>::try_from(measured)
-        .unwrap_or_else(|columns| unreachable!("asked for four columns, got {}", columns.len()));
-    let error = difference(&set_point, &position);
-    let curve = |name, colour, width, samples: Samples, factor: f64| Curve {
-        name,
-        colour,
-        width,
-        samples: samples.into_iter().map(|(time, value)| (time, value * factor)).collect(),
+    states.map(band).collect()
+}
+
+fn curve(name: &str, colour: RGBColor, width: u32, samples: Series) -> Curve {
+    Curve { name: name.into(), colour, width, samples }
+}
+
+fn panels(record: &Record) -> Vec<Panel> {
+    let Record { drive, load, measured, truth, .. } = record;
+    let load_acts = record.load_acts();
+    let scaled = |series: &Series, factor: f64| series.map(|value| value * factor);
+    let apart = measured.numbers("load_position_m").minus(measured.numbers("drive_position_m"));
+    let load_apart = load_acts && apart.largest().is_some_and(|apart| apart > APART_M);
+    let panel = |title: &str, curves: Vec<Curve>| Panel { title: title.into(), curves };
+    let millimetres = |series: &Series| scaled(series, METRE_IN_MM);
+
+    let mut position = vec![
+        curve("position", BLUE, 3, millimetres(measured.numbers("drive_position_m"))),
+        curve("set-point", VERMILION, 1, millimetres(drive.numbers("set_position_m"))),
+    ];
+    let mut velocity = vec![
+        curve("filtered", BLUE, 2, drive.numbers("velocity_m_per_s").clone()),
+        curve("set-point", VERMILION, 1, drive.numbers("set_velocity_m_per_s").clone()),
+    ];
+    if load_apart {
+        position.push(curve("load", GREEN, 1, millimetres(measured.numbers("load_position_m"))));
+        velocity.push(curve("load", GREEN, 1, load.numbers("velocity_m_per_s").clone()));
+    }
+    let mut valves = vec![curve("drive", BLUE, 1, scaled(measured.numbers("drive_valve"), PER_CENT))];
+    let pressures = |axis: [&str; 2]| {
+        vec![
+            curve("a, cap side", BLUE, 2, scaled(measured.numbers(axis[0]), PASCAL_IN_BAR)),
+            curve("b, rod side", GREEN, 1, scaled(measured.numbers(axis[1]), PASCAL_IN_BAR)),
+        ]
     };
-    Ok(vec![
-        Panel {
-            title: "drive position, mm",
-            curves: vec![
-                curve("position", BLUE, 3, position, METRE_IN_MM),
-                curve("set-point", VERMILION, 1, set_point, METRE_IN_MM),
+    let mut drive_pressures = pressures(["drive_pressure_a_Pa", "drive_pressure_b_Pa"]);
+    let supply = truth.numbers("supply_pressure_Pa");
+    if supply.least().zip(supply.most()).is_some_and(|(least, most)| least < 0.9 * most) {
+        drive_pressures.push(curve("supply", PURPLE, 2, scaled(supply, PASCAL_IN_BAR)));
+    }
+    let mut load_panels = Vec::new();
+    let mut force = Vec::new();
+    if load_acts {
+        valves.push(curve("load", VERMILION, 1, scaled(measured.numbers("load_valve"), PER_CENT)));
+        force.push(panel(
+            "load force, N, compression positive",
+            vec![
+                curve("force", BLUE, 1, measured.numbers("load_force_N").clone()),
+                curve("set-point", VERMILION, 1, load.numbers("set_force_N").clone()),
             ],
-        },
-        Panel {
-            title: "set-point - position, mm",
-            curves: vec![curve("error", BLUE, 1, error, METRE_IN_MM)],
-        },
-        Panel { title: "drive valve opening, %", curves: vec![curve("valve", BLUE, 1, valve, PER_CENT)] },
-        Panel {
-            title: "drive pressures, bar absolute",
-            curves: vec![
-                curve("a, cap side", BLUE, 2, cap, PASCAL_IN_BAR),
-                curve("b, rod side", GREEN, 1, rod, PASCAL_IN_BAR),
-            ],
-        },
-    ])
-}
-
-/// Set-point less position where both have a sample of the same time; both grow in time.
-fn difference(set_point: &Samples, position: &Samples) -> Samples {
-    let mut positions = position.iter().peekable();
-    let mut result = Samples::new();
-    for (time, wanted) in set_point {
-        while positions.next_if(|(earlier, _)| earlier < time).is_some() {}
-        if let Some((_, is)) = positions.next_if(|(same, _)| same == time) {
-            result.push((*time, wanted - is));
-        }
+        ));
+        load_panels.push(panel(
+            "load pressures, bar absolute",
+            pressures(["load_pressure_a_Pa", "load_pressure_b_Pa"]),
+        ));
     }
-    result
-}
-
-fn draw_panels(path: &Path, panels: &[Panel]) -> Result<(), Failure> {
-    let root = SVGBackend::new(path, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
-    let end = panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| curve.samples.last());
-    let end_s = end.map(|(time, _)| *time).fold(1e-3, f64::max);
-    for (area, panel) in root.split_evenly((panels.len(), 1)).iter().zip(panels) {
-        draw_panel(area, panel, end_s)?;
-    }
-    root.present()?;
-    Ok(())
-}
-
-fn draw_panel(
-    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
-    panel: &Panel,
-    end_s: f64,
-) -> Result<(), Failure> {
-    let (low, high) = value_range(panel);
-    let mut chart = ChartBuilder::on(area)
-        .margin(8)
-        .margin_right(24)
-        .caption(panel.title, ("sans-serif", 17))
-        .x_label_area_size(28)
-        .y_label_area_size(56)
-        .build_cartesian_2d(0.0..end_s, low..high)?;
-    chart
-        .configure_mesh()
-        .x_desc("time, s")
-        .label_style(("sans-serif", 13))
-        .max_light_lines(0)
-        .bold_line_style(BLACK.mix(0.18))
-        .draw()?;
-    for curve in &panel.curves {
-        draw_curve(&mut chart, thinned(&curve.samples, end_s, (high - low) / ROWS), curve)?;
-    }
-    if panel.curves.len() > 1 {
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .label_font(("sans-serif", 13))
-            .draw()?;
-    }
-    Ok(())
-}
-
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
-fn draw_curve(chart: &mut Chart<'_, '_>, thin: Samples, curve: &Curve) -> Result<(), Failure> {
-    let style = ShapeStyle { color: curve.colour.to_rgba(), filled: false, stroke_width: curve.width };
-    chart
-        .draw_series(LineSeries::new(thin, style))?
-        .label(curve.name)
-        .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
-    Ok(())
-}
-
-/// Smallest and largest value of each pixel column, in the order in which they came; one where they differ by less than
-/// `pixel`, since a line that goes up and down within a pixel draws spikes at its corners.
-fn thinned(samples: &Samples, end_s: f64, pixel: f64) -> Samples {
-    let column = |time: f64| (time / end_s * COLUMNS as f64) as usize;
-    samples
-        .chunk_by(|(one, _), (other, _)| column(*one) == column(*other))
-        .flat_map(|chunk| {
-            let by_value = |one: &&(f64, f64), other: &&(f64, f64)| one.1.total_cmp(&other.1);
-            let extremes = chunk.iter().min_by(by_value).into_iter().chain(chunk.iter().max_by(by_value));
-            let mut extremes: Samples = extremes.copied().collect();
-            if extremes[1].1 - extremes[0].1 < pixel {
-                extremes.pop();
-            }
-            extremes.sort_by(|one, other| one.0.total_cmp(&other.0));
-            extremes
-        })
-        .collect()
-}
-
-/// The values of a panel with a little room; a flat line gets room of one.
-fn value_range(panel: &Panel) -> (f64, f64) {
-    let values = panel.curves.iter().flat_map(|curve| &curve.samples).map(|(_, value)| *value);
-    let (low, high) = values
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-    if low > high {
-        return (0.0, 1.0);
-    }
-    let room = if high > low { (high - low) * 0.06 } else { 0.5 };
-    (low - room, high + room)
+    let mut panels = vec![
+        panel("drive position, mm", position),
+        panel(
+            "drive set-point - position, mm",
+            vec![curve("error", BLUE, 1, millimetres(&record.position_error()))],
+        ),
+    ];
+    panels.extend(force);
+    panels.push(panel("velocity, m/s", velocity));
+    panels.push(panel("valve opening, %", valves));
+    panels.push(panel("drive pressures, bar absolute", drive_pressures));
+    panels.extend(load_panels);
+    panels
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::made::{chain, each_ms, table};
 
-    #[test]
-    fn thinning_keeps_every_spike() {
-        let mut samples: Samples = (0..60_000).map(|ms| (f64::from(ms) * 1e-3, 0.0)).collect();
-        samples[31_416].1 = 7.0;
-        let thin = thinned(&samples, 60.0, 0.1);
-        assert!(thin.len() <= 2 * (COLUMNS + 1));
-        assert!(thin.contains(&(31.416, 7.0)));
-        assert!(thin.is_sorted_by(|one, other| one.0 <= other.0));
+    fn record() -> Record {
+        let measured = table(&[
+            ("drive_position_m", &each_ms(0.0, 2.0, |time| 0.1 * time)),
+            ("drive_pressure_a_Pa", &each_ms(0.0, 2.0, |_| 3e5)),
+            ("load_force_N", &each_ms(0.0, 2.0, |_| 1.0)),
+        ]);
+        Record { measured, ..Record::default() }
     }
 
-    #[test]
-    fn the_error_is_taken_where_both_have_a_sample() {
-        let set_point = vec![(0.002, 1.0), (0.003, 2.0), (0.005, 3.0)];
-        let position = vec![(0.0, 9.0), (0.001, 9.0), (0.002, 0.5), (0.003, 0.5), (0.004, 0.5)];
-        assert_eq!(difference(&set_point, &position), [(0.002, 0.5), (0.003, 1.5)]);
+    fn drawn(record: &Record) -> (tempfile::TempDir, Vec<&'static str>, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let names = draw(folder.path(), record).unwrap();
+        let picture = std::fs::read_to_string(folder.path().join("picture.svg")).unwrap();
+        (folder, names, picture)
     }
 
     #[test]
     fn a_run_without_a_controller_is_drawn_too() {
-        let folder = tempfile::tempdir().unwrap();
-        let head = "time_s,drive_valve,drive_position_m,drive_pressure_a_Pa,drive_pressure_b_Pa";
-        std::fs::write(folder.path().join("measurement.csv"), format!("{head}\n0.000,0,0.1,3e5,3e5\n"))
-            .unwrap();
-        draw(folder.path(), false).unwrap();
-        let picture = std::fs::read_to_string(folder.path().join("picture.svg")).unwrap();
-        assert!(picture.starts_with("<svg") && picture.contains("drive pressures"));
+        let (_folder, names, picture) = drawn(&record());
+        assert_eq!(names, ["picture.svg"]);
+        assert!(picture.contains("drive pressures") && !picture.contains("load force"));
+    }
+
+    #[test]
+    fn a_step_of_the_load_gets_its_panels_and_a_picture_of_its_own() {
+        let plain = record();
+        let mut record = plain.clone();
+        record.load =
+            table(&[("set_force_N", &each_ms(0.0, 2.0, |time| if time < 1.0 { 100.0 } else { 300.0 }))]);
+        record.load.set_states("main_chain", chain(&[("settling", 0.0), ("experiment", 0.5), ("", 2.0)]));
+        record.experiment = "title = \"load-step\"\nabout = \"Fig. 9\"".parse().unwrap();
+        let (folder, names, picture) = drawn(&record);
+        assert_eq!(names, ["picture.svg", "step.svg"]);
+        for part in ["load force", "load-step", "Fig. 9", "settling"] {
+            assert!(picture.contains(part), "{part}");
+        }
+        let step = std::fs::read_to_string(folder.path().join("step.svg")).unwrap();
+        assert!(step.contains("step of the force by 200 N at 1.000 s"));
+        assert!(draw(folder.path(), &plain).is_ok());
+        assert!(!folder.path().join("step.svg").exists(), "of an earlier summary");
     }
 }

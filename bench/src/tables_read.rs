@@ -1,31 +1,86 @@
-//! `measurement.csv` and `controller.csv` as columns of numbers.
+//! The tables of a run's folder as columns: numbers over time, and states over time.
 
 use crate::SummaryError;
+use crate::series::{Series, Span};
+use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Reads the named columns of a table, in the order of `names`; an empty cell is NaN-free: the row is left out of it.
+/// A state and how long it lasted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StateSpan {
+    /// The state's name, as `rig.dbc` has it.
+    pub state: String,
+    /// From when until when.
+    pub span: Span,
+}
+
+/// Columns that were asked for, as far as the table has them.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    numbers: BTreeMap<&'static str, Series>,
+    states: BTreeMap<&'static str, Vec<StateSpan>>,
+}
+
+impl Table {
+    /// The numbers of a column; no samples when the table lacks it.
+    #[must_use]
+    pub fn numbers(&self, name: &str) -> &Series {
+        self.numbers.get(name).unwrap_or(Series::NONE)
+    }
+
+    /// The states of a column; none when the table lacks it.
+    #[must_use]
+    pub fn states(&self, name: &str) -> &[StateSpan] {
+        self.states.get(name).map_or(&[], Vec::as_slice)
+    }
+
+    /// The stretches of a column in which the state is one of `wanted`; neighbours become one.
+    #[must_use]
+    pub fn in_state(&self, name: &str, wanted: &[&str]) -> Vec<Span> {
+        let mut spans: Vec<Span> = Vec::new();
+        for entry in self.states(name).iter().filter(|entry| wanted.contains(&entry.state.as_str())) {
+            match spans.last_mut() {
+                Some(last) if entry.span.from_s <= last.to_s => last.to_s = entry.span.to_s,
+                _ => spans.push(entry.span),
+            }
+        }
+        spans
+    }
+
+    /// Puts a column of numbers in.
+    pub fn set_numbers(&mut self, name: &'static str, column: Series) {
+        self.numbers.insert(name, column);
+    }
+
+    /// Puts a column of states in.
+    pub fn set_states(&mut self, name: &'static str, column: Vec<StateSpan>) {
+        self.states.insert(name, column);
+    }
+}
+
+/// Reads the named columns of a table that has `time_s`; an empty cell is no sample, and a column that the table lacks has none.
 ///
-/// Each column is a row of (time in s, value). Comment lines start with `#`.
+/// Comment lines start with `#`.
 ///
 /// # Errors
-/// [`SummaryError::Read`] with file and line: a column that is missing, a cell that is no finite number.
-pub fn columns(path: &Path, names: &[&str]) -> Result<Vec<Vec<(f64, f64)>>, SummaryError> {
+/// [`SummaryError::Read`] with file and line: no `time_s`, a number that is none or not finite.
+pub fn read(path: &Path, numbers: &[&'static str], states: &[&'static str]) -> Result<Table, SummaryError> {
     let refused = |reason: String| SummaryError::read(path, reason);
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .from_path(path)
         .map_err(|error| refused(error.to_string()))?;
     let head = reader.headers().map_err(|error| refused(error.to_string()))?.clone();
-    let place = |name: &str| {
-        head.iter()
-            .position(|column| column == name)
-            .ok_or_else(|| refused(format!("column {name} is missing")))
+    let place = |name: &str| head.iter().position(|column| column == name);
+    let time = place("time_s").ok_or_else(|| refused("column time_s is missing".into()))?;
+    let placed = |names: &[&'static str]| -> Vec<_> {
+        names.iter().filter_map(|name| Some((*name, place(name)?))).collect()
     };
-    let time = place("time_s")?;
-    let places = names.iter().map(|name| place(name)).collect::<Result<Vec<_>, _>>()?;
-    let mut columns = vec![Vec::new(); names.len()];
-    for row in reader.records() {
-        let row = row.map_err(|error| refused(error.to_string()))?;
+    let (number_places, state_places) = (placed(numbers), placed(states));
+    let mut number_columns = vec![Series::default(); number_places.len()];
+    let mut state_columns: Vec<Vec<StateSpan>> = vec![Vec::new(); state_places.len()];
+    let mut row = csv::StringRecord::new();
+    while reader.read_record(&mut row).map_err(|error| refused(error.to_string()))? {
         let line = row.position().map_or(0, csv::Position::line);
         let number = |place: usize| {
             let cell = row.get(place).unwrap_or_default();
@@ -35,13 +90,31 @@ pub fn columns(path: &Path, names: &[&str]) -> Result<Vec<Vec<(f64, f64)>>, Summ
                 .ok_or_else(|| refused(format!("line {line}: '{cell}' is no finite number")))
         };
         let time_s = number(time)?;
-        for (column, place) in columns.iter_mut().zip(&places) {
+        for (column, (_, place)) in number_columns.iter_mut().zip(&number_places) {
             if !row.get(*place).unwrap_or_default().is_empty() {
-                column.push((time_s, number(*place)?));
+                column.push(time_s, number(*place)?);
             }
         }
+        for (column, (_, place)) in state_columns.iter_mut().zip(&state_places) {
+            enter(column, row.get(*place).unwrap_or_default(), time_s);
+        }
     }
-    Ok(columns)
+    let numbers = number_places.iter().map(|(name, _)| *name).zip(number_columns).collect();
+    let states = state_places.iter().map(|(name, _)| *name).zip(state_columns).collect();
+    Ok(Table { numbers, states })
+}
+
+/// A state lasts until the row of the next one; the last one until its last row.
+fn enter(column: &mut Vec<StateSpan>, state: &str, time_s: f64) {
+    if let Some(last) = column.last_mut() {
+        last.span.to_s = time_s;
+        if last.state == state {
+            return;
+        }
+    }
+    if !state.is_empty() {
+        column.push(StateSpan { state: state.into(), span: Span { from_s: time_s, to_s: time_s } });
+    }
 }
 
 #[cfg(test)]
@@ -58,8 +131,25 @@ mod tests {
     #[test]
     fn columns_are_found_by_name_and_empty_cells_left_out() {
         let (_folder, path) = table("# linked=true\nb,time_s,a\n1,0.000,5\n,0.001,6\n");
-        let read = columns(&path, &["a", "b"]).unwrap();
-        assert_eq!(read, [vec![(0.0, 5.0), (0.001, 6.0)], vec![(0.0, 1.0)]]);
+        let read = read(&path, &["a", "b", "c"], &[]).unwrap();
+        assert_eq!(read.numbers("a"), &Series::from_iter([(0.0, 5.0), (0.001, 6.0)]));
+        assert_eq!(read.numbers("b"), &Series::from_iter([(0.0, 1.0)]));
+        assert!(read.numbers("c").is_empty());
+    }
+
+    #[test]
+    fn a_state_lasts_until_the_next() {
+        let (_folder, path) =
+            table("time_s,s\n0.0,settling\n0.1,settling\n0.2,experiment\n0.3,done\n0.4,done\n");
+        let read = read(&path, &[], &["s"]).unwrap();
+        let told: Vec<_> = read
+            .states("s")
+            .iter()
+            .map(|entry| (entry.state.as_str(), entry.span.from_s, entry.span.to_s))
+            .collect();
+        assert_eq!(told, [("settling", 0.0, 0.2), ("experiment", 0.2, 0.3), ("done", 0.3, 0.4)]);
+        let both = read.in_state("s", &["settling", "experiment"]);
+        assert_eq!(both, [Span { from_s: 0.0, to_s: 0.3 }]);
     }
 
     #[test]
@@ -67,11 +157,11 @@ mod tests {
         for (text, hint) in [
             ("time_s,a\n0.0,x\n", "line 2: 'x'"),
             ("time_s,a\n0.0,NaN\n", "line 2: 'NaN'"),
-            ("time_s,b\n0.0,1\n", "column a is missing"),
+            ("a,b\n0.0,1\n", "column time_s is missing"),
             ("time_s,a\n0.0\n", "t.csv"),
         ] {
             let (_folder, path) = table(text);
-            let message = columns(&path, &["a"]).unwrap_err().to_string();
+            let message = read(&path, &["a"], &[]).unwrap_err().to_string();
             assert!(message.contains(hint), "{text}: {message}");
         }
     }

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("programs/{name}.toml"));
         let source = Source::read(&path)?;
         let fresh = |gain: Option<f64>| -> Result<Program, Box<dyn Error>> {
-            let mut program = source.program(Axis::Drive, &rig)?;
+            let mut program = source.program(Axis::Drive, &rig, false)?;
             let place = program.place("algorithm.gain_per_s").ok_or("no gain")?;
             if let Some(gain) = gain {
                 program.set(place, gain)?;

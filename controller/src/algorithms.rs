@@ -1,5 +1,8 @@
 //! The algorithms that can be asked for by name. A new one is a file beside these and a line in [`SHIPPED`].
 
+pub mod force_manual;
+pub mod force_p;
+pub mod force_pid_map;
 pub mod position_cascade;
 pub mod position_p;
 pub mod position_pid;
@@ -10,7 +13,14 @@ mod laws;
 use crate::algorithm::Kind;
 
 /// All of them.
-pub const SHIPPED: &[Kind] = &[position_p::KIND, position_cascade::KIND, position_pid::KIND];
+pub const SHIPPED: &[Kind] = &[
+    position_p::KIND,
+    position_cascade::KIND,
+    position_pid::KIND,
+    force_p::KIND,
+    force_pid_map::KIND,
+    force_manual::KIND,
+];
 
 /// The algorithm called `name`.
 #[must_use]

@@ -1,6 +1,7 @@
 //! The controller's command line.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use plant::Axis;
 use protocol::bus::BusUrl;
 use protocol::exit::EXIT_CODE_HELP;
 use protocol::run_folder;
@@ -18,8 +19,12 @@ pub struct Cli {
 /// What the controller can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run an experiment: position the drive axis, hold the load's valve shut.
+    /// Run an experiment with the rig on a bus.
     Run(Box<RunArguments>),
+    /// Run an experiment with the plant model inside this process: no bus, faster than real time, the same program.
+    Rehearse(Box<RehearseArguments>),
+    /// List the algorithms with their parameters, and the parameters of the tasks around them.
+    Algorithms,
     /// Try an algorithm from a shared library and print what it offers.
     CheckLibrary(Library),
     /// Try it in this very process, which it may end; `check-library` and program files start this.
@@ -43,27 +48,79 @@ pub enum Pace {
     Lockstep,
 }
 
-/// How to run.
-#[derive(Args, Debug)]
-pub struct RunArguments {
-    /// Bus: can://IFACE (SocketCAN) or unix:///PATH (embedded).
-    #[arg(long, default_value_t = BusUrl::default_embedded())]
-    pub bus: BusUrl,
+/// Which axes a process controls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Axes {
+    /// The drive's alone; another process has the load.
+    Drive,
+    /// The load's alone; another process has the drive.
+    Load,
+    /// Both, which still know each other only as over the bus.
+    Both,
+}
+
+impl Axes {
+    /// The axes, in the order in which they are answered.
+    #[must_use]
+    pub fn list(self) -> &'static [Axis] {
+        match self {
+            Self::Drive => &[Axis::Drive],
+            Self::Load => &[Axis::Load],
+            Self::Both => &Axis::ALL,
+        }
+    }
+}
+
+/// What is controlled, how, and where the files go.
+#[derive(Args, Clone, Debug)]
+pub struct FileArguments {
     /// Rig file, of which nominal numbers are read: valve characteristic, areas, stroke.
     #[arg(long)]
     pub rig: PathBuf,
-    /// Experiment file: motion, repetitions, algorithm and gains.
+    /// Experiment file: set-points, programs, settling, repetitions.
     #[arg(long)]
     pub experiment: PathBuf,
     /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
     #[arg(long, default_value_os_t = run_folder::new_folder())]
     pub out: PathBuf,
-    /// real: answer frames as they arrive; lockstep: join the barrier.
-    #[arg(long, value_enum, default_value_t = Pace::Real)]
-    pub pace: Pace,
+    /// Folder of the programs that the experiment names; by default "programs" beside the experiment's folder.
+    #[arg(long)]
+    pub programs: Option<PathBuf>,
+    /// Program file of the drive, in place of the experiment's.
+    #[arg(long)]
+    pub drive_program: Option<PathBuf>,
+    /// Program file of the load axis, in place of the experiment's.
+    #[arg(long)]
+    pub load_program: Option<PathBuf>,
+    /// A variable in place of the program's, such as drive.algorithm.gain_per_s=30; may be repeated.
+    #[arg(long, value_name = "AXIS.TASK.NAME=VALUE")]
+    pub set: Vec<String>,
     /// Repeat the experiment until the rig ends, instead of saying Done.
     #[arg(long)]
     pub repeat: bool,
+}
+
+/// How to run with a rig on a bus.
+#[derive(Args, Debug)]
+pub struct RunArguments {
+    /// What is controlled.
+    #[command(flatten)]
+    pub files: FileArguments,
+    /// Bus: can://IFACE (SocketCAN) or unix:///PATH (embedded).
+    #[arg(long, default_value_t = BusUrl::default_embedded())]
+    pub bus: BusUrl,
+    /// Which axes this process controls.
+    #[arg(long, value_enum, default_value_t = Axes::Both)]
+    pub axis: Axes,
+    /// Do not wait for the other axis's controller, nor mind its absence; with --axis drive or load.
+    #[arg(long)]
+    pub alone: bool,
+    /// real: answer frames as they arrive; lockstep: join the barrier.
+    #[arg(long, value_enum, default_value_t = Pace::Real)]
+    pub pace: Pace,
+    /// Look for changes of the program files while running, and take over their numbers.
+    #[arg(long)]
+    pub watch: bool,
     /// How long bus and sensors may be gone before giving up, in s.
     #[arg(long, default_value_t = 10.0, value_parser = grace)]
     pub bus_grace: f64,
@@ -76,6 +133,20 @@ pub struct RunArguments {
     /// Ask the system for no priority, no locked memory and no latency request.
     #[arg(long)]
     pub no_realtime: bool,
+}
+
+/// How to rehearse.
+#[derive(Args, Debug)]
+pub struct RehearseArguments {
+    /// What is controlled.
+    #[command(flatten)]
+    pub files: FileArguments,
+    /// Seed of the sensors' noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// End after this much of the rig's time, in s, if the experiment is not done before.
+    #[arg(long, default_value_t = 600.0, value_parser = grace)]
+    pub seconds: f64,
 }
 
 fn grace(text: &str) -> Result<f64, String> {

@@ -40,6 +40,8 @@ pub mod section;
 pub use axis::{AxisExperiment, Change, During, Prepare, ProgramReference, SetPoints};
 pub use section::ExperimentError;
 
+use crate::chains::AfterStop;
+use crate::chains::main::Start;
 use crate::parameters::Parameter;
 use section::{Section, Source};
 use std::path::Path;
@@ -79,27 +81,7 @@ pub struct RunSection {
     /// What starts the experiment once both axes have settled.
     pub start: Start,
     /// What follows an emergency stop.
-    pub after_emergency_stop: AfterEmergencyStop,
-}
-
-/// What starts the experiment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
-    /// Nothing more than that both axes have settled.
-    ByItself,
-    /// The console's start.
-    OnStart,
-}
-
-/// What follows an emergency stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AfterEmergencyStop {
-    /// The run ends.
-    End,
-    /// The experiment starts over once the rig has recovered.
-    Restart,
-    /// It starts over when the console says start.
-    OnStart,
+    pub after_emergency_stop: AfterStop,
 }
 
 /// `[recording]`.
@@ -170,11 +152,7 @@ impl RunSection {
                 .choice("start", &[("by-itself", Start::ByItself), ("on-start", Start::OnStart)])?,
             after_emergency_stop: section.choice(
                 "after_emergency_stop",
-                &[
-                    ("end", AfterEmergencyStop::End),
-                    ("restart", AfterEmergencyStop::Restart),
-                    ("on-start", AfterEmergencyStop::OnStart),
-                ],
+                &[("end", AfterStop::End), ("restart", AfterStop::Restart), ("on-start", AfterStop::OnStart)],
             )?,
         };
         if run.settling_timeout_s <= run.settling_s {
@@ -196,7 +174,7 @@ impl Default for RunSection {
             settling_s: SETTLING.default,
             settling_timeout_s: SETTLING_TIMEOUT.default,
             start: Start::ByItself,
-            after_emergency_stop: AfterEmergencyStop::End,
+            after_emergency_stop: AfterStop::End,
         }
     }
 }
@@ -209,3 +187,6 @@ impl Recording {
         Ok(Self { every_cycles })
     }
 }
+
+#[cfg(test)]
+mod tests;

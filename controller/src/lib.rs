@@ -1,32 +1,35 @@
-//! The axis controllers behind a CAN bus: position control of the drive, the load held shut.
+//! The axis controllers behind a CAN bus: drive and load, each with its program, its chains and its place on the bus.
 //!
-//! It reads nothing of the process but the bus; of the plant it knows the nominal numbers of the rig file.
+//! It reads nothing of the process but the bus, save for the rehearsal, which runs the plant inside the controller; of
+//! the plant it knows the nominal numbers of the rig file.
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`station`] | frames in, commands out |
+//! | [`station`] | frames in, commands out, for the axes of a process |
 //! | [`pace`] | what moves it: the rig's frames, or the barrier |
 //! | [`rig_view`] | cycle numbers, lost frames |
-//! | [`main_chain`] | from a rig at rest through the experiment to done |
-//! | [`chains`] | the sequence chains of one axis: main, force, matching, emergency stop |
-//! | [`set_point`] | profiles and motion laws |
-//! | [`axes`], [`linearisation`] | the axis controllers, the inverse valve characteristic |
+//! | [`axis`] | one axis controller: chains, work, program put together |
+//! | [`chains`] | the sequence chains: main, force, matching, emergency stop |
+//! | [`program`] | tasks of an axis, composed in a file; [`pre_controller`], [`post_controller`], [`linearisation`] |
 //! | [`algorithm`], [`algorithms`], [`parameters`] | what an algorithm is, those shipped, their parameters |
-//! | [`rest_zone`], [`tune`] | when a rod is left alone, figures and margins of a position program |
+//! | [`rest_zone`], [`tune`] | when a rod is left alone; figures and margins of a program |
 //! | [`plugin`], [`guard`] | algorithms from shared libraries, the watch over every algorithm |
+//! | [`set_point`] | motion laws, forces, loads |
+//! | [`experiment`], [`setup`] | experiment files, and controllers made of them |
+//! | [`rehearsal`], [`rehearse`] | the plant inside the controller, and its command |
 //! | [`figures`] | dynamic and static error |
-//! | [`run`], [`recording`], [`experiment`], [`cli`] | around it |
+//! | [`run`], [`recording`], [`report`], [`watch`], [`listing`], [`cli`] | around it |
 
 pub mod algorithm;
 pub mod algorithms;
-pub mod axes;
+pub mod axis;
 pub mod chains;
 pub mod cli;
 pub mod experiment;
 pub mod figures;
 pub mod guard;
 pub mod linearisation;
-pub mod main_chain;
+pub mod listing;
 pub mod pace;
 pub mod parameters;
 pub mod plugin;
@@ -34,9 +37,14 @@ pub mod post_controller;
 pub mod pre_controller;
 pub mod program;
 pub mod recording;
+pub mod rehearsal;
+pub mod rehearse;
+pub mod report;
 pub mod rest_zone;
 pub mod rig_view;
 pub mod run;
 pub mod set_point;
+pub mod setup;
 pub mod station;
 pub mod tune;
+pub mod watch;

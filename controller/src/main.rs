@@ -3,7 +3,7 @@
 use clap::Parser;
 use controller::cli::{Cli, Command};
 use controller::plugin::command;
-use protocol::exit::Exit;
+use controller::run::RunError;
 use std::process::ExitCode;
 
 #[cfg(feature = "count-allocations")]
@@ -11,16 +11,16 @@ use std::process::ExitCode;
 static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;
 
 fn main() -> ExitCode {
-    let exit = match Cli::parse().command {
-        Command::Run(arguments) => controller::run::run(&arguments).unwrap_or_else(|error| {
-            eprintln!("controller: {error}");
-            error.exit()
-        }),
-        Command::CheckLibrary(library) => command::check_library(&library.file).unwrap_or_else(|error| {
-            eprintln!("controller: {error}");
-            Exit::BadInput
-        }),
-        Command::ProbeLibrary(library) => command::probe_library(&library.file),
+    let result = match Cli::parse().command {
+        Command::Run(arguments) => controller::run::run(&arguments),
+        Command::Rehearse(arguments) => controller::rehearse::run(&arguments),
+        Command::Algorithms => Ok(controller::listing::print()),
+        Command::CheckLibrary(library) => command::check_library(&library.file).map_err(RunError::from),
+        Command::ProbeLibrary(library) => Ok(command::probe_library(&library.file)),
     };
+    let exit = result.unwrap_or_else(|error| {
+        eprintln!("controller: {error}");
+        error.exit()
+    });
     exit.into()
 }

@@ -4,9 +4,10 @@
 //! them, and their wake-up latency is counted from the arrival of the frame at our queue.
 
 use crate::station::{News, Station};
+use plant::Axis;
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{Bus, BusError, Received};
-use protocol::frames::{DRIVE_SENSORS, MainChainState};
+use protocol::frames::{DRIVE_SENSORS, LOAD_SENSORS};
 use realtime::{Clock, Interrupt, Recorder as Histogram};
 use std::time::{Duration, Instant as WallInstant};
 
@@ -16,8 +17,8 @@ const PATIENCE: Duration = Duration::from_millis(20);
 const SILENCE: Duration = Duration::from_millis(200);
 /// Silence after Done that counts as the rig's end.
 const DONE_SILENCE: Duration = Duration::from_secs(1);
-/// Cycles after an abort during which the valve is still told to stay shut and the record goes on.
-const ABORT_CYCLES: u64 = 2000;
+/// Cycles after an abort or a fault during which the valve is still told to stay shut and the record goes on.
+const STOPPED_CYCLES: u64 = 2000;
 /// Answers that the allocation count leaves out at the start.
 const WARM_UP: u64 = 1000;
 /// Period of the answers, ns.
@@ -32,8 +33,8 @@ pub enum End {
     Interrupted,
     /// The bus was gone, or no sensors came, for longer than the grace time.
     BusGone,
-    /// The experiment was aborted, by an emergency stop or by the console.
-    Aborted,
+    /// The experiment was aborted or a fault stopped it, and nothing may start it again.
+    Stopped,
     /// Lockstep: a member was not done in time.
     LockstepTimeout,
 }
@@ -42,7 +43,7 @@ pub enum End {
 pub struct Paced {
     /// Why it ended.
     pub end: End,
-    /// Arrival of the drive's sensors to our waking up, ns.
+    /// Arrival of the sensors of our first axis to our waking up, ns.
     pub wakeup_ns: Histogram,
     /// Waking up to the last frame sent, ns.
     pub execution_ns: Histogram,
@@ -73,6 +74,7 @@ pub fn run_real(
     interrupt: &Interrupt,
 ) -> Paced {
     let mut paced = Paced::new();
+    let wakes = if station.has(Axis::Drive) { DRIVE_SENSORS.id } else { LOAD_SENSORS.id };
     let mut last_frame = WallInstant::now();
     let mut last_answer_ns = None;
     let mut silent = false;
@@ -90,7 +92,7 @@ pub fn run_real(
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
             heard = true;
             // Every frame's own waiting counts, so that a stall shows with all the frames that waited for its end.
-            if frame.standard_id() == Some(DRIVE_SENSORS.id) {
+            if frame.standard_id() == Some(wakes) {
                 paced.wakeup_ns.record(woke_ns.saturating_sub(stamp_ns));
             }
             station.take(&frame);
@@ -122,10 +124,10 @@ pub fn run_real(
                 station.tell(News::SensorsSilent);
             }
         }
-        if station.aborted_for() > ABORT_CYCLES {
-            break End::Aborted;
+        if station.stopped_for() > STOPPED_CYCLES {
+            break End::Stopped;
         }
-        if quiet > DONE_SILENCE && station.drive().state() == MainChainState::Done {
+        if quiet > DONE_SILENCE && station.done() {
             break End::RigEnded;
         }
         if quiet > grace {
@@ -168,8 +170,8 @@ pub fn run_lockstep(
                     }
                     station.answer(bus);
                     bus.done(control.cycle);
-                    if station.aborted_for() > ABORT_CYCLES {
-                        break End::Aborted;
+                    if station.stopped_for() > STOPPED_CYCLES {
+                        break End::Stopped;
                     }
                 }
                 Kind::TimedOut => break End::LockstepTimeout,
@@ -183,7 +185,7 @@ pub fn run_lockstep(
                 let since = *waiting_since.get_or_insert_with(WallInstant::now);
                 if bus.counters().disconnects > 0 || since.elapsed() > grace {
                     // The farewell itself may be lost on the wire; a rig that goes when all is done has ended.
-                    let ended = station.ending() || station.drive().state() == MainChainState::Done;
+                    let ended = station.ending() || station.done();
                     break if ended { End::RigEnded } else { End::BusGone };
                 }
                 bus.wait_readable(Duration::from_millis(100));

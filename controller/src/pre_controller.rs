@@ -74,6 +74,15 @@ impl Geometry {
     }
 }
 
+impl Geometry {
+    /// Rig coordinate at an extension of the own rod, m.
+    #[must_use]
+    pub fn position_m(&self, extension_m: f64) -> f64 {
+        // Each axis's map is its own inverse.
+        self.extension_m(extension_m)
+    }
+}
+
 /// A first-order low-pass.
 #[derive(Clone, Copy, Debug, Default)]
 struct LowPass {

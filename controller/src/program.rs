@@ -6,19 +6,21 @@
 //!               every n cycles     every m       every k cycles      held in between
 //! ```
 //!
-//! The algorithm is one of [`crate::algorithms`] or a shared library; a second one, with the multiple of its own, may be there for
-//! the force chain, which relieves the linked system and lets a hand move the axis. Every number is a [`Variable`]: it
-//! has a name such as `algorithm.gain_per_s` and may change between two cycles.
+//! The algorithm is one of [`crate::algorithms`] or a shared library; a second one, with a multiple of its own, may be there for
+//! the force chain, which relieves the linked system and gives way to a hand. Every number is a [`Variable`], those of the chains
+//! too: it has a name such as `algorithm.gain_per_s` and may change between two cycles.
 //!
 //! [`file`] reads the file.
 
 pub mod file;
 
-use crate::algorithm::{Algorithm, Quantity, Ready};
+use crate::algorithm::{Quantity, Ready};
+use crate::chains::force::ForceOutput;
+use crate::guard::{AlgorithmFault, Guarded};
 use crate::parameters::{OutOfRange, Parameter};
 use crate::post_controller::{Output, PostController};
 use crate::pre_controller::{Geometry, PreController};
-use crate::set_point::{ForceSetPoint, SetPoint};
+use crate::set_point::{Actual, ForceSetPoint, SetPoint};
 use protocol::frames::Sensors;
 use std::ops::Range;
 
@@ -59,7 +61,7 @@ pub enum Hand {
 
 /// An algorithm in its task.
 struct Slot {
-    algorithm: Box<dyn Algorithm>,
+    algorithm: Guarded,
     controls: Quantity,
     values: Range<usize>,
     /// Cycle of its last step; `None` when it must begin anew.
@@ -67,21 +69,38 @@ struct Slot {
     wanted_m_per_s: f64,
 }
 
-/// The result of an algorithm that is no number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the algorithm's result is no number")]
-pub struct NotANumber;
+/// A part of the program that is no algorithm and has numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// The pre-controller.
+    PreController,
+    /// The post-controller.
+    PostController,
+    /// The force chain.
+    ForceChain,
+    /// The matching chain.
+    MatchingChain,
+    /// What counts as settled; read once, at the start.
+    Settled,
+}
+
+/// The algorithm that the force chain uses, and the two of its values that the chain sets each cycle.
+struct GivingWay {
+    slot: Slot,
+    moving: usize,
+    limit_m_per_s: usize,
+}
 
 /// The program of one axis.
 pub struct Program {
     pre: PreController,
     post: PostController,
     user: Slot,
-    force_chain: Option<Slot>,
+    giving_way: Option<GivingWay>,
     variables: Vec<Variable>,
     values: Vec<f64>,
-    pre_values: Range<usize>,
-    post_values: Range<usize>,
+    /// Values of each [`Task`].
+    tasks: [Range<usize>; 5],
     ready: Ready,
     observed: Option<u64>,
     post_stepped: Option<u64>,
@@ -91,7 +110,7 @@ pub struct Program {
 impl Program {
     /// Takes the sensors of `cycle`: the pre-controller's task.
     pub fn observe(&mut self, cycle: u64, sensors: &Sensors, supply_pressure_pa: f64) {
-        let parameters = &self.values[self.pre_values.clone()];
+        let parameters = &self.values[self.tasks[Task::PreController as usize].clone()];
         let Some(passed) = due(self.observed, cycle, parameters) else { return };
         self.observed = Some(cycle);
         self.ready.supply_pressure_pa = supply_pressure_pa;
@@ -101,8 +120,8 @@ impl Program {
     /// The opening for `demand`, from the algorithm that has the axis.
     ///
     /// # Errors
-    /// [`NotANumber`] when the algorithm gives none; it must not be asked again.
-    pub fn control(&mut self, cycle: u64, demand: &Demand, hand: Hand) -> Result<Output, NotANumber> {
+    /// [`AlgorithmFault`], latched until [`Program::restart_algorithms`]: the valve is to be shut.
+    pub fn control(&mut self, cycle: u64, demand: &Demand, hand: Hand) -> Result<Output, AlgorithmFault> {
         let geometry = self.pre.geometry();
         let direction = geometry.direction();
         let ready = &mut self.ready;
@@ -111,16 +130,16 @@ impl Program {
         ready.set_acceleration_m_per_s2 = direction * demand.position.acceleration_m_per_s2;
         ready.set_force_n = demand.force.force_n;
         ready.set_force_rate_n_per_s = demand.force.rate_n_per_s;
-        let (slot, other) = match (hand, &mut self.force_chain) {
-            (Hand::ForceChain, Some(slot)) => (slot, Some(&mut self.user)),
-            (_, other) => (&mut self.user, other.as_mut()),
+        let (slot, other) = match (hand, &mut self.giving_way) {
+            (Hand::ForceChain, Some(giving_way)) => (&mut giving_way.slot, Some(&mut self.user)),
+            (_, other) => (&mut self.user, other.as_mut().map(|giving_way| &mut giving_way.slot)),
         };
         if let Some(other) = other {
             other.stepped = None;
         }
         slot.step(cycle, ready, &self.values)?;
         let wanted = slot.wanted_m_per_s;
-        let parameters = &self.values[self.post_values.clone()];
+        let parameters = &self.values[self.tasks[Task::PostController as usize].clone()];
         if due(self.post_stepped, cycle, parameters).is_some() {
             self.post_stepped = Some(cycle);
             self.output = self.post.step(wanted, ready, parameters);
@@ -132,8 +151,8 @@ impl Program {
     /// The valve is shut: whatever has the axis next begins anew.
     pub fn shut(&mut self) {
         self.user.stepped = None;
-        if let Some(slot) = &mut self.force_chain {
-            slot.stepped = None;
+        if let Some(giving_way) = &mut self.giving_way {
+            giving_way.slot.stepped = None;
         }
         self.post_stepped = None;
         self.output = Output::default();
@@ -145,6 +164,46 @@ impl Program {
         self.shut();
         self.pre.reset();
         self.observed = None;
+    }
+
+    /// Takes latched faults away: the chain begins anew.
+    pub fn restart_algorithms(&mut self) {
+        self.user.algorithm.restart();
+        if let Some(giving_way) = &mut self.giving_way {
+            giving_way.slot.algorithm.restart();
+        }
+    }
+
+    /// Tells the algorithm of the force chain what the chain has decided.
+    pub fn give_way(&mut self, chain: &ForceOutput) {
+        if let Some(GivingWay { moving, limit_m_per_s, .. }) = &self.giving_way {
+            self.values[*moving] = f64::from(u8::from(chain.feed_forward));
+            let most = self.variables[*limit_m_per_s].parameter.most;
+            self.values[*limit_m_per_s] = chain.limit_m_per_s.unwrap_or(most);
+        }
+    }
+
+    /// Values of a task, in the order of its table.
+    #[must_use]
+    pub fn task(&self, task: Task) -> &[f64] {
+        &self.values[self.tasks[task as usize].clone()]
+    }
+
+    /// Position of the axis, less the sensor's offset, m, rig coordinates.
+    #[must_use]
+    pub fn position_m(&self) -> f64 {
+        self.pre.geometry().position_m(self.ready.position_m)
+    }
+
+    /// What the axis does, in rig coordinates.
+    #[must_use]
+    pub fn actual(&self) -> Actual {
+        let direction = self.pre.geometry().direction();
+        Actual {
+            position_m: self.position_m(),
+            velocity_m_per_s: direction * self.ready.velocity_m_per_s,
+            acceleration_m_per_s2: direction * self.ready.acceleration_m_per_s2,
+        }
     }
 
     /// What was measured, in the axis's own extension.
@@ -167,8 +226,8 @@ impl Program {
     /// The velocity that the algorithm wants, m/s, own extension.
     #[must_use]
     pub fn wanted_m_per_s(&self, hand: Hand) -> f64 {
-        match (hand, &self.force_chain) {
-            (Hand::ForceChain, Some(slot)) => slot.wanted_m_per_s,
+        match (hand, &self.giving_way) {
+            (Hand::ForceChain, Some(giving_way)) => giving_way.slot.wanted_m_per_s,
             _ => self.user.wanted_m_per_s,
         }
     }
@@ -208,18 +267,18 @@ impl Program {
 }
 
 impl Slot {
-    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<(), NotANumber> {
+    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<(), AlgorithmFault> {
         let (every, parameters) = values[self.values.clone()].split_at(1);
         let Some(passed) = due(self.stepped, cycle, every) else { return Ok(()) };
         ready.period_s = passed as f64 * CYCLE_S;
         if self.stepped.is_none() {
             ready.period_s = every[0] * CYCLE_S;
-            self.algorithm.reset(ready, parameters);
+            self.algorithm.reset(ready, parameters)?;
         }
         self.stepped = Some(cycle);
-        let wanted = self.algorithm.step(ready, parameters);
-        self.wanted_m_per_s = if wanted.is_finite() { wanted } else { 0.0 };
-        if wanted.is_finite() { Ok(()) } else { Err(NotANumber) }
+        self.wanted_m_per_s = 0.0;
+        self.wanted_m_per_s = self.algorithm.step(ready, parameters)?;
+        Ok(())
     }
 }
 

@@ -1,51 +1,123 @@
-//! `controller.csv`: what only the controller knows, a row for each cycle it answered.
+//! `controller-drive.csv` and `controller-load.csv`: what only a controller knows, a row for each recorded cycle.
 //!
 //! A thread of its own polls the queues, so that the 1 ms path wakes nobody.
 
-use crate::axes::DriveRecord;
+use crate::axis::AxisRecord;
 use crate::station::News;
+use crate::watch::Watcher;
 use crossbeam_channel::{Receiver, TryRecvError};
+use plant::Axis;
 use protocol::run_folder::LineFile;
 use std::io::{self, Write};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Pause between two looks at the queues.
 const POLL_PERIOD: Duration = Duration::from_millis(4);
 /// Longest time that a row stays in memory.
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
-const HEAD: &str = "time_s,chain_state,drive_set_point_m,drive_set_point_velocity_m_per_s,drive_position_m,\
-drive_wanted_velocity_m_per_s,drive_opening";
+const HEAD: &str = "time_s,main_chain,force_chain,matching_chain,emergency_stop_chain,set_position_m,\
+set_velocity_m_per_s,set_force_N,position_m,velocity_m_per_s,force_N,wanted_velocity_m_per_s,opening,enabled,moving";
+
+/// The tables of the axes of a process.
+pub struct Tables {
+    tables: Vec<(Axis, LineFile)>,
+}
+
+impl Tables {
+    /// Makes a table for each axis in `folder`.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
+        let tables = axes.iter().map(|axis| {
+            let mut table = LineFile::create(&folder.join(format!("controller-{}.csv", axis.name())))?;
+            writeln!(table.lines(), "{HEAD}")?;
+            Ok((*axis, table))
+        });
+        Ok(Self { tables: tables.collect::<io::Result<_>>()? })
+    }
+
+    /// Appends a row to the table of its axis.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn write(&mut self, record: &AxisRecord) -> io::Result<()> {
+        let Some((_, table)) = self.tables.iter_mut().find(|(axis, _)| *axis == record.axis) else {
+            return Ok(());
+        };
+        let AxisRecord { cycle, main, force_chain, matching, emergency_stop, .. } = record;
+        let out = table.lines();
+        write!(
+            out,
+            "{}.{:03},{main},{force_chain},{matching},{emergency_stop},",
+            cycle / 1000,
+            cycle % 1000
+        )?;
+        match &record.set_position {
+            Some(point) => write!(out, "{},{},", point.position_m, point.velocity_m_per_s)?,
+            None => write!(out, ",,")?,
+        }
+        if let Some(point) = &record.set_force {
+            write!(out, "{}", point.force_n)?;
+        }
+        let moving = record.set_position.is_some_and(|point| point.moving)
+            || record.set_force.is_some_and(|point| point.moving);
+        writeln!(
+            out,
+            ",{},{:?},{},{:?},{},{},{}",
+            record.position_m,
+            record.velocity_m_per_s,
+            record.force_n,
+            record.wanted_velocity_m_per_s,
+            record.opening,
+            u8::from(record.enabled),
+            u8::from(moving)
+        )?;
+        table.write_when_full()
+    }
+
+    /// Writes everything out.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn write_out(&mut self) -> io::Result<()> {
+        self.tables.iter_mut().try_for_each(|(_, table)| table.write_out())
+    }
+}
 
 /// Writes rows and tells news until the senders are gone. Returns the news, and why writing stopped, if it did.
 pub fn run(
-    mut table: LineFile,
-    records: &Receiver<DriveRecord>,
+    mut tables: Tables,
+    records: &Receiver<AxisRecord>,
     news: &Receiver<News>,
+    mut watcher: Option<Watcher>,
     failed: impl Fn(),
 ) -> (Vec<News>, Option<String>) {
     let mut told = Vec::new();
     let mut last_flush = Instant::now();
-    let mut failure = writeln!(table.lines(), "{HEAD}").err().map(|error| error.to_string());
+    let mut failure: Option<String> = None;
     loop {
         let finished = loop {
             match records.try_recv() {
                 Ok(record) if failure.is_none() => {
-                    if let Err(error) = write_row(&mut table, &record) {
-                        failure = Some(error.to_string());
-                    }
+                    failure = tables.write(&record).err().map(|error| error.to_string());
                 }
                 Ok(_) => {}
                 Err(TryRecvError::Empty) => break false,
                 Err(TryRecvError::Disconnected) => break true,
             }
         };
+        if let Some(watcher) = &mut watcher {
+            watcher.look();
+        }
         for item in news.try_iter() {
             eprintln!("controller: {}", sentence(item));
             told.push(item);
         }
         if failure.is_none() && (finished || last_flush.elapsed() > FLUSH_PERIOD) {
             last_flush = Instant::now();
-            failure = table.write_out().err().map(|error| error.to_string());
+            failure = tables.write_out().err().map(|error| error.to_string());
         }
         if let Some(failure) = &failure {
             eprintln!("controller: cannot write {failure}; free space or choose another --out");
@@ -59,21 +131,13 @@ pub fn run(
     }
 }
 
-fn write_row(table: &mut LineFile, record: &DriveRecord) -> io::Result<()> {
-    let DriveRecord { cycle, state, set_point, position_m, wanted_velocity_m_per_s, opening } = record;
-    let out = table.lines();
-    write!(out, "{}.{:03},{state},", cycle / 1000, cycle % 1000)?;
-    match set_point {
-        Some(point) => write!(out, "{},{}", point.position_m, point.velocity_m_per_s)?,
-        None => write!(out, ",")?,
-    }
-    writeln!(out, ",{position_m},{wanted_velocity_m_per_s},{opening}")?;
-    table.write_when_full()
-}
-
-fn sentence(news: News) -> String {
+/// News for a person.
+pub(crate) fn sentence(news: News) -> String {
     match news {
-        News::State(state, cycle) => format!("cycle {cycle}: {state}"),
+        News::State { axis, state, cycle, cause } => {
+            format!("cycle {cycle}: {} {state}: {cause}", axis.name())
+        }
+        News::Changed { axis, place, value } => format!("{}: variable {place} is now {value}", axis.name()),
         News::RigRestarted => "the rig started anew; starting over".into(),
         News::BusLost => "the bus is gone; trying to come back".into(),
         News::BusBack => "the bus is back".into(),

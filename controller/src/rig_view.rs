@@ -26,10 +26,13 @@ pub struct PerAxis {
 }
 
 impl PerAxis {
-    /// Of both axes.
+    /// Of one axis.
     #[must_use]
-    pub fn sum(&self) -> u64 {
-        self.drive + self.load
+    pub fn get(&self, axis: Axis) -> u64 {
+        match axis {
+            Axis::Drive => self.drive,
+            Axis::Load => self.load,
+        }
     }
 
     fn of(&mut self, axis: Axis) -> &mut u64 {
@@ -138,10 +141,10 @@ impl RigView {
         Some((cycle.saturating_sub(behind), sensors))
     }
 
-    /// Whether the rig says that its emergency stop is tripped.
+    /// What the rig says of itself; `None` until it said something.
     #[must_use]
-    pub fn emergency_stop(&self) -> bool {
-        self.status.is_some_and(|status| status.emergency_stop)
+    pub fn status(&self) -> Option<&RigStatus> {
+        self.status.as_ref()
     }
 
     /// Sensor frames received.
@@ -270,7 +273,7 @@ mod tests {
         play(&mut view, 0..5001, &[]);
         view.take_status(RigStatus { emergency_stop: true, ..RigStatus::default() });
         view.take_tick(&tick(0, 0));
-        assert!(!view.emergency_stop());
+        assert!(view.status().is_none());
     }
 
     #[test]

@@ -160,3 +160,6 @@ impl Motion {
         SetPoint::at_rest(self.end_m())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,35 +1,55 @@
-//! The controllers on the bus: frames in, commands out, whatever paces them.
+//! The controllers of a process on the bus: frames in, commands out, whatever paces them.
 //!
 //! ```text
-//!   take(frame)* ──► answer: for each axis with fresh sensors, one command that echoes their cycle
-//!                            every ten cycles, and on change, status and values of the chains
+//!   take(frame)* ──► answer: for each axis with fresh sensors, one command that echoes their cycle;
+//!                            every ten cycles, and on change, status and values of its chains; its emergency stop
 //! ```
 //!
-//! Only the newest sensors of an axis are answered: after a stall, the backlog is read and not replayed. Nothing here
-//! allocates, locks, prints or blocks.
+//! Only the newest sensors of an axis are answered: after a stall, the backlog is read and not replayed. An axis hears its
+//! partner as it would over the bus, a cycle after the partner spoke, also when both live in this process ([`Mail`]): one
+//! process or two give the same log. Nothing here allocates, locks, prints or blocks.
 
-use crate::axes::{DriveAxis, DriveRecord, LoadAxis};
+use crate::axis::{Answer, AxisController, AxisRecord};
+use crate::chains::main::MainCause;
 use crate::rig_view::{RigView, TickNews};
-use crossbeam_channel::Sender;
+use crossbeam_channel::{Receiver, Sender};
 use plant::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
-use protocol::frames::{DecodeError, Frame, MainChainState, RunControl, RunControlCommand};
+use protocol::frames::{
+    ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MainChainState, ValveCommand,
+};
+use std::collections::VecDeque;
 
-/// Period of status and values, in cycles.
-const SLOW_PERIOD: u64 = 10;
-/// Cycles within the period in which each slow frame is sent: none falls on the rig's tick (0) or status (5), nor on another.
-const DRIVE_STATUS_PHASE: u64 = 2;
-const DRIVE_VALUES_PHASE: u64 = 3;
-const LOAD_STATUS_PHASE: u64 = 7;
-const LOAD_VALUES_PHASE: u64 = 8;
+/// Frames of a partner that wait for their cycle; a cycle has three at most.
+const MAIL_ROOM: usize = 16;
 
 /// What a station tells a person.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum News {
-    /// The main chain went to this state in this cycle.
-    State(#[serde(serialize_with = "state_name")] MainChainState, u64),
+    /// The main chain of an axis went to this state in this cycle, because of this.
+    State {
+        /// The axis.
+        axis: Axis,
+        /// Its state.
+        #[serde(serialize_with = "state_name")]
+        state: MainChainState,
+        /// The rig's cycle.
+        cycle: u64,
+        /// Why.
+        #[serde(serialize_with = "in_words")]
+        cause: MainCause,
+    },
+    /// A parameter changed while running.
+    Changed {
+        /// The axis.
+        axis: Axis,
+        /// Place in the list of variables.
+        place: usize,
+        /// Its value.
+        value: f64,
+    },
     /// The rig's time began again.
     RigRestarted,
     /// The bus went away.
@@ -44,6 +64,10 @@ fn state_name<S: serde::Serializer>(state: &MainChainState, serializer: S) -> Re
     serializer.serialize_str(state.name())
 }
 
+fn in_words<S: serde::Serializer>(cause: &MainCause, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(cause)
+}
+
 /// Frames that were counted and ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct IgnoredFrames {
@@ -53,44 +77,80 @@ pub struct IgnoredFrames {
     pub unknown: u64,
 }
 
-/// The sending ends of the recorder's queues.
+/// A parameter that shall change, already checked against its table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change {
+    /// Of which axis.
+    pub axis: Axis,
+    /// Place in the list of variables.
+    pub place: usize,
+    /// Its value.
+    pub value: f64,
+}
+
+/// The queues between a station and the threads that may wait.
 pub struct Outlets {
-    /// A row of `controller.csv` each cycle.
-    pub records: Sender<DriveRecord>,
+    /// A row of an axis each recorded cycle.
+    pub records: Sender<AxisRecord>,
     /// What a person is told.
     pub news: Sender<News>,
+    /// Parameters changed while running.
+    pub changes: Receiver<Change>,
     /// Lockstep waits for the recorder rather than lose a row.
     pub waits: bool,
 }
 
-/// The controllers on the bus.
+/// Frames between two axes of one process, each heard in the cycle after the one in which it was sent, as over the bus.
+#[derive(Default)]
+struct Mail(VecDeque<(u64, Frame)>);
+
+impl Mail {
+    fn new() -> Self {
+        Self(VecDeque::with_capacity(MAIL_ROOM))
+    }
+
+    fn post(&mut self, cycle: u64, frame: Frame) {
+        if self.0.len() == MAIL_ROOM {
+            self.0.pop_front();
+        }
+        self.0.push_back((cycle, frame));
+    }
+
+    fn heard_in(&mut self, cycle: u64) -> Option<Frame> {
+        let due = self.0.front().is_some_and(|(sent, _)| *sent < cycle);
+        if due { self.0.pop_front().map(|(_, frame)| frame) } else { None }
+    }
+}
+
+/// An axis of this process.
+struct Seat {
+    controller: AxisController,
+    /// From the partner in this process.
+    mail: Mail,
+    answered: u64,
+    stopped_for: u64,
+}
+
+/// The controllers of a process on the bus.
 pub struct Station {
     view: RigView,
-    drive: DriveAxis,
-    load: LoadAxis,
+    seats: Vec<Seat>,
     outlets: Outlets,
     ignored: IgnoredFrames,
-    /// State last told to the bus with each axis's status.
-    told_state: [MainChainState; 2],
-    answered: u64,
-    aborted_for: u64,
     records_dropped: u64,
     ending: bool,
 }
 
 impl Station {
-    /// Puts the controllers on the bus.
+    /// Puts the controllers, one or two, on the bus.
     #[must_use]
-    pub fn new(drive: DriveAxis, outlets: Outlets) -> Self {
+    pub fn new(controllers: Vec<AxisController>, outlets: Outlets) -> Self {
+        let seat = |controller| Seat { controller, mail: Mail::new(), answered: 0, stopped_for: 0 };
         Self {
             view: RigView::default(),
-            drive,
-            load: LoadAxis::default(),
+            seats: controllers.into_iter().map(seat).collect(),
             outlets,
             ignored: IgnoredFrames::default(),
-            told_state: [MainChainState::WaitingForRig; 2],
-            answered: 0,
-            aborted_for: 0,
             records_dropped: 0,
             ending: false,
         }
@@ -107,12 +167,14 @@ impl Station {
                 TickNews::Ending => self.ending = true,
                 TickNews::Restarted => {
                     self.ending = false;
-                    self.drive.restart();
+                    self.seats.iter_mut().for_each(|seat| {
+                        seat.controller.restart();
+                        seat.mail.0.clear();
+                    });
                     self.tell(News::RigRestarted);
                 }
             },
-            Ok(Frame::RunControl(RunControl { command: RunControlCommand::Abort, .. })) => self.drive.abort(),
-            Ok(_) => {}
+            Ok(frame) => self.seats.iter_mut().for_each(|seat| seat.controller.hear(&frame)),
             Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
                 self.ignored.unknown += 1;
             }
@@ -120,63 +182,70 @@ impl Station {
         }
     }
 
-    /// Answers what is fresh; true when the drive was answered.
+    /// Answers what is fresh; true when the first of our axes was answered.
     pub fn answer(&mut self, bus: &mut dyn Bus) -> bool {
         if self.ending {
             return false;
         }
-        let drive = self.view.fresh_sensors(Axis::Drive);
-        if let Some((cycle, sensors)) = drive {
-            let command = self.drive.command(cycle, &sensors, self.view.emergency_stop());
-            send(bus, &Frame::DriveValveCommand(command));
-            self.answered += 1;
-            let aborted = self.drive.state() == MainChainState::Aborted;
-            self.aborted_for = if aborted { self.aborted_for + 1 } else { 0 };
-            self.record();
-            self.send_drive_chain(cycle, bus);
+        self.take_changes();
+        let mut first = false;
+        for place in 0..self.seats.len() {
+            let axis = self.seats[place].controller.axis();
+            if let Some((cycle, sensors)) = self.view.fresh_sensors(axis) {
+                let status = self.view.status().copied();
+                let seat = &mut self.seats[place];
+                while let Some(frame) = seat.mail.heard_in(cycle) {
+                    seat.controller.hear(&frame);
+                }
+                let answer = seat.controller.answer(cycle, &sensors, status.as_ref());
+                seat.answered += 1;
+                let stopped =
+                    matches!(seat.controller.state(), MainChainState::Aborted | MainChainState::Fault)
+                        && !seat.controller.may_restart();
+                seat.stopped_for = if stopped { seat.stopped_for + 1 } else { 0 };
+                self.send(place, cycle, &answer, bus);
+                first |= place == 0;
+            }
         }
-        if let Some((cycle, sensors)) = self.view.fresh_sensors(Axis::Load) {
-            send(bus, &Frame::LoadValveCommand(self.load.command(cycle, &sensors)));
-            self.send_load_chain(cycle, bus);
-        }
-        drive.is_some()
+        first
     }
 
-    fn send_drive_chain(&mut self, cycle: u64, bus: &mut dyn Bus) {
-        let state = self.drive.state();
-        let changed = std::mem::replace(&mut self.told_state[Axis::Drive.index()], state) != state;
-        if changed {
-            self.tell(News::State(state, cycle));
+    fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn Bus) {
+        let axis = self.seats[place].controller.axis();
+        send(bus, &command_frame(axis, answer.command));
+        let frames = [
+            answer.emergency_stop.map(|stop| emergency_stop_frame(axis, stop)),
+            answer.status.map(|status| status_frame(axis, status)),
+            answer.values.map(|values| values_frame(axis, values)),
+        ];
+        for frame in frames.into_iter().flatten() {
+            send(bus, &frame);
+            self.seats.iter_mut().enumerate().filter(|(other, _)| *other != place).for_each(|(_, seat)| {
+                seat.mail.post(cycle, as_received(&frame));
+            });
         }
-        if changed || cycle % SLOW_PERIOD == DRIVE_STATUS_PHASE {
-            send(bus, &Frame::DriveChainStatus(self.drive.status()));
+        if let Some(news) = answer.news {
+            self.tell(news);
         }
-        if (changed || cycle % SLOW_PERIOD == DRIVE_VALUES_PHASE)
-            && let Some(values) = self.drive.values()
-        {
-            send(bus, &Frame::DriveChainValues(values));
+        if let Some(record) = answer.record {
+            let sent = if self.outlets.waits {
+                self.outlets.records.send(record).is_ok()
+            } else {
+                self.outlets.records.try_send(record).is_ok()
+            };
+            self.records_dropped += u64::from(!sent);
         }
     }
 
-    fn send_load_chain(&mut self, cycle: u64, bus: &mut dyn Bus) {
-        let state = self.drive.state();
-        let changed = std::mem::replace(&mut self.told_state[Axis::Load.index()], state) != state;
-        if changed || cycle % SLOW_PERIOD == LOAD_STATUS_PHASE {
-            send(bus, &Frame::LoadChainStatus(self.load.status(state)));
+    fn take_changes(&mut self) {
+        while let Ok(change) = self.outlets.changes.try_recv() {
+            let of_axis = |seat: &&mut Seat| seat.controller.axis() == change.axis;
+            let Some(seat) = self.seats.iter_mut().find(of_axis) else { continue };
+            if seat.controller.program_mut().set(change.place, change.value).is_ok() {
+                let Change { axis, place, value } = change;
+                self.tell(News::Changed { axis, place, value });
+            }
         }
-        if changed || cycle % SLOW_PERIOD == LOAD_VALUES_PHASE {
-            send(bus, &Frame::LoadChainValues(self.load.values()));
-        }
-    }
-
-    fn record(&mut self) {
-        let Some(record) = self.drive.last() else { return };
-        let sent = if self.outlets.waits {
-            self.outlets.records.send(record).is_ok()
-        } else {
-            self.outlets.records.try_send(record).is_ok()
-        };
-        self.records_dropped += u64::from(!sent);
     }
 
     /// Tells a person something; a full queue loses it, which a person survives.
@@ -190,10 +259,21 @@ impl Station {
         self.ending
     }
 
-    /// The drive's controller.
+    /// The controllers of this process.
+    pub fn controllers(&self) -> impl Iterator<Item = &AxisController> {
+        self.seats.iter().map(|seat| &seat.controller)
+    }
+
+    /// Whether `axis` is one of ours.
     #[must_use]
-    pub fn drive(&self) -> &DriveAxis {
-        &self.drive
+    pub fn has(&self, axis: Axis) -> bool {
+        self.controllers().any(|controller| controller.axis() == axis)
+    }
+
+    /// Whether all of them are done.
+    #[must_use]
+    pub fn done(&self) -> bool {
+        self.controllers().all(|controller| controller.state() == MainChainState::Done)
     }
 
     /// The rig as seen from here.
@@ -208,16 +288,16 @@ impl Station {
         self.ignored
     }
 
-    /// Cycles of the drive that were answered.
+    /// Cycles answered by the axis that answered most.
     #[must_use]
     pub fn answered(&self) -> u64 {
-        self.answered
+        self.seats.iter().map(|seat| seat.answered).max().unwrap_or(0)
     }
 
-    /// Cycles answered since the experiment was aborted; 0 while it is not.
+    /// Cycles answered since an axis was stopped for good, by an abort or a fault; 0 while none is.
     #[must_use]
-    pub fn aborted_for(&self) -> u64 {
-        self.aborted_for
+    pub fn stopped_for(&self) -> u64 {
+        self.seats.iter().map(|seat| seat.stopped_for).max().unwrap_or(0)
     }
 
     /// Rows lost to a full queue.
@@ -227,10 +307,46 @@ impl Station {
     }
 }
 
+fn command_frame(axis: Axis, command: ValveCommand) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveValveCommand(command),
+        Axis::Load => Frame::LoadValveCommand(command),
+    }
+}
+
+fn emergency_stop_frame(axis: Axis, stop: EmergencyStop) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveEmergencyStop(stop),
+        Axis::Load => Frame::LoadEmergencyStop(stop),
+    }
+}
+
+fn status_frame(axis: Axis, status: ChainStatus) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveChainStatus(status),
+        Axis::Load => Frame::LoadChainStatus(status),
+    }
+}
+
+fn values_frame(axis: Axis, values: ChainValues) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveChainValues(values),
+        Axis::Load => Frame::LoadChainValues(values),
+    }
+}
+
+fn encode(frame: &Frame) -> CanFrame {
+    frame
+        .encode()
+        .unwrap_or_else(|error| panic!("a controller made a frame that rig.dbc does not allow: {error}"))
+}
+
+/// The frame as it arrives elsewhere: values rounded to what the wire carries.
+pub(crate) fn as_received(frame: &Frame) -> Frame {
+    Frame::decode(&encode(frame)).unwrap_or_else(|error| panic!("an encoded frame does not decode: {error}"))
+}
+
 /// Sends a frame that a controller made itself; what the bus does not take is counted there.
 fn send(bus: &mut dyn Bus, frame: &Frame) {
-    let frame = frame
-        .encode()
-        .unwrap_or_else(|error| panic!("a controller made a frame that rig.dbc does not allow: {error}"));
-    let _ = bus.send(&frame);
+    let _ = bus.send(&encode(frame));
 }

@@ -14,7 +14,8 @@
 //! [`STILL_M`], and during moves nothing quicker than a third of a second is larger than [`RIPPLE_M`]. A hop of stick and slip, 1 to 2 mm every
 //! few seconds, is no oscillation; it shows in the figure `rest_peak_to_peak_m`, which is judged apart.
 
-use crate::program::{Demand, Hand, NotANumber, Program};
+use crate::guard::AlgorithmFault;
+use crate::program::{Demand, Hand, Program};
 use crate::set_point::{ForceSetPoint, SetPoint, SmoothWay};
 use plant::{Inputs, ParameterError, Plant, RigParameters, Setup, quantise_valve};
 use protocol::frames::Sensors;
@@ -112,7 +113,7 @@ pub enum TrialError {
     Setup(#[from] plant::SetupError),
     /// The algorithm failed.
     #[error(transparent)]
-    Algorithm(#[from] NotANumber),
+    Algorithm(#[from] AlgorithmFault),
 }
 
 /// Tries `program`, which has seen nothing yet, on `moves`.
@@ -194,13 +195,13 @@ impl Bench {
         program: &mut Program,
         way: SmoothWay,
         duration_s: f64,
-    ) -> Result<Vec<f64>, NotANumber> {
+    ) -> Result<Vec<f64>, AlgorithmFault> {
         let cycles = (duration_s * 1e3).round() as usize;
         (0..cycles).map(|cycle| self.cycle(program, way.position(cycle as f64 * 1e-3))).collect()
     }
 
     /// One cycle; the command that answers it acts from the next one on.
-    fn cycle(&mut self, program: &mut Program, position: SetPoint) -> Result<f64, NotANumber> {
+    fn cycle(&mut self, program: &mut Program, position: SetPoint) -> Result<f64, AlgorithmFault> {
         let acting = self.commands.pop_front().unwrap_or(0.0);
         let inputs = Inputs { valve: [acting, 0.0], ..Inputs::default() };
         let [drive, _] = self.sensors.sample(&self.plant, &inputs);
@@ -274,7 +275,7 @@ mod tests {
 
     fn shipped(name: &str) -> Program {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("programs/{name}.toml"));
-        Source::read(&path).unwrap().program(Axis::Drive, &RigParameters::baseline()).unwrap()
+        Source::read(&path).unwrap().program(Axis::Drive, &RigParameters::baseline(), false).unwrap()
     }
 
     #[test]

@@ -84,6 +84,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub no_bench_frames: bool,
     /// Take commands from standard input, one a line: emergency stop, linkage, weights, hands; 'help' lists them.
+    /// What is typed is not reproducible, in lockstep neither.
     #[arg(long)]
     pub console: bool,
     /// How long the bus may be gone before the run ends, in s.

@@ -4,11 +4,12 @@
 //!   main ─ waits, tells progress, sees signals
 //!    ├─ bus host    serves the embedded bus (FIFO, one above the rig loop)
 //!    ├─ writer      empties the queues into the run's folder
+//!    ├─ console     reads standard input, if asked to
 //!    └─ rig loop    the 1 ms path
 //! ```
 
 use crate::cli::RunArguments;
-use crate::console;
+use crate::console::{self, Command};
 use crate::finish::finish;
 use crate::host_thread::HostThread;
 use crate::inputs::Inputs;
@@ -17,6 +18,7 @@ use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::station::{Station, StationFigures, StationParts};
 use crate::summary::{Machine, RunDescription};
+use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
@@ -96,14 +98,23 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         }
     };
     let (recorder, records) = recording::queues(lockstep);
+    // From this thread: one of the rig loop's would inherit its priority.
+    let limits = console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg };
+    let console = arguments.console.then(|| console::open(limits));
 
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let for_writer = &shared;
         let writer = scope.spawn(move || writer.run(&records, for_writer));
         let bus = bus.as_mut();
-        let work =
-            RigWork { arguments, inputs: &inputs, started: &started, simulated_ns: &simulated_ns, periodic };
+        let work = RigWork {
+            arguments,
+            inputs: &inputs,
+            started: &started,
+            simulated_ns: &simulated_ns,
+            periodic,
+            console,
+        };
         let rig_loop = scope.spawn(|| work.run(recorder, bus, &shared));
         tell_progress(&rig_loop, &shared);
         let outcome = join(rig_loop);
@@ -159,18 +170,18 @@ struct RigWork<'a> {
     started: &'a RunStart,
     simulated_ns: &'a AtomicU64,
     periodic: PeriodicConfig,
+    console: Option<Receiver<Command>>,
 }
 
 impl RigWork<'_> {
     fn run(self, recorder: Recorder, bus: &mut dyn Bus, shared: &Shared) -> Result<LoopOutcome, RunError> {
-        let Self { arguments, inputs, started, simulated_ns, periodic } = self;
+        let Self { arguments, inputs, started, simulated_ns, periodic, console } = self;
         let grants = acquire_realtime(arguments);
         describe(arguments, inputs, started, &grants)?;
-        let limits = console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg };
         let mut station = Station::new(StationParts {
             plant: inputs.plant.clone(),
             people: People::new(&inputs.scene),
-            console: arguments.console.then(|| console::open(limits)),
+            console,
             sensors: Sensors::new(&inputs.rig, arguments.seed),
             recorder,
             bench_frames: !arguments.no_bench_frames,

@@ -23,8 +23,19 @@ pub fn new_folder() -> PathBuf {
 
 /// Files that programs write at the end of a run, or at its start in one go: what is left of an earlier run is none of this
 /// one's. The tables are not among them, since each is made anew by its writer's start.
-pub const RESULTS: &[&str] =
-    &["run.json", "summary.json", "controller.json", "picture.svg", "emulator.hlog", "controller.hlog"];
+pub const RESULTS: &[&str] = &[
+    "run.json",
+    "summary.json",
+    "controller.json",
+    "controller-drive.json",
+    "controller-load.json",
+    "picture.svg",
+    "step.svg",
+    "emulator.hlog",
+    "controller.hlog",
+    "controller-drive.hlog",
+    "controller-load.hlog",
+];
 
 /// Removes what an earlier run left of [`RESULTS`] in `folder`, so that two runs are never taken for one.
 ///

@@ -104,6 +104,11 @@ add_payload() {
         [[ -f $rig && -f $experiment ]] || fail "$exit_usage" "no such file: $rig or $experiment"
         cp "$rig" "$tree/airbench/rig.toml"
         cp "$experiment" "$tree/airbench/point-to-point.toml"
+        # The experiment names its programs by their names, which stand in the folder beside its own.
+        mkdir -p "$tree/programs"
+        local programs
+        programs=$(dirname "$experiment")/../programs
+        if [[ -d $programs ]]; then cp "$programs"/*.toml "$tree/programs/"; fi
         build_binaries "$tree/airbench"
     fi
     if [[ -n $payload ]]; then cp -rL "$payload/." "$tree/airbench/"; fi

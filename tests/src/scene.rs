@@ -12,26 +12,36 @@ use tempfile::TempDir;
 pub const SHORT: &str = r#"title = "short"
 [rig]
 carriage_position_m = 0.1
-[drive]
-law = "bestehorn"
-start_m = 0.1
-moves = [{ to_m = 0.15, duration_s = 0.4, rest_s = 0.25 }]
+[run]
 settling_s = 0.2
-[drive.position-p]
-gain_per_s = 40.0
-velocity_feed_forward = 1.0
+[drive]
+program = "program.toml"
+start_m = 0.1
+set-point = [
+    { law = "bestehorn", to_m = 0.15, duration_s = 0.4 },
+    { law = "rest", duration_s = 0.25 },
+]
 "#;
 
 /// To and fro without a rest, for `--repeat`: after the first half second the valve is hardly ever shut.
 pub const RESTLESS: &str = r#"title = "restless"
 [rig]
 carriage_position_m = 0.2
-[drive]
-law = "bestehorn"
-start_m = 0.2
-moves = [{ to_m = 0.3, duration_s = 0.4, rest_s = 0.0 }, { to_m = 0.2, duration_s = 0.4, rest_s = 0.0 }]
+[run]
 settling_s = 0.0
-[drive.position-p]
+[drive]
+program = "program.toml"
+start_m = 0.2
+set-point = [
+    { law = "bestehorn", to_m = 0.3, duration_s = 0.4 },
+    { law = "bestehorn", to_m = 0.2, duration_s = 0.4 },
+]
+"#;
+
+/// The drive's program of both, which each scene holds as program.toml.
+pub const PROGRAM: &str = r#"title = "stiff"
+[algorithm]
+name = "position-p"
 gain_per_s = 40.0
 velocity_feed_forward = 1.0
 "#;
@@ -42,7 +52,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A folder with the shipped rig file and this experiment.
+    /// A folder with the shipped rig file, this experiment and the program that it names.
     ///
     /// # Panics
     /// When the temporary folder cannot be written.
@@ -54,6 +64,7 @@ impl Scene {
         std::fs::copy(workspace().join("plant/rig.toml"), scene.path("rig.toml"))
             .expect("plant/rig.toml is there");
         scene.write("experiment.toml", experiment);
+        scene.write("program.toml", PROGRAM);
         scene
     }
 

@@ -5,7 +5,7 @@ use std::process::Command;
 use system_tests::binaries::{Build, Program, executable};
 use system_tests::launch::{Launch, Pace};
 use system_tests::process::{Ended, Running};
-use system_tests::scene::{SHORT, Scene};
+use system_tests::scene::{PROGRAM, SHORT, Scene};
 
 const BAD_INPUT: i32 = 2;
 const BUS_FAILED: i32 = 3;
@@ -61,7 +61,7 @@ fn a_wrong_rig_file_is_refused_with_file_line_key_value_and_range() {
 fn a_wrong_experiment_is_refused_with_file_line_key_value_and_range() {
     let scene = Scene::new(SHORT);
     let [emulator, controller] = both(&scene);
-    let wrong: [(&str, &str, &Launch, &[&str]); 8] = [
+    let wrong: [(&str, &str, &Launch, &[&str]); 7] = [
         (
             "carriage_position_m = 0.1",
             "carriage_position_m = 0.9",
@@ -77,9 +77,8 @@ fn a_wrong_experiment_is_refused_with_file_line_key_value_and_range() {
         ("carriage_position_m = 0.1", "added_mass_kg = 500.0", &emulator, &["added_mass_kg = 500", "0 to"]),
         ("carriage_position_m = 0.1", "carriage_m = 0.1", &emulator, &["carriage_m", "line 3"]),
         ("start_m = 0.1", "start_m = 0.6", &controller, &["drive.start_m = 0.6 m", "0 to 0.5 m"]),
-        ("gain_per_s = 40.0", "gain_per_s = nan", &controller, &["gain_per_s = NaN", "0 to 200"]),
-        ("gain_per_s = 40.0", "gain = 40.0", &controller, &["unknown field `gain`", "line 10"]),
-        ("law = \"bestehorn\"", "law = \"jerk\"", &controller, &["jerk", "bestehorn", "line 5"]),
+        ("settling_s = 0.2", "settling = 0.2", &controller, &["unknown key run.settling", "settling_s"]),
+        ("law = \"bestehorn\"", "law = \"jerk\"", &controller, &["jerk", "bestehorn"]),
     ];
     let mut without_place = Vec::new();
     for (from, to, launch, words) in wrong {
@@ -95,6 +94,24 @@ fn a_wrong_experiment_is_refused_with_file_line_key_value_and_range() {
         }
     }
     assert!(without_place.is_empty(), "refused without file and line:\n{}", without_place.concat());
+}
+
+#[test]
+fn a_wrong_program_is_refused_with_file_line_key_value_and_range() {
+    let scene = Scene::new(SHORT);
+    let wrong: [(&str, &str, &[&str]); 3] = [
+        ("gain_per_s = 40.0", "gain_per_s = nan", &["gain_per_s = NaN", "0 to 200"]),
+        ("gain_per_s = 40.0", "gain = 40.0", &["algorithm.gain", "gain_per_s"]),
+        ("\"position-p\"", "\"position-q\"", &["position-q", "position-p"]),
+    ];
+    for (from, to, words) in wrong {
+        assert!(PROGRAM.contains(from), "'{from}' is not in the program");
+        let program = scene.write("program.toml", &PROGRAM.replacen(from, to, 1));
+        let ended = refused(&scene, &scene.controller(Pace::Real), BAD_INPUT, words);
+        assert!(ended.stderr.contains(&line_of(&program, to)), "{}", ended.stderr);
+    }
+    std::fs::remove_file(scene.path("program.toml")).expect("it is there");
+    refused(&scene, &scene.controller(Pace::Real), BAD_INPUT, &["cannot read", "program.toml"]);
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn a_controller_that_is_killed_leaves_the_valve_shut_until_the_next_one_comes() 
 #[test]
 fn an_emulator_that_is_killed_and_restarted_is_found_again_and_the_chain_starts_anew() {
     let _machine = turn::take();
-    let scene = Scene::new(&SHORT.replace("rest_s = 0.25", "rest_s = 2.0"));
+    let scene = Scene::new(&SHORT.replace("duration_s = 0.25", "duration_s = 2.0"));
     let emulator = scene.emulator(Pace::Real).out(&scene.path("first")).start();
     let mut controller = scene.controller(Pace::Real).start();
     controller.wait_for(": experiment");

@@ -1,4 +1,4 @@
-//! What every position algorithm must keep, whatever its law: for their tests.
+//! What every algorithm must keep, whatever its law: for their tests.
 
 use crate::algorithm::{Kind, Ready};
 use plant::RigParameters;
@@ -13,7 +13,9 @@ fn any_ready() -> impl Strategy<Value = Ready> {
     let position = (0.0..0.5_f64, -1.0..1.0_f64, -50.0..50.0_f64);
     let air = (-2000.0..2000.0_f64, 0.0..1e6_f64, 0.0..1e6_f64, 1e5..8e5_f64);
     let set = (0.0..0.5_f64, -1.0..1.0_f64, -50.0..50.0_f64);
-    (position, air, set, -1.0..1.0_f64, 1e-3..0.1_f64).prop_map(|(position, air, set, applied, period_s)| {
+    let set_force = (-2000.0..2000.0_f64, -1e5..1e5_f64);
+    let rest = (-1.0..1.0_f64, 1e-3..0.1_f64);
+    (position, air, set, set_force, rest).prop_map(|(position, air, set, set_force, (applied, period_s))| {
         Ready {
             period_s,
             position_m: position.0,
@@ -26,8 +28,8 @@ fn any_ready() -> impl Strategy<Value = Ready> {
             set_position_m: set.0,
             set_velocity_m_per_s: set.1,
             set_acceleration_m_per_s2: set.2,
-            set_force_n: 0.0,
-            set_force_rate_n_per_s: 0.0,
+            set_force_n: set_force.0,
+            set_force_rate_n_per_s: set_force.1,
             applied_velocity_m_per_s: applied,
         }
     })

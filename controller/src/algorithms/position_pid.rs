@@ -35,7 +35,7 @@ const INTEGRAL_ZONE: usize = 4;
 const DERIVATIVE_TIME: usize = 5;
 const REST_ZONE: usize = 6;
 static PARAMETERS: [Parameter; 7] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 25.0, "velocity for each error"),
+    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 30.0, "velocity for each error"),
     Parameter::new(
         ("velocity_feed_forward", ""),
         [0.0, 2.0],

@@ -1,1 +1,242 @@
+//! Two chains that talk to each other, for tests: what one says in a cycle the other sees in the next.
+//!
+//! The order within a cycle is the one that an axis controller must keep: emergency stop chain, main chain, trip by a
+//! fault, frame.
 
+use super::emergency_stop::{EmergencyStopChain, StopConfig, StopInputs};
+use super::main::{Lengths, MainChain, MainConfig, MainInputs, MainOutput, OwnAxis, Phase};
+use super::settled::ControlError;
+use super::{AfterStop, Console, Fault, Partner};
+use protocol::frames::{
+    ChainStatus, EmergencyStopChainState, EmergencyStopReason, MainChainState, RigStatus,
+};
+
+/// Nominal supply pressure, Pa.
+pub(super) const SUPPLY_PA: f64 = 7e5;
+
+/// One axis controller with what its sensors show.
+pub(super) struct One {
+    pub(super) main: MainChain,
+    pub(super) stop: EmergencyStopChain,
+    pub(super) position_m: f64,
+    pub(super) error: ControlError,
+    pub(super) prepared: bool,
+    /// Sensors of this axis come.
+    pub(super) sensors: bool,
+    /// Its status frames reach the other.
+    pub(super) heard: bool,
+    /// It runs.
+    pub(super) alive: bool,
+    /// A fault that its axis tells.
+    pub(super) fault: Option<Fault>,
+    partner: Partner,
+    pub(super) output: Option<MainOutput>,
+    experiment: u8,
+    needs_partner: bool,
+    /// States as they were entered.
+    pub(super) seen: Vec<(u64, MainChainState)>,
+    /// It holds the emergency stop, as the rig knows it.
+    holds: bool,
+}
+
+impl One {
+    pub(super) fn new(config: MainConfig) -> Self {
+        let stop =
+            StopConfig { after_emergency_stop: config.after_emergency_stop, supply_pressure_pa: SUPPLY_PA };
+        Self {
+            experiment: config.experiment,
+            needs_partner: config.partner_needed,
+            main: MainChain::new(config),
+            stop: EmergencyStopChain::new(stop),
+            position_m: 0.1,
+            error: ControlError::None,
+            prepared: true,
+            sensors: true,
+            heard: true,
+            alive: true,
+            fault: None,
+            partner: Partner::default(),
+            output: None,
+            seen: Vec::new(),
+            holds: false,
+        }
+    }
+
+    pub(super) fn state(&self) -> MainChainState {
+        self.main.entered().state
+    }
+
+    pub(super) fn fault(&self) -> Option<Fault> {
+        self.output.and_then(|output| output.fault)
+    }
+
+    pub(super) fn stop_state(&self) -> EmergencyStopChainState {
+        self.stop.state()
+    }
+
+    fn status(&self) -> Option<ChainStatus> {
+        let output = self.output?;
+        Some(ChainStatus {
+            main_chain: output.state,
+            emergency_stop_chain: self.stop.state(),
+            ok: output.ok,
+            experiment: self.experiment,
+            repetition: output.repetition as u8,
+            ..ChainStatus::default()
+        })
+    }
+
+    /// One cycle; the reason of the frame it sends.
+    fn advance(
+        &mut self,
+        cycle: u64,
+        rig: RigStatus,
+        frame: Option<EmergencyStopReason>,
+        console: Console,
+    ) -> Option<EmergencyStopReason> {
+        if !self.alive {
+            return None;
+        }
+        let partner_fresh = !self.needs_partner || self.partner.fresh(cycle).is_some();
+        let emergency_stop = self.stop.advance(&StopInputs {
+            cycle,
+            rig: Some(rig),
+            frame,
+            console,
+            at_standstill: true,
+            partner_fresh,
+            sensors_fresh: self.sensors,
+        });
+        let own = self.sensors.then_some(OwnAxis { position_m: self.position_m, error: self.error });
+        let output = self.main.advance(&MainInputs {
+            cycle,
+            own,
+            prepared: self.prepared,
+            partner: self.partner,
+            emergency_stop,
+            console,
+            fault: self.fault,
+        });
+        let newly = self.fault().is_none();
+        if let Some(fault) = output.fault.filter(|_| newly) {
+            self.stop.trip(fault, cycle);
+        }
+        assert!(
+            !output.ok || !matches!(output.state, MainChainState::Aborted | MainChainState::Fault),
+            "an ended chain is never OK"
+        );
+        if emergency_stop != EmergencyStopChainState::Ready {
+            assert_eq!(output.phase, Phase::Shut, "an emergency stop shuts in its cycle");
+        }
+        if self.seen.last().is_none_or(|(_, state)| *state != output.state) {
+            self.seen.push((cycle, output.state));
+        }
+        self.output = Some(output);
+        let sent = self.stop.frame_due(cycle)?;
+        self.holds = !sent.release;
+        (!sent.release).then_some(sent.reason)
+    }
+}
+
+/// Two axes, the rig's emergency stop, and the console.
+pub(super) struct Duo {
+    pub(super) axes: [One; 2],
+    pub(super) cycle: u64,
+    /// Said in the next cycle only.
+    pub(super) console: Console,
+    pub(super) console_holds: bool,
+    /// What each sent in the cycle before.
+    sent: [Option<EmergencyStopReason>; 2],
+}
+
+impl Duo {
+    pub(super) fn new(config: &MainConfig) -> Self {
+        Self {
+            axes: [0, 1].map(|_| One::new(config.clone())),
+            cycle: 0,
+            console: Console::default(),
+            console_holds: false,
+            sent: [None; 2],
+        }
+    }
+
+    fn rig_is_stopped(&self) -> bool {
+        self.console_holds || self.axes.iter().any(|axis| axis.holds)
+    }
+
+    /// One cycle of both; each sees what the other said in the cycle before.
+    pub(super) fn step(&mut self) {
+        if self.console.release {
+            self.console_holds = false;
+        }
+        let emergency_stop = self.rig_is_stopped();
+        let supply_pressure_pa = if emergency_stop { 1e5 } else { SUPPLY_PA };
+        let rig = RigStatus {
+            emergency_stop,
+            supply_pressure_pa,
+            check_valves_shut: emergency_stop,
+            ..RigStatus::default()
+        };
+        let console = std::mem::take(&mut self.console);
+        let said = [0, 1].map(|index| {
+            let one = &self.axes[index];
+            one.status().filter(|_| one.alive && one.heard)
+        });
+        let sent = self.sent;
+        for index in [0, 1] {
+            let one = &mut self.axes[index];
+            if let Some(status) = said[1 - index] {
+                one.partner = Partner { status: Some(status), values: None, heard: Some(self.cycle) };
+            }
+            self.sent[index] = one.advance(self.cycle, rig, sent[1 - index], console);
+        }
+        self.cycle += 1;
+    }
+
+    pub(super) fn run(&mut self, cycles: u64) {
+        (0..cycles).for_each(|_| self.step());
+    }
+
+    /// Runs until the first axis is in `state`; panics after 60 s.
+    pub(super) fn run_to(&mut self, state: MainChainState) {
+        for _ in 0..60_000 {
+            if self.axes[0].state() == state {
+                return;
+            }
+            self.step();
+        }
+        panic!("{state} was not reached: {:?} {:?}", self.axes[0].seen, self.axes[1].seen);
+    }
+
+    pub(super) fn states(&self) -> [MainChainState; 2] {
+        [0, 1].map(|index| self.axes[index].state())
+    }
+
+    pub(super) fn faults(&self) -> [Option<Fault>; 2] {
+        [0, 1].map(|index| self.axes[index].fault())
+    }
+
+    /// The console trips the emergency stop for half a second.
+    pub(super) fn stop_and_release(&mut self) {
+        self.console_holds = true;
+        self.run(500);
+        self.console.release = true;
+        self.step();
+    }
+}
+
+/// Half a second of positioning, 0.2 s of force, 0.3 s of settling, 1 s of experiment.
+pub(super) fn short() -> MainConfig {
+    let own = Lengths { prepare_s: 0.0, initial_force_s: 0.2, experiment_s: 1.0 };
+    MainConfig {
+        experiment: 9,
+        start_m: Some(0.1),
+        prepares: true,
+        own,
+        either: own,
+        settling_s: 0.3,
+        settling_timeout_s: 2.0,
+        after_emergency_stop: AfterStop::Restart,
+        ..MainConfig::default()
+    }
+}

@@ -22,8 +22,8 @@
 //! | moving | no | yes | no |
 //!
 //! At first the velocity is limited, since a high force between linked axes would throw the rod. The case distinction on
-//! significant movement is the paper's: at standstill the noise of the velocity must not be fed forward, and a control error within
-//! the friction must not be worked on; when moving, both would be felt in the hand.
+//! significant movement is the paper's: at standstill the noise of the velocity must not be fed forward, and a control error
+//! within the friction must not be worked on; when moving, both would be felt in the hand.
 
 use super::{CYCLE_S, Entered, Fault, cycles, elapsed_s};
 use crate::parameters::Parameter;

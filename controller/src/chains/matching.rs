@@ -12,8 +12,8 @@
 //!    └── any: the rig restarted; waiting, averaging, fault: no longer asked
 //! ```
 //!
-//! offset = mean of the load's position sensor - mean of the drive's `averaged_position`, in rig coordinates; the load's position is
-//! its sensor less the offset. The load eye may lie anywhere in the gap of the linkage, so ±0.1 mm
+//! offset = mean of the load's position sensor - mean of the drive's `averaged_position`, in rig coordinates; the load's
+//! position is its sensor less the offset. The load eye may lie anywhere in the gap of the linkage, so ±0.1 mm
 //! ([`UNCERTAINTY_M`]) remain, besides the drive sensor's own error: the offset makes both axes agree, not either of them true.
 //! A matched offset holds until the next one, or until the rig restarts.
 

@@ -3,7 +3,7 @@
 //! ```text
 //!   still   = peak to peak of the position over the window     < still_m
 //!   there   = position axis:  largest |error| over the window  < position_error_m
-//!             force axis:     |mean error| over the window     < the larger of force_error_n and force_error_share |set-point|
+//!             force axis:     |mean error| over the window     < the larger of force_error_n and force_error_n_per_n |set-point|
 //!   settled = still and there in every cycle of settling_s
 //! ```
 //!
@@ -21,7 +21,12 @@ pub const PARAMETERS: &[Parameter] = &[
     Parameter::new(("still_m", "m"), [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest"),
     Parameter::new(("position_error_m", "m"), [1e-5, 0.5], 2e-3, "largest position error of a settled axis"),
     Parameter::new(("force_error_n", "N"), [0.1, 2000.0], 20.0, "largest mean force error of a settled axis"),
-    Parameter::new(("force_error_share", "1"), [0.0, 1.0], 0.1, "the same as a share of the force set-point"),
+    Parameter::new(
+        ("force_error_n_per_n", "N/N"),
+        [0.0, 1.0],
+        0.1,
+        "the same as a share of the force set-point",
+    ),
 ];
 
 /// Cycles of one bucket, and the longest gap between samples.
@@ -41,7 +46,7 @@ pub struct Bounds {
     /// Largest mean force error, N.
     pub force_error_n: f64,
     /// The same as a share of the set-point.
-    pub force_error_share: f64,
+    pub force_error_n_per_n: f64,
 }
 
 impl Bounds {
@@ -51,18 +56,18 @@ impl Bounds {
     /// When it is not as long as the table.
     #[must_use]
     pub fn of(values: &[f64]) -> Self {
-        let &[still_m, position_error_m, force_error_n, force_error_share] = values else {
+        let &[still_m, position_error_m, force_error_n, force_error_n_per_n] = values else {
             panic!("{} values for the {} parameters of {TABLE}", values.len(), PARAMETERS.len())
         };
-        Self { still_m, position_error_m, force_error_n, force_error_share }
+        Self { still_m, position_error_m, force_error_n, force_error_n_per_n }
     }
 }
 
 impl Default for Bounds {
     fn default() -> Self {
-        let [still_m, position_error_m, force_error_n, force_error_share] =
+        let [still_m, position_error_m, force_error_n, force_error_n_per_n] =
             std::array::from_fn(|index| PARAMETERS[index].default);
-        Self { still_m, position_error_m, force_error_n, force_error_share }
+        Self { still_m, position_error_m, force_error_n, force_error_n_per_n }
     }
 }
 
@@ -197,7 +202,7 @@ impl Settled {
                     (sum + bucket.error_sum, samples + bucket.samples)
                 });
                 let bound_n =
-                    self.bounds.force_error_n.max(self.bounds.force_error_share * set_force_n.abs());
+                    self.bounds.force_error_n.max(self.bounds.force_error_n_per_n * set_force_n.abs());
                 f64::abs(sum / samples) < bound_n
             }
         }

@@ -1,7 +1,7 @@
 //! `[drive]` and `[load]` of an experiment file: what one axis does.
 //!
 //! ```toml
-//! program = "position-p"        # programs/NAME.toml beside the experiments, or a path ending in .toml from the experiment's folder
+//! program = "position-p"        # programs/NAME.toml beside the experiments' folder, or a path ending in .toml
 //! start_m = 0.1                 # where initial positioning goes; a row of forces may leave it out
 //! prepare = ["relieve", "match"]
 //! during = "set-point"          # or "manual"
@@ -15,8 +15,8 @@
 //! value = 30.0
 //! ```
 //!
-//! Whether the row is of positions or of forces follows from its laws and their keys (`to_m`, `to_n`); a row that says neither is of
-//! positions for the drive and of forces for the load axis.
+//! Whether the row is of positions or of forces follows from its laws and their keys (`to_m`, `to_n`); a row that says neither is
+//! of positions for the drive and of forces for the load axis.
 
 use super::section::{ExperimentError, Section};
 use crate::algorithm::Quantity;

@@ -130,7 +130,7 @@ impl<'a> Section<'a> {
     pub fn needed_number(&mut self, parameter: &Parameter) -> Result<f64, ExperimentError> {
         let Parameter { name, unit, least, most, meaning, .. } = parameter;
         let missing = format!("{name} is missing: {meaning}, {least} to {most} {unit}");
-        self.number(parameter)?.ok_or_else(|| self.wrong(missing.trim_end()))
+        self.number(parameter)?.ok_or_else(|| self.lacks(missing.trim_end()))
     }
 
     /// The whole number of this parameter, or its default.
@@ -166,7 +166,7 @@ impl<'a> Section<'a> {
     /// # Errors
     /// Missing, or no text.
     pub fn needed_text(&mut self, key: &str, meaning: &str) -> Result<Text, ExperimentError> {
-        self.text(key)?.ok_or_else(|| self.wrong(&format!("{key} is missing: {meaning}")))
+        self.text(key)?.ok_or_else(|| self.lacks(&format!("{key} is missing: {meaning}")))
     }
 
     /// Which of the named choices `key` makes; the first when it is absent.
@@ -271,6 +271,12 @@ impl<'a> Section<'a> {
             Some((_, value)) => self.told(value, said),
             None => self.wrong(said),
         }
+    }
+
+    /// A missing key, with those that are there: it may be one of them, misspelt.
+    fn lacks(&self, said: &str) -> ExperimentError {
+        let keys: Vec<&str> = self.table.keys().map(|name| name.get_ref().as_ref()).collect();
+        self.wrong(&format!("{said}; the keys here are {}", keys.join(", ")))
     }
 
     fn told(&self, value: &Spanned<DeValue<'_>>, said: &str) -> ExperimentError {

@@ -9,19 +9,28 @@
 //! gain_per_s = 25.0
 //! [post-controller]
 //! linearisation = "choked-exhaust"
-//! [force-chain]                    # optional: the algorithm that the force chain uses
+//! [giving-way]                     # optional: the algorithm that the force chain uses, to relieve and for a hand
 //! name = "force-manual"
+//! [force-chain]                    # numbers of the chains
+//! high_force_n = 150.0
+//! [matching-chain]
+//! [settled]
 //! ```
 //!
-//! What is left out takes the default of its table.
+//! What is left out takes the default of its table. In place of a name, `library = "FILE"`, from the program's folder, takes the
+//! algorithm of a shared library (controller/docs/own-algorithm.md).
 
-use super::{EVERY_CYCLES, Program, Slot, Variable};
-use crate::algorithms;
+use super::{EVERY_CYCLES, GivingWay, Program, Slot, Variable};
+use crate::algorithm::{Algorithm, Quantity};
+use crate::chains::{force, matching, settled};
+use crate::guard::Guarded;
 use crate::linearisation::{Law, Linearisation};
 use crate::parameters::Parameter;
 use crate::post_controller::{self, Output, PostController};
 use crate::pre_controller::{self, Geometry, PreController};
+use crate::{algorithms, plugin};
 use plant::{Axis, RigParameters};
+use realtime::MonotonicClock;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -44,7 +53,13 @@ struct File {
     algorithm: Spanned<Section>,
     #[serde(default)]
     post_controller: Section,
-    force_chain: Option<Spanned<Section>>,
+    giving_way: Option<Spanned<Section>>,
+    #[serde(default)]
+    force_chain: Section,
+    #[serde(default)]
+    matching_chain: Section,
+    #[serde(default)]
+    settled: Section,
 }
 
 /// A program file as it was read, for records.
@@ -71,44 +86,43 @@ impl Source {
         Ok(source)
     }
 
+    /// The program of an axis of which nothing is asked.
+    #[must_use]
+    pub fn shut() -> Self {
+        let text = "title = \"valve held shut\"\n[algorithm]\nname = \"position-p\"\n";
+        Self { path: "(none)".into(), title: "valve held shut".into(), text: text.into() }
+    }
+
     fn parse(&self) -> Result<File, ProgramError> {
         toml::from_str(&self.text).map_err(|error| ProgramError(format!("{}: {error}", self.path.display())))
     }
 
-    /// The program of `axis` that the file describes, for a rig of these nominal numbers.
+    /// The program of `axis` that the file describes, for a rig of these nominal numbers. The time that an algorithm takes is
+    /// watched where it is `real_time`.
     ///
     /// # Errors
     /// [`ProgramError`] with file, line, key, value and what is allowed.
-    pub fn program(&self, axis: Axis, rig: &RigParameters) -> Result<Program, ProgramError> {
+    pub fn program(&self, axis: Axis, rig: &RigParameters, real_time: bool) -> Result<Program, ProgramError> {
         let file = self.parse()?;
-        let mut reader = Reader { source: self, rig, variables: Vec::new(), values: Vec::new() };
-        let pre_values =
-            reader.section("pre-controller", file.pre_controller, &pre_controller::PARAMETERS)?;
+        let mut reader = Reader { source: self, rig, real_time, variables: Vec::new(), values: Vec::new() };
+        let pre = reader.section("pre-controller", file.pre_controller, &pre_controller::PARAMETERS)?;
         let user = reader.slot("algorithm", file.algorithm)?;
         let mut section = file.post_controller;
-        let kind = reader.take_text("post-controller.linearisation", section.remove("linearisation"))?;
-        let law = match &kind {
-            None => Law::ChokedExhaust,
-            Some(kind) => Law::by_name(kind.as_ref()).ok_or_else(|| {
-                let names = Law::ALL.map(Law::name).join(", ");
-                let problem =
-                    format!("post-controller.linearisation = \"{}\"; there are {names}", kind.as_ref());
-                reader.error(kind.span().start, &problem)
-            })?,
-        };
-        let linearisation = Linearisation::new(rig, law);
-        let post_values = reader.section("post-controller", section, &post_controller::PARAMETERS)?;
-        let force_chain = file.force_chain.map(|section| reader.slot("force-chain", section)).transpose()?;
+        let linearisation = reader.linearisation(section.remove("linearisation"))?;
+        let post = reader.section("post-controller", section, &post_controller::PARAMETERS)?;
+        let giving_way = file.giving_way.map(|section| reader.giving_way(section)).transpose()?;
+        let force_chain = reader.section(force::TABLE, file.force_chain, force::PARAMETERS)?;
+        let matching_chain = reader.section(matching::TABLE, file.matching_chain, matching::PARAMETERS)?;
+        let settled = reader.section(settled::TABLE, file.settled, settled::PARAMETERS)?;
         let Reader { variables, values, .. } = reader;
         Ok(Program {
             pre: PreController::new(Geometry::new(axis, rig.cylinder().stroke_m)),
             post: PostController::new(linearisation),
             user,
-            force_chain,
+            giving_way,
             variables,
             values,
-            pre_values,
-            post_values,
+            tasks: [pre, post, force_chain, matching_chain, settled],
             ready: crate::algorithm::Ready::default(),
             observed: None,
             post_stepped: None,
@@ -121,6 +135,7 @@ impl Source {
 struct Reader<'a> {
     source: &'a Source,
     rig: &'a RigParameters,
+    real_time: bool,
     variables: Vec<Variable>,
     values: Vec<f64>,
 }
@@ -170,23 +185,64 @@ impl Reader<'_> {
         let place = section.span().start;
         let mut section = section.into_inner();
         let asked = self.take_text(&format!("{name}.name"), section.remove("name"))?;
-        let names = || algorithms::SHIPPED.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
-        let Some(asked) = asked else {
-            return Err(self.error(place, &format!("[{name}] has no name; there are {}", names())));
+        let library = self.take_text(&format!("{name}.library"), section.remove("library"))?;
+        let (algorithm, controls, parameters): (Box<dyn Algorithm>, _, _) = match (asked, library) {
+            (Some(asked), None) => {
+                let kind = algorithms::by_name(asked.as_ref()).ok_or_else(|| {
+                    let problem = format!("{name}.name = \"{}\"; there are {}", asked.as_ref(), names());
+                    self.error(asked.span().start, &problem)
+                })?;
+                ((kind.make)(self.rig), kind.controls, kind.parameters.to_vec())
+            }
+            (None, Some(library)) => {
+                let folder = self.source.path.parent().unwrap_or(Path::new(""));
+                let plugin = plugin::load(&folder.join(library.as_ref()), self.rig)
+                    .map_err(|error| self.error(library.span().start, &format!("{name}.library: {error}")))?;
+                let description = plugin.description().clone();
+                (Box::new(plugin), description.controls, description.parameters)
+            }
+            _ => {
+                let problem = format!("[{name}] has one of name and library; names are {}", names());
+                return Err(self.error(place, &problem));
+            }
         };
-        let kind = algorithms::by_name(asked.as_ref()).ok_or_else(|| {
-            let problem = format!("{name}.name = \"{}\"; there are {}", asked.as_ref(), names());
-            self.error(asked.span().start, &problem)
-        })?;
-        let table: Vec<_> = std::iter::once(&EVERY_CYCLES).chain(kind.parameters).cloned().collect();
+        let table: Vec<_> = std::iter::once(EVERY_CYCLES).chain(parameters).collect();
         let values = self.section(name, section, &table)?;
-        Ok(Slot {
-            algorithm: (kind.make)(self.rig),
-            controls: kind.controls,
-            values,
-            stepped: None,
-            wanted_m_per_s: 0.0,
-        })
+        let clock = self.real_time.then(|| Box::new(MonotonicClock) as _);
+        let algorithm = Guarded::new(algorithm, clock);
+        Ok(Slot { algorithm, controls, values, stepped: None, wanted_m_per_s: 0.0 })
+    }
+
+    fn giving_way(&mut self, section: Spanned<Section>) -> Result<GivingWay, ProgramError> {
+        let place = section.span().start;
+        let slot = self.slot("giving-way", section)?;
+        let find = |name: &str| {
+            let name = format!("giving-way.{name}");
+            self.variables.iter().position(|variable| variable.name == name)
+        };
+        match (slot.controls, find("moving"), find("limit_m_per_s")) {
+            (Quantity::Force, Some(moving), Some(limit_m_per_s)) => {
+                Ok(GivingWay { slot, moving, limit_m_per_s })
+            }
+            _ => Err(self.error(
+                place,
+                "[giving-way] needs an algorithm of force with the parameters moving and limit_m_per_s, such as force-manual",
+            )),
+        }
+    }
+
+    fn linearisation(&self, asked: Option<Spanned<toml::Value>>) -> Result<Linearisation, ProgramError> {
+        let asked = self.take_text("post-controller.linearisation", asked)?;
+        let law = match &asked {
+            None => Law::ChokedExhaust,
+            Some(asked) => Law::by_name(asked.as_ref()).ok_or_else(|| {
+                let names = Law::ALL.map(Law::name).join(", ");
+                let problem =
+                    format!("post-controller.linearisation = \"{}\"; there are {names}", asked.as_ref());
+                self.error(asked.span().start, &problem)
+            })?,
+        };
+        Ok(Linearisation::new(self.rig, law))
     }
 
     fn take_text(
@@ -201,6 +257,10 @@ impl Reader<'_> {
             other => Err(self.error(span.start, &format!("{key} = {other}: not a text in quotes"))),
         }
     }
+}
+
+fn names() -> String {
+    algorithms::SHIPPED.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
 }
 
 fn number(value: &toml::Value) -> Option<f64> {
@@ -231,7 +291,7 @@ opening_limit = 0.5
     }
 
     fn program(text: &str) -> Result<Program, ProgramError> {
-        source(text).program(Axis::Drive, &RigParameters::baseline())
+        source(text).program(Axis::Drive, &RigParameters::baseline(), false)
     }
 
     #[test]
@@ -258,7 +318,11 @@ opening_limit = 0.5
             ("gain_per_s = 20", "gain_per_s = \"20\"", ["p.toml:7", "gain_per_s", "not a number"]),
             ("\"position-p\"", "\"position-q\"", ["p.toml:5", "position-q", "position-p"]),
             ("\"choked-exhaust\"", "\"magic\"", ["p.toml:9", "magic", "choked-exhaust"]),
-            ("name = \"position-p\"\n", "", ["p.toml", "[algorithm] has no name", "position-p"]),
+            (
+                "name = \"position-p\"\n",
+                "",
+                ["p.toml:4", "[algorithm] has one of name and library", "position-p"],
+            ),
             ("[post-controller]", "[past-controller]", ["p.toml", "past-controller", "post-controller"]),
         ] {
             assert!(GOOD.contains(good));

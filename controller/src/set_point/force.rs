@@ -8,8 +8,8 @@
 //! ```
 //!
 //! Signs: compression is positive. The load axis presses against the drive's extension, to -x, so that a force above 0 acts on
-//! the carriage in -x. A load that opposes a motion in +x is therefore above its base force, one in -x below it; and since an axis
-//! can only press, the sum is limited to 0 and the limit. With a base force of half the span a load acts to both sides.
+//! the carriage in -x. A load that opposes a motion in +x is therefore above its base force, one in -x below it; and since an
+//! axis can only press, the sum is limited to 0 and the limit. With a base force of half the span a load acts to both sides.
 //!
 //! A new load is a file in the folder beside this one and a line in [`KINDS`].
 
@@ -211,8 +211,8 @@ impl ForceSource {
         point
     }
 
-    /// The set-point that is held from the end on. After a load that depends on the axis it is the force that it had last, so that
-    /// nothing jumps.
+    /// The set-point that is held from the end on. After a load that depends on the axis it is the force that it had last, so
+    /// that nothing jumps.
     #[must_use]
     pub fn end(&self) -> ForceSetPoint {
         ForceSetPoint::at_rest(self.memory.last_n.unwrap_or(self.profile.end_n()))
@@ -224,3 +224,6 @@ impl Row<Segment> {
         matches!(self.segment(index), Some(Segment::Load { .. }))
     }
 }
+
+#[cfg(test)]
+mod tests;

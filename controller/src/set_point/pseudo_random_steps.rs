@@ -1,4 +1,4 @@
-//! Pseudo-random steps: every hold_s at once to one of some levels to either side of where the row stands, and back there at the end.
+//! Pseudo-random steps: every hold_s at once to one of some levels around where the row stands, and back there at the end.
 //!
 //! ```text
 //!   x_k = x_0 - A + 2 A n_k / (N - 1)      n_k uniform in 0 ... N - 1, from the generator PCG XSL RR 128/64 of the seed

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Times begin at 0 and grow; positions begin where the row stands. Smooth is a piecewise cubic through the points whose rate at
-//! a point is the harmonic mean of the slopes on either side (0 at a turn and at both ends), so that it never leaves the span of two
-//! neighbouring points; position and rate are continuous, the acceleration jumps at the points.
+//! a point is the harmonic mean of the slopes on either side (0 at a turn and at both ends), so that it never leaves the span of
+//! two neighbouring points; position and rate are continuous, the acceleration jumps at the points.
 //!
 //! Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300 (the mean, here unweighted).
 
@@ -159,5 +159,107 @@ impl Law for Table {
     fn reach(&self) -> [f64; 2] {
         let least = self.values.iter().copied().fold(f64::INFINITY, f64::min);
         [least, self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::{Experiment, SetPoints};
+    use crate::set_point::{Actual, ForceSource, Motion};
+
+    fn read(csv: &str, keys: &str) -> Result<SetPoints, String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("way.csv"), csv).unwrap();
+        let text = format!(
+            "title = 't'\n[drive]\nprogram = 'p'\nstart_m = 0.1\n[[drive.set-point]]\nlaw = 'table'\nfile = 'way.csv'\n{keys}"
+        );
+        let experiment = Experiment::from_toml(&text, &folder.path().join("e.toml"), 0.5);
+        experiment.map(|experiment| experiment.drive.unwrap().set_points).map_err(|error| error.to_string())
+    }
+
+    const WAY: &str =
+        "# measured\ntime_s,other,position_m\n0,x,0.1\n0.5,x,0.3\n1.0,x,0.35\n2.0,x,0.35\n2.5,x,0.2\n";
+
+    fn motion(keys: &str) -> Motion {
+        match read(WAY, keys) {
+            Ok(SetPoints::Positions(motion)) => motion,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn linear_is_straight_between_its_points() {
+        let motion = motion("");
+        let point = motion.at(0.25);
+        // Roundings of numbers below 1.
+        assert!((point.position_m - 0.2).abs() < 1e-15 && (point.velocity_m_per_s - 0.4).abs() < 1e-15);
+        assert!(point.moving && !motion.at(1.5).moving);
+        assert_eq!((motion.duration_s(), motion.end_m()), (2.5, 0.2));
+    }
+
+    #[test]
+    fn smooth_goes_through_its_points_without_leaving_their_span() {
+        const STEP_S: f64 = 1e-6;
+        let motion = motion("interpolation = \"smooth\"");
+        for (time_s, position_m) in [(0.0, 0.1), (0.5, 0.3), (1.0, 0.35), (2.0, 0.35)] {
+            assert!((motion.at(time_s).position_m - position_m).abs() < 1e-15);
+        }
+        for cycle in 1..2499 {
+            let time_s = f64::from(cycle) * 1e-3;
+            let [before, now, after] = [-STEP_S, 0.0, STEP_S].map(|off_s| motion.at(time_s + off_s));
+            assert!((0.1..=0.35 + 1e-15).contains(&now.position_m), "{time_s} s: {now:?}");
+            let slope = (after.position_m - before.position_m) / (2.0 * STEP_S);
+            // At a point the acceleration jumps by less than 10 m/s^2: 10 times 1e-6 / 4.
+            assert!((slope - now.velocity_m_per_s).abs() < 3e-6, "{time_s} s: {slope}, {now:?}");
+            let at_point = cycle % 500 == 0;
+            let slope = (after.velocity_m_per_s - before.velocity_m_per_s) / (2.0 * STEP_S);
+            assert!(
+                at_point || (slope - now.acceleration_m_per_s2).abs() < 1e-6,
+                "{time_s} s: {slope}, {now:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_table_of_forces_makes_the_row_one_of_forces() {
+        let Ok(SetPoints::Forces(profile)) = read("force_N,time_s\n10,0\n20,1\n", "") else {
+            panic!("not a row of forces")
+        };
+        assert_eq!(ForceSource::new(profile).at(0.5, &Actual::default()).force_n, 15.0);
+    }
+
+    #[test]
+    fn a_bad_table_is_told_with_file_and_line() {
+        for (csv, hints) in [
+            ("", ["way.csv:1", "empty"]),
+            ("time_s,x\n0,0.1\n1,0.2\n", ["way.csv:1", "position_m or force_N"]),
+            ("t,position_m\n0,0.1\n1,0.2\n", ["way.csv:1", "column time_s is missing"]),
+            ("time_s,position_m\n0,0.1\n1,a\n", ["way.csv:3", "position_m = 'a'"]),
+            ("time_s,position_m\n0,0.1\n1\n", ["way.csv:3", "position_m = ''"]),
+            ("time_s,position_m\n0,0.1\n1,nan\n", ["way.csv:3", "is no number"]),
+            ("time_s,position_m\n0,0.1\n# c\n0,0.2\n", ["way.csv:4", "time_s = 0 s; allowed is above 0 s"]),
+            ("time_s,position_m\n1,0.1\n2,0.2\n", ["way.csv:2", "begins at 0"]),
+            ("time_s,position_m\n0,0.1\n1,0.6\n", ["way.csv:3", "0.6 m; allowed is 0 to 0.5 m"]),
+            ("time_s,position_m\n0,0.2\n1,0.3\n", ["way.csv:2", "the axis is at 0.1 m"]),
+            ("time_s,position_m\n0,0.1\n", ["way.csv: 1 points", "2 to 1000000"]),
+        ] {
+            let message = read(csv, "").unwrap_err();
+            hints
+                .iter()
+                .for_each(|hint| assert!(message.contains(hint), "'{hint}' is missing in: {message}"));
+            assert!(message.contains("e.toml:7: drive.set-point[1].file"), "{message}");
+        }
+        let message = read(WAY, "interpolation = \"cubic\"").unwrap_err();
+        assert!(message.contains("linear, smooth"), "{message}");
+    }
+
+    #[test]
+    fn a_missing_table_is_named() {
+        let axis =
+            "[drive]\nprogram = 'p'\nstart_m = 0.1\n[[drive.set-point]]\nlaw = 'table'\nfile = 'no.csv'\n";
+        let text = &format!("title = 't'\n{axis}");
+        let message = Experiment::from_toml(text, Path::new("e.toml"), 0.5).unwrap_err().to_string();
+        assert!(message.contains("e.toml:7") && message.contains("cannot read no.csv"), "{message}");
     }
 }

@@ -4,7 +4,7 @@ use crate::build::{Libraries, trier};
 use crate::position_pi::KIND;
 use controller::algorithm::{Algorithm, Quantity, Ready};
 use controller::guard::Guarded;
-use controller::linearisation::Linearisation;
+use controller::linearisation::{Law, Linearisation};
 use controller::plugin::{Plugin, load_tried_by};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
 use realtime::{MonotonicClock, allocations};
@@ -17,21 +17,10 @@ fn defaults(plugin: &Plugin) -> Vec<f64> {
     plugin.description().parameters.iter().map(|parameter| parameter.default).collect()
 }
 
-/// The largest velocity that is not limited, m/s.
-fn largest_velocity(linearisation: &Linearisation) -> f64 {
-    let (mut low, mut high) = (0.0, 10.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if linearisation.opening(middle) < 1.0 { low = middle } else { high = middle }
-    }
-    low
-}
-
 /// Positions of the unlinked drive after each ms of 5 s with its set-point at `target_m`, from 0.1 m, under the example.
 fn drive_to(target_m: f64, change: impl Fn(&mut [f64])) -> Vec<f64> {
     let rig = RigParameters::baseline();
-    let linearisation = Linearisation::new(&rig);
-    let largest = largest_velocity(&linearisation);
+    let linearisation = Linearisation::new(&rig, Law::ChokedExhaust);
     let plugin = example();
     let mut values = defaults(&plugin);
     change(&mut values);
@@ -47,8 +36,9 @@ fn drive_to(target_m: f64, change: impl Fn(&mut [f64])) -> Vec<f64> {
                 guarded.reset(&ready, &values).unwrap();
             }
             let wanted = guarded.step(&ready, &values).unwrap();
+            let largest = linearisation.velocity(1.0f64.copysign(wanted), &ready).abs();
             ready.applied_velocity_m_per_s = wanted.clamp(-largest, largest);
-            inputs.valve[0] = linearisation.opening(ready.applied_velocity_m_per_s);
+            inputs.valve[0] = linearisation.opening(ready.applied_velocity_m_per_s, &ready);
             plant.step(&inputs);
             plant.state().axes[0].extension_m
         })

@@ -1,1 +1,260 @@
+//! Tests of the force chain: its edges, its times, and what it asks for.
 
+use super::*;
+use ForceChainState as S;
+use proptest::prelude::*;
+
+fn defaults() -> Vec<f64> {
+    PARAMETERS.iter().map(|parameter| parameter.default).collect()
+}
+
+struct Play {
+    chain: ForceChain,
+    inputs: ForceInputs,
+    values: Vec<f64>,
+}
+
+impl Play {
+    fn new(asked: ForceAsked) -> Self {
+        let inputs = ForceInputs { asked, ..ForceInputs::default() };
+        Self { chain: ForceChain::default(), inputs, values: defaults() }
+    }
+
+    fn step(&mut self) -> ForceOutput {
+        self.inputs.cycle += 1;
+        self.chain.advance(&self.inputs, &self.values)
+    }
+
+    /// Cycles until another state, and that state; after 100 s the same one.
+    fn next(&mut self) -> (u64, S) {
+        let before = self.chain.entered().state;
+        for cycles in 1..=100_000 {
+            if self.step().state != before {
+                return (cycles, self.chain.entered().state);
+            }
+        }
+        (100_000, before)
+    }
+
+    /// A chain in a state of manual mode.
+    fn to(state: S) -> Self {
+        let mut play = Self::new(ForceAsked::Manual);
+        play.inputs.force_n = 50.0;
+        play.next();
+        while play.chain.entered().state != state {
+            play.inputs.velocity_m_per_s = if state == S::Moving { 0.1 } else { 0.0 };
+            play.next();
+        }
+        play
+    }
+}
+
+#[test]
+fn a_high_force_limits_the_velocity_at_first() {
+    let mut play = Play::new(ForceAsked::Manual);
+    play.inputs.force_n = -151.0;
+    let output = play.step();
+    assert_eq!((output.state, output.limit_m_per_s), (S::Limited, Some(0.02)));
+    assert!(!output.feed_forward && !output.dead_zone);
+    assert_eq!(play.next(), (100_000, S::Limited));
+    play.inputs.force_n = -149.0;
+    // The first low sample, and 50 ms.
+    assert_eq!(play.next(), (51, S::Standstill));
+    play.inputs.force_n = 1000.0;
+    assert_eq!(play.next(), (100_000, S::Standstill), "only at first");
+}
+
+#[test]
+fn a_force_that_is_low_for_a_moment_stays_limited() {
+    let mut play = Play::new(ForceAsked::Manual);
+    for cycle in 0..1000 {
+        play.inputs.force_n = if cycle % 50 == 0 { 151.0 } else { 0.0 };
+        assert_eq!(play.step().state, S::Limited);
+    }
+}
+
+#[test]
+fn significant_movement_has_a_hysteresis_in_velocity_and_time() {
+    let mut play = Play::to(S::Standstill);
+    play.inputs.velocity_m_per_s = 0.0099;
+    assert_eq!(play.next(), (100_000, S::Standstill));
+    play.inputs.velocity_m_per_s = -0.0101;
+    assert_eq!(play.next(), (21, S::Moving));
+    play.inputs.velocity_m_per_s = 0.0051;
+    assert_eq!(play.next(), (100_000, S::Moving));
+    play.inputs.velocity_m_per_s = 0.0049;
+    assert_eq!(play.next(), (101, S::Standstill));
+}
+
+#[test]
+fn noise_of_the_velocity_moves_nothing() {
+    let mut play = Play::to(S::Standstill);
+    for cycle in 0..1000 {
+        play.inputs.velocity_m_per_s = if cycle % 20 == 0 { 0.0 } else { 0.02 };
+        assert_eq!(play.step().state, S::Standstill);
+    }
+}
+
+#[test]
+fn the_case_distinction_is_feed_forward_or_a_dead_zone() {
+    for (state, feed_forward, dead_zone) in [(S::Standstill, false, true), (S::Moving, true, false)] {
+        let output = Play::to(state).step();
+        assert_eq!((output.feed_forward, output.dead_zone), (feed_forward, dead_zone), "{state}");
+        assert_eq!((output.limit_m_per_s, output.set_force_n), (None, Some(0.0)));
+    }
+}
+
+#[test]
+fn a_low_mean_force_at_standstill_is_relieved() {
+    let mut play = Play::new(ForceAsked::Relieve);
+    play.inputs.force_n = 19.0;
+    assert_eq!(play.next().1, S::Limited);
+    assert_eq!(play.next().1, S::Standstill);
+    assert_eq!(play.next(), (301, S::Done));
+    let output = play.step();
+    assert!(output.relieved && output.dead_zone && !output.feed_forward);
+    assert_eq!(output.set_force_n, Some(0.0));
+}
+
+#[test]
+fn a_force_that_swings_is_not_relieved() {
+    let mut play = Play::new(ForceAsked::Relieve);
+    for cycle in 0..7000_u64 {
+        // A swing of 200 ms, which a mean over 50 ms still shows.
+        play.inputs.force_n = if cycle % 200 < 100 { 100.0 } else { -100.0 };
+        play.step();
+    }
+    assert_eq!(play.chain.entered().state, S::Standstill);
+}
+
+#[test]
+fn manual_mode_is_never_done() {
+    let mut play = Play::to(S::Standstill);
+    play.inputs.force_n = 0.0;
+    assert_eq!(play.next(), (100_000, S::Standstill));
+}
+
+#[test]
+fn a_relief_that_takes_too_long_is_a_fault_from_each_state() {
+    for (force_n, velocity_m_per_s, last) in
+        [(500.0, 0.0, S::Limited), (100.0, 0.0, S::Standstill), (100.0, 0.1, S::Moving)]
+    {
+        let mut play = Play::new(ForceAsked::Relieve);
+        (play.inputs.force_n, play.inputs.velocity_m_per_s) = (force_n, velocity_m_per_s);
+        let mut before = S::Idle;
+        while play.chain.entered().state != S::Fault {
+            before = play.chain.entered().state;
+            play.next();
+        }
+        assert_eq!(before, last);
+        assert_eq!(play.step().fault, Some(Fault::RelieveTimeout));
+        let cycles = play.chain.entered().cycle;
+        assert!((8000..=8003).contains(&cycles), "{last}: {cycles}");
+        play.inputs.asked = ForceAsked::Manual;
+        assert_eq!(play.step().state, S::Fault);
+        play.inputs.asked = ForceAsked::Idle;
+        assert_eq!(play.step().state, S::Idle);
+    }
+}
+
+#[test]
+fn what_is_asked_names_the_rest_from_everywhere() {
+    let asks = [
+        (ForceAsked::Idle, S::Idle),
+        (ForceAsked::InitialRamp, S::InitialRamp),
+        (ForceAsked::LoadProfile, S::LoadProfile),
+        (ForceAsked::Done, S::Done),
+        (ForceAsked::Relieve, S::Limited),
+        (ForceAsked::Manual, S::Limited),
+    ];
+    for (first, _) in asks {
+        for (asked, state) in asks {
+            let mut play = Play::new(first);
+            for _ in 0..200 {
+                play.step();
+            }
+            play.inputs.asked = asked;
+            let output = play.step();
+            if first != asked {
+                assert_eq!(output.state, state, "{first:?} {asked:?}");
+                assert_eq!(output.set_force_n.is_some(), state == S::Limited);
+                assert!(!output.relieved);
+            }
+        }
+    }
+}
+
+#[test]
+fn parameters_act_at_once() {
+    let mut play = Play::to(S::Standstill);
+    play.inputs.velocity_m_per_s = 0.005;
+    play.step();
+    play.values[3] = 0.004;
+    assert_eq!(play.next(), (21, S::Moving));
+}
+
+#[test]
+fn skipped_cycles_pass() {
+    let mut play = Play::to(S::Standstill);
+    play.inputs.velocity_m_per_s = 0.1;
+    play.step();
+    play.inputs.cycle += 19;
+    assert_eq!(play.step().state, S::Moving);
+}
+
+#[test]
+fn a_new_rig_makes_idle() {
+    let mut play = Play::to(S::Moving);
+    play.chain.restart(7);
+    assert_eq!(play.chain.entered(), Entered { cycle: 7, state: S::Idle, cause: ForceCause::Began });
+    play.inputs.cycle = 7;
+    assert_eq!(play.step().state, S::Limited, "what is asked is asked anew");
+}
+
+#[test]
+fn the_defaults_lie_in_their_ranges() {
+    for parameter in PARAMETERS {
+        assert_eq!(parameter.check(parameter.default), Ok(parameter.default), "{}", parameter.name);
+    }
+}
+
+proptest! {
+    #[test]
+    fn whatever_comes_feed_forward_and_dead_zone_exclude_each_other(
+        row in prop::collection::vec(
+            (1_u64..40, 0_u8..60, prop_oneof![-300.0..300.0, Just(f64::NAN)], prop_oneof![-0.02..0.02, Just(f64::NAN)]),
+            1..400,
+        ),
+    ) {
+        let mut play = Play::new(ForceAsked::Relieve);
+        for (cycles, asked, force_n, velocity_m_per_s) in row {
+            play.inputs.cycle += cycles;
+            play.inputs.force_n = force_n;
+            play.inputs.velocity_m_per_s = velocity_m_per_s;
+            play.inputs.asked = match asked {
+                0 => ForceAsked::Idle,
+                1 => ForceAsked::InitialRamp,
+                2 => ForceAsked::LoadProfile,
+                3 => ForceAsked::Done,
+                4 => ForceAsked::Manual,
+                5 => ForceAsked::Relieve,
+                _ => play.inputs.asked,
+            };
+            let before = play.chain.entered().state;
+            let output = play.step();
+            prop_assert!(!(output.feed_forward && output.dead_zone));
+            prop_assert_eq!(output.limit_m_per_s.is_some(), output.state == S::Limited);
+            prop_assert_eq!(output.fault.is_some(), output.state == S::Fault);
+            let by_itself = match before {
+                S::Limited => &[S::Standstill, S::Fault][..],
+                S::Standstill => &[S::Moving, S::Done, S::Fault],
+                S::Moving => &[S::Standstill, S::Fault],
+                _ => &[],
+            };
+            let cause = play.chain.entered().cause;
+            let same = output.state == before;
+            let allowed = same || by_itself.contains(&output.state) || matches!(cause, ForceCause::Asked(_));
+            prop_assert!(allowed, "{before} -> {}", output.state);
+        }
+    }
+}

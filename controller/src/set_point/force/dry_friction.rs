@@ -4,8 +4,9 @@
 //!   F = F_base + F_c tanh(v / v_s)     dF/dt = F_c (1 - tanh^2(v / v_s)) a / v_s
 //! ```
 //!
-//! F_c: force_n. v_s: velocity_scale_m_per_s, around which the sign is smoothed: 76 % of the force at v_s, 96 % at 2 v_s, nothing at
-//! standstill, where the axis therefore creeps instead of sticking. F_base: base_force_n. v, a: actual values, rig coordinates.
+//! F_c: force_n. v_s: velocity_scale_m_per_s, around which the sign is smoothed: 76 % of the force at v_s, 96 % at 2 v_s,
+//! nothing at standstill, where the axis therefore creeps instead of sticking. F_base: base_force_n. v, a: actual values, rig
+//! coordinates.
 
 use super::{Kind, Load};
 use crate::parameters::Parameter;

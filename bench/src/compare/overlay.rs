@@ -1,0 +1,105 @@
+//! The curves of several runs on the same axes: over the whole experiment, and around its step.
+
+use crate::drawing::{COLOURS, Curve, Panel, Picture};
+use crate::picture;
+use crate::record::Record;
+use crate::runs::Run;
+use crate::series::{Series, Span};
+use plotters::style::BLACK;
+
+const METRE_IN_MM: f64 = 1e3;
+const PER_CENT: f64 = 100.0;
+/// What the picture around a step shows before and after it.
+const AROUND: Span = Span { from_s: -0.2, to_s: 0.6 };
+
+/// A quantity that runs are laid over each other by.
+struct Quantity {
+    title: &'static str,
+    of: fn(&Record) -> Series,
+    /// What the first run wanted it to be.
+    wanted: Option<fn(&Record) -> Series>,
+}
+
+const QUANTITIES: &[Quantity] = &[
+    Quantity {
+        title: "drive position, mm",
+        of: |record| record.measured.numbers("drive_position_m").map(|value| value * METRE_IN_MM),
+        wanted: Some(|record| record.drive.numbers("set_position_m").map(|value| value * METRE_IN_MM)),
+    },
+    Quantity {
+        title: "drive set-point - position, mm",
+        of: |record| record.position_error().map(|value| value * METRE_IN_MM),
+        wanted: None,
+    },
+    Quantity {
+        title: "load force, N",
+        of: |record| {
+            if record.load_acts() {
+                record.measured.numbers("load_force_N").clone()
+            } else {
+                Series::default()
+            }
+        },
+        wanted: Some(|record| record.load.numbers("set_force_N").clone()),
+    },
+    Quantity {
+        title: "drive valve opening, %",
+        of: |record| record.measured.numbers("drive_valve").map(|value| value * PER_CENT),
+        wanted: None,
+    },
+    Quantity {
+        title: "load valve opening, %",
+        of: |record| {
+            let valve = record.measured.numbers("load_valve").map(|value| value * PER_CENT);
+            if record.load_acts() { valve } else { Series::default() }
+        },
+        wanted: None,
+    },
+];
+
+/// The whole experiment, and what is around its step if it has one.
+pub(super) fn pictures(runs: &[Run]) -> Vec<Picture> {
+    let Some(first) = runs.first() else { return Vec::new() };
+    let length = |run: &Run| run.record.experiments().last().map(|span| span.to_s - run.start_s());
+    let longest_s = runs.iter().filter_map(length).fold(1e-3, f64::max);
+    let whole = Picture {
+        title: first.title(),
+        caption: String::new(),
+        time_name: "time since the experiment's begin, s".into(),
+        range: Span { from_s: 0.0, to_s: longest_s },
+        mark_s: None,
+        bands: Vec::new(),
+        panels: panels(runs, Run::start_s),
+    };
+    let Some((what, _)) = picture::step(&first.record) else { return vec![whole] };
+    let at_s = |run: &Run| picture::step(&run.record).map_or(run.start_s(), |(_, at_s)| at_s);
+    let step = Picture {
+        title: format!("{}: {what}", first.title()),
+        time_name: "time since the step, s".into(),
+        range: AROUND,
+        mark_s: Some(0.0),
+        panels: panels(runs, at_s),
+        ..whole.clone()
+    };
+    vec![whole, step]
+}
+
+/// A panel for each quantity; each run's time begins at its `zero_s`.
+fn panels(runs: &[Run], zero_s: impl Fn(&Run) -> f64) -> Vec<Panel> {
+    let panel = |quantity: &Quantity| {
+        let wanted = quantity.wanted.zip(runs.first()).map(|(wanted, first)| Curve {
+            name: "set-point".into(),
+            colour: BLACK,
+            width: 1,
+            samples: wanted(&first.record).shifted(-zero_s(first)),
+        });
+        let curves = runs.iter().enumerate().map(|(place, run)| Curve {
+            name: run.name.clone(),
+            colour: COLOURS[place % (COLOURS.len() - 1)], // the last one, black, is the set-point's
+            width: if place == 0 { 2 } else { 1 },
+            samples: (quantity.of)(&run.record).shifted(-zero_s(run)),
+        });
+        Panel { title: quantity.title.into(), curves: wanted.into_iter().chain(curves).collect() }
+    };
+    QUANTITIES.iter().map(panel).collect()
+}

@@ -1,0 +1,92 @@
+//! The load axis moved by hand: what the hand has to push.
+//!
+//! Unlinked, the load's force sensor reads the hand. Whether the axis moves is taken from its position and not from what the
+//! controller thinks, so that controllers with and without a distinction of cases are judged alike.
+
+use super::force::NOISE_S;
+use super::{Definition, Family, Figures};
+use crate::record::{Record, common};
+use crate::series::{Series, Span};
+
+/// A faster load axis moves.
+const MOVES_M_PER_S: f64 = 0.01;
+/// Window of the slope that gives its speed.
+const SLOPE_S: f64 = 0.02;
+/// The first movement has begun when the axis is so far from where it stood.
+const AWAY_M: f64 = 0.001;
+/// States of the force chain in which a hand may move the axis.
+const BY_HAND: &[&str] = &["limited", "standstill", "moving"];
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    title: "hand (manual mode in the experiment; load sensor smoothed over 5 ms)",
+    definitions: &[
+        Definition {
+            name: "hand_force_mean_n",
+            unit: "N",
+            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s",
+        },
+        Definition {
+            name: "hand_force_largest_n",
+            unit: "N",
+            meaning: "largest |force| of the same samples",
+        },
+        Definition {
+            name: "hand_force_breakaway_n",
+            unit: "N",
+            meaning: "largest |force| until the load axis is 1 mm from where it stood",
+        },
+    ],
+    compute,
+};
+
+fn compute(record: &Record, figures: &mut Figures) {
+    let by_hand = common(&record.load.in_state("force_chain", BY_HAND), &record.experiments());
+    let Some(first) = by_hand.first() else { return };
+    let position = record.measured.numbers("load_position_m");
+    let force = record.measured.numbers("load_force_N").smoothed(NOISE_S).map(f64::abs);
+    let moving: Series =
+        position.slope(SLOPE_S).iter().filter(|(_, velocity)| velocity.abs() >= MOVES_M_PER_S).collect();
+    let pushing = force.with(&moving, |force, _| force).within_all(&by_hand);
+    figures.put("hand_force_mean_n", pushing.mean());
+    figures.put("hand_force_largest_n", pushing.most());
+    let smooth = position.smoothed(SLOPE_S);
+    let start = smooth.at(first.from_s);
+    let leaves_s = start.and_then(|start| {
+        smooth.within_all(&by_hand).first_time(|position| (position - start).abs() >= AWAY_M)
+    });
+    let until_then = leaves_s.map(|to_s| force.within(&Span { from_s: first.from_s, to_s }));
+    figures.put("hand_force_breakaway_n", until_then.and_then(|force| force.most()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::made::{chain, each_ms, table};
+
+    #[test]
+    fn a_hand_breaks_the_axis_away_and_then_pushes_less() {
+        // Rests until 1 s while the hand grows to 40 N, then moves at 0.1 m/s under 12 N for a second.
+        let position = each_ms(0.0, 3.0, |time| 0.3 + 0.1 * (time - 1.0).clamp(0.0, 1.0));
+        let force = each_ms(0.0, 3.0, |time| match time {
+            _ if time < 1.0 => -40.0 * time,
+            _ if time < 2.0 => -12.0,
+            _ => 0.0,
+        });
+        let mut load = Table::default();
+        load.set_states("main_chain", chain(&[("settling", 0.0), ("experiment", 0.1), ("", 3.0)]));
+        load.set_states(
+            "force_chain",
+            chain(&[("idle", 0.0), ("standstill", 0.1), ("moving", 1.1), ("", 3.0)]),
+        );
+        let measured = table(&[("load_position_m", &position), ("load_force_N", &force)]);
+        let record = Record { load, measured, ..Record::default() };
+        let figures = super::super::of(&record);
+        assert!((figures.get("hand_force_mean_n").unwrap() - 12.0).abs() < 0.5, "blurred at both ends");
+        assert!((figures.get("hand_force_breakaway_n").unwrap() - 40.0).abs() < 0.5);
+        let idle = Record { load: Table::default(), ..record };
+        assert_eq!(super::super::of(&idle).get("hand_force_mean_n"), None);
+    }
+
+    use crate::tables_read::Table;
+}

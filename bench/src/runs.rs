@@ -1,0 +1,230 @@
+//! Several runs together: their folders read, their experiments held against each other, their figures side by side.
+
+use crate::SummaryError;
+use crate::figures::{self, position};
+use crate::join::{experiment, read_object};
+use crate::record::{self, Record};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Figures at the top of the summary that are compared too, with their units.
+const TOP: &[(&str, &str)] = &[
+    ("position_error_dynamic_m", "m"),
+    ("position_error_static_m", "m"),
+    ("overruns", "1"),
+    ("frames_lost", "1"),
+    ("stale_commands", "1"),
+];
+
+/// Why runs are not laid side by side.
+#[derive(Debug, thiserror::Error)]
+pub enum RunsError {
+    /// A folder cannot be read, or a page not written.
+    #[error(transparent)]
+    Summary(#[from] SummaryError),
+    /// They are of different experiments.
+    #[error(
+        "{one} is of '{title_one}' and {other} of '{title_other}', which ask the rig for different things; --anyway lays them side by side all the same"
+    )]
+    DifferentExperiments {
+        /// The first run.
+        one: PathBuf,
+        /// Its experiment.
+        title_one: String,
+        /// The run that differs.
+        other: PathBuf,
+        /// Its experiment.
+        title_other: String,
+    },
+}
+
+/// A run as it is compared.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What it is called in tables and legends.
+    pub name: String,
+    /// Its tables.
+    pub record: Record,
+    /// Its figures in the order of [`rows`], those that are known.
+    figures: Vec<(&'static str, f64)>,
+}
+
+impl Run {
+    /// The title of its experiment.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let title = self.record.experiment.get("title").and_then(toml::Value::as_str);
+        title.unwrap_or("no experiment").to_owned()
+    }
+
+    /// The figure of this name.
+    #[must_use]
+    pub fn figure(&self, name: &str) -> Option<f64> {
+        self.figures.iter().find(|(own, _)| *own == name).map(|(_, value)| *value)
+    }
+
+    /// The experiment's begin: the zero of the time axis when runs are laid over each other.
+    #[must_use]
+    pub fn start_s(&self) -> f64 {
+        self.record.experiments().first().map_or(0.0, |span| span.from_s)
+    }
+}
+
+/// Reads the runs in `folders`; names that are equal are made different by their parents.
+///
+/// # Errors
+/// [`SummaryError`]: no summary, files that cannot be read.
+pub fn read(folders: &[PathBuf]) -> Result<Vec<Run>, SummaryError> {
+    let mut runs = folders.iter().map(|folder| read_one(folder)).collect::<Result<Vec<_>, _>>()?;
+    let names: Vec<_> = runs.iter().map(|run| run.name.clone()).collect();
+    for run in &mut runs {
+        if names.iter().filter(|name| **name == run.name).count() > 1 {
+            run.name = run.folder.display().to_string();
+        }
+    }
+    Ok(runs)
+}
+
+fn read_one(folder: &Path) -> Result<Run, SummaryError> {
+    let summary_path = folder.join("summary.json");
+    if !summary_path.exists() {
+        return Err(SummaryError::NoSummary(folder.into()));
+    }
+    let summary = read_object(&summary_path)?;
+    let run = read_object(&folder.join("run.json"))?;
+    let record = record::read(folder, experiment(&run)?)?;
+    // The figures are computed anew: an older summary may know fewer.
+    let computed = figures::of(&record);
+    let top = |name: &str| match name {
+        "position_error_dynamic_m" => {
+            summary_figure(&summary, name).or_else(|| position::error_dynamic_m(&record))
+        }
+        "position_error_static_m" => {
+            summary_figure(&summary, name).or_else(|| position::error_static_m(&record))
+        }
+        _ => summary_figure(&summary, name).or_else(|| computed.get(name)),
+    };
+    let figures = rows().filter_map(|(name, _)| Some((name, top(name)?))).collect();
+    let real = folder.canonicalize().unwrap_or_else(|_| folder.into());
+    let name =
+        real.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into());
+    Ok(Run { folder: folder.into(), name, record, figures })
+}
+
+fn summary_figure(summary: &serde_json::Map<String, Value>, name: &str) -> Option<f64> {
+    summary.get(name).and_then(Value::as_f64)
+}
+
+/// Names and units of all figures that runs are compared by.
+pub fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
+    TOP.iter().copied().chain(figures::definitions().map(|definition| (definition.name, definition.unit)))
+}
+
+/// Refuses runs that asked the rig for different things. Programs, their parameters, recording and bounds may differ: controllers are
+/// what is compared.
+///
+/// # Errors
+/// [`RunsError::DifferentExperiments`]
+pub fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
+    let Some((first, others)) = runs.split_first() else { return Ok(()) };
+    let asked_first = asked(&first.record.experiment);
+    match others.iter().find(|other| asked(&other.record.experiment) != asked_first) {
+        None => Ok(()),
+        Some(other) => Err(RunsError::DifferentExperiments {
+            one: first.folder.clone(),
+            title_one: first.title(),
+            other: other.folder.clone(),
+            title_other: other.title(),
+        }),
+    }
+}
+
+/// What an experiment asks of the rig: its state at the start, and the set-points of both axes.
+fn asked(experiment: &toml::Table) -> toml::Table {
+    const OWN: [&str; 3] = ["program", "change", "position-p"];
+    let mut asked = toml::Table::new();
+    for key in ["rig", "drive", "load"] {
+        if let Some(table) = experiment.get(key).and_then(toml::Value::as_table) {
+            let kept = table.iter().filter(|(key, _)| !OWN.contains(&key.as_str()));
+            let kept: toml::Table = kept.map(|(key, value)| (key.clone(), value.clone())).collect();
+            asked.insert(key.into(), toml::Value::Table(kept));
+        }
+    }
+    asked
+}
+
+#[cfg(test)]
+pub(crate) mod made {
+    use super::*;
+    use std::fs;
+
+    /// The folder of a run with this experiment, whose position lags a ramp by `error_m`.
+    pub(crate) fn folder(parent: &Path, name: &str, experiment: &str, error_m: f64) -> PathBuf {
+        let folder = parent.join(name);
+        fs::create_dir(&folder).unwrap();
+        let run = serde_json::json!({ "experiment_toml": experiment });
+        fs::write(folder.join("run.json"), run.to_string()).unwrap();
+        fs::write(folder.join("summary.json"), r#"{ "passed": true, "frames_lost": 0 }"#).unwrap();
+        let mut controller = "time_s,main_chain,set_position_m,position_m,moving\n".to_owned();
+        let mut measured = "time_s,drive_position_m,drive_valve\n".to_owned();
+        for ms in 0..500_u32 {
+            let time = f64::from(ms) * 1e-3;
+            let state = if ms < 100 { "settling" } else { "experiment" };
+            let (set, is) = (0.1 + 0.1 * time, 0.1 + 0.1 * time - error_m);
+            controller += &format!("{time:.3},{state},{set},{is},{}\n", u8::from(ms >= 100));
+            measured += &format!("{time:.3},{is},0.1\n");
+        }
+        fs::write(folder.join("controller-drive.csv"), controller).unwrap();
+        fs::write(folder.join("measurement.csv"), measured).unwrap();
+        folder
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn runs(experiments: &[&str]) -> (tempfile::TempDir, Vec<Run>) {
+        let parent = tempfile::tempdir().unwrap();
+        let folders: Vec<_> = experiments
+            .iter()
+            .enumerate()
+            .map(|(place, text)| made::folder(parent.path(), &format!("run-{place}"), text, 0.002))
+            .collect();
+        let runs = read(&folders).unwrap();
+        (parent, runs)
+    }
+
+    #[test]
+    fn programs_may_differ_and_set_points_may_not() {
+        let with = |program: &str, to: f64| {
+            format!("title = \"a\"\n[drive]\nprogram = \"{program}\"\n[[drive.set-point]]\nto_m = {to}\n")
+        };
+        let (_parent, same) = runs(&[&with("p", 0.4), &with("cascade", 0.4)]);
+        assert!(expect_one_experiment(&same).is_ok());
+        let (_parent, other) = runs(&[&with("p", 0.4), &with("p", 0.3)]);
+        let message = expect_one_experiment(&other).unwrap_err().to_string();
+        assert!(message.contains("--anyway") && message.contains("run-1"), "{message}");
+    }
+
+    #[test]
+    fn figures_are_computed_where_the_summary_has_none() {
+        let (_parent, runs) = runs(&["title = \"a\""]);
+        assert!((runs[0].figure("position_error_dynamic_m").unwrap() - 0.002).abs() < 1e-12);
+        assert_eq!((runs[0].figure("frames_lost"), runs[0].figure("force_rise_s")), (Some(0.0), None));
+        assert!((runs[0].start_s() - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn runs_of_one_name_are_told_apart_by_their_folders() {
+        let parent = tempfile::tempdir().unwrap();
+        let folders = ["a", "b"].map(|sub| {
+            std::fs::create_dir(parent.path().join(sub)).unwrap();
+            made::folder(&parent.path().join(sub), "run", "", 0.0)
+        });
+        let runs = read(&folders).unwrap();
+        assert_ne!(runs[0].name, runs[1].name);
+    }
+}

@@ -1,0 +1,106 @@
+//! Repetitions of one experiment: how much each figure spreads.
+
+use crate::grid::Grid;
+use crate::runs::{Run, rows};
+use crate::table::{in_use, without_unit};
+use serde_json::{Map, Value, json};
+
+/// A figure over the runs that have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Spread {
+    count: usize,
+    mean: f64,
+    /// Of the sample; none from a single run.
+    standard_deviation: Option<f64>,
+    least: f64,
+    most: f64,
+}
+
+impl Spread {
+    fn of(values: &[f64]) -> Option<Self> {
+        let count = values.len();
+        let mean = values.iter().sum::<f64>() / count as f64;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        Some(Self {
+            count,
+            mean,
+            standard_deviation: (count > 1).then(|| (squares / (count - 1) as f64).sqrt()),
+            least: values.iter().copied().reduce(f64::min)?,
+            most: values.iter().copied().reduce(f64::max)?,
+        })
+    }
+}
+
+/// The spread of each figure that any run has.
+fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
+    let spread = |(name, unit)| {
+        let values: Vec<_> = runs.iter().filter_map(|run| run.figure(name)).collect();
+        Some((name, unit, Spread::of(&values)?))
+    };
+    rows().filter_map(spread).collect()
+}
+
+/// The spreads as a table.
+#[must_use]
+pub fn table(runs: &[Run]) -> Grid {
+    let head = ["figure", "n", "mean", "standard deviation", "least", "most"].map(str::to_owned).to_vec();
+    let rows = spreads(runs).into_iter().map(|(name, unit, spread)| {
+        let told = |value: f64| in_use(value, unit);
+        let deviation = spread.standard_deviation.map_or_else(|| "-".to_owned(), told);
+        let count = spread.count.to_string();
+        vec![without_unit(name), count, told(spread.mean), deviation, told(spread.least), told(spread.most)]
+    });
+    Grid { head, rows: rows.collect() }
+}
+
+/// The spreads as JSON, SI, by the figures' names.
+#[must_use]
+pub fn json(runs: &[Run]) -> Value {
+    let figures: Map<_, _> = spreads(runs)
+        .into_iter()
+        .map(|(name, _, spread)| {
+            let Spread { count, mean, standard_deviation, least, most } = spread;
+            let told = json!({
+                "n": count, "mean": mean, "standard_deviation": standard_deviation, "least": least, "most": most,
+            });
+            (name.to_owned(), told)
+        })
+        .collect();
+    let names: Vec<_> = runs.iter().map(|run| run.name.as_str()).collect();
+    json!({
+        "schema_version": protocol::run_folder::SCHEMA_VERSION,
+        "experiment": runs.first().map(Run::title),
+        "runs": names,
+        "figures": figures,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runs::{self, made};
+
+    #[test]
+    fn mean_and_deviation_are_those_of_the_sample() {
+        let spread = Spread::of(&[1.0, 2.0, 3.0, 6.0]).unwrap();
+        assert_eq!((spread.count, spread.mean, spread.least, spread.most), (4, 3.0, 1.0, 6.0));
+        assert!((spread.standard_deviation.unwrap() - (14.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_eq!(Spread::of(&[4.0]).unwrap().standard_deviation, None);
+        assert_eq!(Spread::of(&[]), None);
+    }
+
+    #[test]
+    fn repetitions_are_summed_up_as_a_table_and_as_json() {
+        let parent = tempfile::tempdir().unwrap();
+        let folders = [("one", 0.002), ("two", 0.004)]
+            .map(|(name, error_m)| made::folder(parent.path(), name, "title = \"ramp\"", error_m));
+        let runs = runs::read(&folders).unwrap();
+        let told = json(&runs);
+        assert_eq!(told["runs"], json!(["one", "two"]));
+        let figure = &told["figures"]["position_error_dynamic_m"];
+        assert!((figure["mean"].as_f64().unwrap() - 0.003).abs() < 1e-12 && figure["n"] == 2);
+        let grid = table(&runs);
+        let row = grid.rows.iter().find(|row| row[0] == "position error dynamic").unwrap();
+        assert_eq!(row[1..], ["2", "3.000 mm", "1.414 mm", "2.000 mm", "4.000 mm"]);
+    }
+}

@@ -1,0 +1,51 @@
+//! Moving average of the position sensor over the last 0.2 s, for the partner.
+
+/// Samples of the window.
+const WINDOW: usize = 200;
+
+/// The window.
+#[derive(Clone, Debug)]
+pub(super) struct Average {
+    samples: [f64; WINDOW],
+    taken: usize,
+}
+
+impl Default for Average {
+    fn default() -> Self {
+        Self { samples: [0.0; WINDOW], taken: 0 }
+    }
+}
+
+impl Average {
+    pub(super) fn take(&mut self, value: f64) {
+        self.samples[self.taken % WINDOW] = value;
+        self.taken += 1;
+    }
+
+    /// The mean; 0 before the first sample. Summed anew each time, so that roundings never pile up.
+    pub(super) fn value(&self) -> f64 {
+        let count = self.taken.min(WINDOW);
+        self.samples[..count].iter().sum::<f64>() / count.max(1) as f64
+    }
+
+    /// The newest sample; 0 before the first.
+    pub(super) fn last(&self) -> f64 {
+        self.taken.checked_sub(1).map_or(0.0, |newest| self.samples[newest % WINDOW])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_the_mean_of_the_last_window() {
+        let mut average = Average::default();
+        assert_eq!((average.value(), average.last()), (0.0, 0.0));
+        average.take(3.0);
+        assert_eq!(average.value(), 3.0);
+        (0..WINDOW).for_each(|sample| average.take(sample as f64));
+        // 0 to 199: their mean, exact in binary.
+        assert_eq!((average.value(), average.last()), (99.5, 199.0));
+    }
+}

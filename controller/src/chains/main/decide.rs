@@ -1,0 +1,209 @@
+//! Which edge of the main chain is to be gone: pure functions of state and inputs.
+
+use super::{Edge, Ended, GRACE_CYCLES, MainCause, MainChain, MainConfig, MainInputs, Start, State, Wait};
+use crate::chains::sync::{Relation, relation};
+use crate::chains::{AfterStop, Fault, cycles};
+use protocol::frames::{ChainStatus, EmergencyStopChainState, MainChainState};
+
+impl MainChain {
+    /// The edge to go, if any.
+    pub(super) fn decide(&self, inputs: &MainInputs) -> Option<Edge> {
+        match &self.state {
+            State::Fault { ended, .. } => self.decide_ended(ended, inputs),
+            _ if inputs.fault.is_some() => inputs.fault.map(fault),
+            State::Aborted { ended } => self.decide_ended(ended, inputs),
+            _ if inputs.emergency_stop != EmergencyStopChainState::Ready => {
+                Some((MainChainState::Aborted, MainCause::EmergencyStop))
+            }
+            _ if inputs.console.abort => Some((MainChainState::Aborted, MainCause::Console)),
+            State::WaitingForRig { since } => self.decide_waiting_for_rig((*since)?, inputs),
+            State::Done { .. } => self.decide_partner_ended(inputs),
+            State::InitialPositioning { wait, .. }
+            | State::Preparing { wait }
+            | State::InitialForce { wait }
+            | State::Settling { wait }
+            | State::Experiment { wait }
+            | State::FinalSettling { wait } => self
+                .decide_partner_gone(wait, inputs)
+                .or_else(|| self.decide_ready(inputs))
+                .or_else(|| self.decide_late(wait, inputs)),
+        }
+    }
+
+    fn decide_waiting_for_rig(&self, since: u64, inputs: &MainInputs) -> Option<Edge> {
+        let go = Some((MainChainState::InitialPositioning, MainCause::Ready));
+        inputs.own?;
+        if !self.config.partner_needed {
+            return go;
+        }
+        let status = inputs.partner.fresh(inputs.cycle);
+        let same = |status: &&ChainStatus| [0, self.config.experiment].contains(&status.experiment);
+        match status.filter(same).map(|status| (status.main_chain, status.ok, status.repetition)) {
+            Some((MainChainState::WaitingForRig, true, _) | (MainChainState::InitialPositioning, _, 0)) => {
+                return go;
+            }
+            Some((ended, ..)) if passed(since, GRACE_CYCLES, inputs.cycle) => {
+                if let Some(edge) = partner_ended(ended) {
+                    return Some(edge);
+                }
+            }
+            _ => {}
+        }
+        let late = passed(since, cycles(self.config.partner_timeout_s), inputs.cycle);
+        late.then(|| match status {
+            Some(other) if !same(&other) => fault(Fault::PartnerOtherExperiment),
+            Some(status) if status.main_chain == MainChainState::WaitingForRig => fault(Fault::PartnerNotOk),
+            _ => fault(Fault::PartnerMissing),
+        })
+    }
+
+    /// The partner ended, fell silent or began anew.
+    fn decide_partner_gone(&self, wait: &Wait, inputs: &MainInputs) -> Option<Edge> {
+        if !self.config.partner_needed {
+            return None;
+        }
+        let restarted = matches!(self.state, State::InitialPositioning { .. });
+        let in_grace = restarted && !passed(wait.since, GRACE_CYCLES, inputs.cycle);
+        match self.relation(inputs) {
+            Relation::Silent => Some(fault(Fault::PartnerLost)),
+            Relation::Restarted => Some(fault(Fault::PartnerRestarted)),
+            Relation::Aborted | Relation::Fault if !in_grace => self.decide_partner_ended(inputs),
+            _ => None,
+        }
+    }
+
+    pub(super) fn decide_partner_ended(&self, inputs: &MainInputs) -> Option<Edge> {
+        let status = inputs.partner.fresh(inputs.cycle).filter(|_| self.config.partner_needed)?;
+        partner_ended(status.main_chain)
+    }
+
+    /// Both are ready.
+    fn decide_ready(&self, inputs: &MainInputs) -> Option<Edge> {
+        use MainChainState as S;
+        let partner_ok = !self.config.partner_needed || self.relation(inputs).ok();
+        if !(self.ok(inputs) && partner_ok) {
+            return None;
+        }
+        let again = self.config.repetitions.is_none_or(|most| self.repetition.saturating_add(1) < most);
+        let next = match self.state {
+            State::InitialPositioning { .. } => S::Preparing,
+            State::Preparing { .. } => S::InitialForce,
+            State::InitialForce { .. } => S::Settling,
+            State::Settling { .. } => S::Experiment,
+            State::Experiment { .. } => S::FinalSettling,
+            State::FinalSettling { .. } if again => {
+                return Some((S::InitialPositioning, MainCause::NextRepetition));
+            }
+            State::FinalSettling { .. } => S::Done,
+            State::WaitingForRig { .. }
+            | State::Done { .. }
+            | State::Aborted { .. }
+            | State::Fault { .. } => {
+                return None;
+            }
+        };
+        Some((next, MainCause::Ready))
+    }
+
+    /// A state has been waited in for too long.
+    fn decide_late(&self, wait: &Wait, inputs: &MainInputs) -> Option<Edge> {
+        let timeout = cycles(self.config.settling_timeout_s);
+        let [own, either] = self.expected_cycles();
+        if let Some(ok_since) = wait.ok_since {
+            let from = ok_since.max(wait.since + either);
+            // The partner's own time-out, which names the cause, comes first.
+            return passed(from, timeout + GRACE_CYCLES, inputs.cycle).then_some(fault(Fault::PartnerNotOk));
+        }
+        let from = wait.for_console.unwrap_or(0).max(wait.since + own);
+        // Settled and waiting for the console is not late.
+        let late = passed(from, timeout, inputs.cycle) && !self.held(inputs);
+        let cause = match self.state {
+            State::Settling { .. } | State::FinalSettling { .. } => Fault::SettlingTimeout,
+            _ => Fault::PreparationTimeout,
+        };
+        late.then_some(fault(cause))
+    }
+
+    /// The way back from aborted and fault.
+    fn decide_ended(&self, ended: &Ended, inputs: &MainInputs) -> Option<Edge> {
+        let ready = |state| state == EmergencyStopChainState::Ready;
+        if self.config.after_emergency_stop == AfterStop::End || !ready(inputs.emergency_stop) {
+            return None;
+        }
+        inputs.own.filter(|_| inputs.fault.is_none())?;
+        if self.config.partner_needed {
+            inputs.partner.fresh(inputs.cycle).filter(|status| {
+                use MainChainState::{Aborted, Fault, InitialPositioning};
+                let goes_along = matches!(status.main_chain, Aborted | Fault | InitialPositioning);
+                goes_along && ready(status.emergency_stop_chain)
+            })?;
+        }
+        let recovered = ended.stopped && !ended.by_person;
+        let cause = match inputs.console.start {
+            true if !recovered => MainCause::Started,
+            _ if recovered => MainCause::Recovered,
+            _ => return None,
+        };
+        Some((MainChainState::InitialPositioning, cause))
+    }
+
+    pub(super) fn relation(&self, inputs: &MainInputs) -> Relation {
+        relation(self.name(), self.repetition, &inputs.partner, inputs.cycle)
+    }
+
+    /// Whether the own axis is done with the state, whoever must start what follows.
+    pub(super) fn held(&self, inputs: &MainInputs) -> bool {
+        let over = |wait: &Wait, length_s| passed(wait.since, cycles(length_s), inputs.cycle + 1);
+        let settled =
+            |wait: &Wait| self.settled.settled_for(self.config.settling_s, wait.since, inputs.cycle);
+        match &self.state {
+            State::WaitingForRig { .. } => inputs.own.is_some(),
+            State::InitialPositioning { wait, duration_s, .. } => over(wait, *duration_s),
+            State::Preparing { .. } => inputs.prepared || !self.config.prepares,
+            State::InitialForce { wait } => over(wait, self.config.own.initial_force_s),
+            State::Settling { wait } | State::FinalSettling { wait } => settled(wait),
+            State::Experiment { wait } => over(wait, self.config.own.experiment_s),
+            State::Done { .. } => true,
+            State::Aborted { .. } | State::Fault { .. } => false,
+        }
+    }
+
+    /// The OK flag.
+    pub(super) fn ok(&self, inputs: &MainInputs) -> bool {
+        let waits = matches!(self.state, State::Settling { .. }) && self.config.start == Start::OnStart;
+        self.held(inputs) && (self.started || !waits)
+    }
+
+    /// How long the state is meant to last, for this axis and for the slower of both.
+    fn expected_cycles(&self) -> [u64; 2] {
+        let MainConfig { own, either, settling_s, approach_longest_s, .. } = &self.config;
+        let seconds = match &self.state {
+            State::InitialPositioning { duration_s, .. } => [*duration_s, *approach_longest_s],
+            State::Preparing { .. } => [own.prepare_s, either.prepare_s],
+            State::InitialForce { .. } => [own.initial_force_s, either.initial_force_s],
+            State::Settling { .. } | State::FinalSettling { .. } => [*settling_s; 2],
+            State::Experiment { .. } => [own.experiment_s, either.experiment_s],
+            _ => [0.0; 2],
+        };
+        [cycles(seconds[0]), cycles(seconds[0].max(seconds[1]))]
+    }
+}
+
+/// More than `length` cycles have passed.
+fn passed(since: u64, length: u64, cycle: u64) -> bool {
+    cycle.saturating_sub(since) > length
+}
+
+fn fault(fault: Fault) -> Edge {
+    (MainChainState::Fault, MainCause::Fault(fault))
+}
+
+/// What follows from a partner in `state`, when it has ended its run.
+fn partner_ended(state: MainChainState) -> Option<Edge> {
+    let cause = match state {
+        MainChainState::Aborted => MainCause::PartnerAborted,
+        MainChainState::Fault => MainCause::PartnerFault,
+        _ => return None,
+    };
+    Some((MainChainState::Aborted, cause))
+}

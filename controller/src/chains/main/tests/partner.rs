@@ -1,0 +1,304 @@
+//! Two main chains: a partner that is silent, late, slow, or begins anew, and the time-outs of each state.
+
+use super::*;
+
+/// Keeps an axis in a waiting state by taking what its condition needs.
+fn hold(duo: &mut Duo, index: usize, state: S) {
+    match state {
+        S::Preparing => duo.axes[index].prepared = false,
+        S::Settling | S::FinalSettling => {
+            duo.axes[index].error = ControlError::Position { error_m: 0.1 };
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn a_partner_that_falls_silent_is_lost_after_a_hundred_cycles() {
+    for state in RUNNING {
+        let mut duo = both_in(state);
+        let silent_from = duo.cycle;
+        // Neither may go on in the meantime.
+        hold(&mut duo, 0, state);
+        duo.axes[1].alive = false;
+        while duo.axes[0].state() != S::Fault {
+            duo.step();
+            assert!(duo.cycle < silent_from + 1000, "{state}");
+        }
+        assert_eq!(duo.faults()[0], Some(Fault::PartnerLost), "{state}");
+        let cycles = duo.cycle - silent_from;
+        assert!((100..=104).contains(&cycles), "{state}: {cycles}");
+        duo.run(300);
+        assert_eq!(duo.axes[0].stop_state(), EmergencyStopChainState::WaitingForRelease);
+    }
+}
+
+#[test]
+fn a_lost_partner_cannot_be_released_before_it_is_heard() {
+    let mut duo = both_in(S::Experiment);
+    duo.axes[1].heard = false;
+    duo.run(500);
+    assert_eq!(duo.faults(), [Some(Fault::PartnerLost), None]);
+    duo.console.release = true;
+    duo.run(1000);
+    assert_eq!(duo.axes[0].stop.holds(), Some(Fault::PartnerLost));
+    duo.axes[1].heard = true;
+    duo.run(1000);
+    assert_eq!(duo.axes[0].stop.holds(), Some(Fault::PartnerLost), "the release came too early");
+    duo.console.release = true;
+    duo.run(400);
+    assert_eq!(duo.states(), [S::InitialPositioning; 2]);
+}
+
+#[test]
+fn status_frames_may_be_lost_for_a_while() {
+    let mut duo = Duo::new(&short());
+    for round in 0..60 {
+        duo.axes[round % 2].heard = false;
+        duo.run(90);
+        duo.axes[round % 2].heard = true;
+        duo.run(10);
+    }
+    assert_eq!((duo.states(), duo.faults()), ([S::Done; 2], [None; 2]));
+}
+
+#[test]
+fn a_partner_may_be_silent_when_done() {
+    let mut duo = both_in(S::Done);
+    duo.axes[1].alive = false;
+    duo.run(1000);
+    assert_eq!(duo.axes[0].state(), S::Done);
+}
+
+#[test]
+fn a_partner_that_is_never_heard_is_missing_after_ten_seconds() {
+    let mut duo = Duo::new(&short());
+    duo.axes[1].alive = false;
+    duo.run(10_001);
+    assert_eq!(duo.axes[0].state(), S::WaitingForRig);
+    duo.step();
+    assert_eq!(duo.faults()[0], Some(Fault::PartnerMissing));
+}
+
+#[test]
+fn a_partner_without_sensors_is_not_ok() {
+    let mut duo = Duo::new(&short());
+    duo.axes[1].sensors = false;
+    duo.run(10_002);
+    assert_eq!(duo.faults()[0], Some(Fault::PartnerNotOk));
+}
+
+#[test]
+fn a_partner_with_another_experiment_is_named_so() {
+    let mut duo = Duo::new(&short());
+    duo.axes[1] = One::new(MainConfig { experiment: 8, ..short() });
+    duo.run(10_002);
+    assert_eq!(duo.faults()[0], Some(Fault::PartnerOtherExperiment));
+}
+
+#[test]
+fn a_partner_that_comes_late_is_waited_for() {
+    let mut duo = Duo::new(&short());
+    duo.axes[1].alive = false;
+    duo.run(9000);
+    duo.axes[1].alive = true;
+    duo.run(5000);
+    assert_eq!(duo.states(), [S::Done; 2]);
+}
+
+#[test]
+fn a_partner_that_begins_anew_is_a_fault() {
+    for state in RUNNING {
+        let mut duo = both_in(state);
+        hold(&mut duo, 0, state);
+        duo.axes[1] = One::new(short());
+        duo.run(4);
+        if state == S::InitialPositioning {
+            assert_eq!(duo.states(), [state; 2], "it just began: the other joins");
+            continue;
+        }
+        assert_eq!(duo.faults()[0], Some(Fault::PartnerRestarted), "{state}");
+        duo.run(100);
+        assert_eq!(duo.states(), [S::Fault, S::Aborted], "{state}");
+    }
+}
+
+#[test]
+fn an_axis_that_does_not_settle_ends_in_a_fault_of_that_name() {
+    for (state, fault) in [
+        (S::Preparing, Fault::PreparationTimeout),
+        (S::Settling, Fault::SettlingTimeout),
+        (S::FinalSettling, Fault::SettlingTimeout),
+    ] {
+        let mut duo = Duo::new(&short());
+        duo.axes[1].prepared = true;
+        if state == S::FinalSettling {
+            duo.run_to(S::Experiment);
+        }
+        hold(&mut duo, 0, state);
+        duo.run_to(state);
+        let since = duo.cycle;
+        duo.run_to(S::Fault);
+        assert_eq!(duo.faults()[0], Some(fault));
+        // 2 s beyond the 0.3 s that settling takes.
+        let expected = if state == S::Preparing { 2000 } else { 2300 };
+        let cycles = duo.cycle - since;
+        assert!(cycles.abs_diff(expected) <= 2, "{state}: {cycles}");
+        duo.run(3);
+        assert_eq!(duo.states()[1], S::Aborted);
+    }
+}
+
+#[test]
+fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
+    // The partner's chain is held in each state by a length of its own that nobody knows of.
+    let endless = 1e4;
+    let slow = |state| match state {
+        S::InitialPositioning => MainConfig { start_m: Some(0.1 + 0.1 * endless), ..short() },
+        S::InitialForce => MainConfig { own: Lengths { initial_force_s: endless, ..short().own }, ..short() },
+        S::Experiment => MainConfig { own: Lengths { experiment_s: endless, ..short().own }, ..short() },
+        S::Preparing => {
+            MainConfig { prepares: true, own: Lengths { prepare_s: endless, ..short().own }, ..short() }
+        }
+        _ => MainConfig { settling_timeout_s: endless, ..short() },
+    };
+    for state in RUNNING {
+        let mut duo = Duo::new(&short());
+        duo.axes[1] = One::new(slow(state));
+        duo.axes[1].prepared = state != S::Preparing;
+        if state == S::FinalSettling {
+            duo.run_to(S::Experiment);
+        }
+        if matches!(state, S::Settling | S::FinalSettling) {
+            hold(&mut duo, 1, state);
+        }
+        duo.run_to(state);
+        let since = duo.cycle;
+        duo.run_to(S::Fault);
+        assert_eq!(duo.faults()[0], Some(Fault::PartnerNotOk), "{state}");
+        let own_s = match state {
+            S::InitialPositioning => short().approach_longest_s,
+            S::Preparing => 0.0,
+            S::InitialForce => 0.2,
+            S::Experiment => 1.0,
+            _ => 0.3,
+        };
+        let cycles = (duo.cycle - since) as f64 * 1e-3;
+        assert!((cycles - own_s - 2.1).abs() < 0.01, "{state}: {cycles} s");
+    }
+}
+
+#[test]
+fn a_slow_partner_is_waited_for_when_its_length_is_known() {
+    let long = Lengths { experiment_s: 6.0, ..short().own };
+    let mut duo = Duo::new(&MainConfig { either: long, ..short() });
+    duo.axes[1] = One::new(MainConfig { own: long, either: long, ..short() });
+    duo.run(9000);
+    assert_eq!(duo.states(), [S::Done; 2]);
+}
+
+#[test]
+fn two_axes_that_hunt_each_other_do_not_wait_for_ever() {
+    let mut duo = Duo::new(&short());
+    duo.run_to(S::Settling);
+    for round in 0..10 {
+        // Each is settled for a moment while the other is not.
+        for index in [0, 1] {
+            let error_m = if round % 2 == index { 0.1 } else { 0.0 };
+            duo.axes[index].error = ControlError::Position { error_m };
+        }
+        duo.run(550);
+    }
+    assert!(duo.states().contains(&S::Fault), "{:?}", duo.states());
+}
+
+/// An aborted pair on the way back, whose second axis is held up for `cycles` by its sensors.
+fn recovering_apart(cycles: u64) -> Duo {
+    let mut duo = both_in(S::Experiment);
+    duo.stop_and_release();
+    duo.axes[1].sensors = false;
+    duo.run_to(S::InitialPositioning);
+    duo.run(cycles);
+    assert_eq!(duo.states()[1], S::Aborted);
+    duo.axes[1].sensors = true;
+    duo
+}
+
+#[test]
+fn a_partner_that_is_a_little_later_on_the_way_back_is_waited_for() {
+    let mut duo = recovering_apart(90);
+    duo.run(6000);
+    assert_eq!(duo.states(), [S::Done; 2]);
+}
+
+#[test]
+fn a_partner_that_stays_aborted_on_the_way_back_ends_it_until_a_person_starts() {
+    let mut duo = recovering_apart(110);
+    assert_eq!(duo.states(), [S::Aborted; 2]);
+    assert_eq!(duo.axes[0].main.entered().cause, MainCause::PartnerAborted);
+    // The second still goes by itself, is left alone, and gives up too.
+    duo.run(1000);
+    assert_eq!(duo.states(), [S::Aborted; 2]);
+    duo.console.start = true;
+    duo.run(6000);
+    assert_eq!(duo.states(), [S::Done; 2]);
+}
+
+#[test]
+fn both_go_on_with_the_later_repetition() {
+    let mut duo = Duo::new(&MainConfig { repetitions: Some(9), ..short() });
+    duo.run_to(S::Experiment);
+    duo.stop_and_release();
+    for (index, repetition) in [(0, 6), (1, 7)] {
+        duo.axes[index].main.repetition = repetition;
+    }
+    duo.run(300);
+    assert_eq!(duo.states(), [S::InitialPositioning; 2]);
+    assert_eq!([0, 1].map(|index| duo.axes[index].output.unwrap().repetition), [7; 2]);
+}
+
+#[test]
+fn nobody_goes_back_before_the_partner_has_ended_and_its_emergency_stop_chain_is_ready() {
+    use EmergencyStopChainState as Stop;
+    for (main_chain, emergency_stop_chain, state) in [
+        (S::Aborted, Stop::Recovering, S::Aborted),
+        (S::Aborted, Stop::WaitingForStart, S::Aborted),
+        (S::Experiment, Stop::Ready, S::Aborted),
+        (S::Aborted, Stop::Ready, S::InitialPositioning),
+        (S::Fault, Stop::Ready, S::InitialPositioning),
+    ] {
+        let mut duo = both_in(S::Experiment);
+        duo.console_holds = true;
+        duo.step();
+        let cycle = duo.cycle;
+        let status = ChainStatus { main_chain, emergency_stop_chain, ..ChainStatus::default() };
+        let output = duo.axes[0].main.advance(&MainInputs {
+            cycle,
+            own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
+            partner: Partner { status: Some(status), values: None, heard: Some(cycle) },
+            ..MainInputs::default()
+        });
+        assert_eq!(output.state, state, "{main_chain} {emergency_stop_chain}");
+    }
+}
+
+#[test]
+fn a_partner_that_had_ended_before_ends_the_waiting_for_the_rig_too() {
+    for (main_chain, cause) in [(S::Aborted, MainCause::PartnerAborted), (S::Fault, MainCause::PartnerFault)]
+    {
+        let mut chain = MainChain::new(short());
+        for cycle in 0..102 {
+            let status = ChainStatus { main_chain, ..ChainStatus::default() };
+            let output = chain.advance(&MainInputs {
+                cycle,
+                own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
+                partner: Partner { status: Some(status), values: None, heard: Some(cycle) },
+                ..MainInputs::default()
+            });
+            // A rig that began anew has both in waiting, and the last status may be of before.
+            let expected = if cycle > 100 { S::Aborted } else { S::WaitingForRig };
+            assert_eq!(output.state, expected, "cycle {cycle}");
+        }
+        assert_eq!(chain.entered().cause, cause);
+    }
+}

@@ -1,0 +1,202 @@
+//! `controller rehearse`: a rehearsal with the files of a run.
+//!
+//! It leaves what a run on a bus leaves, save for what only a bus has: no `bus.log`, no latencies.
+
+use crate::cli::RehearseArguments;
+use crate::recording::{Tables, sentence};
+use crate::rehearsal::{Rehearsal, RehearsalParts};
+use crate::report::{AxisReport, Report};
+use crate::run::RunError;
+use crate::setup::{Inputs, Mode};
+use plant::scene::Outcome;
+use plant::{Axis, Scene, tables};
+use protocol::bus::BusCounters;
+use protocol::exit::Exit;
+use protocol::run_folder::{LineFile, SCHEMA_VERSION, clear_results, write_json};
+use realtime::{Interrupt, Percentiles, Recorder};
+use serde_json::json;
+use std::path::Path;
+use std::time::Instant;
+
+/// Rehearses as the command line asks.
+///
+/// # Errors
+/// [`RunError`] when it cannot start or be saved; how it went is the exit code.
+pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
+    let inputs = Inputs::read(&arguments.files)?;
+    let file = arguments.files.experiment.display().to_string();
+    let scene = Scene::from_toml(&inputs.experiment_toml, &file, &inputs.rig).map_err(RunError::input)?;
+    let mut rehearsal = rehearsal(&inputs, &scene, arguments.seed, arguments.files.repeat)?;
+    let interrupt =
+        Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
+    let out = &arguments.files.out;
+    std::fs::create_dir_all(out)
+        .and_then(|()| clear_results(out))
+        .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
+    let started = Instant::now();
+    let mut files = Files::create(out, &scene).map_err(RunError::output)?;
+    let cycles = (arguments.seconds * 1000.0).round() as u64;
+    let mut told = Vec::new();
+    let mut interrupted = false;
+    while rehearsal.cycles() < cycles && !rehearsal.ended() && !interrupted {
+        let rehearsed = rehearsal.step(|cycle, outcome| told.push(event(cycle, outcome)));
+        files.write(&rehearsed).map_err(RunError::output)?;
+        if let Some(news) = rehearsal.take_news() {
+            eprintln!("controller: {}", sentence(news));
+        }
+        interrupted = interrupt.came();
+    }
+    files.write_out().map_err(RunError::output)?;
+    let ended = Ended { rehearsal, interrupted, told, took_s: started.elapsed().as_secs_f64() };
+    save(arguments, &inputs, &scene, &ended)
+}
+
+/// A rehearsal of what was read.
+///
+/// # Errors
+/// [`RunError::Input`] when rig and scene, or experiment and programs, do not go together.
+pub fn rehearsal(inputs: &Inputs, scene: &Scene, seed: u64, forever: bool) -> Result<Rehearsal, RunError> {
+    let mode = Mode { partner_needed: true, real_time: false, forever };
+    let controllers =
+        Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?;
+    let parts = RehearsalParts { rig: &inputs.rig, scene, seed, controllers };
+    Rehearsal::new(parts).map_err(RunError::input)
+}
+
+/// The tables of a rehearsal.
+struct Files {
+    measurement: LineFile,
+    truth: LineFile,
+    axes: Tables,
+}
+
+impl Files {
+    fn create(folder: &Path, scene: &Scene) -> std::io::Result<Self> {
+        let mut measurement = LineFile::create(&folder.join("measurement.csv"))?;
+        let mut truth = LineFile::create(&folder.join("truth.csv"))?;
+        tables::write_measurement_head(measurement.lines(), scene.linked, scene.added_mass_kg)?;
+        tables::write_truth_head(truth.lines())?;
+        Ok(Self { measurement, truth, axes: Tables::create(folder, &Axis::ALL)? })
+    }
+
+    fn write(&mut self, rehearsed: &crate::rehearsal::Rehearsed) -> std::io::Result<()> {
+        tables::write_measurement(self.measurement.lines(), &rehearsed.cycle)?;
+        tables::write_truth(self.truth.lines(), &rehearsed.cycle)?;
+        rehearsed.axes.iter().flatten().try_for_each(|record| self.axes.write(record))?;
+        self.measurement.write_when_full()?;
+        self.truth.write_when_full()
+    }
+
+    fn write_out(&mut self) -> std::io::Result<()> {
+        self.measurement.write_out()?;
+        self.truth.write_out()?;
+        self.axes.write_out()
+    }
+}
+
+struct Ended {
+    rehearsal: Rehearsal,
+    interrupted: bool,
+    told: Vec<serde_json::Value>,
+    took_s: f64,
+}
+
+fn event(cycle: u64, outcome: Outcome) -> serde_json::Value {
+    json!({ "cycle": cycle, "what": format!("{outcome:?}") })
+}
+
+fn save(
+    arguments: &RehearseArguments,
+    inputs: &Inputs,
+    scene: &Scene,
+    ended: &Ended,
+) -> Result<Exit, RunError> {
+    let station = ended.rehearsal.station();
+    let axes = AxisReport::of_station(station, inputs);
+    let stopped = axes.iter().find(|(_, axis)| axis.is_stopped());
+    let (exit, ended_because) = match stopped {
+        _ if ended.interrupted => {
+            (Exit::Interrupted, "interrupted; everything recorded so far is saved".into())
+        }
+        Some((name, axis)) => {
+            (Exit::BoundBroken, format!("stopped before the end: {name}: {}", axis.chain_cause))
+        }
+        None if axes.values().all(AxisReport::is_done) => (Exit::Good, "the controllers are done".to_owned()),
+        None if arguments.files.repeat => (Exit::Good, "the time asked for is over".to_owned()),
+        None => (Exit::BoundBroken, "the time asked for was over before the experiment was done".to_owned()),
+    };
+    let cycles = ended.rehearsal.cycles();
+    let simulated_s = cycles as f64 * 1e-3;
+    eprintln!(
+        "controller: {ended_because}; {simulated_s} s rehearsed in {:.2} s, {:.0} times real time",
+        ended.took_s,
+        simulated_s / ended.took_s
+    );
+    let out = &arguments.files.out;
+    let empty = || Recorder::new().percentiles();
+    let report = Report {
+        schema_version: SCHEMA_VERSION,
+        command_line: std::env::args().collect(),
+        version: env!("CARGO_PKG_VERSION"),
+        title: inputs.experiment.title.clone(),
+        started_unix_s: None,
+        ended_well: exit == Exit::Good,
+        ended_because: ended_because.clone(),
+        cycles_answered: station.answered(),
+        rig_cycles_skipped: 0,
+        frames_ignored: station.ignored(),
+        bus: BusCounters::default(),
+        wakeup_ns: empty(),
+        execution_ns: empty(),
+        period_error_ns: empty(),
+        allocations_in_cycle: None,
+        records_dropped: station.records_dropped(),
+        realtime_granted: Vec::new(),
+        realtime_refused: Vec::new(),
+        axes,
+        news: Vec::new(),
+    };
+    write_json(&out.join("controller.json"), &report).map_err(RunError::output)?;
+    let run = json!({
+        "schema_version": SCHEMA_VERSION,
+        "pace": "rehearsal",
+        "seed": arguments.seed,
+        "rig_toml": inputs.rig_toml,
+        "experiment_toml": inputs.experiment_toml,
+        "rig_setup": scene,
+    });
+    write_json(&out.join("run.json"), &run).map_err(RunError::output)?;
+    write_json(&out.join("summary.json"), &summary(cycles, exit, &ended_because, &ended.told, empty()))
+        .map_err(RunError::output)?;
+    Ok(exit)
+}
+
+/// The keys of `summary.json` that others read; what only a bus or a clock has is 0 or empty.
+fn summary(
+    cycles: u64,
+    exit: Exit,
+    ended_because: &str,
+    events: &[serde_json::Value],
+    none: Percentiles,
+) -> serde_json::Value {
+    json!({
+        "schema_version": SCHEMA_VERSION,
+        "position_error_dynamic_m": null,
+        "position_error_static_m": null,
+        "cycles": cycles,
+        "skipped": 0,
+        "overruns": 0,
+        "frames_sent": 0,
+        "frames_received": 0,
+        "frames_lost": 0,
+        "frames_lost_at_rig": 0,
+        "frames_malformed": 0,
+        "stale_commands": 0,
+        "wakeup_ns": none,
+        "round_trip_ns": none,
+        "records_dropped": 0,
+        "passed": exit == Exit::Good,
+        "ended_because": ended_because,
+        "events": events,
+    })
+}

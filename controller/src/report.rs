@@ -1,0 +1,149 @@
+//! `controller.json`, or `controller-drive.json` and `controller-load.json`: what a process's controllers were run with and what
+//! they counted.
+
+use crate::axis::AxisController;
+use crate::rig_view::RigView;
+use crate::setup::Inputs;
+use crate::station::{IgnoredFrames, News, Station};
+use plant::Axis;
+use protocol::bus::BusCounters;
+use protocol::frames::MainChainState;
+use realtime::Percentiles;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The report of a process.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// See [`protocol::run_folder::SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// How it was called.
+    pub command_line: Vec<String>,
+    /// Its version.
+    pub version: &'static str,
+    /// Title of the experiment.
+    pub title: String,
+    /// Start of its clock, s since 1970; null where time is simulated.
+    pub started_unix_s: Option<f64>,
+    /// Whether it ended as it should.
+    pub ended_well: bool,
+    /// Why it ended.
+    pub ended_because: String,
+    /// Cycles answered.
+    pub cycles_answered: u64,
+    /// Cycles that the rig says it skipped.
+    pub rig_cycles_skipped: u64,
+    /// Frames counted and ignored.
+    pub frames_ignored: IgnoredFrames,
+    /// What the bus counted.
+    pub bus: BusCounters,
+    /// Arrival of the sensors to waking up.
+    pub wakeup_ns: Percentiles,
+    /// Waking up to the last frame sent.
+    pub execution_ns: Percentiles,
+    /// Deviation of the time between two answers from the period.
+    pub period_error_ns: Percentiles,
+    /// Allocations in the 1 ms path; null when the build does not count them.
+    pub allocations_in_cycle: Option<u64>,
+    /// Rows lost to a full queue.
+    pub records_dropped: u64,
+    /// What the system granted for real time.
+    pub realtime_granted: Vec<String>,
+    /// What it refused, with the remedy.
+    pub realtime_refused: Vec<String>,
+    /// Each axis of the process.
+    pub axes: BTreeMap<&'static str, AxisReport>,
+    /// What a person was told.
+    pub news: Vec<News>,
+}
+
+/// What an axis was run with and what it counted.
+#[derive(Clone, Debug, Serialize)]
+pub struct AxisReport {
+    /// State of its main chain at the end.
+    pub chain_state: &'static str,
+    /// Why it came to that.
+    pub chain_cause: String,
+    /// State of its emergency stop chain at the end.
+    pub emergency_stop_state: &'static str,
+    /// How often the experiment was driven through.
+    pub repetitions_done: u32,
+    /// Why its algorithm is no longer asked; null while it is.
+    pub algorithm_fault: Option<String>,
+    /// Largest |set-point - position sensor| while the set-point moved; null without a position.
+    pub position_error_dynamic_m: Option<f64>,
+    /// Largest mean |error| over the last 0.2 s of each rest; null without a position.
+    pub position_error_static_m: Option<f64>,
+    /// Sensor frames of the axis that came.
+    pub sensors_received: u64,
+    /// Sensor frames of the axis that never came.
+    pub sensors_lost: u64,
+    /// Offset of its position sensor as it was matched, m.
+    pub matched_offset_m: f64,
+    /// The program file as it stands; null for an axis that held its valve shut.
+    pub program_toml: Option<String>,
+    /// Its path.
+    pub program_file: Option<String>,
+    /// Values of all variables at the end.
+    pub variables: BTreeMap<String, f64>,
+}
+
+impl AxisReport {
+    /// Of a controller, as its rig was seen.
+    #[must_use]
+    pub fn new(controller: &AxisController, view: &RigView, inputs: &Inputs) -> Self {
+        let program = controller.program();
+        let source = inputs.programs[controller.axis().index()].as_ref();
+        let values = program.values().iter();
+        Self {
+            chain_state: controller.state().name(),
+            chain_cause: controller.cause().to_string(),
+            emergency_stop_state: controller.emergency_stop().name(),
+            repetitions_done: controller.repetitions_done(),
+            algorithm_fault: controller.algorithm_fault().map(|fault| fault.to_string()),
+            position_error_dynamic_m: controller.figures().dynamic_m(),
+            position_error_static_m: controller.figures().static_m(),
+            sensors_received: view.received().get(controller.axis()),
+            sensors_lost: view.lost().get(controller.axis()),
+            matched_offset_m: program.geometry().offset_m,
+            program_toml: source.map(|source| source.text.clone()),
+            program_file: source.map(|source| source.path.display().to_string()),
+            variables: program
+                .variables()
+                .iter()
+                .map(|variable| variable.name.clone())
+                .zip(values.copied())
+                .collect(),
+        }
+    }
+
+    /// Of every controller of a station.
+    #[must_use]
+    pub fn of_station(station: &Station, inputs: &Inputs) -> BTreeMap<&'static str, Self> {
+        let of = |controller: &AxisController| {
+            (controller.axis().name(), Self::new(controller, station.view(), inputs))
+        };
+        station.controllers().map(of).collect()
+    }
+
+    /// Whether the axis ended what it was asked for.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.chain_state == MainChainState::Done.name()
+    }
+
+    /// Whether it was stopped before.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        [MainChainState::Aborted.name(), MainChainState::Fault.name()].contains(&self.chain_state)
+    }
+}
+
+/// Name of the report of a process with these axes, without its ending.
+#[must_use]
+pub fn name(axes: &[Axis]) -> String {
+    match axes {
+        [axis] => format!("controller-{}", axis.name()),
+        _ => "controller".into(),
+    }
+}

@@ -1,0 +1,269 @@
+//! What a run reads before it starts: rig, experiment and programs, checked; and the controllers made of them.
+
+use crate::algorithm::Quantity;
+use crate::axis::{AxisController, AxisParts, ForcePlan, Plan, PlannedChange, PrepareStep};
+use crate::chains::main::{Lengths, MainConfig, approach_s};
+use crate::chains::matching;
+use crate::chains::settled::Bounds;
+use crate::chains::{force, main};
+use crate::cli::FileArguments;
+use crate::experiment::{AxisExperiment, During, Experiment, Prepare, SetPoints};
+use crate::program::file::Source;
+use crate::program::{Program, Task};
+use crate::run::RunError;
+use crate::set_point::ForceSource;
+use plant::{Axis, RigParameters};
+use protocol::frames::DRIVE_CHAIN_VALUES;
+use std::path::{Path, PathBuf};
+
+/// Everything that was read.
+pub struct Inputs {
+    /// Nominal numbers of the rig.
+    pub rig: RigParameters,
+    /// The rig file as it stands.
+    pub rig_toml: String,
+    /// The experiment.
+    pub experiment: Experiment,
+    /// Its file as it stands.
+    pub experiment_toml: String,
+    /// Programs of drive and load, as they stand; `None` for an axis that the experiment leaves out.
+    pub programs: [Option<Source>; 2],
+    /// Variables set on the command line: axis, name, value.
+    overrides: Vec<(Axis, String, f64)>,
+    experiment_file: PathBuf,
+}
+
+/// How the controllers of a process are run.
+#[derive(Clone, Copy, Debug)]
+pub struct Mode {
+    /// The other axis's controller is waited for.
+    pub partner_needed: bool,
+    /// Time is real: it is watched.
+    pub real_time: bool,
+    /// Until the rig ends.
+    pub forever: bool,
+}
+
+impl Inputs {
+    /// Reads and checks the files.
+    ///
+    /// # Errors
+    /// [`RunError::Input`] with file, line, key, value and allowed range.
+    pub fn read(files: &FileArguments) -> Result<Self, RunError> {
+        let rig_toml = read(&files.rig)?;
+        let rig =
+            RigParameters::from_toml(&rig_toml, &files.rig.display().to_string()).map_err(RunError::input)?;
+        let (stroke_m, most_m) = (rig.cylinder().stroke_m, DRIVE_CHAIN_VALUES.signals[0].max);
+        if stroke_m > most_m {
+            let file = files.rig.display();
+            return Err(RunError::Input(format!(
+                "{file}: cylinder.stroke_mm: {stroke_m} m; rig.dbc carries positions of at most {most_m} m"
+            )));
+        }
+        let experiment_toml = read(&files.experiment)?;
+        let experiment =
+            Experiment::from_toml(&experiment_toml, &files.experiment, stroke_m).map_err(RunError::input)?;
+        let given = [&files.drive_program, &files.load_program];
+        let mut programs = [None, None];
+        for (axis, section) in sections(&experiment) {
+            let path = match (given[axis.index()], &files.programs) {
+                (Some(path), _) => path.clone(),
+                (None, Some(folder)) if !section.program.written.ends_with(".toml") => {
+                    folder.join(format!("{}.toml", section.program.written))
+                }
+                (None, _) => section.program_path(&files.experiment),
+            };
+            programs[axis.index()] = Some(Source::read(&path).map_err(|error| {
+                let place = format!("{}:{}", files.experiment.display(), section.program.line);
+                RunError::Input(format!("{place}: program of the {} axis: {error}", axis.name()))
+            })?);
+        }
+        let overrides = files.set.iter().map(|text| parse_override(text)).collect::<Result<_, _>>()?;
+        let experiment_file = files.experiment.clone();
+        Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
+    }
+
+    /// The controller of `axis`.
+    ///
+    /// # Errors
+    /// [`RunError::Input`] when program and experiment do not go together.
+    pub fn controller(&self, axis: Axis, mode: Mode) -> Result<AxisController, RunError> {
+        let section =
+            sections(&self.experiment).find(|(other, _)| *other == axis).map(|(_, section)| section);
+        let mut program = self.program(axis, mode.real_time)?;
+        self.check_kind(axis, section, &program)?;
+        for (_, name, value) in self.overrides.iter().filter(|(of, ..)| *of == axis) {
+            let place = place(&program, axis, name)?;
+            program
+                .set(place, *value)
+                .map_err(|error| RunError::Input(format!("--set {}.{error}", axis.name())))?;
+        }
+        let changes = section.map_or(Ok(Vec::new()), |section| self.changes(axis, section, &program))?;
+        let main = self.main_config(section, &program, mode);
+        Ok(AxisController::new(AxisParts {
+            axis,
+            program,
+            plan: section.map_or(Plan::Shut, plan),
+            main,
+            supply_pressure_pa: self.rig.supply().pressure_pa,
+            changes,
+            record_every: u64::from(self.experiment.recording.every_cycles),
+        }))
+    }
+
+    /// The program of an axis; one that nothing is asked of for an axis that the experiment leaves out.
+    fn program(&self, axis: Axis, real_time: bool) -> Result<Program, RunError> {
+        let shut = Source::shut();
+        let source = self.programs[axis.index()].as_ref().unwrap_or(&shut);
+        source.program(axis, &self.rig, real_time).map_err(RunError::input)
+    }
+
+    fn check_kind(
+        &self,
+        axis: Axis,
+        section: Option<&AxisExperiment>,
+        program: &Program,
+    ) -> Result<(), RunError> {
+        let Some(section) = section else { return Ok(()) };
+        let (asked, able) = (section.set_points.quantity(), program.controls());
+        if asked == able {
+            return Ok(());
+        }
+        let name = |quantity| match quantity {
+            Quantity::Position => "positions",
+            Quantity::Force => "forces",
+        };
+        Err(RunError::Input(format!(
+            "{}:{}: the {} axis has set-points of {}, and its program controls {}; choose another program",
+            self.experiment_file.display(),
+            section.program.line,
+            axis.name(),
+            name(asked),
+            name(able)
+        )))
+    }
+
+    fn changes(
+        &self,
+        axis: Axis,
+        section: &AxisExperiment,
+        program: &Program,
+    ) -> Result<Vec<PlannedChange>, RunError> {
+        let planned = section.changes.iter().map(|change| {
+            let at = format!("{}:{}", self.experiment_file.display(), change.line);
+            let place = place(program, axis, &change.parameter)
+                .map_err(|error| RunError::Input(format!("{at}: {error}")))?;
+            let value = program.variables()[place]
+                .parameter
+                .check(change.value)
+                .map_err(|error| RunError::Input(format!("{at}: {error}")))?;
+            Ok(PlannedChange { at_s: change.at_s, place, value })
+        });
+        planned.collect()
+    }
+
+    fn main_config(&self, section: Option<&AxisExperiment>, program: &Program, mode: Mode) -> MainConfig {
+        let run = &self.experiment.run;
+        let all: Vec<_> = sections(&self.experiment).map(|(_, section)| lengths(section, program)).collect();
+        let most = |of: fn(&Lengths) -> f64| all.iter().map(of).fold(0.0, f64::max);
+        MainConfig {
+            experiment: self.experiment.number,
+            partner_needed: mode.partner_needed,
+            start_m: section.and_then(|section| match &section.set_points {
+                SetPoints::Positions(motion) => Some(motion.start_m()),
+                SetPoints::Forces(_) => None,
+            }),
+            prepares: section.is_some_and(|section| !section.prepare.is_empty()),
+            own: Lengths {
+                // Both axes end together, whichever has the longer row.
+                experiment_s: self.experiment.duration_s(),
+                ..section.map_or(Lengths::default(), |section| lengths(section, program))
+            },
+            either: Lengths {
+                prepare_s: most(|lengths| lengths.prepare_s),
+                initial_force_s: most(|lengths| lengths.initial_force_s),
+                experiment_s: self.experiment.duration_s(),
+            },
+            approach_longest_s: approach_s(0.0, self.rig.cylinder().stroke_m),
+            repetitions: (!mode.forever).then_some(run.repetitions),
+            settling_s: run.settling_s,
+            settling_timeout_s: run.settling_timeout_s,
+            partner_timeout_s: main::PARTNER_TIMEOUT_S,
+            start: run.start,
+            after_emergency_stop: run.after_emergency_stop,
+            settled: Bounds::of(program.task(Task::Settled)),
+        }
+    }
+}
+
+/// Axes that the experiment speaks of.
+fn sections(experiment: &Experiment) -> impl Iterator<Item = (Axis, &AxisExperiment)> {
+    let sections = [(Axis::Drive, &experiment.drive), (Axis::Load, &experiment.load)];
+    sections.into_iter().filter_map(|(axis, section)| Some((axis, section.as_ref()?)))
+}
+
+/// How long the states before the experiment may take.
+fn lengths(section: &AxisExperiment, program: &Program) -> Lengths {
+    let step_s = |step: &Prepare| match step {
+        Prepare::Relieve => timeout_s(force::PARAMETERS, program.task(Task::ForceChain), "relieve_timeout_s"),
+        Prepare::Match => {
+            timeout_s(matching::PARAMETERS, program.task(Task::MatchingChain), "match_timeout_s")
+        }
+    };
+    let ramps = section.initial_force_n() > 0.0;
+    Lengths {
+        prepare_s: section.prepare.iter().map(step_s).sum(),
+        initial_force_s: if ramps { section.initial_ramp_s } else { 0.0 },
+        experiment_s: section.set_points.duration_s(),
+    }
+}
+
+fn timeout_s(table: &[crate::parameters::Parameter], values: &[f64], name: &str) -> f64 {
+    table.iter().position(|parameter| parameter.name == name).map_or(0.0, |place| values[place])
+}
+
+fn plan(section: &AxisExperiment) -> Plan {
+    match &section.set_points {
+        SetPoints::Positions(motion) => Plan::Position(motion.clone()),
+        SetPoints::Forces(profile) => Plan::Force(ForcePlan {
+            source: ForceSource::new(profile.clone()),
+            initial_ramp_s: section.initial_ramp_s,
+            prepare: section
+                .prepare
+                .iter()
+                .map(|step| match step {
+                    Prepare::Relieve => PrepareStep::Relieve,
+                    Prepare::Match => PrepareStep::Match,
+                })
+                .collect(),
+            manual: section.during == During::Manual,
+        }),
+    }
+}
+
+fn place(program: &Program, axis: Axis, name: &str) -> Result<usize, RunError> {
+    program.place(name).ok_or_else(|| {
+        let known: Vec<_> = program.variables().iter().map(|variable| variable.name.as_str()).collect();
+        RunError::Input(format!("{}.{name}: no such variable; there are {}", axis.name(), known.join(", ")))
+    })
+}
+
+/// `drive.algorithm.gain_per_s=30`.
+fn parse_override(text: &str) -> Result<(Axis, String, f64), RunError> {
+    let parse = || {
+        let (name, value) = text.split_once('=')?;
+        let (axis, name) = name.split_once('.')?;
+        let axis = Axis::ALL.into_iter().find(|known| known.name() == axis)?;
+        Some((axis, name.trim().to_owned(), value.trim().parse().ok()?))
+    };
+    parse().ok_or_else(|| {
+        RunError::Input(format!(
+            "--set {text}: expected AXIS.TASK.NAME=NUMBER, such as drive.algorithm.gain_per_s=30"
+        ))
+    })
+}
+
+fn read(path: &Path) -> Result<String, RunError> {
+    std::fs::read_to_string(path)
+        .map_err(|error| RunError::Input(format!("cannot read {}: {error}", path.display())))
+}
