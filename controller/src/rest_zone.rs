@@ -14,7 +14,8 @@
 
 use crate::algorithm::Ready;
 
-/// A rod that leaves no band of this half-width, m, over [`STANDING_S`] stands: slower than 2 mm/s. Five times the sensor's noise.
+/// A rod that leaves no band of this half-width, m, over [`STANDING_S`] stands: slower than 2 mm/s. Five times the
+/// sensor's noise.
 const STANDING_M: f64 = 1e-4;
 const STANDING_S: f64 = 0.05;
 /// How much wider than the zone an error must be to leave it.
