@@ -1,62 +1,28 @@
-//! Tuning: the figures of a position program, and how far it is from oscillating, over load masses and supply pressures.
+//! Tuning: what a program does, and how far it is from oscillating, over load masses and supply pressures.
 //!
-//! ```text
-//!   moves ──► program ──► 1 cycle (+ extra delay) ──► plant, K_V times the loop's factor ──► sensors with noise ──┐
-//!                ▲                                                                                                │
-//!                └────────────────────────────────────────────────────────────────────────────────────────────────┘
-//! ```
+//! | file | holds |
+//! |---|---|
+//! | [`position`] | a position program alone on moves: errors, steps, margins of gain and delay |
+//! | [`rehearsed`] | a whole experiment, both axes with their chains: its rows, and the margin of a linked rig |
 //!
-//! The program is the real one; the plant is unlinked and has no chains around it. The loop's factor multiplies the K_V
-//! tables of the plant and not those of the program: what the valve passes is what every loop goes through, so a factor of
-//! 2 without oscillation is a gain margin of 2, whatever the algorithm. The delay margin counts cycles that each command is
-//! late.
-//!
-//! *No oscillation* means: in the last half second of each rest of [`EXCITATION`] the position, as a mean over 10 ms, moves
-//! by less than [`STILL_M`], and during moves nothing quicker than a third of a second is larger than [`RIPPLE_M`]. A hop
-//! of stick and slip, 1 to 2 mm every few seconds, is no oscillation; it shows in the figure `rest_peak_to_peak_m`, which
-//! is judged apart.
+//! The programs are the real ones, made for the nominal rig. The loop's factor multiplies the K_V tables of the plant and not those of
+//! the programs: what the valves pass is what every loop goes through, so a factor of 2 without oscillation is a gain margin of
+//! 2, whatever the algorithm. Linked, both axes' loops are multiplied at once.
+
+pub mod position;
+pub mod rehearsed;
 
 use crate::guard::AlgorithmFault;
-use crate::program::{Demand, Hand, Program};
-use crate::set_point::{ForceSetPoint, SetPoint, SmoothWay};
-use plant::{Inputs, ParameterError, Plant, RigParameters, Setup, quantise_valve};
-use protocol::frames::Sensors;
-use std::collections::VecDeque;
+use crate::run::RunError;
+use plant::{ParameterError, RigParameters};
+use std::sync::Mutex;
 
-/// Largest movement at rest that is no oscillation, m.
-pub const STILL_M: f64 = 2e-3;
-/// Largest ripple during a move that is no oscillation, m.
-pub const RIPPLE_M: f64 = 2e-3;
 /// Factors that a gain margin is looked for in.
 pub const FACTORS: [f64; 8] = [1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0];
 /// Added masses of the corners, kg.
 pub const MASSES_KG: [f64; 4] = [0.0, 5.0, 10.0, 20.0];
 /// Supply pressures of the corners, bar.
 pub const SUPPLIES_BAR: [f64; 4] = [5.0, 6.0, 7.0, 8.0];
-
-/// A move along a Bestehorn sinoid and the rest behind it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Move {
-    /// Where it ends, m.
-    pub to_m: f64,
-    /// How long it takes, s; 0 is a step.
-    pub duration_s: f64,
-    /// How long it rests, s; 0.5 s at least.
-    pub rest_s: f64,
-}
-
-const fn to(to_m: f64, duration_s: f64, rest_s: f64) -> Move {
-    Move { to_m, duration_s, rest_s }
-}
-
-/// Where all moves start, m.
-const START_M: f64 = 0.1;
-/// The paper's positioning: Fig. 8.
-pub const POINT_TO_POINT: &[Move] = &[to(0.4, 3.0, 1.0), to(0.1, 3.0, 1.0)];
-/// A step and back: Fig. 7.
-pub const STEP: &[Move] = &[to(0.3, 0.0, 2.0), to(0.1, 0.0, 2.0)];
-/// What wakes up an oscillation: both ends, the soft middle, a step.
-pub const EXCITATION: &[Move] = &[to(0.4, 3.0, 3.0), to(0.1, 3.0, 3.0), to(0.25, 0.0, 4.0)];
 
 /// Under which conditions a program is tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,42 +31,38 @@ pub struct Trial {
     pub added_mass_kg: f64,
     /// Absolute supply pressure, bar.
     pub supply_bar: f64,
-    /// What the valve passes more than its table says.
+    /// What the valves pass more than their table says.
     pub loop_factor: f64,
-    /// Cycles that each command is late.
-    pub late_cycles: usize,
     /// Of the sensors' noise.
     pub seed: u64,
 }
 
 impl Default for Trial {
     fn default() -> Self {
-        Self { added_mass_kg: 0.0, supply_bar: 7.0, loop_factor: 1.0, late_cycles: 0, seed: 1 }
+        Self { added_mass_kg: 0.0, supply_bar: 7.0, loop_factor: 1.0, seed: 1 }
     }
 }
 
-/// What came of a trial.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Figures {
-    /// Largest |error| while the set-point moves, m.
-    pub dynamic_m: f64,
-    /// Largest mean |error| over the last 0.2 s of a rest, m.
-    pub static_m: f64,
-    /// Largest peak to peak of the position's mean over 10 ms in the last 0.5 s of a rest, m.
-    pub rest_peak_to_peak_m: f64,
-    /// Largest error during moves beside its mean over 0.3 s, m.
-    pub ripple_m: f64,
-    /// Largest overshoot after a step, m.
-    pub overshoot_m: f64,
-    /// Longest time from a step until the error stays within 2 mm, s.
-    pub settling_s: f64,
-}
-
-impl Figures {
-    /// Whether nothing oscillated.
+impl Trial {
+    /// All corners of mass and supply, row by row.
     #[must_use]
-    pub fn is_still(&self) -> bool {
-        self.rest_peak_to_peak_m < STILL_M && self.ripple_m < RIPPLE_M
+    pub fn corners() -> Vec<Self> {
+        let corner = |added_mass_kg, supply_bar| Self { added_mass_kg, supply_bar, ..Self::default() };
+        let row = |mass_kg| SUPPLIES_BAR.map(|supply_bar| corner(mass_kg, supply_bar));
+        MASSES_KG.into_iter().flat_map(row).collect()
+    }
+
+    /// The rig of these conditions.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when they are none of the rig's.
+    pub fn rig(&self, nominal: &RigParameters) -> Result<RigParameters, ParameterError> {
+        let scaled = |kv: &[f64]| kv.iter().map(|kv| kv * self.loop_factor).collect::<Vec<_>>();
+        let valve = nominal.valve();
+        nominal
+            .with("supply.pressure_bar", &[self.supply_bar])?
+            .with("valve.kv_supply_m3_per_h", &scaled(&valve.kv_supply_m3_per_h))?
+            .with("valve.kv_exhaust_m3_per_h", &scaled(&valve.kv_exhaust_m3_per_h))
     }
 }
 
@@ -116,52 +78,22 @@ pub enum TrialError {
     /// The algorithm failed.
     #[error(transparent)]
     Algorithm(#[from] AlgorithmFault),
+    /// Experiment and programs do not go together.
+    #[error(transparent)]
+    Run(#[from] RunError),
 }
 
-/// Tries `program`, which has seen nothing yet, on `moves`.
+/// Largest of [`FACTORS`] up to which `is_still`; 0 if it is not even as it is.
 ///
 /// # Errors
-/// [`TrialError`] when the conditions are none of the rig's, or the algorithm's result is no number.
-pub fn attempt(mut program: Program, moves: &[Move], trial: &Trial) -> Result<Figures, TrialError> {
-    let mut rig = RigParameters::baseline().with("supply.pressure_bar", &[trial.supply_bar])?;
-    for (path, kv) in [
-        ("valve.kv_supply_m3_per_h", rig.valve().kv_supply_m3_per_h),
-        ("valve.kv_exhaust_m3_per_h", rig.valve().kv_exhaust_m3_per_h),
-    ] {
-        rig = rig.with(path, &kv.map(|kv| kv * trial.loop_factor))?;
-    }
-    let setup = Setup { carriage_position_m: START_M, linked: false, added_mass_kg: trial.added_mass_kg };
-    let mut bench = Bench {
-        plant: Plant::new(&rig, &setup)?,
-        sensors: plant::Sensors::new(&rig, trial.seed),
-        commands: VecDeque::from(vec![0.0; 1 + trial.late_cycles]),
-        cycle: 0,
-    };
-    let mut figures = Figures::default();
-    bench.follow(&mut program, SmoothWay::new(START_M, START_M, 0.0), 0.5)?;
-    let mut from_m = START_M;
-    for part in moves {
-        let way = SmoothWay::new(from_m, part.to_m, part.duration_s);
-        let moving = bench.follow(&mut program, way, part.duration_s)?;
-        let resting = bench.follow(&mut program, SmoothWay::new(part.to_m, part.to_m, 0.0), part.rest_s)?;
-        figures.take_move(&moving);
-        figures.take_rest(&resting);
-        if part.duration_s == 0.0 {
-            figures.take_step(&resting, (part.to_m - from_m).signum());
-        }
-        from_m = part.to_m;
-    }
-    Ok(figures)
-}
-
-/// Largest of [`FACTORS`] up to which nothing oscillates; 0 if something does as it is.
-///
-/// # Errors
-/// As [`attempt`].
-pub fn gain_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<f64, TrialError> {
+/// Those of `is_still`.
+pub fn largest_factor(
+    trial: &Trial,
+    mut is_still: impl FnMut(&Trial) -> Result<bool, TrialError>,
+) -> Result<f64, TrialError> {
     let mut margin = 0.0;
     for loop_factor in FACTORS {
-        if !attempt(program(), EXCITATION, &Trial { loop_factor, ..*trial })?.is_still() {
+        if !is_still(&Trial { loop_factor, ..*trial })? {
             break;
         }
         margin = loop_factor;
@@ -169,98 +101,21 @@ pub fn gain_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<f64, 
     Ok(margin)
 }
 
-/// How many cycles a command may be late without oscillation, up to 20; `None` if something oscillates as it is.
+/// `work` on each of `items` on all processors; the results in the order of the items.
 ///
-/// # Errors
-/// As [`attempt`].
-pub fn delay_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<Option<usize>, TrialError> {
-    for late_cycles in 0..=20 {
-        if !attempt(program(), EXCITATION, &Trial { late_cycles, ..*trial })?.is_still() {
-            return Ok(late_cycles.checked_sub(1));
-        }
-    }
-    Ok(Some(20))
-}
-
-/// The closed loop: plant, sensors, and the commands on their way.
-struct Bench {
-    plant: Plant,
-    sensors: plant::Sensors,
-    commands: VecDeque<f64>,
-    cycle: u64,
-}
-
-impl Bench {
-    /// Follows `way` for `duration_s`; errors of each cycle, m.
-    fn follow(
-        &mut self,
-        program: &mut Program,
-        way: SmoothWay,
-        duration_s: f64,
-    ) -> Result<Vec<f64>, AlgorithmFault> {
-        let cycles = (duration_s * 1e3).round() as usize;
-        (0..cycles).map(|cycle| self.cycle(program, way.position(cycle as f64 * 1e-3))).collect()
-    }
-
-    /// One cycle; the command that answers it acts from the next one on.
-    fn cycle(&mut self, program: &mut Program, position: SetPoint) -> Result<f64, AlgorithmFault> {
-        let acting = self.commands.pop_front().unwrap_or(0.0);
-        let inputs = Inputs { valve: [acting, 0.0], ..Inputs::default() };
-        let [drive, _] = self.sensors.sample(&self.plant, &inputs);
-        let sensors = Sensors {
-            position_m: drive.position.value,
-            force_n: drive.force.value,
-            pressure_a_pa: drive.pressure_a.value,
-            pressure_b_pa: drive.pressure_b.value,
-            ..Sensors::default()
-        };
-        program.observe(self.cycle, &sensors, self.plant.supply_pressure_pa());
-        let demand = Demand { position, force: ForceSetPoint::at_rest(0.0) };
-        let output = program.control(self.cycle, &demand, Hand::User)?;
-        self.commands.push_back(quantise_valve(output.opening));
-        self.plant.step(&inputs);
-        self.cycle += 1;
-        Ok(position.position_m - sensors.position_m)
-    }
-}
-
-/// Cycles of a mean that takes the noise away, of the end of a rest for its movement, and of that for its error.
-const SMOOTH: usize = 10;
-const STILL: usize = 500;
-const STATIC: usize = 200;
-/// Cycles of the mean that a ripple is measured from.
-const SLOW: usize = 300;
-/// Within this a step has settled, m.
-const SETTLED_M: f64 = 2e-3;
-
-impl Figures {
-    fn take_move(&mut self, errors_m: &[f64]) {
-        self.dynamic_m = errors_m.iter().fold(self.dynamic_m, |most, error| most.max(error.abs()));
-        let (quick, slow) = (means(errors_m, SMOOTH), means(errors_m, SLOW));
-        let middle = (SLOW - SMOOTH) / 2;
-        let ripple = quick.iter().skip(middle).zip(&slow).map(|(quick, slow)| (quick - slow).abs());
-        // The break-away in the first second is no ripple.
-        self.ripple_m = ripple.skip(1000).fold(self.ripple_m, f64::max);
-    }
-
-    fn take_rest(&mut self, errors_m: &[f64]) {
-        let end = |cycles: usize| &errors_m[errors_m.len().saturating_sub(cycles)..];
-        let mean_m = end(STATIC).iter().map(|error| error.abs()).sum::<f64>() / STATIC as f64;
-        self.static_m = self.static_m.max(mean_m);
-        let smooth = means(end(STILL), SMOOTH);
-        let [least, most] = smooth
-            .iter()
-            .fold([f64::MAX, f64::MIN], |[least, most], error| [least.min(*error), most.max(*error)]);
-        self.rest_peak_to_peak_m = self.rest_peak_to_peak_m.max(most - least);
-    }
-
-    fn take_step(&mut self, errors_m: &[f64], direction: f64) {
-        let smooth = means(errors_m, SMOOTH);
-        self.overshoot_m = smooth.iter().fold(self.overshoot_m, |most, error| most.max(-direction * error));
-        let settled =
-            smooth.iter().rposition(|error| error.abs() > SETTLED_M).map_or(0, |place| place + SMOOTH);
-        self.settling_s = self.settling_s.max(settled as f64 * 1e-3);
-    }
+/// # Panics
+/// When `work` does.
+pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let next = Mutex::new(items.iter().enumerate());
+    let take = || next.lock().expect("no holder panics").next();
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let part = || std::iter::from_fn(take).map(|(place, item)| (place, work(item))).collect::<Vec<_>>();
+    let mut done: Vec<(usize, R)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(&part)).collect();
+        threads.into_iter().flat_map(|thread| thread.join().expect("work does not panic")).collect()
+    });
+    done.sort_by_key(|(place, _)| *place);
+    done.into_iter().map(|(_, result)| result).collect()
 }
 
 /// Means of all windows of so many values.
@@ -268,50 +123,30 @@ fn means(values: &[f64], window: usize) -> Vec<f64> {
     values.windows(window).map(|part| part.iter().sum::<f64>() / window as f64).collect()
 }
 
+/// Largest less least; 0 of nothing.
+fn peak_to_peak(values: &[f64]) -> f64 {
+    let ends = values.iter().fold([f64::MAX, f64::MIN], |[least, most], value| [least.min(*value), most.max(*value)]);
+    (ends[1] - ends[0]).max(0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::program::file::Source;
-    use plant::Axis;
-    use std::path::Path;
 
-    fn shipped(name: &str) -> Program {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("programs/{name}.toml"));
-        Source::read(&path).unwrap().program(Axis::Drive, &RigParameters::baseline(), false).unwrap()
+    #[test]
+    fn results_of_all_threads_stand_in_the_order_of_the_items() {
+        let items: Vec<u32> = (0..100).collect();
+        assert_eq!(in_parallel(&items, |item| item * 2), items.iter().map(|item| item * 2).collect::<Vec<_>>());
     }
 
     #[test]
-    fn the_cascade_halves_the_dynamic_error_of_p() {
-        let figures = |name| attempt(shipped(name), POINT_TO_POINT, &Trial::default()).unwrap();
-        let (p, cascade) = (figures("position-p"), figures("position-cascade"));
-        assert!(p.dynamic_m < 5e-3 && p.static_m < 3e-4, "{p:?}");
-        assert!(cascade.dynamic_m < p.dynamic_m / 2.0 && cascade.static_m < p.static_m, "{cascade:?}");
-        for figures in [p, cascade, figures("position-pid")] {
-            assert!(figures.rest_peak_to_peak_m < 2e-4, "{figures:?}");
-        }
-    }
-
-    #[test]
-    fn the_cascade_has_a_margin_of_two_in_the_outermost_corners() {
-        for added_mass_kg in [0.0, 20.0] {
-            for supply_bar in [5.0, 8.0] {
-                let trial = Trial { added_mass_kg, supply_bar, loop_factor: 2.0, ..Trial::default() };
-                let figures = attempt(shipped("position-cascade"), EXCITATION, &trial).unwrap();
-                assert!(figures.is_still(), "{trial:?}: {figures:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_loop_that_oscillates_is_noticed() {
-        let loud = || {
-            let mut program = shipped("position-p");
-            let place = program.place("algorithm.gain_per_s").unwrap();
-            program.set(place, 80.0).unwrap();
-            program
+    fn a_margin_is_the_last_factor_before_the_first_that_oscillates() {
+        let margin = |still: fn(f64) -> bool| {
+            largest_factor(&Trial::default(), |trial| Ok(still(trial.loop_factor))).unwrap()
         };
-        let trial = Trial { added_mass_kg: 20.0, ..Trial::default() };
-        assert_eq!(gain_margin(loud, &trial).unwrap(), 0.0);
-        assert_eq!(delay_margin(loud, &trial).unwrap(), None);
+        assert_eq!(margin(|_| true), 4.0);
+        assert_eq!(margin(|_| false), 0.0);
+        // Quiet again beyond is no margin.
+        assert_eq!(margin(|factor| factor != 2.0), 1.75);
     }
 }
