@@ -227,28 +227,6 @@ mod tests {
     }
 
     #[test]
-    fn the_cascade_halves_the_dynamic_error_of_p() {
-        let figures = |name| attempt(shipped(name), POINT_TO_POINT, &Trial::default()).unwrap();
-        let (p, cascade) = (figures("position-p"), figures("position-cascade"));
-        assert!(p.dynamic_m < 5e-3 && p.static_m < 3e-4, "{p:?}");
-        assert!(cascade.dynamic_m < p.dynamic_m / 2.0 && cascade.static_m < p.static_m, "{cascade:?}");
-        for figures in [p, cascade, figures("position-pid")] {
-            assert!(figures.rest_peak_to_peak_m < 2e-4, "{figures:?}");
-        }
-    }
-
-    #[test]
-    fn the_cascade_has_a_margin_of_two_in_the_outermost_corners() {
-        for added_mass_kg in [0.0, 20.0] {
-            for supply_bar in [5.0, 8.0] {
-                let trial = Trial { added_mass_kg, supply_bar, loop_factor: 2.0, ..Trial::default() };
-                let figures = attempt(shipped("position-cascade"), EXCITATION, &trial).unwrap();
-                assert!(figures.is_still(), "{trial:?}: {figures:?}");
-            }
-        }
-    }
-
-    #[test]
     fn a_loop_that_oscillates_is_noticed() {
         let loud = || {
             let mut program = shipped("position-p");
