@@ -111,7 +111,7 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync)
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     let part = || std::iter::from_fn(take).map(|(place, item)| (place, work(item))).collect::<Vec<_>>();
     let mut done: Vec<(usize, R)> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(&part)).collect();
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(part)).collect();
         threads.into_iter().flat_map(|thread| thread.join().expect("work does not panic")).collect()
     });
     done.sort_by_key(|(place, _)| *place);
@@ -125,7 +125,9 @@ fn means(values: &[f64], window: usize) -> Vec<f64> {
 
 /// Largest less least; 0 of nothing.
 fn peak_to_peak(values: &[f64]) -> f64 {
-    let ends = values.iter().fold([f64::MAX, f64::MIN], |[least, most], value| [least.min(*value), most.max(*value)]);
+    let ends = values
+        .iter()
+        .fold([f64::MAX, f64::MIN], |[least, most], value| [least.min(*value), most.max(*value)]);
     (ends[1] - ends[0]).max(0.0)
 }
 
@@ -136,7 +138,10 @@ mod tests {
     #[test]
     fn results_of_all_threads_stand_in_the_order_of_the_items() {
         let items: Vec<u32> = (0..100).collect();
-        assert_eq!(in_parallel(&items, |item| item * 2), items.iter().map(|item| item * 2).collect::<Vec<_>>());
+        assert_eq!(
+            in_parallel(&items, |item| item * 2),
+            items.iter().map(|item| item * 2).collect::<Vec<_>>()
+        );
     }
 
     #[test]

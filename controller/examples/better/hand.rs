@@ -25,16 +25,9 @@ const SUBJECTS: [Subject; 4] = [
     Subject {
         name: "valve shut",
         load: "force-manual",
-        set: &[
-            "load.giving-way.gain_m_per_n_s=0",
-            "load.giving-way.velocity_feed_forward=0",
-        ],
+        set: &["load.giving-way.gain_m_per_n_s=0", "load.giving-way.velocity_feed_forward=0"],
     },
-    Subject {
-        name: "P alone",
-        load: "force-plain",
-        set: &["load.algorithm.velocity_feed_forward=0"],
-    },
+    Subject { name: "P alone", load: "force-plain", set: &["load.algorithm.velocity_feed_forward=0"] },
     Subject { name: "P and feed-forward, no distinction", load: "force-plain", set: &[] },
     Subject { name: "manual mode, with its distinction", load: "force-manual", set: &[] },
 ];
@@ -48,7 +41,8 @@ pub(crate) fn table() -> Result<(), Box<dyn Error>> {
     println!("|---|---|---|---|---|---|---|---|---|");
     for subject in &SUBJECTS {
         let set: Vec<_> = subject.set.iter().map(|set| (*set).to_owned()).collect();
-        let case = Case::new(&Made { experiment: EXPERIMENT, load: Some(subject.load), set: &set, drive: None })?;
+        let case =
+            Case::new(&Made { experiment: EXPERIMENT, load: Some(subject.load), set: &set, drive: None })?;
         let runs = in_parallel(&SEEDS, |seed| told(&case, *seed));
         let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
         let scales = [1e3, 1.0, 1.0, 1.0, 1e3, 1e3, 1e2, 1e3];
@@ -74,9 +68,9 @@ fn told(case: &Case, seed: u64) -> Result<[Option<f64>; 8], TrialError> {
     let tail = run.rows.get(end - 1000..end);
     let open = |row: &&Rehearsed| row.cycle.valve[Axis::Load.index()] != 0.0;
     let open = tail.map(|tail| tail.iter().filter(open).count() as f64 / tail.len() as f64);
-    let slides = position.get(let_go..let_go + 1000).map(|part| {
-        part.iter().fold(0.0_f64, |most, place| most.max((place - part[0]).abs()))
-    });
+    let slides = position
+        .get(let_go..let_go + 1000)
+        .map(|part| part.iter().fold(0.0_f64, |most, place| most.max((place - part[0]).abs())));
     let way = position.first().zip(position.get(let_go)).map(|(from, to)| (to - from).abs());
     Ok([
         way,

@@ -48,7 +48,12 @@ fn load_step() -> Result<(), Box<dyn Error>> {
     let subject = |name, drive, load, papers| Subject { name, drive: Some(drive), load: Some(load), papers };
     let subjects = [
         subject("force-p", "position-linked", "force-p", true),
-        subject("force-paper-linked, drive position-paper-linked", "position-paper-linked", "force-paper-linked", true),
+        subject(
+            "force-paper-linked, drive position-paper-linked",
+            "position-paper-linked",
+            "force-paper-linked",
+            true,
+        ),
         subject("force-pid-map", "position-linked", "force-pid-map", false),
     ];
     let columns = [

@@ -70,7 +70,8 @@ impl Sheet<'_> {
         let told =
             self.subjects.iter().map(|subject| self.figures(subject)).collect::<Result<Vec<_>, _>>()?;
         for (subject, told) in self.subjects.iter().zip(&told) {
-            let cells = told.iter().zip(self.columns).map(|(spread, column)| Spread::cell(*spread, column.scale));
+            let cells =
+                told.iter().zip(self.columns).map(|(spread, column)| Spread::cell(*spread, column.scale));
             println!("| {} | {} |", subject.name, cells.collect::<Vec<_>>().join(" | "));
         }
         println!("\nAt most half, and by how much (ratio of the means)?\n");

@@ -66,7 +66,12 @@ pub(crate) fn record(run: &Run) -> Record {
     let rows = |axis: Axis| {
         run.rows.iter().filter_map(move |row| Some((time_s(row), row.axes[axis.index()].as_ref()?)))
     };
-    Record { drive: controller(rows(Axis::Drive)), load: controller(rows(Axis::Load)), measured: measured(run), ..Record::default() }
+    Record {
+        drive: controller(rows(Axis::Drive)),
+        load: controller(rows(Axis::Load)),
+        measured: measured(run),
+        ..Record::default()
+    }
 }
 
 /// Its figures; those of the drive's error, which a controller tells itself, taken from the tables too.

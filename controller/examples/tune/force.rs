@@ -37,8 +37,7 @@ const SHARES: [f64; 4] = [0.3, 0.5, 0.65, 0.8];
 const SEEDS: [u64; 3] = [1, 2, 3];
 
 /// Programs of the drive that are tried beside each other.
-const DRIVES: [&str; 5] =
-    [DRIVE, "position-paper-linked", "position-p", "position-pid", "position-cascade"];
+const DRIVES: [&str; 5] = [DRIVE, "position-paper-linked", "position-p", "position-pid", "position-cascade"];
 
 /// Prints them all.
 pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
@@ -173,7 +172,11 @@ fn by_feed_forward() -> Result<(), Box<dyn Error>> {
             let case = Case::new(&made)?;
             let figures = Figures::of(&case, &Trial::default())?;
             let margin = worst_gain_margin(&case.inputs, &case.scene)?;
-            cells.push(format!("{} ms / {} % / {margin}", ms(figures.settling_s), number(figures.overshoot * 1e2, 1)));
+            cells.push(format!(
+                "{} ms / {} % / {margin}",
+                ms(figures.settling_s),
+                number(figures.overshoot * 1e2, 1)
+            ));
         }
         println!("| {gain} | {} |", cells.join(" | "));
     }

@@ -96,7 +96,8 @@ pub fn gain_margin(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<f64,
 /// As [`rehearse`].
 pub fn worst_gain_margin(inputs: &Inputs, scene: &Scene) -> Result<f64, TrialError> {
     super::largest_factor(&Trial::default(), |Trial { loop_factor, .. }| {
-        let corners = Trial::corners().into_iter().map(|corner| Trial { loop_factor: *loop_factor, ..corner });
+        let corners =
+            Trial::corners().into_iter().map(|corner| Trial { loop_factor: *loop_factor, ..corner });
         let still = in_parallel(&corners.collect::<Vec<_>>(), |trial| is_still(inputs, scene, trial));
         Ok(still.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().all(|still| still))
     })
@@ -117,9 +118,8 @@ impl Run {
     #[must_use]
     pub fn unrest(&self) -> Unrest {
         let drive = |row: &Rehearsed| row.axes[Axis::Drive.index()];
-        let in_experiment = |row: &&Rehearsed| {
-            drive(row).is_some_and(|drive| drive.main == MainChainState::Experiment)
-        };
+        let in_experiment =
+            |row: &&Rehearsed| drive(row).is_some_and(|drive| drive.main == MainChainState::Experiment);
         let rows: Vec<_> = self.rows.iter().filter(in_experiment).collect();
         let column = |of: fn(&Rehearsed) -> f64| rows.iter().map(|row| of(row)).collect::<Vec<_>>();
         let position = column(|row| row.cycle.readings[Axis::Drive.index()].position.value);
@@ -134,7 +134,8 @@ impl Run {
         let rest_from = rows.len() - rows.iter().rev().take_while(|row| !moves(row)).count();
         let motion = &force[rest_from.saturating_sub(2 * WINDOW)..rest_from.saturating_sub(WINDOW)];
         let (quick, slow) = (means(motion, SMOOTH_N), means(motion, SLOW));
-        let beside = quick.iter().skip((SLOW - SMOOTH_N) / 2).zip(&slow).map(|(quick, slow)| (quick - slow).abs());
+        let beside =
+            quick.iter().skip((SLOW - SMOOTH_N) / 2).zip(&slow).map(|(quick, slow)| (quick - slow).abs());
         Unrest {
             done: self.done,
             position_m: least(&position, SMOOTH_M),
