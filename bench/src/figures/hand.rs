@@ -1,6 +1,6 @@
 //! The load axis moved by hand: what the hand has to push.
 //!
-//! Unlinked, the load's force sensor reads the hand. Whether the axis moves is taken from its position and not from what the
+//! Unlinked, the load's force sensor reads the hand; beside the carriage it may read the linkage, so there nothing is taken. Whether the axis moves is taken from its position and not from what the
 //! controller thinks, so that controllers with and without a distinction of cases are judged alike.
 
 use super::force::NOISE_S;
@@ -14,6 +14,8 @@ const MOVES_M_PER_S: f64 = 0.01;
 const SLOPE_S: f64 = 0.02;
 /// The first movement has begun when the axis is so far from where it stood.
 const AWAY_M: f64 = 0.001;
+/// A load eye that is no further from the carriage may be linked to it: the sensor's offset and the linkage's gap are below.
+const BESIDE_M: f64 = 0.005;
 /// States of the force chain in which a hand may move the axis.
 const BY_HAND: &[&str] = &["limited", "standstill", "moving"];
 
@@ -24,7 +26,7 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "hand_force_mean_n",
             unit: "N",
-            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s",
+            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s, more than 5 mm from the carriage",
         },
         Definition {
             name: "hand_force_largest_n",
@@ -47,7 +49,9 @@ fn compute(record: &Record, figures: &mut Figures) {
     let force = record.measured.numbers("load_force_N").smoothed(NOISE_S).map(f64::abs);
     let moving: Series =
         position.slope(SLOPE_S).iter().filter(|(_, velocity)| velocity.abs() >= MOVES_M_PER_S).collect();
-    let pushing = force.with(&moving, |force, _| force).within_all(&by_hand);
+    let apart = position.minus(record.measured.numbers("drive_position_m"));
+    let free = by_hand_alone(&by_hand, &apart);
+    let pushing = force.with(&moving, |force, _| force).within_all(&free);
     figures.put("hand_force_mean_n", pushing.mean());
     figures.put("hand_force_largest_n", pushing.most());
     let smooth = position.smoothed(SLOPE_S);
@@ -57,6 +61,11 @@ fn compute(record: &Record, figures: &mut Figures) {
     });
     let until_then = leaves_s.map(|to_s| force.within(&Span { from_s: first.from_s, to_s }));
     figures.put("hand_force_breakaway_n", until_then.and_then(|force| force.most()));
+}
+
+/// The stretches in which the load eye is certainly not linked.
+fn by_hand_alone(by_hand: &[Span], apart: &Series) -> Vec<Span> {
+    if apart.is_empty() { by_hand.to_vec() } else { common(&apart.stretches(|apart| apart.abs() > BESIDE_M), by_hand) }
 }
 
 #[cfg(test)]
@@ -84,6 +93,13 @@ mod tests {
         let figures = super::super::of(&record);
         assert!((figures.get("hand_force_mean_n").unwrap() - 12.0).abs() < 0.5, "blurred at both ends");
         assert!((figures.get("hand_force_breakaway_n").unwrap() - 40.0).abs() < 0.5);
+        // In the last 4 mm before the carriage the linkage knocks.
+        let knock = |time: f64| if (1.96..2.0).contains(&time) { 100.0 } else { 0.0 };
+        let force = each_ms(0.0, 3.0, |time| knock(time) - if time < 2.0 { 12.0 } else { 0.0 });
+        let carriage = each_ms(0.0, 3.0, |_| 0.4);
+        let pressed = [("load_position_m", &position), ("load_force_N", &force), ("drive_position_m", &carriage)];
+        let linked = super::super::of(&Record { measured: table(&pressed), ..record.clone() });
+        assert!((linked.get("hand_force_largest_n").unwrap() - 12.0).abs() < 0.5);
         let idle = Record { load: Table::default(), ..record };
         assert_eq!(super::super::of(&idle).get("hand_force_mean_n"), None);
     }
