@@ -89,7 +89,13 @@ mod tests {
     #[test]
     fn what_an_experiment_left_is_relieved_from_the_next_positioning_on() {
         let figures = decaying(
-            &[("preparing", 0.0), ("experiment", 0.2), ("initial-positioning", 1.0), ("preparing", 1.5), ("", 3.0)],
+            &[
+                ("preparing", 0.0),
+                ("experiment", 0.2),
+                ("initial-positioning", 1.0),
+                ("preparing", 1.5),
+                ("", 3.0),
+            ],
             &[("limited", 0.0), ("load-profile", 0.2), ("limited", 1.0), ("standstill", 1.2), ("", 3.0)],
         );
         assert!((figures.get("relieve_force_before_n").unwrap() - 400.0).abs() < 1e-9);

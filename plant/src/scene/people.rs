@@ -122,7 +122,8 @@ impl People {
                 }
             }
         }
-        let passed = |watched: &Watched, plant: &Plant| is_short_of(watched.position_m, plant) != watched.short;
+        let passed =
+            |watched: &Watched, plant: &Plant| is_short_of(watched.position_m, plant) != watched.short;
         while let Some(place) = self.watched.iter().position(|watched| passed(watched, plant)) {
             let Watched { action, .. } = self.watched.remove(place);
             self.act(action, plant, &mut tell);
