@@ -32,7 +32,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
     controller.signal(Signal::CONT);
     let code = controller.wait_within(LIMIT).code;
     assert!(matches!(code, Some(BUS_FAILED | LOCKSTEP_TIMEOUT)), "the controller ends too, with {code:?}");
-    let _ = expect_whole_lines(&scene.path("controller/controller.csv"));
+    let _ = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn an_emulator_that_is_killed_ends_the_member() {
     scene.wait_for_rows("emulator", 600);
     let _ = emulator.kill();
     let _ = controller.wait_within(LIMIT).expect_code(BUS_FAILED);
-    let rows = expect_whole_lines(&scene.path("controller/controller.csv"));
+    let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
     assert_eq!(count(&json(&scene.path("controller/controller.json")), "/cycles_answered"), rows as u64);
 }
 

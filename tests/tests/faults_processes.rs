@@ -109,7 +109,7 @@ fn a_controller_that_stands_still_has_its_valve_shut_and_its_losses_counted_at_b
         for (axis, id) in [("drive", "120"), ("load", "121")] {
             let dropped = count_of_id(&peer["dropped_at_queue"], id);
             assert_eq!(
-                count(&report, &format!("/sensors_lost/{axis}")),
+                count(&report, &format!("/axes/{axis}/sensors_lost")),
                 dropped,
                 "{axis}, stopped for {stopped:?}"
             );
@@ -137,7 +137,7 @@ fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost
     let report = json(&scene.path("controller/controller.json"));
     assert_eq!(count(&report, "/rig_cycles_skipped"), skipped, "the controller knows of every skipped cycle");
     for axis in ["drive", "load"] {
-        assert_eq!(count(&report, &format!("/sensors_lost/{axis}")), 0, "{axis}: skipped is not lost");
+        assert_eq!(count(&report, &format!("/axes/{axis}/sensors_lost")), 0, "{axis}: skipped is not lost");
     }
     let told: u64 = events::all(&summary)
         .iter()
