@@ -26,8 +26,8 @@ use crate::station::News;
 use average::Average;
 use plant::Axis;
 use protocol::frames::{
-    ALIVE_RANGE, ChainStatus, ChainValues, ECHO_RANGE, EmergencyStop, EmergencyStopChainState,
-    EmergencyStopReason, Frame, MainChainState, RigStatus, Sensors, ValveCommand,
+    ALIVE_RANGE, ChainStatus, ChainValues, DRIVE_CHAIN_VALUES, ECHO_RANGE, EmergencyStop,
+    EmergencyStopChainState, EmergencyStopReason, Frame, MainChainState, RigStatus, Sensors, ValveCommand,
 };
 use work::{Asked, Seen, Work};
 
@@ -36,6 +36,11 @@ const SLOW_PERIOD: u64 = 10;
 /// Cycles within the period in which status and values of drive and load are sent: none falls on the rig's tick (0) or status
 /// (5), nor on another.
 const SLOW_PHASES: [[u64; 2]; 2] = [[2, 3], [7, 8]];
+
+/// Positions and forces that the values can carry; those of both axes are alike.
+const LEAST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].min;
+const MOST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].max;
+const MOST_N: f64 = DRIVE_CHAIN_VALUES.signals[2].max;
 
 /// A parameter that changes at a time of the experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +57,7 @@ pub struct PlannedChange {
 pub struct AxisParts {
     /// Which axis.
     pub axis: Axis,
-    /// Its program; `None` for an axis that holds its valve shut.
+    /// Its program.
     pub program: Program,
     /// What it does in the experiment.
     pub plan: Plan,
@@ -92,6 +97,7 @@ pub struct AxisController {
     stop: EmergencyStopChain,
     heard: Heard,
     changes: Changes,
+    supply_pressure_pa: f64,
     record_every: u64,
     figures: PositionFigures,
     average: Average,
@@ -120,6 +126,7 @@ impl AxisController {
             stop: EmergencyStopChain::new(stop),
             heard: Heard::default(),
             changes: Changes { planned: changes, before, done: 0 },
+            supply_pressure_pa,
             record_every,
             figures: PositionFigures::default(),
             average: Average::default(),
@@ -160,7 +167,7 @@ impl AxisController {
     /// The answer to the sensors of `cycle`.
     pub fn answer(&mut self, cycle: u64, sensors: &Sensors, rig: Option<&RigStatus>) -> Answer {
         // Until the rig has told its supply pressure, the nominal one is the best guess.
-        let supply_pa = rig.map_or(0.0, |rig| rig.supply_pressure_pa);
+        let supply_pa = rig.map_or(self.supply_pressure_pa, |rig| rig.supply_pressure_pa);
         self.program.observe(cycle, sensors, supply_pa);
         self.average.take(sensors.position_m);
         if std::mem::take(&mut self.heard.partner_spoke) {
@@ -357,12 +364,10 @@ impl AxisController {
             _ => average_m,
         };
         let now_m = self.average.last();
-        let positions = DRIVE_POSITIONS;
         ChainValues {
-            averaged_position_m: average_m.clamp(positions.0, positions.1),
-            position_set_point_m: set_position_m.clamp(positions.0, positions.1),
-            force_set_point_n: demand
-                .map_or(0.0, |demand| demand.force.force_n.clamp(-MOST_FORCE_N, MOST_FORCE_N)),
+            averaged_position_m: average_m.clamp(LEAST_M, MOST_M),
+            position_set_point_m: set_position_m.clamp(LEAST_M, MOST_M),
+            force_set_point_n: demand.map_or(0.0, |demand| demand.force.force_n.clamp(-MOST_N, MOST_N)),
             control_error_m: if self.work.is_position() { set_position_m - now_m } else { 0.0 },
         }
     }
@@ -445,8 +450,3 @@ impl Heard {
         }
     }
 }
-
-use protocol::frames::DRIVE_CHAIN_VALUES;
-/// Positions and forces that the values can carry.
-const DRIVE_POSITIONS: (f64, f64) = (DRIVE_CHAIN_VALUES.signals[0].min, DRIVE_CHAIN_VALUES.signals[0].max);
-const MOST_FORCE_N: f64 = DRIVE_CHAIN_VALUES.signals[2].max;

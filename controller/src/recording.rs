@@ -137,7 +137,6 @@ pub(crate) fn sentence(news: News) -> String {
         News::State { axis, state, cycle, cause } => {
             format!("cycle {cycle}: {} {state}: {cause}", axis.name())
         }
-        News::Changed { axis, place, value } => format!("{}: variable {place} is now {value}", axis.name()),
         News::RigRestarted => "the rig started anew; starting over".into(),
         News::BusLost => "the bus is gone; trying to come back".into(),
         News::BusBack => "the bus is back".into(),

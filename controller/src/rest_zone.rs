@@ -7,14 +7,15 @@
 //!               set-point moves, or |e| > 2 zone
 //! ```
 //!
-//! Below the break-away force a rod stays where it is while a valve, barely open, builds up pressure; then it breaks away, slides past
-//! the set-point, and the same begins on the other side. A shut valve ends that: the air is trapped and friction holds.
-//! The rod must stand first: shut in at a speed v, its air lets it slide on by v b / c, 0.2 mm for each mm/s in the middle of the stroke.
-//! e: error, m; b, c: viscous friction and stiffness of the air.
+//! Below the break-away force a rod stays where it is while a valve, barely open, builds up pressure; then it breaks away,
+//! slides past the set-point, and the same begins on the other side. A shut valve ends that: the air is trapped and
+//! friction holds. The rod must stand first: shut in at a speed v, its air lets it slide on by v b / c, 0.2 mm for each
+//! mm/s in the middle of the stroke. e: error, m; b, c: viscous friction and stiffness of the air.
 
 use crate::algorithm::Ready;
 
-/// A rod that leaves no band of this half-width, m, over [`STANDING_S`] stands: slower than 2 mm/s. Five times the sensor's noise.
+/// A rod that leaves no band of this half-width, m, over [`STANDING_S`] stands: slower than 2 mm/s. Five times the
+/// sensor's noise.
 const STANDING_M: f64 = 1e-4;
 const STANDING_S: f64 = 0.05;
 /// How much wider than the zone an error must be to leave it.

@@ -141,6 +141,12 @@ impl RigView {
         Some((cycle.saturating_sub(behind), sensors))
     }
 
+    /// The newest cycle that is known; `None` before the first tick.
+    #[must_use]
+    pub fn cycle(&self) -> Option<u64> {
+        self.cycle
+    }
+
     /// What the rig says of itself; `None` until it said something.
     #[must_use]
     pub fn status(&self) -> Option<&RigStatus> {

@@ -21,6 +21,10 @@ use protocol::frames::{
 };
 use std::collections::VecDeque;
 
+/// Ticks of the rig, one every ten cycles, without sensors of an axis in between, after which they count as lost: 100 ms.
+const SILENT_TICKS: u64 = 10;
+/// Cycles from tick to tick.
+const TICK_PERIOD: u64 = 10;
 /// Frames of a partner that wait for their cycle; a cycle has three at most.
 const MAIL_ROOM: usize = 16;
 
@@ -40,15 +44,6 @@ pub enum News {
         /// Why.
         #[serde(serialize_with = "in_words")]
         cause: MainCause,
-    },
-    /// A parameter changed while running.
-    Changed {
-        /// The axis.
-        axis: Axis,
-        /// Place in the list of variables.
-        place: usize,
-        /// Its value.
-        value: f64,
     },
     /// The rig's time began again.
     RigRestarted,
@@ -129,6 +124,8 @@ struct Seat {
     mail: Mail,
     answered: u64,
     stopped_for: u64,
+    /// Ticks since the last own sensors.
+    silent_ticks: u64,
 }
 
 /// The controllers of a process on the bus.
@@ -145,7 +142,8 @@ impl Station {
     /// Puts the controllers, one or two, on the bus.
     #[must_use]
     pub fn new(controllers: Vec<AxisController>, outlets: Outlets) -> Self {
-        let seat = |controller| Seat { controller, mail: Mail::new(), answered: 0, stopped_for: 0 };
+        let seat =
+            |controller| Seat { controller, mail: Mail::new(), answered: 0, stopped_for: 0, silent_ticks: 0 };
         Self {
             view: RigView::default(),
             seats: controllers.into_iter().map(seat).collect(),
@@ -163,13 +161,14 @@ impl Station {
             Ok(Frame::LoadSensors(sensors)) => self.view.take_sensors(Axis::Load, sensors),
             Ok(Frame::RigStatus(status)) => self.view.take_status(status),
             Ok(Frame::Tick(tick)) => match self.view.take_tick(&tick) {
-                TickNews::Usual => {}
+                TickNews::Usual => self.seats.iter_mut().for_each(|seat| seat.silent_ticks += 1),
                 TickNews::Ending => self.ending = true,
                 TickNews::Restarted => {
                     self.ending = false;
                     self.seats.iter_mut().for_each(|seat| {
                         seat.controller.restart();
                         seat.mail.0.clear();
+                        seat.silent_ticks = 0;
                     });
                     self.tell(News::RigRestarted);
                 }
@@ -199,15 +198,35 @@ impl Station {
                 }
                 let answer = seat.controller.answer(cycle, &sensors, status.as_ref());
                 seat.answered += 1;
+                seat.silent_ticks = 0;
                 let stopped =
                     matches!(seat.controller.state(), MainChainState::Aborted | MainChainState::Fault)
                         && !seat.controller.may_restart();
                 seat.stopped_for = if stopped { seat.stopped_for + 1 } else { 0 };
                 self.send(place, cycle, &answer, bus);
                 first |= place == 0;
+            } else if self.seats[place].silent_ticks >= SILENT_TICKS {
+                self.speak_without_sensors(place, bus);
             }
         }
         first
+    }
+
+    /// The rig goes on, and own sensors do not come: after each tick the axis says what a fault has to say.
+    fn speak_without_sensors(&mut self, place: usize, bus: &mut dyn Bus) {
+        let Some(cycle) = self.view.cycle() else { return };
+        let seat = &mut self.seats[place];
+        if seat.answered == 0 {
+            // It never had any: it waits for its rig.
+            return;
+        }
+        let axis = seat.controller.axis();
+        let stop = seat.controller.without_sensors(cycle);
+        seat.stopped_for += if seat.controller.may_restart() { 0 } else { TICK_PERIOD };
+        seat.silent_ticks = SILENT_TICKS - 1;
+        if let Some(stop) = stop {
+            send(bus, &emergency_stop_frame(axis, stop));
+        }
     }
 
     fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn Bus) {
@@ -241,10 +260,8 @@ impl Station {
         while let Ok(change) = self.outlets.changes.try_recv() {
             let of_axis = |seat: &&mut Seat| seat.controller.axis() == change.axis;
             let Some(seat) = self.seats.iter_mut().find(of_axis) else { continue };
-            if seat.controller.program_mut().set(change.place, change.value).is_ok() {
-                let Change { axis, place, value } = change;
-                self.tell(News::Changed { axis, place, value });
-            }
+            // Checked by whoever sent it.
+            let _ = seat.controller.program_mut().set(change.place, change.value);
         }
     }
 
@@ -349,4 +366,27 @@ pub(crate) fn as_received(frame: &Frame) -> Frame {
 /// Sends a frame that a controller made itself; what the bus does not take is counted there.
 fn send(bus: &mut dyn Bus, frame: &Frame) {
     let _ = bus.send(&encode(frame));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mail_is_heard_in_the_cycle_after_it_was_sent() {
+        let mut mail = Mail::new();
+        let frame = Frame::DriveChainStatus(ChainStatus::default());
+        mail.post(7, frame);
+        assert!(mail.heard_in(7).is_none());
+        mail.post(8, frame);
+        assert!(mail.heard_in(8).is_some() && mail.heard_in(8).is_none());
+        assert!(mail.heard_in(9).is_some());
+    }
+
+    #[test]
+    fn a_partner_that_is_not_heard_for_long_leaves_the_newest() {
+        let mut mail = Mail::new();
+        (0..100).for_each(|cycle| mail.post(cycle, Frame::DriveChainStatus(ChainStatus::default())));
+        assert_eq!((0..200).filter(|_| mail.heard_in(1000).is_some()).count(), MAIL_ROOM);
+    }
 }

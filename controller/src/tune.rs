@@ -6,13 +6,15 @@
 //!                └────────────────────────────────────────────────────────────────────────────────────────────────┘
 //! ```
 //!
-//! The program is the real one; the plant is unlinked and has no chains around it. The loop's factor multiplies the K_V tables of the plant
-//! and not those of the program: what the valve passes is what every loop goes through, so a factor of 2 without
-//! oscillation is a gain margin of 2, whatever the algorithm. The delay margin counts cycles that each command is late.
+//! The program is the real one; the plant is unlinked and has no chains around it. The loop's factor multiplies the K_V
+//! tables of the plant and not those of the program: what the valve passes is what every loop goes through, so a factor of
+//! 2 without oscillation is a gain margin of 2, whatever the algorithm. The delay margin counts cycles that each command is
+//! late.
 //!
-//! *No oscillation* means: in the last half second of each rest of [`EXCITATION`] the position, as a mean over 10 ms, moves by less than
-//! [`STILL_M`], and during moves nothing quicker than a third of a second is larger than [`RIPPLE_M`]. A hop of stick and slip, 1 to 2 mm every
-//! few seconds, is no oscillation; it shows in the figure `rest_peak_to_peak_m`, which is judged apart.
+//! *No oscillation* means: in the last half second of each rest of [`EXCITATION`] the position, as a mean over 10 ms, moves
+//! by less than [`STILL_M`], and during moves nothing quicker than a third of a second is larger than [`RIPPLE_M`]. A hop
+//! of stick and slip, 1 to 2 mm every few seconds, is no oscillation; it shows in the figure `rest_peak_to_peak_m`, which
+//! is judged apart.
 
 use crate::guard::AlgorithmFault;
 use crate::program::{Demand, Hand, Program};

@@ -80,6 +80,7 @@ impl Watched {
             if *value != self.values[place] {
                 let change = Change { axis: self.axis, place, value: *value };
                 changes.try_send(change).map_err(|_| "too many changes at a time".to_owned())?;
+                eprintln!("controller: {}.{} is {value} now", self.axis.name(), names[place]);
                 self.values[place] = *value;
             }
         }

@@ -31,6 +31,7 @@ pub const RESULTS: &[&str] = &[
     "controller-load.json",
     "picture.svg",
     "step.svg",
+    "stop.svg",
     "emulator.hlog",
     "controller.hlog",
     "controller-drive.hlog",

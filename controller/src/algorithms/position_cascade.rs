@@ -12,19 +12,22 @@
 //!   F   = p_a A_a - p_b A_b - p_atm (A_a - A_b)            c = p_a A_a^2 / V_a + p_b A_b^2 / V_b
 //! ```
 //!
-//! w, x, e: set-point, extension, error, m; k_x: position gain, 1/s; v_c: wanted speed, m/s; k_f, k_a: shares of the set-point's rates
-//! that are fed forward; F_c, F: wanted and measured pneumatic force, N; F_s: force sensor, N; m: moved mass, kg; b: viscous friction,
-//! N s/m; F_sli: sliding friction, N, compensated in full from the speed v_r on; k_v: velocity gain, N s/m; k_r, k_l: shares; I: integral
-//! part, N; k_i: N/(m s); k_F: force gain, 1/s; A, V, p: areas, volumes and pressures of the chambers; c: stiffness of the air, N/m.
+//! w, x, e: set-point, extension, error, m; k_x: position gain, 1/s; v_c: wanted speed, m/s; k_f, k_a: shares of the
+//! set-point's rates that are fed forward; F_c, F: wanted and measured pneumatic force, N; F_s: force sensor, N; m: moved
+//! mass, kg; b: viscous friction, N s/m; F_sli: sliding friction, N, compensated in full from the speed v_r on; k_v:
+//! velocity gain, N s/m; k_r, k_l: shares; I: integral part, N; k_i: N/(m s); k_F: force gain, 1/s; A, V, p: areas, volumes
+//! and pressures of the chambers; c: stiffness of the air, N/m.
 //!
-//! The force's rate is F' = c (v - x'), v being what the valve does (see [`crate::linearisation`], whose pressure-compensated law
-//! it wants): v is therefore the wanted speed and, over c, the wanted rate of the force. The force sensor tells the load; it also reads
-//! the mass behind it, which its low-pass (force_filter_hz of the pre-controller, 5 Hz) keeps out of the loop.
+//! The force's rate is F' = c (v - x'), v being what the valve does (see [`crate::linearisation`], whose
+//! pressure-compensated law it wants): v is therefore the wanted speed and, over c, the wanted rate of the force. The force
+//! sensor tells the load; it also reads the mass behind it, which its low-pass (force_filter_hz of the pre-controller, 5
+//! Hz) keeps out of the loop.
 //!
-//! The integral part stands still at its limit, while the error is larger than its zone, and while the valve cannot follow, unless
-//! the error takes it back. At rest, within the rest zone, 0 comes out: see [`crate::rest_zone`].
+//! The integral part stands still at its limit, while the error is larger than its zone, and while the valve cannot follow,
+//! unless the error takes it back. At rest, within the rest zone, 0 comes out: see [`crate::rest_zone`].
 //!
-//! Source: [Neugebauer 2011, section 5] supposes that such a cascade does better than P; air and friction from rig-model.md.
+//! Source: [Neugebauer 2011, section 5] supposes that such a cascade does better than P; air and friction from
+//! rig-model.md.
 
 use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
 use crate::linearisation::Air;

@@ -4,8 +4,8 @@
 //!   w, w' ──► v = k_v (w - x) + k_f w'
 //! ```
 //!
-//! w: set-point, m; w': its rate, m/s; x: extension, m; k_v: gain, 1/s; k_f: share of the set-point's rate. At rest, within the rest
-//! zone, 0 comes out: see [`crate::rest_zone`]. No other state.
+//! w: set-point, m; w': its rate, m/s; x: extension, m; k_v: gain, 1/s; k_f: share of the set-point's rate. At rest, within
+//! the rest zone, 0 comes out: see [`crate::rest_zone`]. No other state.
 //!
 //! Source: [Neugebauer 2011, section 4].
 

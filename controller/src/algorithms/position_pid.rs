@@ -6,11 +6,12 @@
 //!   I' = e / T_i
 //! ```
 //!
-//! w, w': set-point and its rate, m and m/s; x, x': extension and its filtered rate; k_p: gain, 1/s; T_d, T_i: derivative and integral
-//! time, s (T_i = 0: no integral part); k_f: share of the set-point's rate; I: integral part, m.
+//! w, w': set-point and its rate, m and m/s; x, x': extension and its filtered rate; k_p: gain, 1/s; T_d, T_i: derivative
+//! and integral time, s (T_i = 0: no integral part); k_f: share of the set-point's rate; I: integral part, m.
 //!
-//! The integral part stands still at its limit, while the error is larger than its zone, and while the valve cannot follow, unless
-//! the error takes it back. The derivative makes up for the lag of the air, 0.2 s in the middle of the stroke. At rest, within the rest zone, 0 comes out: see [`crate::rest_zone`].
+//! The integral part stands still at its limit, while the error is larger than its zone, and while the valve cannot follow,
+//! unless the error takes it back. The derivative makes up for the lag of the air, 0.2 s in the middle of the stroke. At
+//! rest, within the rest zone, 0 comes out: see [`crate::rest_zone`].
 //!
 //! Source: [Åström, Hägglund 1995], PID in the ideal form; the derivative filter is the pre-controller's.
 
@@ -35,7 +36,7 @@ const INTEGRAL_ZONE: usize = 4;
 const DERIVATIVE_TIME: usize = 5;
 const REST_ZONE: usize = 6;
 static PARAMETERS: [Parameter; 7] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 20.0, "velocity for each error"),
+    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 30.0, "velocity for each error"),
     Parameter::new(
         ("velocity_feed_forward", ""),
         [0.0, 2.0],
@@ -149,8 +150,8 @@ mod tests {
 
     #[test]
     fn it_does_not_wind_up() {
-        // The integral's limit is 3 mm; 2.9 mm take it back in 2 * 3 / 2.9 s of an integral time of 1 s at most, but the error itself
-        // turns the sign as soon as the integral is below it.
+        // The integral's limit is 3 mm; 2.9 mm take it back in 2 * 3 / 2.9 s of an integral time of 1 s at most, but the
+        // error itself turns the sign as soon as the integral is below it.
         laws::recovers(&KIND, &AT_REST, 2.1);
     }
 }

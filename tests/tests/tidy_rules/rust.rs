@@ -83,7 +83,8 @@ fn edge(room: &str, other: &str) -> String {
 const NOMINAL: &[&str] = &["RigParameters", "Axis", "parameters"];
 
 /// Where the controller looks into the plant: its rehearsal, as the paper has it.
-const REHEARSAL: &[&str] = &["controller/src/rehearsal.rs", "controller/src/rehearse.rs"];
+const REHEARSAL: &[&str] =
+    &["controller/src/rehearsal.rs", "controller/src/rehearse.rs", "controller/src/tune.rs"];
 
 /// The controller reads the rig's nominal numbers and nothing else of the plant.
 pub(super) const NOMINAL_NUMBERS_ONLY: Rule = Rule {
@@ -185,6 +186,7 @@ const STATISTICS: &[&str] = &["min", "max", "mean", "rms", "p50", "p90", "p99", 
 /// Names of quantities without a unit, or whose unit stands beside them.
 const DIMENSIONLESS: &[&str] = &[
     "opening",               // of a valve, -1 to 1
+    "loop_factor",           // on what a valve passes
     "valve",                 // the same, of both axes
     "spool",                 // position of a valve's spool, -1 to 1
     "velocity_feed_forward", // share

@@ -1,0 +1,248 @@
+//! Axis controllers under anything that a bus can say: sensors that jump, a rig that trips, a partner that lies, a console that
+//! shouts, parameters at the ends of their ranges. On the virtual clock: time is the number of the cycle.
+//!
+//! Whatever comes, the opening is a number within the valve, and the valve is shut in every state that has no control.
+
+use clap::Parser;
+use controller::axis::{Answer, AxisController};
+use controller::cli::{Cli, Command};
+use controller::setup::{Inputs, Mode};
+use plant::Axis;
+use proptest::prelude::*;
+use protocol::frames::{
+    ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, EmergencyStopReason, Frame,
+    MainChainState, RigStatus, RunControl, RunControlCommand, Sensors,
+};
+use std::path::Path;
+
+const POSITION_PROGRAMS: [&str; 4] = ["position-p", "position-pid", "position-cascade", "position-linked"];
+const FORCE_PROGRAMS: [&str; 3] = ["force-p", "force-pid-map", "force-manual"];
+
+/// The controller of `axis` for the shipped experiment load-step, with another program.
+fn controller(axis: Axis, program: &str) -> AxisController {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = |name: &str| root.join(name).display().to_string();
+    let arguments = [
+        "controller",
+        "rehearse",
+        "--rig",
+        &path("../plant/rig.toml"),
+        "--experiment",
+        &path("experiments/load-step.toml"),
+        &format!("--{}-program", axis.name()),
+        &path(&format!("programs/{program}.toml")),
+    ];
+    let Command::Rehearse(arguments) = Cli::parse_from(arguments).command else {
+        unreachable!("the line above asks for a rehearsal")
+    };
+    let mode = Mode { partner_needed: true, real_time: false, forever: false };
+    Inputs::read(&arguments.files).unwrap().controller(axis, mode).unwrap()
+}
+
+/// What happens in a cycle besides the sensors.
+#[derive(Clone, Debug)]
+enum Happening {
+    Nothing,
+    Rig(RigStatus),
+    Partner(ChainStatus, ChainValues),
+    Stop(Frame),
+    Console(Frame),
+    Parameter(usize, f64),
+    Skipped(u64),
+    Restart,
+}
+
+fn sensors() -> impl Strategy<Value = Sensors> {
+    (0.0..=0.5_f64, -2000.0..=2000.0_f64, 0.0..=1e6_f64, 0.0..=1e6_f64).prop_map(
+        |(position_m, force_n, pressure_a_pa, pressure_b_pa)| Sensors {
+            position_m,
+            force_n,
+            pressure_a_pa,
+            pressure_b_pa,
+            alive: 0,
+        },
+    )
+}
+
+fn main_state() -> impl Strategy<Value = MainChainState> {
+    use MainChainState as S;
+    prop_oneof![
+        Just(S::WaitingForRig),
+        Just(S::InitialPositioning),
+        Just(S::Preparing),
+        Just(S::InitialForce),
+        Just(S::Settling),
+        Just(S::Experiment),
+        Just(S::FinalSettling),
+        Just(S::Done),
+        Just(S::Aborted),
+        Just(S::Fault),
+    ]
+}
+
+fn happening() -> impl Strategy<Value = Happening> {
+    let rig = (0.0..=1e6_f64, any::<[bool; 3]>()).prop_map(|(supply_pressure_pa, [linked, stop, shut])| {
+        Happening::Rig(RigStatus {
+            supply_pressure_pa,
+            linked,
+            emergency_stop: stop,
+            check_valves_shut: shut,
+            ..RigStatus::default()
+        })
+    });
+    let partner = (main_state(), any::<bool>(), 0..4_u8, 0.0..=0.5_f64).prop_map(
+        |(main_chain, ok, repetition, averaged_position_m)| {
+            let status = ChainStatus { main_chain, ok, repetition, experiment: 9, ..ChainStatus::default() };
+            Happening::Partner(status, ChainValues { averaged_position_m, ..ChainValues::default() })
+        },
+    );
+    let stop =
+        any::<bool>().prop_map(|release| EmergencyStop { reason: EmergencyStopReason::Operator, release });
+    let stops = prop_oneof![
+        stop.clone().prop_map(Frame::ConsoleEmergencyStop),
+        stop.clone().prop_map(Frame::DriveEmergencyStop),
+        stop.clone().prop_map(Frame::LoadEmergencyStop),
+        stop.prop_map(Frame::RigEmergencyStop),
+    ];
+    let console = any::<bool>().prop_map(|start| {
+        let command = if start { RunControlCommand::Start } else { RunControlCommand::Abort };
+        Frame::RunControl(RunControl { command, experiment: 0 })
+    });
+    prop_oneof![
+        20 => Just(Happening::Nothing),
+        4 => rig,
+        8 => partner,
+        1 => stops.prop_map(Happening::Stop),
+        1 => console.prop_map(Happening::Console),
+        4 => (0..100_usize, 0.0..=1.0_f64).prop_map(|(place, share)| Happening::Parameter(place, share)),
+        1 => (1..2000_u64).prop_map(Happening::Skipped),
+        1 => Just(Happening::Restart),
+    ]
+}
+
+/// A partner that goes along, so that the axis gets somewhere.
+fn echo_partner(controller: &mut AxisController, answer: &Answer) {
+    let Some(status) = answer.status else { return };
+    let status = ChainStatus { ok: true, ..status };
+    controller.hear(&match controller.axis() {
+        Axis::Drive => Frame::LoadChainStatus(status),
+        Axis::Load => Frame::DriveChainStatus(status),
+    });
+}
+
+fn check(answer: &Answer, controller: &AxisController) -> Result<(), TestCaseError> {
+    use MainChainState::{Aborted, Fault, WaitingForRig};
+    let command = answer.command;
+    prop_assert!(command.opening.is_finite() && command.opening.abs() <= 1.0, "{command:?}");
+    let without_control = matches!(controller.state(), WaitingForRig | Aborted | Fault)
+        || controller.emergency_stop() != EmergencyStopChainState::Ready
+        || controller.algorithm_fault().is_some();
+    prop_assert!(!without_control || !command.enable, "{:?} and {command:?}", controller.state());
+    prop_assert!(command.enable || command.opening == 0.0, "{command:?}");
+    // What goes out fits the wire.
+    for frame in [
+        Frame::DriveValveCommand(command),
+        Frame::DriveChainStatus(answer.status.unwrap_or_default()),
+        Frame::DriveChainValues(answer.values.unwrap_or_default()),
+    ] {
+        prop_assert!(frame.encode().is_ok(), "{frame:?}");
+    }
+    Ok(())
+}
+
+fn drive_through(
+    mut controller: AxisController,
+    course: &[(Sensors, Happening)],
+    goes_along: bool,
+) -> Result<(), TestCaseError> {
+    let mut cycle = 0;
+    let mut rig = Some(RigStatus { supply_pressure_pa: 7e5, linked: true, ..RigStatus::default() });
+    for (sensors, happening) in course {
+        match happening {
+            Happening::Nothing => {}
+            Happening::Rig(status) => rig = Some(*status),
+            Happening::Partner(status, values) => {
+                for axis_frame in [
+                    Frame::DriveChainStatus(*status),
+                    Frame::LoadChainStatus(*status),
+                    Frame::DriveChainValues(*values),
+                    Frame::LoadChainValues(*values),
+                ] {
+                    controller.hear(&axis_frame);
+                }
+            }
+            Happening::Stop(frame) | Happening::Console(frame) => controller.hear(frame),
+            Happening::Parameter(place, share) => {
+                let program = controller.program_mut();
+                let place = place % program.variables().len();
+                let parameter = &program.variables()[place].parameter;
+                let value = parameter.least + share * (parameter.most - parameter.least);
+                prop_assert!(program.set(place, value).is_ok());
+            }
+            Happening::Skipped(cycles) => cycle += cycles,
+            Happening::Restart => {
+                controller.restart();
+                (cycle, rig) = (0, None);
+            }
+        }
+        // A rest of ten cycles each, so that time-outs and filters see more than noise.
+        for _ in 0..10 {
+            let answer = controller.answer(cycle, sensors, rig.as_ref());
+            check(&answer, &controller)?;
+            if goes_along {
+                echo_partner(&mut controller, &answer);
+            }
+            cycle += 1;
+        }
+        rig = rig.or(Some(RigStatus { supply_pressure_pa: 7e5, linked: true, ..RigStatus::default() }));
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_position_axis_keeps_its_valve_in_range_and_shut_without_control(
+        program in 0..POSITION_PROGRAMS.len(),
+        goes_along in any::<bool>(),
+        course in prop::collection::vec((sensors(), happening()), 1..120),
+    ) {
+        drive_through(controller(Axis::Drive, POSITION_PROGRAMS[program]), &course, goes_along)?;
+    }
+
+    #[test]
+    fn a_force_axis_keeps_its_valve_in_range_and_shut_without_control(
+        program in 0..FORCE_PROGRAMS.len(),
+        goes_along in any::<bool>(),
+        course in prop::collection::vec((sensors(), happening()), 1..120),
+    ) {
+        drive_through(controller(Axis::Load, FORCE_PROGRAMS[program]), &course, goes_along)?;
+    }
+}
+
+/// The drive under a partner that goes along, with its carriage held at `position_m`; openings from cycle `from` on.
+fn held_at(position_m: f64, from: u64, until: u64) -> Vec<f64> {
+    let mut controller = controller(Axis::Drive, "position-cascade");
+    let rig = RigStatus { supply_pressure_pa: 7e5, linked: true, ..RigStatus::default() };
+    let mut openings = Vec::new();
+    for cycle in 0..until {
+        let sensors = Sensors {
+            position_m: if cycle < from { 0.1 } else { position_m },
+            pressure_a_pa: 4e5,
+            pressure_b_pa: 4e5,
+            ..Sensors::default()
+        };
+        let answer = controller.answer(cycle, &sensors, Some(&rig));
+        echo_partner(&mut controller, &answer);
+        openings.push(answer.command.opening);
+    }
+    openings
+}
+
+#[test]
+fn the_random_courses_reach_control_and_not_only_faults() {
+    // The experiment begins with a rest at 0.1 m: with the carriage held there all goes its way, and held away the valve opens.
+    let openings = held_at(0.09, 2300, 2600);
+    assert!(openings[2310..].iter().all(|opening| *opening > 0.0), "{:?}", &openings[2300..2330]);
+}
