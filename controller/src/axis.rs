@@ -177,6 +177,9 @@ impl AxisController {
         let seen = Seen { cycle, rig, partner: &self.heard.partner, still: self.main.still() };
         self.asked = self.work.ask(&output, &seen, &mut self.program);
         self.fault = self.work.fault();
+        if self.fault.is_some() {
+            self.asked = None;
+        }
         self.change_parameters(&output);
         let command = self.command(cycle);
         if let Some(fault) = self.fault {
