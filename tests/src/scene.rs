@@ -55,7 +55,7 @@ linked = true
 [run]
 settling_s = 0.2
 [drive]
-program = "program.toml"
+program = "linked-program.toml"
 start_m = 0.2
 set-point = [
     { law = "bestehorn", to_m = 0.25, duration_s = 1.0 },
@@ -72,13 +72,30 @@ set-point = [
 ]
 "#;
 
-/// The load's program of the linked experiment, which each scene holds as load-program.toml.
-pub const LOAD_PROGRAM: &str = r#"title = "presses"
+/// The drive's program of the linked experiment, which each scene holds as linked-program.toml: the shipped one of its time.
+pub const LINKED_PROGRAM: &str = r#"title = "damped"
 [algorithm]
-name = "force-p"
-gain_m_per_n_s = 0.01
-velocity_feed_forward = 0.8
+name = "position-pid"
+gain_per_s = 10.0
+velocity_feed_forward = 1.0
+integral_time_s = 0.0
+derivative_time_s = 0.09
+rest_zone_m = 0.0003
 [post-controller]
+linearisation = "pressure-compensated"
+"#;
+
+/// The load's program of the linked experiment, which each scene holds as load-program.toml: the same.
+pub const LOAD_PROGRAM: &str = r#"title = "presses"
+[pre-controller]
+pressure_filter_hz = 200.0
+[algorithm]
+name = "force-pid-map"
+gain_per_s = 150.0
+integral_time_s = 0.2
+integral_limit_n = 100.0
+[post-controller]
+linearisation = "pressure-compensated"
 dead_zone_m_per_s = 0.004
 [giving-way]
 name = "force-manual"
@@ -103,6 +120,7 @@ impl Scene {
             .expect("plant/rig.toml is there");
         scene.write("experiment.toml", experiment);
         scene.write("program.toml", PROGRAM);
+        scene.write("linked-program.toml", LINKED_PROGRAM);
         scene.write("load-program.toml", LOAD_PROGRAM);
         scene
     }

@@ -97,7 +97,7 @@ fn a_second_emulator_on_the_bus_does_not_take_the_first_ones_place() {
     let scene = Scene::new(RESTLESS);
     let emulator = scene.emulator(Pace::Lockstep).with("--seconds 60").start();
     let mut controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    controller.wait_for(": experiment");
+    controller.wait_for(": drive experiment");
     let second = scene.emulator(Pace::Lockstep).out(&scene.path("second")).with("--join-timeout 1").start();
     let second = second.wait_within(LIMIT);
     assert_eq!(second.code, Some(BUS_FAILED), "the second is refused; it said:\n{}", second.stderr);
