@@ -66,7 +66,7 @@ mod tests {
     use crate::tables_read::Table;
 
     /// 400 N that decay from 1 s on.
-    fn decaying(main: &[(&str, f64)], force_chain: &[(&str, f64)]) -> super::Figures {
+    fn decaying(main: &[(&str, f64)], force_chain: &[(&str, f64)]) -> Figures {
         let mut load = Table::default();
         load.set_states("main_chain", chain(main));
         load.set_states("force_chain", chain(force_chain));
