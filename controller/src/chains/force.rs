@@ -251,7 +251,11 @@ impl ForceChain {
     fn note(&mut self, inputs: &ForceInputs, numbers: &Numbers) {
         let ForceInputs { cycle, force_n, velocity_m_per_s, .. } = *inputs;
         let now = Mean { cycle, force_n, velocity_m_per_s };
-        let mean = self.mean.map_or(now, |last| last.to(&now));
+        let mut mean = self.mean.map_or(now, |last| last.to(&now));
+        if !matches!(self.state, State::Moving { .. }) {
+            // The mean is of one movement: what was before it does not count.
+            mean.velocity_m_per_s = velocity_m_per_s;
+        }
         // What is no number must not stay.
         self.mean = (mean.force_n.is_finite() && mean.velocity_m_per_s.is_finite()).then_some(mean);
         let mean_n = mean.force_n;

@@ -8,6 +8,12 @@ fn defaults() -> Vec<f64> {
     PARAMETERS.iter().map(|parameter| parameter.default).collect()
 }
 
+/// The default of a time, in cycles.
+fn cycles_of(name: &str) -> u64 {
+    let parameter = PARAMETERS.iter().find(|parameter| parameter.name == name).unwrap();
+    cycles(parameter.default)
+}
+
 struct Play {
     chain: ForceChain,
     inputs: ForceInputs,
@@ -162,7 +168,8 @@ fn a_relief_that_takes_too_long_is_a_fault_from_each_state() {
         assert_eq!(before, last);
         assert_eq!(play.step().fault, Some(Fault::RelieveTimeout));
         let cycles = play.chain.entered().cycle;
-        assert!((15_000..=15_003).contains(&cycles), "{last}: {cycles}");
+        let timeout = cycles_of("relieve_timeout_s");
+        assert!((timeout..=timeout + 3).contains(&cycles), "{last}: {cycles}");
         play.inputs.asked = ForceAsked::Manual;
         assert_eq!(play.step().state, S::Fault);
         play.inputs.asked = ForceAsked::Idle;
