@@ -12,8 +12,9 @@ use system_tests::turn;
 
 /// Rows after which the valve moves.
 const UNDER_WAY: usize = 900;
-/// States of the main chain when all goes well.
-const STATES: [&str; 7] = [
+/// States of the main chain from the restart on, when all goes well.
+const STATES: [&str; 8] = [
+    "waiting-for-rig",
     "initial-positioning",
     "preparing",
     "initial-force",
