@@ -30,12 +30,16 @@ pub fn table(runs: &[Run]) -> Grid {
     Grid { head, rows: rows.collect() }
 }
 
-/// Relative change in per cent; nothing against zero or the unknown.
+/// Changes beyond this, in per cent, say no more than that the first was next to nothing.
+const MOST_CHANGE: f64 = 1000.0;
+
+/// Relative change in per cent; nothing against zero, next to zero or the unknown.
 fn change(first: Option<f64>, other: Option<f64>) -> String {
     match (first, other) {
         (Some(first), Some(other)) if first == other => "0 %".into(),
         (Some(first), Some(other)) if first != 0.0 => {
-            format!("{:+.1} %", 100.0 * (other - first) / first.abs())
+            let change = 100.0 * (other - first) / first.abs();
+            if change.abs() > MOST_CHANGE { "-".into() } else { format!("{change:+.1} %") }
         }
         _ => "-".into(),
     }
@@ -128,6 +132,7 @@ mod tests {
         assert_eq!(change(Some(-2.0), Some(-3.0)), "-50.0 %");
         assert_eq!(change(Some(0.0), Some(0.0)), "0 %");
         assert_eq!(change(Some(0.0), Some(3.0)), "-");
+        assert_eq!(change(Some(1e-16), Some(3.0)), "-");
         assert_eq!(change(None, Some(3.0)), "-");
     }
 }

@@ -3,7 +3,9 @@
 //! Times are the rig's own, counted in its cycles; what the machine takes is nobody's business here. A partner is lost 100 cycles
 //! after its last status, which it sends each 10: at most 110 after it died, and one for the way of a frame.
 
-use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand, ValveCommand};
+use protocol::frames::{
+    EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand, ValveCommand,
+};
 use rustix::process::Signal;
 use std::path::PathBuf;
 use system_tests::axis_table::AxisTable;
@@ -82,7 +84,8 @@ fn expect_lost(log: &[Logged], lost: &str, other: &str, grace: u64) {
     let call = stop(&log[tripped].frame, other).expect("found by it");
     assert_eq!(call, EmergencyStop { reason: EmergencyStopReason::PartnerLost, release: false });
     // The command of the same cycle stands before it or after it: on a bus the emergency stop goes first.
-    let commands = |of: &[Logged]| of.iter().filter_map(|logged| command(&logged.frame, other)).collect::<Vec<_>>();
+    let commands =
+        |of: &[Logged]| of.iter().filter_map(|logged| command(&logged.frame, other)).collect::<Vec<_>>();
     let (before, after) = (commands(&log[..tripped]), commands(&log[tripped..]));
     assert!(before.len() > 1000 && after.len() > 1000, "{} and {} commands", before.len(), after.len());
     assert!(before[..before.len() - 1].iter().any(|command| command.enable), "{other} was under way");
@@ -99,7 +102,9 @@ fn expect_lost(log: &[Logged], lost: &str, other: &str, grace: u64) {
     let passed = |since: u64| (u64::from(shut.echo) + ECHO_RANGE - since) % ECHO_RANGE;
     let since_status = passed(spoke(&|frame| is_status(frame, lost)));
     let since_death = passed(spoke(&|frame| command(frame, lost).is_some()));
-    eprintln!("{lost} lost: {since_status} cycles after its last status, {since_death} after its last command");
+    eprintln!(
+        "{lost} lost: {since_status} cycles after its last status, {since_death} after its last command"
+    );
     assert!(since_status >= LOST_AFTER, "{lost} was given up {since_status} cycles after its last status");
     assert!(since_death <= LOST_AT_LATEST + grace, "{lost} was given up {since_death} cycles after its end");
 }
@@ -226,7 +231,11 @@ fn frames_lost_on_the_wire_do_not_stop_a_run() {
 }
 
 /// Runs both controllers beside a console that says something in a cycle.
-fn with_console(experiment: &str, cycles: u32, mut say: impl FnMut(u32) -> Option<Frame>) -> (Scene, [Ended; 2]) {
+fn with_console(
+    experiment: &str,
+    cycles: u32,
+    mut say: impl FnMut(u32) -> Option<Frame>,
+) -> (Scene, [Ended; 2]) {
     let scene = Scene::new(experiment);
     let options = format!("--members 3 --seconds {}", f64::from(cycles) * 1e-3);
     let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
@@ -266,7 +275,8 @@ fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
         assert_eq!(table.states("emergency_stop_chain"), ["ready"], "{axis}");
     }
     let log = read_to_last_whole_line(&log_of(&scene));
-    let stops = log.iter().filter(|logged| ["drive", "load"].iter().any(|axis| stop(&logged.frame, axis).is_some()));
+    let stops =
+        log.iter().filter(|logged| ["drive", "load"].iter().any(|axis| stop(&logged.frame, axis).is_some()));
     assert_eq!(stops.count(), 0, "no emergency stop");
     let supply = Table::read(&scene.path("emulator/truth.csv")).column("supply_pressure_Pa");
     assert!(supply.iter().all(|pressure| *pressure == 700_000.0), "the supply stays");

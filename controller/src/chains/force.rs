@@ -34,12 +34,7 @@ pub const TABLE: &str = "force-chain";
 
 /// Parameters, in the order of the slices.
 pub const PARAMETERS: &[Parameter] = &[
-    Parameter::new(
-        ("high_force_n", "N"),
-        [1.0, 2000.0],
-        150.0,
-        "above it, at first, the velocity is limited",
-    ),
+    Parameter::new(("high_force_n", "N"), [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),
     Parameter::new(("limited_m_per_s", "m/s"), [1e-3, 1.0], 0.02, "largest rod velocity while it is limited"),
     Parameter::new(("low_force_for_s", "s"), [0.0, 10.0], 0.05, "how long the force must be low to end that"),
     Parameter::new(("moving_m_per_s", "m/s"), [1e-4, 1.0], 0.01, "significant movement; half of it ends it"),
@@ -47,7 +42,7 @@ pub const PARAMETERS: &[Parameter] = &[
     Parameter::new(("still_for_s", "s"), [0.0, 1.0], 0.1, "how long it must not, to be at standstill again"),
     Parameter::new(("relieved_n", "N"), [0.1, 2000.0], 20.0, "mean force of a relieved system"),
     Parameter::new(("relieved_for_s", "s"), [0.0, 60.0], 0.3, "how long it must be lower, at standstill"),
-    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 8.0, "how long relieving may take"),
+    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 15.0, "how long relieving may take"),
 ];
 
 /// Time constant of the mean force, s.
