@@ -2,9 +2,7 @@
 //!
 //! Times and ways are the rig's; they are told, and held against what `bench summary` makes of the same files.
 
-use protocol::frames::{
-    EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand,
-};
+use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand};
 use serde_json::Value;
 use std::process::Command;
 use system_tests::axis_table::AxisTable;
@@ -134,7 +132,9 @@ fn at_full_speed_the_carriage_stands_in_time_and_the_air_stays_in_the_chambers_w
             assert!(change < 1e-9, "{by:?}: {chamber} changes by {change} of its air");
         }
         let summary = figures(&scene);
-        let figure = |name: &str| summary["figures"][name].as_f64().unwrap_or_else(|| panic!("{by:?}: no {name}: {summary:#}"));
+        let figure = |name: &str| {
+            summary["figures"][name].as_f64().unwrap_or_else(|| panic!("{by:?}: no {name}: {summary:#}"))
+        };
         assert!((figure("stop_time_s") - (rest - trip) as f64 * 1e-3).abs() < 2.5e-3, "{by:?}");
         assert!((figure("stop_way_m") - way_m).abs() < 1e-3, "{by:?}");
         assert!(figure("air_mass_change_while_shut_ratio") < 1e-9, "{by:?}");
@@ -164,7 +164,10 @@ fn expect_smooth_restart(scene: &Scene, after: &str) -> AxisTable {
     assert!(drive.numbers("enabled")[aborted..again].iter().all(|enabled| *enabled == 0.0), "{after}");
     // Where the carriage is: the sensor's noise is 20 um, and the sinoid begins with nothing.
     let (set, is) = (drive.numbers("set_position_m")[again], drive.numbers("position_m")[again]);
-    assert!((set - is).abs() < 1e-4, "{after}: the set-point begins at {set} m, the carriage stands at {is} m");
+    assert!(
+        (set - is).abs() < 1e-4,
+        "{after}: the set-point begins at {set} m, the carriage stands at {is} m"
+    );
     assert!((is - 0.1).abs() > 0.1, "{after}: far from the start, at {is} m");
 
     let truth = Table::read(&scene.path("run/truth.csv"));
@@ -179,7 +182,9 @@ fn expect_smooth_restart(scene: &Scene, after: &str) -> AxisTable {
         steps * 1e3
     };
     let (creep, restart) = (jump(open..begins), jump(begins..settled));
-    eprintln!("{after}: at most {creep:.3} mm/ms while the supply comes back, {restart:.3} mm/ms on the way to the start");
+    eprintln!(
+        "{after}: at most {creep:.3} mm/ms while the supply comes back, {restart:.3} mm/ms on the way to the start"
+    );
     assert!(creep < RESTART_M_PER_MS * 1e3 && restart < RESTART_M_PER_MS * 1e3, "{after}");
 
     assert_eq!(drive.states("main_chain").iter().filter(|state| **state == "experiment").count(), 2);
@@ -223,8 +228,8 @@ fn nobody_is_told_to_start_while_the_stop_is_held() {
     let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
     assert_eq!(drive.states("emergency_stop_chain").last(), Some(&"waiting-for-release"));
     assert!(drive.numbers("enabled")[TRIP + 2..].iter().all(|enabled| *enabled == 0.0), "shut for 29 s");
-    let released = read(&scene.path("run/bus.log")).into_iter().any(|logged| {
-        matches!(logged.frame, Frame::DriveEmergencyStop(_) | Frame::LoadEmergencyStop(_))
-    });
+    let released = read(&scene.path("run/bus.log"))
+        .into_iter()
+        .any(|logged| matches!(logged.frame, Frame::DriveEmergencyStop(_) | Frame::LoadEmergencyStop(_)));
     assert!(!released, "the controllers hold no stop of their own, and withdraw none");
 }

@@ -39,7 +39,10 @@ fn rehearse(name: &str, path: &PathBuf) -> Result<(), String> {
     let summary = Running::start("bench summary", bench.arg("summary").arg(&out)).wait();
     let bounds = &json(&out.join("summary.json"))["thresholds"];
     if summary.code != Some(0) {
-        return Err(format!("{name}: bench summary gives {:?}: {}\n{bounds:#}", summary.code, summary.stdout));
+        return Err(format!(
+            "{name}: bench summary gives {:?}: {}\n{bounds:#}",
+            summary.code, summary.stdout
+        ));
     }
     eprintln!("{name}: passed {} bound(s)", bounds.as_object().map_or(0, serde_json::Map::len));
     Ok(())
@@ -47,8 +50,7 @@ fn rehearse(name: &str, path: &PathBuf) -> Result<(), String> {
 
 #[test]
 fn every_experiment_is_rehearsed_to_its_end_and_passes_its_own_bounds() {
-    let failures: Vec<_> =
-        shipped().iter().filter_map(|(name, path)| rehearse(name, path).err()).collect();
+    let failures: Vec<_> = shipped().iter().filter_map(|(name, path)| rehearse(name, path).err()).collect();
     assert!(failures.is_empty(), "{} failed:\n{}", failures.len(), failures.join("\n"));
 }
 
@@ -78,6 +80,9 @@ fn the_list_names_each_experiment_with_its_sentence() {
     for (name, path) in &experiments {
         let sentence = about(path);
         assert!(sentence.len() > 20, "{name}: '{sentence}' is no sentence");
-        assert!(lines.iter().any(|(listed, text)| listed == name && text.trim() == sentence), "{name}: {listed}");
+        assert!(
+            lines.iter().any(|(listed, text)| listed == name && text.trim() == sentence),
+            "{name}: {listed}"
+        );
     }
 }

@@ -74,9 +74,7 @@ fn a_planned_change_that_cannot_be_is_refused_with_file_line_and_range() {
         ("algorithm.gain_per_s", "1000.0", &["1000", "0 to 200"][..]),
         ("algorithm.gain", "10.0", &["algorithm.gain", "algorithm.gain_per_s"]),
     ] {
-        let change = format!(
-            "[[drive.change]]\nat_s = 0.1\nparameter = \"{parameter}\"\nvalue = {value}\n"
-        );
+        let change = format!("[[drive.change]]\nat_s = 0.1\nparameter = \"{parameter}\"\nvalue = {value}\n");
         let scene = Scene::new(&format!("{SHORT}{change}"));
         let line = SHORT.lines().count() + 1;
         let ended = scene.controller(Pace::Real).start().wait().expect_code(2).expect_said(words);
@@ -124,7 +122,7 @@ fn a_number_edited_while_running_is_taken_over_and_a_bad_edit_changes_nothing() 
         ("gain_per_s = 20.0", "gain_per_s = 900.0", "gain_per_s = 900"),
         ("gain_per_s = 20.0", "gain_per_s = nan", "gain_per_s = NaN"),
         ("gain_per_s = 20.0", "gain_per_s = = 5", "program.toml"),
-        ("\"position-p\"", "\"position-cascade\"", "position-cascade"),
+        ("\"position-p\"", "\"position-pid\"", "another algorithm needs another start"),
     ] {
         let before = controller.stderr().matches("the numbers in use stay").count();
         edit(&scene, from, to);
