@@ -1,6 +1,6 @@
 //! Every shipped experiment runs to its end, passes its own bounds, and is listed with its sentence.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::process::Running;
@@ -20,7 +20,7 @@ fn shipped() -> Vec<(String, PathBuf)> {
     named
 }
 
-fn about(path: &PathBuf) -> String {
+fn about(path: &Path) -> String {
     let text = std::fs::read_to_string(path).expect("it is listed");
     let line = text.lines().find_map(|line| line.strip_prefix("about = \""));
     let line = line.unwrap_or_else(|| panic!("{}: no about", path.display()));
@@ -28,7 +28,7 @@ fn about(path: &PathBuf) -> String {
 }
 
 /// What went wrong with a rehearsal of an experiment, if anything did.
-fn rehearse(name: &str, path: &PathBuf) -> Result<(), String> {
+fn rehearse(name: &str, path: &Path) -> Result<(), String> {
     let scene = Scene::new(SHORT);
     let out = scene.path("run");
     let rehearsal = scene.rehearsal().experiment(path).out(&out).with("--seconds 86400").start().wait();

@@ -35,7 +35,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "relieve_s",
             unit: "s",
-            meaning: "until |force| (smoothed over 5 ms) stays below a tenth of that before or 10 N, whichever is larger; absent when it does not",
+            meaning: "until |force| (smoothed over 5 ms) stays below a tenth of that before or 10 N, whichever is larger; \
+                absent when it does not",
         },
     ],
     compute,
