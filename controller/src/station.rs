@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Only the newest sensors of an axis are answered: after a stall, the backlog is read and not replayed. An axis hears its
-//! partner as it would over the bus, a cycle after the partner spoke, also when both live in this process ([`Mail`]): one
+//! partner as it would over the bus, a cycle after the partner spoke, also when both live in this process: one
 //! process or two give the same log. Nothing here allocates, locks, prints or blocks.
 
 use crate::axis::{Answer, AxisController, AxisRecord};
