@@ -5,7 +5,7 @@
 //!   answer(sensors) ─► emergency stop chain ─► main chain ─► work: what is asked ─► program: opening ─► Answer
 //! ```
 //!
-//! Drive and load are the same code; what differs is their [`Work`] (a position, a force, or nothing) and their program. They
+//! Drive and load are the same code; what differs is their work (a position, a force, or nothing) and their program. They
 //! know each other through what was heard alone. Nothing here allocates, locks, prints or blocks.
 
 mod average;

@@ -5,8 +5,8 @@
 //!                                                        commands of k - 1 latched ─► row recorded ─► plant steps
 //! ```
 //!
-//! The frames are the bus's own, coded and decoded, and the order is that of the lockstep barrier: what is rehearsed gives the same
-//! measurement, to the byte, as emulator and controllers in lockstep. This is the only place where the controller
+//! The frames are the bus's own, coded and decoded, and the order is that of the lockstep barrier: what is rehearsed gives
+//! the same measurement, to the byte, as emulator and controllers in lockstep. This is the only place where the controller
 //! looks into the plant; the rehearsed controllers see the frames alone.
 
 use crate::axis::{AxisController, AxisRecord};

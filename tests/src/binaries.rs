@@ -1,7 +1,8 @@
 //! Where the programs under test are: given by the environment, else built once as they ship.
 //!
-//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped, `bench`; a script that has
-//! built them sets these. Without them cargo builds the release profile, and says itself where the results are.
+//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped,
+//! `bench`; a script that has built them sets these. Without them cargo builds the release profile, and says itself where
+//! the results are.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

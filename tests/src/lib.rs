@@ -18,6 +18,7 @@ pub mod bus_cycles;
 pub mod events;
 pub mod launch;
 pub mod load;
+pub mod own;
 pub mod peer;
 pub mod process;
 pub mod records;
