@@ -30,12 +30,16 @@ pub fn table(runs: &[Run]) -> Grid {
     Grid { head, rows: rows.collect() }
 }
 
-/// Relative change in per cent; nothing against zero or the unknown.
+/// Changes beyond this, in per cent, say no more than that the first was next to nothing.
+const MOST_CHANGE: f64 = 1000.0;
+
+/// Relative change in per cent; nothing against zero, next to zero or the unknown.
 fn change(first: Option<f64>, other: Option<f64>) -> String {
     match (first, other) {
         (Some(first), Some(other)) if first == other => "0 %".into(),
         (Some(first), Some(other)) if first != 0.0 => {
-            format!("{:+.1} %", 100.0 * (other - first) / first.abs())
+            let change = 100.0 * (other - first) / first.abs();
+            if change.abs() > MOST_CHANGE { "-".into() } else { format!("{change:+.1} %") }
         }
         _ => "-".into(),
     }
@@ -54,7 +58,8 @@ pub fn page(runs: &[Run], grid: &Grid) -> Result<String, SummaryError> {
     let list: String = runs.iter().map(entry).collect();
     let figures: String = pictures.iter().map(|svg| format!("<figure>{svg}</figure>\n")).collect();
     Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}: {} runs</title>\n<style>{STYLE}</style></head>\n\
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}: {} \
+            runs</title>\n<style>{STYLE}</style></head>\n\
          <body>\n<h1>{title}: {} runs side by side</h1>\n<ul>\n{list}</ul>\n{}{figures}</body></html>\n",
         runs.len(),
         runs.len(),
@@ -65,7 +70,8 @@ pub fn page(runs: &[Run], grid: &Grid) -> Result<String, SummaryError> {
 
 const STYLE: &str = "body{font:15px sans-serif;max-width:1150px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
 table{border-collapse:collapse;margin:1.5em 0}td,th{padding:.25em .8em;border-bottom:1px solid #ccc;text-align:right;\
-font-variant-numeric:tabular-nums}td:first-child,th:first-child{text-align:left}figure{margin:2em 0}svg{max-width:100%;height:auto}";
+font-variant-numeric:tabular-nums}td:first-child,th:first-child{text-align:left}figure{margin:2em \
+    0}svg{max-width:100%;height:auto}";
 
 /// A run by name, with the programs that its experiment names.
 fn entry(run: &Run) -> String {
@@ -128,6 +134,7 @@ mod tests {
         assert_eq!(change(Some(-2.0), Some(-3.0)), "-50.0 %");
         assert_eq!(change(Some(0.0), Some(0.0)), "0 %");
         assert_eq!(change(Some(0.0), Some(3.0)), "-");
+        assert_eq!(change(Some(1e-16), Some(3.0)), "-");
         assert_eq!(change(None, Some(3.0)), "-");
     }
 }

@@ -1,7 +1,8 @@
 //! What a run adds up to, in named numbers: `figures` of `summary.json`.
 //!
-//! One file for each family in `figures/`, one line for each family in [`FAMILIES`]. A family says the name, unit and meaning of its
-//! figures and computes them from a [`Record`]; a figure that the run has nothing to measure on is absent, not zero.
+//! One file for each family in `figures/`, one line for each family in [`FAMILIES`]. A family says the name, unit and
+//! meaning of its figures and computes them from a [`Record`]; a figure that the run has nothing to measure on is absent,
+//! not zero.
 //! `bench figures` lists them all.
 //!
 //! Smoothing is a centred moving mean, velocity a centred least-squares slope: both shift nothing in time.

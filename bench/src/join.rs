@@ -1,6 +1,7 @@
 //! Joins what emulator and controllers left in a run's folder: `summary.json` and `run.json` become whole.
 //!
-//! The emulator writes both with what the rig knows. `controller.json` (one process for both axes), or `controller-drive.json` and
+//! The emulator writes both with what the rig knows. `controller.json` (one process for both axes), or
+//! `controller-drive.json` and
 //! `controller-load.json` (a process each), hold what only the controllers know; the tables give the figures. Joining twice gives
 //! the same as joining once. A key that is missing, since another version or a foreign controller wrote the file, counts as not
 //! known: null.

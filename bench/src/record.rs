@@ -1,8 +1,8 @@
 //! What a run's folder holds of the run itself: the tables, and what the experiment asked for.
 //!
 //! Sensors and valves come from `measurement.csv`, set-points and states of the chains from `controller-drive.csv` and
-//! `controller-load.csv`, what only a simulation knows from `truth.csv`. A table that is not there is empty, and so are the figures
-//! that would need it.
+//! `controller-load.csv`, what only a simulation knows from `truth.csv`. A table that is not there is empty, and so are the
+//! figures that would need it.
 
 use crate::SummaryError;
 use crate::series::{Series, Span};
@@ -172,8 +172,8 @@ impl Step {
 /// For how long a set-point stays before and after what counts as a step.
 const STAYS_S: f64 = 0.05;
 
-/// The largest jump of `set_point` within `spans` of at least `least_value`; the first of equals. The values that it leaves and takes last
-/// at least 50 ms each, so that ramps, sines and loads that follow the motion have none.
+/// The largest jump of `set_point` within `spans` of at least `least_value`; the first of equals. The values that it leaves
+/// and takes last at least 50 ms each, so that ramps, sines and loads that follow the motion have none.
 #[must_use]
 pub fn largest_step(set_point: &Series, spans: &[Span], least_value: f64) -> Option<Step> {
     let stretches = set_point.constant_stretches();

@@ -122,8 +122,8 @@ pub fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
     TOP.iter().copied().chain(figures::definitions().map(|definition| (definition.name, definition.unit)))
 }
 
-/// Refuses runs that asked the rig for different things. Programs, their parameters, recording and bounds may differ: controllers are
-/// what is compared.
+/// Refuses runs that asked the rig for different things. Programs, their parameters, recording and bounds may differ:
+/// controllers are what is compared.
 ///
 /// # Errors
 /// [`RunsError::DifferentExperiments`]

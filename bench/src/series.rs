@@ -1,7 +1,8 @@
 //! A quantity over time, and the arithmetic that figures are made of.
 //!
-//! Samples stand at growing times; where there was no value there is no sample. Smoothing and slopes are centred, so that they shift
-//! nothing in time; at the ends their window is cut. Stretches of time are half open: a sample at `to_s` is no longer inside.
+//! Samples stand at growing times; where there was no value there is no sample. Smoothing and slopes are centred, so that
+//! they shift nothing in time; at the ends their window is cut. Stretches of time are half open: a sample at `to_s` is no
+//! longer inside.
 
 /// Times that differ by less are the same: far below a cycle, far above a rounding.
 const SAME_S: f64 = 1e-7;

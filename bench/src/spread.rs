@@ -19,14 +19,17 @@ struct Spread {
 impl Spread {
     fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
-        let mean = values.iter().sum::<f64>() / count as f64;
+        let (least, most) =
+            (values.iter().copied().reduce(f64::min)?, values.iter().copied().reduce(f64::max)?);
+        // The sum of equal values need not be a multiple to the bit.
+        let mean = if least == most { least } else { values.iter().sum::<f64>() / count as f64 };
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
         Some(Self {
             count,
             mean,
             standard_deviation: (count > 1).then(|| (squares / (count - 1) as f64).sqrt()),
-            least: values.iter().copied().reduce(f64::min)?,
-            most: values.iter().copied().reduce(f64::max)?,
+            least,
+            most,
         })
     }
 }
@@ -87,6 +90,8 @@ mod tests {
         assert!((spread.standard_deviation.unwrap() - (14.0_f64 / 3.0).sqrt()).abs() < 1e-15);
         assert_eq!(Spread::of(&[4.0]).unwrap().standard_deviation, None);
         assert_eq!(Spread::of(&[]), None);
+        let equal = Spread::of(&[0.1; 3]).unwrap();
+        assert_eq!((equal.mean, equal.standard_deviation), (0.1, Some(0.0)));
     }
 
     #[test]

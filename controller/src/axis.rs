@@ -5,7 +5,7 @@
 //!   answer(sensors) ─► emergency stop chain ─► main chain ─► work: what is asked ─► program: opening ─► Answer
 //! ```
 //!
-//! Drive and load are the same code; what differs is their [`Work`] (a position, a force, or nothing) and their program. They
+//! Drive and load are the same code; what differs is their work (a position, a force, or nothing) and their program. They
 //! know each other through what was heard alone. Nothing here allocates, locks, prints or blocks.
 
 mod average;
@@ -106,6 +106,10 @@ pub struct AxisController {
     asked: Option<Asked>,
     output: Option<MainOutput>,
     told: ChainStatus,
+    /// Cycle answered last.
+    answered: Option<u64>,
+    /// Periods of status and values in which they were sent last.
+    periods: [u64; 2],
     alive: u8,
 }
 
@@ -135,6 +139,8 @@ impl AxisController {
             asked: None,
             output: None,
             told: ChainStatus::default(),
+            answered: None,
+            periods: [0; 2],
             alive: 0,
         }
     }
@@ -170,13 +176,14 @@ impl AxisController {
         let supply_pa = rig.map_or(self.supply_pressure_pa, |rig| rig.supply_pressure_pa);
         self.program.observe(cycle, sensors, supply_pa);
         self.average.take(sensors.position_m);
-        if std::mem::take(&mut self.heard.partner_spoke) {
-            self.heard.partner.heard = Some(cycle);
-        }
+        self.listen(cycle);
         let output = self.advance(cycle, rig, rig.map(|_| self.own_axis(sensors)));
         let seen = Seen { cycle, rig, partner: &self.heard.partner, still: self.main.still() };
         self.asked = self.work.ask(&output, &seen, &mut self.program);
         self.fault = self.work.fault();
+        if self.fault.is_some() {
+            self.asked = None;
+        }
         self.change_parameters(&output);
         let command = self.command(cycle);
         if let Some(fault) = self.fault {
@@ -185,6 +192,18 @@ impl AxisController {
         self.take_figures(&output, sensors);
         let record = cycle.is_multiple_of(self.record_every).then(|| self.record(cycle, sensors, &command));
         self.answer_with(cycle, command, record)
+    }
+
+    /// Notes when the partner was heard. Cycles that the rig skipped, or that this process missed, are no silence of its: it
+    /// had nothing to answer, or nobody listened.
+    fn listen(&mut self, cycle: u64) {
+        let missed = self.answered.map_or(0, |last| cycle.saturating_sub(last + 1));
+        self.answered = Some(cycle);
+        let heard = &mut self.heard.partner.heard;
+        *heard = heard.map(|heard| heard + missed);
+        if std::mem::take(&mut self.heard.partner_spoke) {
+            *heard = Some(cycle);
+        }
     }
 
     /// What is to be said in `cycle` though no own sensors came, which is a fault once it lasted.
@@ -221,7 +240,8 @@ impl AxisController {
         if let Some(fault) = output.fault {
             self.stop.trip(fault, cycle);
         }
-        if output.state == MainChainState::InitialPositioning {
+        let before = self.output.map(|output| output.state);
+        if output.state == MainChainState::InitialPositioning && before != Some(output.state) {
             self.algorithm_fault = None;
             self.program.restart_algorithms();
         }
@@ -323,14 +343,16 @@ impl AxisController {
             cycle,
             cause: self.main.entered().cause,
         });
-        let [status_phase, values_phase] = SLOW_PHASES[self.axis.index()];
-        let due = |phase| changed || cycle % SLOW_PERIOD == phase;
+        // Counted, so that a cycle that was skipped puts off what was due in it and does not drop it.
+        let periods = SLOW_PHASES[self.axis.index()].map(|phase| (cycle + SLOW_PERIOD - phase) / SLOW_PERIOD);
+        let [status_due, values_due] = [0, 1].map(|which| changed || periods[which] != self.periods[which]);
+        self.periods = periods;
         self.told = status;
         Answer {
             command,
             emergency_stop: self.stop.frame_due(cycle),
-            status: due(status_phase).then_some(status),
-            values: due(values_phase).then(|| self.values()),
+            status: status_due.then_some(status),
+            values: values_due.then(|| self.values()),
             news,
             record,
         }
@@ -380,7 +402,7 @@ impl AxisController {
         self.program.restart();
         self.heard = Heard::default();
         self.figures.end_rest();
-        (self.asked, self.output, self.fault) = (None, None, None);
+        (self.asked, self.output, self.fault, self.answered) = (None, None, None, None);
     }
 
     /// Which axis.

@@ -34,7 +34,8 @@ use protocol::frames::{ChainStatus, ChainValues, RunControl, RunControlCommand};
 /// Seconds of one cycle.
 const CYCLE_S: f64 = 1e-3;
 
-/// Cycles after which a partner that is needed counts as lost: ten periods of its status.
+/// Cycles after which a partner that is needed counts as lost: ten periods of its status. Those that the axis answered itself
+/// count: when the rig skips cycles, or the own process is held up, the partner is not to blame.
 pub const PARTNER_LOST_CYCLES: u64 = 100;
 
 /// The partner as it was heard last.

@@ -246,7 +246,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn only_finite_results_leave_and_only_before_the_first_fault(results in prop::collection::vec(prop::num::f64::ANY, 1..50)) {
+        fn only_finite_results_leave_and_only_before_the_first_fault(
+            results in prop::collection::vec(prop::num::f64::ANY, 1..50),
+        ) {
             let mut bench = Bench::new(true);
             let mut faulty = false;
             for result in results {

@@ -10,7 +10,7 @@
 //! the force chain, which relieves the linked system and gives way to a hand. Every number is a [`Variable`], those of the chains
 //! too: it has a name such as `algorithm.gain_per_s` and may change between two cycles.
 //!
-//! [`file`] reads the file.
+//! [`mod@file`] reads the file.
 
 pub mod file;
 

@@ -5,8 +5,8 @@
 //!                                                        commands of k - 1 latched ─► row recorded ─► plant steps
 //! ```
 //!
-//! The frames are the bus's own, coded and decoded, and the order is that of the lockstep barrier: what is rehearsed gives the same
-//! measurement, to the byte, as emulator and controllers in lockstep. This is the only place where the controller
+//! The frames are the bus's own, coded and decoded, and the order is that of the lockstep barrier: what is rehearsed gives
+//! the same measurement, to the byte, as emulator and controllers in lockstep. This is the only place where the controller
 //! looks into the plant; the rehearsed controllers see the frames alone.
 
 use crate::axis::{AxisController, AxisRecord};
@@ -58,7 +58,6 @@ pub struct Rehearsal {
     news: Receiver<News>,
     cycle: u64,
     closing: bool,
-    told: Option<News>,
 }
 
 /// What a cycle left.
@@ -106,7 +105,6 @@ impl Rehearsal {
             news,
             cycle: 0,
             closing: false,
-            told: None,
         })
     }
 
@@ -141,7 +139,6 @@ impl Rehearsal {
         let truth = self.plant.truth(&self.inputs);
         let record = CycleRecord { cycle, valve: self.inputs.valve, readings, truth };
         self.plant.step(&self.inputs);
-        self.told = self.news.try_iter().last().or(self.told);
         let mut axes = [None, None];
         self.records.try_iter().for_each(|record| axes[record.axis.index()] = Some(record));
         Rehearsed { cycle: record, axes }
@@ -208,9 +205,9 @@ impl Rehearsal {
         self.cycle
     }
 
-    /// Newest news.
-    pub fn take_news(&mut self) -> Option<News> {
-        self.told.take()
+    /// News since they were taken last.
+    pub fn take_news(&mut self) -> impl Iterator<Item = News> {
+        self.news.try_iter()
     }
 
     /// Whether the controllers are done, or stopped for good.

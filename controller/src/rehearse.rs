@@ -5,9 +5,10 @@
 use crate::cli::RehearseArguments;
 use crate::recording::{Tables, sentence};
 use crate::rehearsal::{Rehearsal, RehearsalParts};
-use crate::report::{AxisReport, Report};
+use crate::report::{self, AxisReport, Report};
 use crate::run::RunError;
 use crate::setup::{Inputs, Mode};
+use crate::station::News;
 use plant::scene::Outcome;
 use plant::{Axis, Scene, tables};
 use protocol::bus::BusCounters;
@@ -36,18 +37,19 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let started = Instant::now();
     let mut files = Files::create(out, &scene).map_err(RunError::output)?;
     let cycles = (arguments.seconds * 1000.0).round() as u64;
-    let mut told = Vec::new();
+    let (mut told, mut news) = (Vec::new(), Vec::new());
     let mut interrupted = false;
     while rehearsal.cycles() < cycles && !rehearsal.ended() && !interrupted {
         let rehearsed = rehearsal.step(|cycle, outcome| told.push(event(cycle, outcome)));
         files.write(&rehearsed).map_err(RunError::output)?;
-        if let Some(news) = rehearsal.take_news() {
-            eprintln!("controller: {}", sentence(news));
+        for item in rehearsal.take_news() {
+            eprintln!("controller: {}", sentence(item));
+            news.push(item);
         }
         interrupted = interrupt.came();
     }
     files.write_out().map_err(RunError::output)?;
-    let ended = Ended { rehearsal, interrupted, told, took_s: started.elapsed().as_secs_f64() };
+    let ended = Ended { rehearsal, interrupted, told, news, took_s: started.elapsed().as_secs_f64() };
     save(arguments, &inputs, &scene, &ended)
 }
 
@@ -98,6 +100,7 @@ struct Ended {
     rehearsal: Rehearsal,
     interrupted: bool,
     told: Vec<serde_json::Value>,
+    news: Vec<News>,
     took_s: f64,
 }
 
@@ -113,7 +116,7 @@ fn save(
 ) -> Result<Exit, RunError> {
     let station = ended.rehearsal.station();
     let axes = AxisReport::of_station(station, inputs);
-    let stopped = axes.iter().find(|(_, axis)| axis.is_stopped());
+    let stopped = report::stopped(&axes);
     let (exit, ended_because) = match stopped {
         _ if ended.interrupted => {
             (Exit::Interrupted, "interrupted; everything recorded so far is saved".into())
@@ -154,7 +157,7 @@ fn save(
         realtime_granted: Vec::new(),
         realtime_refused: Vec::new(),
         axes,
-        news: Vec::new(),
+        news: ended.news.clone(),
     };
     write_json(&out.join("controller.json"), &report).map_err(RunError::output)?;
     let run = json!({

@@ -139,6 +139,13 @@ impl AxisReport {
     }
 }
 
+/// The axis that was stopped, the one with the fault before one that only followed it.
+#[must_use]
+pub fn stopped<'a>(axes: &'a BTreeMap<&'static str, AxisReport>) -> Option<(&'static str, &'a AxisReport)> {
+    let stopped = || axes.iter().filter(|(_, axis)| axis.is_stopped()).map(|(name, axis)| (*name, axis));
+    stopped().find(|(_, axis)| axis.chain_state == MainChainState::Fault.name()).or_else(|| stopped().next())
+}
+
 /// Name of the report of a process with these axes, without its ending.
 #[must_use]
 pub fn name(axes: &[Axis]) -> String {

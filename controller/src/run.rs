@@ -171,7 +171,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
 fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
     let Finished { paced, axes, .. } = &ended.finished;
     let done = arguments.files.repeat || axes.values().all(AxisReport::is_done);
-    let stopped = axes.iter().find(|(_, axis)| axis.is_stopped());
+    let stopped = report::stopped(axes);
     let aborted = || {
         let why = stopped.map_or_else(String::new, |(name, axis)| format!(": {name}: {}", axis.chain_cause));
         (Exit::BoundBroken, format!("stopped before the end{why}"))

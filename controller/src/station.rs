@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Only the newest sensors of an axis are answered: after a stall, the backlog is read and not replayed. An axis hears its
-//! partner as it would over the bus, a cycle after the partner spoke, also when both live in this process ([`Mail`]): one
+//! partner as it would over the bus, a cycle after the partner spoke, also when both live in this process: one
 //! process or two give the same log. Nothing here allocates, locks, prints or blocks.
 
 use crate::axis::{Answer, AxisController, AxisRecord};
@@ -21,8 +21,9 @@ use protocol::frames::{
 };
 use std::collections::VecDeque;
 
-/// Ticks of the rig, one every ten cycles, without sensors of an axis in between, after which they count as lost: 100 ms.
-const SILENT_TICKS: u64 = 10;
+/// Ticks of the rig, one every ten cycles, without sensors of an axis in between, after which they count as lost: 50 ms. Sooner
+/// than its partner gives it up for its silence, so that the cause is named.
+const SILENT_TICKS: u64 = 5;
 /// Cycles from tick to tick.
 const TICK_PERIOD: u64 = 10;
 /// Frames of a partner that wait for their cycle; a cycle has three at most.
@@ -225,8 +226,16 @@ impl Station {
         seat.stopped_for += if seat.controller.may_restart() { 0 } else { TICK_PERIOD };
         seat.silent_ticks = SILENT_TICKS - 1;
         if let Some(stop) = stop {
-            send(bus, &emergency_stop_frame(axis, stop));
+            self.send_to_all(place, cycle, &emergency_stop_frame(axis, stop), bus);
         }
+    }
+
+    /// Onto the bus, and to the partner if it lives in this process.
+    fn send_to_all(&mut self, place: usize, cycle: u64, frame: &Frame, bus: &mut dyn Bus) {
+        send(bus, frame);
+        self.seats.iter_mut().enumerate().filter(|(other, _)| *other != place).for_each(|(_, seat)| {
+            seat.mail.post(cycle, as_received(frame));
+        });
     }
 
     fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn Bus) {
@@ -238,10 +247,7 @@ impl Station {
             answer.values.map(|values| values_frame(axis, values)),
         ];
         for frame in frames.into_iter().flatten() {
-            send(bus, &frame);
-            self.seats.iter_mut().enumerate().filter(|(other, _)| *other != place).for_each(|(_, seat)| {
-                seat.mail.post(cycle, as_received(&frame));
-            });
+            self.send_to_all(place, cycle, &frame, bus);
         }
         if let Some(news) = answer.news {
             self.tell(news);

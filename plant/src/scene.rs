@@ -30,6 +30,11 @@
 //! at_s = 3.0
 //! do = "link"                    # or "unlink", "emergency-stop", "release", "weights" (with added_mass_kg)
 //! until_s = 5.0                  # tried in each cycle until then: the pin is wiggled in
+//!
+//! [[rig.event]]
+//! at_s = 1.0
+//! at_position_m = 0.25           # not at that time, but as soon as the carriage passes this place from then on
+//! do = "emergency-stop"
 //! ```
 //!
 //! | file | holds |
@@ -78,6 +83,9 @@ pub struct Scene {
 pub struct Event {
     /// When, s of the rig's time.
     pub at_s: f64,
+    /// From then on, as soon as the carriage passes this place, m; `None`: at that time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_position_m: Option<f64>,
     /// What.
     #[serde(flatten)]
     pub action: Action,

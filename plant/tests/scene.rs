@@ -42,6 +42,20 @@ fn eye_m(state: &State) -> f64 {
     0.5 - state.axes[1].extension_m
 }
 
+#[test]
+fn an_event_at_a_position_waits_for_the_carriage_from_its_time_on() {
+    let text = "[rig]\ncarriage_position_m = 0.1\n[[rig.event]]\nat_s = 0.05\nat_position_m = 0.2\ndo = \"emergency-stop\"\n\
+                [[rig.event]]\nat_s = 0.1\ndo = \"weights\"\nadded_mass_kg = 5\n";
+    let played = play(&scene(text), 1000, |_| [1.0, 0.0]);
+    let Some((cycle, Outcome::Stopped)) = played.told.last().copied() else { panic!("{:?}", played.told) };
+    assert_eq!(played.told[0], (100, Outcome::Weights { added_mass_kg: 5.0 }), "nothing waits for it");
+    let place_m = |cycle: u64| played.course[cycle as usize].0.axes[0].extension_m;
+    assert!(place_m(cycle - 1) < 0.2 && place_m(cycle) >= 0.2, "{cycle}");
+    // Beyond the place already: it is passed on the way back, and here there is none.
+    let late = text.replace("0.05", "0.5");
+    assert_eq!(play(&scene(&late), 1000, |_| [1.0, 0.0]).told.len(), 1);
+}
+
 // The file.
 
 #[test]

@@ -1,7 +1,8 @@
 //! Where the programs under test are: given by the environment, else built once as they ship.
 //!
-//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator` and `controller`; a script that has
-//! built them sets these. Without them cargo builds the release profile, and says itself where the results are.
+//! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped,
+//! `bench`; a script that has built them sets these. Without them cargo builds the release profile, and says itself where
+//! the results are.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -14,6 +15,8 @@ pub enum Program {
     Emulator,
     /// Process 2: the axis controllers.
     Controller,
+    /// What sums runs up.
+    Bench,
 }
 
 impl Program {
@@ -23,6 +26,7 @@ impl Program {
         match self {
             Self::Emulator => "emulator",
             Self::Controller => "controller",
+            Self::Bench => "bench",
         }
     }
 }
@@ -68,12 +72,13 @@ fn folder(variable: &str, features: &[&str]) -> PathBuf {
     std::env::var_os(variable).map_or_else(|| build(features), PathBuf::from)
 }
 
-/// Builds both programs and asks cargo where it put them. With features, into a target folder of its own: else each
+/// Builds the programs and asks cargo where it put them. With features, into a target folder of its own: else each
 /// build would throw the other's results away.
 fn build(features: &[&str]) -> PathBuf {
     let mut cargo = Command::new(option_env!("CARGO").unwrap_or("cargo"));
     cargo.current_dir(workspace()).args(["build", "--release", "--message-format=json-render-diagnostics"]);
-    for program in [Program::Emulator, Program::Controller] {
+    let all = [Program::Emulator, Program::Controller, Program::Bench];
+    for program in all.into_iter().filter(|program| features.is_empty() || *program != Program::Bench) {
         cargo.args(["--package", program.name(), "--bin", program.name()]);
     }
     if !features.is_empty() {

@@ -26,14 +26,15 @@ pub struct Launch {
     rig: PathBuf,
     experiment: PathBuf,
     out: PathBuf,
-    pace: Pace,
+    /// `None`: a rehearsal, which knows no bus and no pace.
+    pace: Option<Pace>,
     more: Vec<OsString>,
     shell: Option<String>,
     user: Option<u32>,
 }
 
 impl Launch {
-    pub(crate) fn new(program: Program, scene: &Scene, pace: Pace) -> Self {
+    pub(crate) fn new(program: Program, scene: &Scene, pace: Option<Pace>) -> Self {
         Self {
             program,
             build: Build::Shipped,
@@ -116,10 +117,13 @@ impl Launch {
             }
             None => Command::new(program),
         };
-        let pace = if self.pace == Pace::Real { "real" } else { "lockstep" };
-        command.arg("run").arg("--bus").arg(&self.bus).arg("--rig").arg(&self.rig);
-        command.arg("--experiment").arg(&self.experiment).arg("--out").arg(&self.out);
-        command.args(["--pace", pace]).args(&self.more);
+        match self.pace {
+            None => command.arg("rehearse"),
+            Some(Pace::Real) => command.args(["run", "--pace", "real", "--bus"]).arg(&self.bus),
+            Some(Pace::Lockstep) => command.args(["run", "--pace", "lockstep", "--bus"]).arg(&self.bus),
+        };
+        command.arg("--rig").arg(&self.rig).arg("--experiment").arg(&self.experiment);
+        command.arg("--out").arg(&self.out).args(&self.more);
         if let Some(user) = self.user {
             command.uid(user).gid(user);
         }

@@ -12,10 +12,13 @@
 //! protection against hanging, many times longer than what it limits takes.
 
 pub mod account;
+pub mod axis_table;
 pub mod binaries;
+pub mod bus_cycles;
 pub mod events;
 pub mod launch;
 pub mod load;
+pub mod own;
 pub mod peer;
 pub mod process;
 pub mod records;

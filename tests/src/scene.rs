@@ -46,13 +46,68 @@ gain_per_s = 40.0
 velocity_feed_forward = 1.0
 "#;
 
+/// Linked axes, the load pressing: some 4 s of preparing, a ramp, 0.05 m in 0.4 s, and a step of the force while it moves.
+pub const LINKED: &str = r#"title = "linked"
+number = 5
+[rig]
+carriage_position_m = 0.2
+linked = true
+[run]
+settling_s = 0.2
+[drive]
+program = "linked-program.toml"
+start_m = 0.2
+set-point = [
+    { law = "bestehorn", to_m = 0.25, duration_s = 1.0 },
+    { law = "rest", duration_s = 0.5 },
+]
+[load]
+program = "load-program.toml"
+prepare = ["relieve", "match"]
+initial_force_n = 100.0
+initial_ramp_s = 0.3
+set-point = [
+    { law = "constant", force_n = 100.0, duration_s = 0.5 },
+    { law = "step", to_n = 150.0, duration_s = 1.0 },
+]
+"#;
+
+/// The drive's program of the linked experiment, which each scene holds as linked-program.toml: the shipped one of its time.
+pub const LINKED_PROGRAM: &str = r#"title = "damped"
+[algorithm]
+name = "position-pid"
+gain_per_s = 10.0
+velocity_feed_forward = 1.0
+integral_time_s = 0.0
+derivative_time_s = 0.09
+rest_zone_m = 0.0003
+[post-controller]
+linearisation = "pressure-compensated"
+"#;
+
+/// The load's program of the linked experiment, which each scene holds as load-program.toml: the same.
+pub const LOAD_PROGRAM: &str = r#"title = "presses"
+[pre-controller]
+pressure_filter_hz = 200.0
+[algorithm]
+name = "force-pid-map"
+gain_per_s = 150.0
+integral_time_s = 0.2
+integral_limit_n = 100.0
+[post-controller]
+linearisation = "pressure-compensated"
+dead_zone_m_per_s = 0.004
+[giving-way]
+name = "force-manual"
+"#;
+
 /// A test's folder.
 pub struct Scene {
     folder: TempDir,
 }
 
 impl Scene {
-    /// A folder with the shipped rig file, this experiment and the program that it names.
+    /// A folder with the shipped rig file, this experiment and the programs that it names.
     ///
     /// # Panics
     /// When the temporary folder cannot be written.
@@ -65,6 +120,8 @@ impl Scene {
             .expect("plant/rig.toml is there");
         scene.write("experiment.toml", experiment);
         scene.write("program.toml", PROGRAM);
+        scene.write("linked-program.toml", LINKED_PROGRAM);
+        scene.write("load-program.toml", LOAD_PROGRAM);
         scene
     }
 
@@ -109,13 +166,25 @@ impl Scene {
     /// The emulator on the scene's bus, writing to the folder `emulator`.
     #[must_use]
     pub fn emulator(&self, pace: Pace) -> Launch {
-        Launch::new(Program::Emulator, self, pace)
+        Launch::new(Program::Emulator, self, Some(pace))
     }
 
     /// The controller on the scene's bus, writing to the folder `controller`.
     #[must_use]
     pub fn controller(&self, pace: Pace) -> Launch {
-        Launch::new(Program::Controller, self, pace)
+        Launch::new(Program::Controller, self, Some(pace))
+    }
+
+    /// The controller of one axis alone, writing to the folder `controller` too: its files have names of their own.
+    #[must_use]
+    pub fn axis_controller(&self, pace: Pace, axis: &str) -> Launch {
+        self.controller(pace).with(&format!("--axis {axis}"))
+    }
+
+    /// A rehearsal, writing to the folder `controller`.
+    #[must_use]
+    pub fn rehearsal(&self) -> Launch {
+        Launch::new(Program::Controller, self, None)
     }
 
     /// A bus of its own process; `options` follow the URL's question mark. It serves when this returns.

@@ -78,6 +78,6 @@ fn the_controllers_end_an_aborted_experiment_by_themselves() {
     let _ = controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
     let _ = emulator.wait();
     let report = json(&scene.path("controller/controller.json"));
-    assert_eq!(report["chain_state"], "aborted");
+    assert_eq!(report["axes"]["drive"]["chain_state"], "aborted");
     assert_eq!(report["ended_well"], false);
 }

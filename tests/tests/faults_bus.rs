@@ -5,29 +5,37 @@ use rustix::process::Signal;
 use system_tests::account::of_sensors;
 use system_tests::events::{self, expect_valve_shut_between};
 use system_tests::launch::Pace;
-use system_tests::process::PATIENCE;
+use system_tests::process::{PATIENCE, Running};
 use system_tests::records::{Table, bus_log, count, count_of_id, json};
 use system_tests::scene::{RESTLESS, SHORT, Scene};
 use system_tests::turn;
 
 const UNDER_WAY: usize = 900;
 
+/// Controllers of both axes that mind nobody's absence, nor a second one's presence.
+fn alone(scene: &Scene, folder: &str) -> [Running; 2] {
+    ["drive", "load"].map(|axis| {
+        let controller = scene.axis_controller(Pace::Real, axis).out(&scene.path(folder));
+        controller.with("--alone --repeat").start()
+    })
+}
+
 #[test]
 fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let mut emulator = scene.emulator(Pace::Real).start();
-    let first = scene.controller(Pace::Real).with("--repeat").start();
+    let first = alone(&scene, "first");
     scene.wait_for_rows("emulator", UNDER_WAY);
-    let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
+    let second = alone(&scene, "second");
     emulator.wait_for("fault two-sources: two senders on the drive command, valve shut");
     scene.wait_for_more_rows("emulator", 200);
-    let _ = second.kill();
+    second.into_iter().for_each(|controller| drop(controller.kill()));
     emulator.wait_for("one sender left on the drive command, valve follows");
     scene.wait_for_more_rows("emulator", 600);
     emulator.signal(Signal::INT);
     let _ = emulator.wait().expect_code(130);
-    let _ = first.wait().expect_code(0);
+    first.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
     let summary = json(&scene.path("emulator/summary.json"));
     let measurement = Table::read(&scene.path("emulator/measurement.csv"));
     expect_valve_shut_between(&summary, &measurement, "two-sources", "one-source");
@@ -38,6 +46,24 @@ fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
     for span in events::spans(&told, "two-sources", "one-source", measurement.len()) {
         assert!(span.len() >= 20, "cleared after 20 silent cycles, not before: {span:?}");
     }
+}
+
+#[test]
+fn controllers_that_know_of_each_other_take_a_second_one_for_a_fault_and_stop() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let emulator = scene.emulator(Pace::Real).start();
+    let first = scene.controller(Pace::Real).with("--repeat").start();
+    scene.wait_for_rows("emulator", UNDER_WAY);
+    let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
+    let _ = first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
+    let _ = second.wait().expect_code(1);
+    emulator.signal(Signal::INT);
+    let _ = emulator.wait().expect_code(130);
+    let told = events::all(&json(&scene.path("emulator/summary.json")));
+    assert!(events::times(&told, "emergency-stop") >= 1, "{told:?}");
+    let valve = Table::read(&scene.path("emulator/measurement.csv")).column("drive_valve");
+    assert!(valve[valve.len() - 1000..].iter().all(|opening| *opening == 0.0), "the valve stays shut");
 }
 
 #[test]

@@ -32,7 +32,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
     controller.signal(Signal::CONT);
     let code = controller.wait_within(LIMIT).code;
     assert!(matches!(code, Some(BUS_FAILED | LOCKSTEP_TIMEOUT)), "the controller ends too, with {code:?}");
-    let _ = expect_whole_lines(&scene.path("controller/controller.csv"));
+    let _ = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn an_emulator_that_is_killed_ends_the_member() {
     scene.wait_for_rows("emulator", 600);
     let _ = emulator.kill();
     let _ = controller.wait_within(LIMIT).expect_code(BUS_FAILED);
-    let rows = expect_whole_lines(&scene.path("controller/controller.csv"));
+    let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
     assert_eq!(count(&json(&scene.path("controller/controller.json")), "/cycles_answered"), rows as u64);
 }
 
@@ -97,7 +97,7 @@ fn a_second_emulator_on_the_bus_does_not_take_the_first_ones_place() {
     let scene = Scene::new(RESTLESS);
     let emulator = scene.emulator(Pace::Lockstep).with("--seconds 60").start();
     let mut controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    controller.wait_for(": experiment");
+    controller.wait_for(": drive experiment");
     let second = scene.emulator(Pace::Lockstep).out(&scene.path("second")).with("--join-timeout 1").start();
     let second = second.wait_within(LIMIT);
     assert_eq!(second.code, Some(BUS_FAILED), "the second is refused; it said:\n{}", second.stderr);

@@ -46,7 +46,7 @@ fn a_controller_whose_file_cannot_grow_ends_and_the_rig_shuts_its_valve() {
     let controller = scene.controller(Pace::Real).with("--repeat").after_shell(SMALL_FILES).start();
     expect_told(controller.wait(), &scene.path("controller"));
     emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
-    assert!(expect_whole_lines(&scene.path("controller/controller.csv")) > 100);
+    assert!(expect_whole_lines(&scene.path("controller/controller-drive.csv")) > 100);
     let report = json(&scene.path("controller/controller.json"));
     assert_eq!(report["ended_because"], "the output could not be written");
 }

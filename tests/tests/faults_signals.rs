@@ -33,8 +33,8 @@ fn expect_complete(scene: &Scene, pace: Pace, signal: Signal) {
     let frames = count(&summary, "/frames_sent") + count(&summary, "/frames_received");
     assert_eq!(bus_log(&scene.path("emulator/bus.log")).len() as u64, frames, "lines of bus.log, {at}");
     let report = json(&scene.path("controller/controller.json"));
-    let rows = expect_whole_lines(&scene.path("controller/controller.csv"));
-    assert_eq!(count(&report, "/cycles_answered"), rows as u64, "rows of controller.csv, {at}");
+    let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
+    assert_eq!(count(&report, "/cycles_answered"), rows as u64, "rows of controller-drive.csv, {at}");
     if pace == Pace::Real {
         for hlog in ["emulator/emulator.hlog", "controller/controller.hlog"] {
             assert!(scene.path(hlog).exists(), "{hlog} is missing, {at}");

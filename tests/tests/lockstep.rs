@@ -9,7 +9,7 @@ use system_tests::scene::{SHORT, Scene};
 
 /// Files of emulator and controller that must be the same.
 const FILES: [&str; 4] =
-    ["emulator/bus.log", "emulator/measurement.csv", "emulator/truth.csv", "controller/controller.csv"];
+    ["emulator/bus.log", "emulator/measurement.csv", "emulator/truth.csv", "controller/controller-drive.csv"];
 
 /// How a run differs from another in what must not matter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,9 @@ fn two_runs_give_the_same_files_to_the_byte_whatever_the_circumstances() {
             assert!(first.same(&first.path(file), &again.path(file)), "{file} differs with {circumstance:?}");
         }
         for figure in ["position_error_dynamic_m", "position_error_static_m"] {
-            let of = |scene: &Scene| json(&scene.path("controller/controller.json"))[figure].clone();
+            let of = |scene: &Scene| {
+                json(&scene.path("controller/controller.json"))["axes"]["drive"][figure].clone()
+            };
             assert_eq!(of(&first), of(&again), "{figure} with {circumstance:?}");
             assert!(of(&first).is_number(), "{figure} was measured");
         }

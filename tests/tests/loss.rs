@@ -56,7 +56,7 @@ impl Counted {
             "{axis} sensors: what the trace misses is what the wire lost"
         );
         let account = of_sensors(&self.heard, id);
-        let lost = count(&self.controller, &format!("/sensors_lost/{axis}"));
+        let lost = count(&self.controller, &format!("/axes/{axis}/sensors_lost"));
         assert_eq!(
             lost, account.missing_between_ticks,
             "{axis} sensors: gaps at the controller, {account:?}"
@@ -150,7 +150,7 @@ fn without_loss_nobody_counts_any() {
         assert_eq!(count(&counted.summary, pointer), 0, "{pointer}");
     }
     for axis in ["drive", "load"] {
-        assert_eq!(count(&counted.controller, &format!("/sensors_lost/{axis}")), 0, "{axis}");
+        assert_eq!(count(&counted.controller, &format!("/axes/{axis}/sensors_lost")), 0, "{axis}");
     }
 }
 

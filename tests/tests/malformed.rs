@@ -16,7 +16,8 @@ use system_tests::scene::{SHORT, Scene};
 /// The carriage moves from here on; before, an open valve would show as well, but later is closer to what matters.
 const FIRST_CYCLE: u32 = 750;
 const EVERY: u32 = 3;
-const FILES: [&str; 3] = ["emulator/measurement.csv", "emulator/truth.csv", "controller/controller.csv"];
+const FILES: [&str; 3] =
+    ["emulator/measurement.csv", "emulator/truth.csv", "controller/controller-drive.csv"];
 
 /// What the injector does in a cycle.
 type Act<'a> = &'a mut dyn FnMut(&Peer, u32);

@@ -57,7 +57,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "release_jump_m",
             unit: "m",
-            meaning: "largest change of the drive's position from the opening of the check valves until the valves are commanded again, 0.2 s at most",
+            meaning: "largest change of the drive's position from the opening of the check valves until the valves are \
+                commanded again, 0.2 s at most",
         },
         Definition {
             name: "restart_jump_m",

@@ -33,7 +33,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "force_rest_peak_to_peak_n",
             unit: "N",
-            meaning: "largest peak to peak of the force in the last 0.5 s of the rests of the drive's set-point, the force's set-point being constant",
+            meaning: "largest peak to peak of the force in the last 0.5 s of the rests of the drive's set-point, the \
+                force's set-point being constant",
         },
         Definition {
             name: "force_initial_settled_n",
@@ -44,7 +45,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "load_law_error_rms_n",
             unit: "N",
-            meaning: "rms of force less set-point in the experiment, for a load that follows from the motion (spring, damper, mass, dry friction)",
+            meaning: "rms of force less set-point in the experiment, for a load that follows from the motion (spring, \
+                damper, mass, dry friction)",
         },
         Definition {
             name: "load_law_error_largest_n",

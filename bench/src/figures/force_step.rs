@@ -49,7 +49,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "force_settling_s",
             unit: "s",
-            meaning: "from the step until the force stays within 5 % of it around the final value (mean over the last 0.2 s of the 0.5 s that are looked at); absent when it does not",
+            meaning: "from the step until the force stays within 5 % of it around the final value (mean over the last 0.2 \
+                s of the 0.5 s that are looked at); absent when it does not",
         },
         Definition {
             name: "force_settling_to_set_point_s",
@@ -85,7 +86,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "position_error_recovered_s",
             unit: "s",
-            meaning: "from the step until |position error| stays below 5 mm or its level before, whichever is larger, within 1.5 s; absent when it does not",
+            meaning: "from the step until |position error| stays below 5 mm or its level before, whichever is larger, \
+                within 1.5 s; absent when it does not",
         },
     ],
     compute,
@@ -196,7 +198,8 @@ mod tests {
 
     #[test]
     fn the_drive_falls_behind_and_catches_up() {
-        // e = 0.03 s/T exp(1 - s/T), T = 0.1 s: peak 30 mm at T; slope 0.3 e exp(..) > 0.1 m/s at first, so the drive even turns back.
+        // e = 0.03 s/T exp(1 - s/T), T = 0.1 s: peak 30 mm at T; slope 0.3 e exp(..) > 0.1 m/s at first, so the drive even
+        // turns back.
         let figures =
             figures(|since| f64::from(since > 0.0), |since| 0.3 * since * (1.0 - since / 0.1).exp());
         assert!((figures.get("position_error_peak_after_step_m").unwrap() - 0.03).abs() < 1e-5);

@@ -1,7 +1,8 @@
 //! The load axis moved by hand: what the hand has to push.
 //!
-//! Unlinked, the load's force sensor reads the hand. Whether the axis moves is taken from its position and not from what the
-//! controller thinks, so that controllers with and without a distinction of cases are judged alike.
+//! Unlinked, the load's force sensor reads the hand; beside the carriage it may read the linkage, so there nothing is taken.
+//! Whether the axis moves is taken from its position and not from what the controller thinks, so that controllers with and
+//! without a distinction of cases are judged alike.
 
 use super::force::NOISE_S;
 use super::{Definition, Family, Figures};
@@ -14,6 +15,10 @@ const MOVES_M_PER_S: f64 = 0.01;
 const SLOPE_S: f64 = 0.02;
 /// The first movement has begun when the axis is so far from where it stood.
 const AWAY_M: f64 = 0.001;
+/// A load eye that is no further from the carriage may be linked to it: the sensor's offset and the linkage's gap are below.
+const BESIDE_M: f64 = 0.005;
+/// What is looked at in the end.
+const END_S: f64 = 0.3;
 /// States of the force chain in which a hand may move the axis.
 const BY_HAND: &[&str] = &["limited", "standstill", "moving"];
 
@@ -24,7 +29,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "hand_force_mean_n",
             unit: "N",
-            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s",
+            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s, \
+                      more than 5 mm from the carriage",
         },
         Definition {
             name: "hand_force_largest_n",
@@ -35,6 +41,12 @@ pub(super) const FAMILY: Family = Family {
             name: "hand_force_breakaway_n",
             unit: "N",
             meaning: "largest |force| until the load axis is 1 mm from where it stood",
+        },
+        Definition {
+            name: "hand_valve_unrest_ratio",
+            unit: "1",
+            meaning: "share of the cycles in which the load's valve is moved, in the last 0.3 s of the experiment, \
+                      the hand being gone",
         },
     ],
     compute,
@@ -47,9 +59,12 @@ fn compute(record: &Record, figures: &mut Figures) {
     let force = record.measured.numbers("load_force_N").smoothed(NOISE_S).map(f64::abs);
     let moving: Series =
         position.slope(SLOPE_S).iter().filter(|(_, velocity)| velocity.abs() >= MOVES_M_PER_S).collect();
-    let pushing = force.with(&moving, |force, _| force).within_all(&by_hand);
+    let apart = position.minus(record.measured.numbers("drive_position_m"));
+    let free = by_hand_alone(&by_hand, &apart);
+    let pushing = force.with(&moving, |force, _| force).within_all(&free);
     figures.put("hand_force_mean_n", pushing.mean());
     figures.put("hand_force_largest_n", pushing.most());
+    figures.put("hand_valve_unrest_ratio", by_hand.last().and_then(|last| unrest(record, last)));
     let smooth = position.smoothed(SLOPE_S);
     let start = smooth.at(first.from_s);
     let leaves_s = start.and_then(|start| {
@@ -57,6 +72,21 @@ fn compute(record: &Record, figures: &mut Figures) {
     });
     let until_then = leaves_s.map(|to_s| force.within(&Span { from_s: first.from_s, to_s }));
     figures.put("hand_force_breakaway_n", until_then.and_then(|force| force.most()));
+}
+
+fn unrest(record: &Record, by_hand: &Span) -> Option<f64> {
+    let valve = record.measured.numbers("load_valve").within(&by_hand.last(END_S));
+    let moved = valve.values().windows(2).filter(|pair| pair[0] != pair[1]).count();
+    (valve.len() > 1).then(|| moved as f64 / (valve.len() - 1) as f64)
+}
+
+/// The stretches in which the load eye is certainly not linked.
+fn by_hand_alone(by_hand: &[Span], apart: &Series) -> Vec<Span> {
+    if apart.is_empty() {
+        by_hand.to_vec()
+    } else {
+        common(&apart.stretches(|apart| apart.abs() > BESIDE_M), by_hand)
+    }
 }
 
 #[cfg(test)]
@@ -84,6 +114,21 @@ mod tests {
         let figures = super::super::of(&record);
         assert!((figures.get("hand_force_mean_n").unwrap() - 12.0).abs() < 0.5, "blurred at both ends");
         assert!((figures.get("hand_force_breakaway_n").unwrap() - 40.0).abs() < 0.5);
+        // In the last 4 mm before the carriage the linkage knocks.
+        let knock = |time: f64| if (1.96..2.0).contains(&time) { 100.0 } else { 0.0 };
+        let force = each_ms(0.0, 3.0, |time| knock(time) - if time < 2.0 { 12.0 } else { 0.0 });
+        let carriage = each_ms(0.0, 3.0, |_| 0.4);
+        // One value in even cycles, another in odd ones.
+        let valve = each_ms(0.0, 3.0, |time| if (time * 500.0).fract() < 0.25 { 0.01 } else { 0.02 });
+        let pressed = [
+            ("load_position_m", &position),
+            ("load_force_N", &force),
+            ("drive_position_m", &carriage),
+            ("load_valve", &valve),
+        ];
+        let linked = super::super::of(&Record { measured: table(&pressed), ..record.clone() });
+        assert!((linked.get("hand_force_largest_n").unwrap() - 12.0).abs() < 0.5);
+        assert!(linked.get("hand_valve_unrest_ratio").unwrap() > 0.9, "changed from each cycle to the next");
         let idle = Record { load: Table::default(), ..record };
         assert_eq!(super::super::of(&idle).get("hand_force_mean_n"), None);
     }

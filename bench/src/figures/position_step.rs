@@ -42,12 +42,14 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "valve_saturated_s",
             unit: "s",
-            meaning: "how long |opening| of the drive's valve stays at 0.99 or more from the step on; 0 when it never gets there within 20 ms",
+            meaning: "how long |opening| of the drive's valve stays at 0.99 or more from the step on; 0 when it never \
+                gets there within 20 ms",
         },
         Definition {
             name: "position_oscillation_after_settling_m",
             unit: "m",
-            meaning: "peak to peak of the position, smoothed over 10 ms, from 0.2 s after settling until the set-point changes again",
+            meaning: "peak to peak of the position, smoothed over 10 ms, from 0.2 s after settling until the set-point \
+                changes again",
         },
     ],
     compute,

@@ -9,11 +9,11 @@
 //! w: set-point of the force, N, zero as a rule; F: own force sensor, N, compression positive; x': rate of the own extension,
 //! m/s; k_p: gain, m/(N s); k_f: share of the rate; d: dead zone, N; v_max: limit, m/s. No state.
 //!
-//! At standstill neither the zero of the sensor nor the noise of x' shall set the rod in motion, hence the dead zone and no feed-forward.
-//! Once the rod moves, a dead zone would be a force for the hand, and k_f x' lets the air follow the rod. A rod let go in motion
-//! slides on by v b / (c (1 - k_f)), since only its spring stops it: k_f = 1 is the ideal for the hand and never stops.
-//! b: viscous friction, N s/m; c: stiffness of the air, N/m. The limit is for high forces in the beginning.
-//! Which case it is, and which limit, the force chain decides and sets in each cycle.
+//! At standstill neither the zero of the sensor nor the noise of x' shall set the rod in motion, hence the dead zone and no
+//! feed-forward. Once the rod moves, a dead zone would be a force for the hand, and k_f x' lets the air follow the rod. A
+//! rod let go in motion slides on by v b / (c (1 - k_f)), since only its spring stops it: k_f = 1 is the ideal for the hand
+//! and never stops. b: viscous friction, N s/m; c: stiffness of the air, N/m. The limit is for high forces in the
+//! beginning. Which case it is, and which limit, the force chain decides and sets in each cycle.
 //!
 //! Source: [Neugebauer 2011, section 4], manual mode.
 

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! w: set-point of the force, N; F: own force sensor, N, compression positive; x': rate of the own extension, m/s; k_p: gain,
-//! m/(N s); k_f: share of the rate. No state. At a blocked rod the air integrates v to force, so P alone leaves no lasting error; the
-//! motion that the other axis forces on the rod would, and x' moves the air along with the rod.
+//! m/(N s); k_f: share of the rate. No state. At a blocked rod the air integrates v to force, so P alone leaves no lasting
+//! error; the motion that the other axis forces on the rod would, and x' moves the air along with the rod.
 //!
 //! Source: [Neugebauer 2011, section 4].
 

@@ -12,13 +12,14 @@
 //! w, w': set-point and its rate, N and N/s; F, F': own force sensor and its filtered rate; x', x'': filtered rates of the own
 //! extension, m/s and m/s^2; c: stiffness of the air, N/m, from nominal geometry and measured position and pressures: the
 //! characteristic map, which has its counterpart for the valve in the pressure-compensated linearisation
-//! ([`crate::linearisation`]); b: nominal viscous friction, N s/m; k_p: gain, 1/s; T_i, T_d: integral and derivative time, s; T_r, T_v: time
-//! constants, s; v_r: m/s; k_r, k_f, k_b: shares fed forward; s: how much the rod moves, 0 to 1; d: dead zone, N; T_f: 50 ms.
+//! ([`crate::linearisation`]); b: nominal viscous friction, N s/m; k_p: gain, 1/s; T_i, T_d: integral and derivative time,
+//! s; T_r, T_v: time constants, s; v_r: m/s; k_r, k_f, k_b: shares fed forward; s: how much the rod moves, 0 to 1; d: dead
+//! zone, N; T_f: 50 ms.
 //!
-//! Why: a step is more than the valve can do, so the error is taken against what can be expected by now, and the gain need not be low
-//! for the step's sake. The sensor sees what is left of the air's force behind the rod's friction: when the other axis slows
-//! down under the step, b x'' of it comes or goes, and is fed forward. At rest friction freezes the force: the integral fades
-//! and small errors are let be, lest they pump the rod loose.
+//! Why: a step is more than the valve can do, so the error is taken against what can be expected by now, and the gain need
+//! not be low for the step's sake. The sensor sees what is left of the air's force behind the rod's friction: when the
+//! other axis slows down under the step, b x'' of it comes or goes, and is fed forward. At rest friction freezes the force:
+//! the integral fades and small errors are let be, lest they pump the rod loose.
 //!
 //! The integral part stops at its limit, and while the valve cannot follow unless the error takes it back.
 //!

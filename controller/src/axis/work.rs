@@ -10,8 +10,8 @@
 //!   hold the end        hold the end          hold the last force, or give way
 //! ```
 //!
-//! An axis under force control holds its valve shut while the rods are not linked, save where it gives way to a hand: with nothing
-//! to press against it would run into its end.
+//! An axis under force control holds its valve shut while the rods are not linked, save where it gives way to a hand: with
+//! nothing to press against it would run into its end.
 
 use crate::algorithm::Ready;
 use crate::chains::force::{ForceAsked, ForceChain, ForceInputs};

@@ -23,7 +23,8 @@
 //!
 //! At first the velocity is limited, since a high force between linked axes would throw the rod. The case distinction on
 //! significant movement is the paper's: at standstill the noise of the velocity must not be fed forward, and a control error
-//! within the friction must not be worked on; when moving, both would be felt in the hand.
+//! within the friction must not be worked on; when moving, both would be felt in the hand. Movement begins with the velocity and
+//! ends with its mean: a rod that bounces within the gap of the linkage is fast at times and goes nowhere.
 
 use super::{CYCLE_S, Entered, Fault, cycles, elapsed_s};
 use crate::parameters::Parameter;
@@ -34,12 +35,7 @@ pub const TABLE: &str = "force-chain";
 
 /// Parameters, in the order of the slices.
 pub const PARAMETERS: &[Parameter] = &[
-    Parameter::new(
-        ("high_force_n", "N"),
-        [1.0, 2000.0],
-        150.0,
-        "above it, at first, the velocity is limited",
-    ),
+    Parameter::new(("high_force_n", "N"), [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),
     Parameter::new(("limited_m_per_s", "m/s"), [1e-3, 1.0], 0.02, "largest rod velocity while it is limited"),
     Parameter::new(("low_force_for_s", "s"), [0.0, 10.0], 0.05, "how long the force must be low to end that"),
     Parameter::new(("moving_m_per_s", "m/s"), [1e-4, 1.0], 0.01, "significant movement; half of it ends it"),
@@ -47,12 +43,14 @@ pub const PARAMETERS: &[Parameter] = &[
     Parameter::new(("still_for_s", "s"), [0.0, 1.0], 0.1, "how long it must not, to be at standstill again"),
     Parameter::new(("relieved_n", "N"), [0.1, 2000.0], 20.0, "mean force of a relieved system"),
     Parameter::new(("relieved_for_s", "s"), [0.0, 60.0], 0.3, "how long it must be lower, at standstill"),
-    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 8.0, "how long relieving may take"),
+    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 15.0, "how long relieving may take"),
 ];
 
 /// Time constant of the mean force, s.
 const MEAN_S: f64 = 0.05;
-/// Share of the significant velocity below which movement ends.
+/// Time constant of the mean velocity, s: long beside a rod that bounces within the gap of the linkage, which goes nowhere.
+const MEAN_VELOCITY_S: f64 = 0.15;
+/// Share of the significant velocity below which, in the mean, movement ends.
 const STILL_SHARE: f64 = 0.5;
 
 /// [`PARAMETERS`] by name.
@@ -168,6 +166,27 @@ pub enum ForceCause {
     TooLong,
 }
 
+/// Means of what the axis shows, up to a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Mean {
+    cycle: u64,
+    force_n: f64,
+    velocity_m_per_s: f64,
+}
+
+impl Mean {
+    fn to(self, now: &Self) -> Self {
+        let passed_s = now.cycle.saturating_sub(self.cycle) as f64 * CYCLE_S;
+        let towards =
+            |mean: f64, value: f64, constant_s: f64| mean + (passed_s / constant_s).min(1.0) * (value - mean);
+        Self {
+            cycle: now.cycle,
+            force_n: towards(self.force_n, now.force_n, MEAN_S),
+            velocity_m_per_s: towards(self.velocity_m_per_s, now.velocity_m_per_s, MEAN_VELOCITY_S),
+        }
+    }
+}
+
 /// State of the chain; each holds what it needs and nothing else. `began` is when the relief or the manual mode began.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
@@ -190,7 +209,7 @@ pub struct ForceChain {
     state: State,
     asked: ForceAsked,
     /// Mean of the force, with the cycle of its last sample.
-    mean: Option<(u64, f64)>,
+    mean: Option<Mean>,
     entered: Entered<ForceChainState, ForceCause>,
 }
 
@@ -230,24 +249,27 @@ impl ForceChain {
 
     /// Keeps what the inputs tell, without a change of state.
     fn note(&mut self, inputs: &ForceInputs, numbers: &Numbers) {
-        let ForceInputs { cycle, force_n, .. } = *inputs;
-        let mean_n = self.mean.map_or(force_n, |(last, mean_n)| {
-            let share = (cycle.saturating_sub(last) as f64 * CYCLE_S / MEAN_S).min(1.0);
-            mean_n + share * (force_n - mean_n)
-        });
+        let ForceInputs { cycle, force_n, velocity_m_per_s, .. } = *inputs;
+        let now = Mean { cycle, force_n, velocity_m_per_s };
+        let mut mean = self.mean.map_or(now, |last| last.to(&now));
+        if !matches!(self.state, State::Moving { .. }) {
+            // The mean is of one movement: what was before it does not count.
+            mean.velocity_m_per_s = velocity_m_per_s;
+        }
         // What is no number must not stay.
-        self.mean = mean_n.is_finite().then_some((cycle, mean_n));
+        self.mean = (mean.force_n.is_finite() && mean.velocity_m_per_s.is_finite()).then_some(mean);
+        let mean_n = mean.force_n;
         let lasting = |since: &mut Option<u64>, holds: bool| {
             *since = if holds { since.or(Some(cycle)) } else { None };
         };
-        let speed_m_per_s = inputs.velocity_m_per_s.abs();
         match &mut self.state {
             State::Limited { low_since, .. } => lasting(low_since, force_n.abs() < numbers.high_force_n),
             State::Standstill { moves_since, low_since, .. } => {
-                lasting(moves_since, speed_m_per_s > numbers.moving_m_per_s);
+                lasting(moves_since, velocity_m_per_s.abs() > numbers.moving_m_per_s);
                 lasting(low_since, mean_n.abs() < numbers.relieved_n);
             }
             State::Moving { still_since, .. } => {
+                let speed_m_per_s = mean.velocity_m_per_s.abs();
                 lasting(still_since, speed_m_per_s < STILL_SHARE * numbers.moving_m_per_s);
             }
             _ => {}

@@ -189,3 +189,48 @@ fn the_shipped_experiments_are_read() {
     }
     assert!(count > 0);
 }
+
+/// The experiments that come with airbench: name of the file, text, what was read.
+fn shipped() -> Vec<(String, String, Experiment)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let shipped = files.filter(|path| path.extension().is_some_and(|ending| ending == "toml")).map(|path| {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let experiment = Experiment::from_toml(&text, &path, 0.5).unwrap_or_else(|error| panic!("{error}"));
+        (path.file_stem().unwrap().to_str().unwrap().to_owned(), text, experiment)
+    });
+    shipped.collect()
+}
+
+#[test]
+fn a_shipped_experiment_is_named_as_its_file_and_says_what_it_is_about_on_one_line() {
+    for (name, text, experiment) in shipped() {
+        assert_eq!(experiment.title, name);
+        // scripts/run --list reads that line.
+        let line = format!("about = \"{}\"", experiment.about);
+        assert!(!experiment.about.is_empty() && text.lines().any(|other| other == line), "{name}: {line}");
+        assert!(text.contains("\nnumber = "), "{name} has a number of its own");
+    }
+}
+
+#[test]
+fn a_shipped_experiment_has_a_number_that_no_other_has_and_bounds_to_pass() {
+    let mut numbers = std::collections::BTreeMap::new();
+    for (name, _, experiment) in shipped() {
+        assert!(!experiment.passed.is_empty(), "{name} can fail");
+        let before = numbers.insert(experiment.number, name.clone());
+        assert_eq!(before, None, "number {} of {name}", experiment.number);
+    }
+    assert!(numbers.len() >= 12, "{numbers:?}");
+}
+
+#[test]
+fn the_programs_of_the_shipped_experiments_are_shipped() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    for (name, _, experiment) in shipped() {
+        for axis in [&experiment.drive, &experiment.load].into_iter().flatten() {
+            let path = axis.program_path(&folder.join("e.toml"));
+            assert!(path.is_file(), "{name}: {}", path.display());
+        }
+    }
+}

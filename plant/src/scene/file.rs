@@ -91,6 +91,7 @@ struct EventTable {
     at_s: Spanned<f64>,
     #[serde(rename = "do")]
     kind: Spanned<Kind>,
+    at_position_m: Option<Spanned<f64>>,
     until_s: Option<Spanned<f64>>,
     added_mass_kg: Option<Spanned<f64>>,
 }
@@ -258,6 +259,9 @@ impl Check<'_> {
 
     fn event(&self, table: &EventTable) -> Result<Event, SceneError> {
         let at_s = self.number(AT_S, &table.at_s)?;
+        let place = table.at_position_m.as_ref();
+        let at_position_m =
+            place.map(|place| self.number(self.place("rig.event.at_position_m"), place)).transpose()?;
         let kind = *table.kind.get_ref();
         if kind != Kind::Link {
             let until = [("rig.event.until_s", &table.until_s)];
@@ -285,6 +289,6 @@ impl Check<'_> {
                 Action::Weights { added_mass_kg: self.number(mass, added)? }
             }
         };
-        Ok(Event { at_s, action })
+        Ok(Event { at_s, at_position_m, action })
     }
 }

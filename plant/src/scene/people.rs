@@ -30,11 +30,11 @@ impl Script {
         Script { hands: scene.hand.iter().copied().map(HandAtWork::new).collect(), events, next: 0 }
     }
 
-    /// The next action that is due by `cycle`; to be asked until there is none.
-    pub fn due(&mut self, cycle: u64) -> Option<Action> {
+    /// The next event that is due by `cycle`; to be asked until there is none.
+    pub fn due(&mut self, cycle: u64) -> Option<Event> {
         let event = self.events.get(self.next).filter(|event| cycle_of(event.at_s) <= cycle)?;
         self.next += 1;
-        Some(event.action)
+        Some(*event)
     }
 
     /// What all hands push with over `cycle`; the plant stands at its start.
@@ -80,13 +80,29 @@ pub struct People {
     holders: Holders,
     /// Somebody wiggles the pin in, up to this cycle.
     linking_until: Option<u64>,
+    /// What is done when the carriage passes a place; has room for all events.
+    watched: Vec<Watched>,
+}
+
+/// What is done when the carriage passes a place.
+#[derive(Debug, Clone, Copy)]
+struct Watched {
+    position_m: f64,
+    /// The carriage was short of it when the watch began.
+    short: bool,
+    action: Action,
+}
+
+fn is_short_of(position_m: f64, plant: &Plant) -> bool {
+    plant.state().axes[0].extension_m < position_m
 }
 
 impl People {
     /// Those of a scene, before cycle 0.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        People { script: Script::new(scene), holders: Holders::default(), linking_until: None }
+        let watched = Vec::with_capacity(scene.event.len());
+        People { script: Script::new(scene), holders: Holders::default(), linking_until: None, watched }
     }
 
     /// Does what is due in `cycle` to the plant, tells what came of it, and gives the scripted hands' forces over the
@@ -97,7 +113,19 @@ impl People {
         plant: &mut Plant,
         mut tell: impl FnMut(Outcome),
     ) -> HandForces {
-        while let Some(action) = self.script.due(cycle) {
+        while let Some(Event { at_position_m, action, .. }) = self.script.due(cycle) {
+            match at_position_m {
+                None => self.act(action, plant, &mut tell),
+                Some(position_m) => {
+                    let short = is_short_of(position_m, plant);
+                    self.watched.push(Watched { position_m, short, action });
+                }
+            }
+        }
+        let passed =
+            |watched: &Watched, plant: &Plant| is_short_of(watched.position_m, plant) != watched.short;
+        while let Some(place) = self.watched.iter().position(|watched| passed(watched, plant)) {
+            let Watched { action, .. } = self.watched.remove(place);
             self.act(action, plant, &mut tell);
         }
         if let Some(until) = self.linking_until {

@@ -199,6 +199,9 @@ const DIMENSIONLESS: &[&str] = &[
     "least",                 // of a parameter, whose unit is a field beside it
     "most",                  // the same
     "default",               // the same
+    "variables",             // of a program: names with their units, and values
+    "before_value",          // of a set-point, position or force
+    "after_value",           // the same
 ];
 
 /// A public number says its unit in its name.

@@ -1,0 +1,95 @@
+//! `controller-drive.csv` and `controller-load.csv`: states of chains by name, and numbers that may be absent.
+
+use std::path::Path;
+
+/// A table of one axis.
+#[derive(Debug)]
+pub struct AxisTable {
+    columns: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl AxisTable {
+    /// Reads a table up to its last whole line; the process that wrote it may have been killed.
+    ///
+    /// # Panics
+    /// When it is not there, or a row has another number of fields than the head.
+    #[must_use]
+    pub fn read(path: &Path) -> Self {
+        let text =
+            std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let whole = &text[..=text.rfind('\n').expect("at least the head")];
+        let fields = |line: &str| -> Vec<String> { line.split(',').map(str::to_owned).collect() };
+        let mut lines = whole.lines();
+        let columns = fields(lines.next().expect("a head"));
+        let rows: Vec<_> = lines.map(fields).collect();
+        for (row, cells) in rows.iter().enumerate() {
+            assert_eq!(cells.len(), columns.len(), "{}: row {row}: {cells:?}", path.display());
+        }
+        Self { columns, rows }
+    }
+
+    /// A column as it is written.
+    ///
+    /// # Panics
+    /// When there is none of this name.
+    #[must_use]
+    pub fn texts(&self, name: &str) -> Vec<&str> {
+        let place = self.columns.iter().position(|column| column == name);
+        let place = place.unwrap_or_else(|| panic!("no column {name} in {:?}", self.columns));
+        self.rows.iter().map(|row| row[place].as_str()).collect()
+    }
+
+    /// A column of numbers; where there is none, not a number.
+    ///
+    /// # Panics
+    /// When a field is neither empty nor a number.
+    #[must_use]
+    pub fn numbers(&self, name: &str) -> Vec<f64> {
+        let number = |text: &str| match text {
+            "" => f64::NAN,
+            text => text.parse().unwrap_or_else(|_| panic!("{name}: {text} is no number")),
+        };
+        self.texts(name).into_iter().map(number).collect()
+    }
+
+    /// The rig's cycle of each row.
+    #[must_use]
+    pub fn cycles(&self) -> Vec<usize> {
+        self.numbers("time_s").into_iter().map(|time_s| (time_s * 1000.0).round() as usize).collect()
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// First row from `from` on in which the chain of column `chain` is in `state`.
+    ///
+    /// # Panics
+    /// When there is none, with the states that there are.
+    #[must_use]
+    #[track_caller]
+    pub fn first(&self, chain: &str, state: &str, from: usize) -> usize {
+        let states = self.texts(chain);
+        let found = states.iter().skip(from).position(|one| *one == state);
+        found.map(|place| place + from).unwrap_or_else(|| {
+            panic!("{chain} is never {state} from row {from} on, but {:?}", self.states(chain))
+        })
+    }
+
+    /// The states of a chain in their order, each once for each time that it was entered.
+    #[must_use]
+    pub fn states(&self, chain: &str) -> Vec<&str> {
+        let mut states = self.texts(chain);
+        states.dedup();
+        states
+    }
+}

@@ -1,0 +1,236 @@
+//! Emergency stop at full speed and the way back: the air stays in the chambers, the carriage stands, and it begins anew
+//! where it is.
+//!
+//! Times and ways are the rig's; they are told, and held against what `bench summary` makes of the same files.
+
+use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand};
+use serde_json::Value;
+use std::process::Command;
+use system_tests::axis_table::AxisTable;
+use system_tests::binaries::{Build, Program, executable};
+use system_tests::bus_cycles::read;
+use system_tests::launch::Pace;
+use system_tests::own;
+use system_tests::process::{Ended, Running};
+use system_tests::records::{Table, json};
+use system_tests::scene::Scene;
+
+/// 0.3 m in 0.5 s: 1.2 m/s at its fastest, which the valve gives for a moment only.
+const FAST: &str = r#"title = "fast"
+number = 7
+[rig]
+carriage_position_m = 0.1
+[run]
+settling_s = 0.2
+after_emergency_stop = "end"
+[drive]
+program = "program.toml"
+start_m = 0.1
+set-point = [
+    { law = "bestehorn", to_m = 0.4, duration_s = 0.5 },
+    { law = "rest", duration_s = 0.5 },
+]
+"#;
+/// The experiment begins in cycle 710, and half of the way is done 250 ms later.
+const TRIP: usize = 1000;
+const RELEASE: usize = 2500;
+/// 0.2 s after the supply is back at nine tenths, 0.65 s after the release, and some.
+const START: usize = 4000;
+const CHAMBERS: [&str; 4] =
+    ["drive_stored_air_a_J", "drive_stored_air_b_J", "load_stored_air_a_J", "load_stored_air_b_J"];
+/// A Bestehorn sinoid at 0.1 m/s on average reaches twice that; half as much again for the control error.
+const RESTART_M_PER_MS: f64 = 0.3e-3;
+
+/// Who trips it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum By {
+    /// A frame of the console.
+    Bus,
+    /// The script at the rig's own button.
+    Rig,
+    /// The drive's controller, whose algorithm returns no number at full speed.
+    Controller,
+}
+
+fn stop(release: bool) -> Frame {
+    Frame::ConsoleEmergencyStop(EmergencyStop { reason: EmergencyStopReason::Operator, release })
+}
+
+/// Runs with a console that says something in some cycles, everything into one folder. Returns how the controller ended.
+fn run(scene: &Scene, mut say: impl FnMut(usize) -> Option<Frame>) -> Ended {
+    let out = scene.path("run");
+    let options = "--members 2 --seconds 30";
+    let emulator = scene.emulator(Pace::Lockstep).out(&out).with(options).start();
+    let controller = scene.controller(Pace::Lockstep).out(&out).start();
+    scene.peer().take_part("console", |peer, cycle, _| {
+        if let Some(frame) = say(cycle as usize) {
+            peer.send(&frame.encode().expect("in range").to_bytes());
+        }
+    });
+    let _ = emulator.wait();
+    controller.wait()
+}
+
+fn tripped(by: By) -> Scene {
+    let script = format!("[[rig.event]]\nat_s = {}\ndo = \"emergency-stop\"\n", TRIP as f64 * 1e-3);
+    let scene = Scene::new(&if by == By::Rig { format!("{FAST}{script}") } else { FAST.into() });
+    if by == By::Controller {
+        own::failing(&scene, "count > 200 && ready->set_position_m > 0.28", &[]);
+        scene.write("program.toml", own::PROGRAM);
+    }
+    let ended = run(&scene, |cycle| (by == By::Bus && cycle == TRIP).then(|| stop(false)));
+    let cause = if by == By::Controller { "controller-fault" } else { "the emergency stop is tripped" };
+    let _ = ended.expect_code(1).expect_said(&["stopped before the end: drive", cause]);
+    scene
+}
+
+fn figures(scene: &Scene) -> Value {
+    let mut command = Command::new(executable(Program::Bench, Build::Shipped));
+    // Its code tells of the run, which was stopped; its figures are what is wanted.
+    let _ = Running::start("bench summary", command.arg("summary").arg(scene.path("run"))).wait();
+    json(&scene.path("run/summary.json"))
+}
+
+fn first(column: &[f64], from: usize, what: impl Fn(f64) -> bool) -> usize {
+    from + column[from..].iter().position(|value| what(*value)).expect("it happens")
+}
+
+#[test]
+fn at_full_speed_the_carriage_stands_in_time_and_the_air_stays_in_the_chambers_whoever_trips() {
+    for by in [By::Bus, By::Rig, By::Controller] {
+        let scene = tripped(by);
+        let truth = Table::read(&scene.path("run/truth.csv"));
+        let supply = truth.column("supply_pressure_Pa");
+        let velocity = truth.column("drive_rod_velocity_m_per_s");
+        let position = truth.column("drive_position_m");
+        let fell = first(&supply, 0, |pressure| pressure < 700_000.0);
+        let trip = fell - 1;
+        assert!((TRIP - 60..TRIP + 60).contains(&trip), "{by:?}: tripped in cycle {trip}");
+        assert!(velocity[trip] > 0.5, "{by:?}: {} m/s is no full speed", velocity[trip]);
+        let slow = |from: &usize| velocity[*from..*from + 100].iter().all(|speed| speed.abs() < 1e-3);
+        let rest = (trip..velocity.len() - 100).find(slow).expect("it comes to rest");
+        let way_m = position[rest] - position[trip];
+        eprintln!(
+            "{by:?}: at {:.2} m/s, {} ms and {:.1} mm to standstill",
+            velocity[trip],
+            rest - trip,
+            way_m * 1e3
+        );
+        // Viscous friction of 1.1 kN s/m against trapped air of some 6 kN/m: 0.2 s, seven times that from 0.7 m/s to 1 mm/s, and
+        // b v / k of way at most, which the stroke leaves.
+        assert!(rest - trip < 2000, "{by:?}: {} ms", rest - trip);
+        assert!(way_m > 0.0 && way_m < 0.2, "{by:?}: {way_m} m");
+
+        let shut = truth.column("check_valves_shut");
+        let shut_from = first(&shut, trip, |shut| shut != 0.0);
+        // Discharge with 0.05 s: 7 bar fall below 2.5 bar after 70 ms.
+        assert!((65..76).contains(&(shut_from - trip)), "{by:?}: shut after {} ms", shut_from - trip);
+        assert!(shut[shut_from..].iter().all(|shut| *shut == 1.0), "{by:?}: and stay shut");
+        assert!(shut.len() - shut_from > 1000);
+        for chamber in CHAMBERS {
+            let air = &truth.column(chamber)[shut_from..];
+            let change = air.iter().map(|stored| (stored / air[0] - 1.0).abs()).fold(0.0, f64::max);
+            assert!(change < 1e-9, "{by:?}: {chamber} changes by {change} of its air");
+        }
+        let summary = figures(&scene);
+        let figure = |name: &str| {
+            summary["figures"][name].as_f64().unwrap_or_else(|| panic!("{by:?}: no {name}: {summary:#}"))
+        };
+        assert!((figure("stop_time_s") - (rest - trip) as f64 * 1e-3).abs() < 2.5e-3, "{by:?}");
+        assert!((figure("stop_way_m") - way_m).abs() < 1e-3, "{by:?}");
+        assert!(figure("air_mass_change_while_shut_ratio") < 1e-9, "{by:?}");
+    }
+}
+
+/// Stops, releases and starts again; the aborted repetition is driven anew.
+fn back(after: &str) -> Scene {
+    let scene = Scene::new(&FAST.replace("\"end\"", &format!("\"{after}\"")));
+    let start = Frame::RunControl(RunControl { command: RunControlCommand::Start, experiment: 7 });
+    let ended = run(&scene, |cycle| match cycle {
+        TRIP => Some(stop(false)),
+        RELEASE => Some(stop(true)),
+        START => Some(start),
+        _ => None,
+    });
+    let _ = ended.expect_code(0);
+    scene
+}
+
+fn expect_smooth_restart(scene: &Scene, after: &str) -> AxisTable {
+    let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
+    let aborted = drive.first("main_chain", "aborted", 0);
+    assert_eq!(drive.cycles()[aborted], TRIP + 1, "heard in the next cycle");
+    assert_eq!(drive.texts("main_chain")[aborted - 1], "experiment");
+    let again = drive.first("main_chain", "initial-positioning", aborted);
+    assert!(drive.numbers("enabled")[aborted..again].iter().all(|enabled| *enabled == 0.0), "{after}");
+    // Where the carriage is: the sensor's noise is 20 um, and the sinoid begins with nothing.
+    let (set, is) = (drive.numbers("set_position_m")[again], drive.numbers("position_m")[again]);
+    assert!(
+        (set - is).abs() < 1e-4,
+        "{after}: the set-point begins at {set} m, the carriage stands at {is} m"
+    );
+    assert!((is - 0.1).abs() > 0.1, "{after}: far from the start, at {is} m");
+
+    let truth = Table::read(&scene.path("run/truth.csv"));
+    let (shut, position) = (truth.column("check_valves_shut"), truth.column("drive_position_m"));
+    let shut_from = first(&shut, TRIP, |shut| shut != 0.0);
+    let open = first(&shut, shut_from, |shut| shut == 0.0);
+    let begins = drive.cycles()[again];
+    assert!(open > RELEASE && begins > open, "{after}: open in {open}, begins in {begins}");
+    let settled = drive.cycles()[drive.first("main_chain", "settling", again)];
+    let jump = |rows: std::ops::Range<usize>| {
+        let steps = position[rows].windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        steps * 1e3
+    };
+    let (creep, restart) = (jump(open..begins), jump(begins..settled));
+    eprintln!(
+        "{after}: at most {creep:.3} mm/ms while the supply comes back, {restart:.3} mm/ms on the way to the start"
+    );
+    assert!(creep < RESTART_M_PER_MS * 1e3 && restart < RESTART_M_PER_MS * 1e3, "{after}");
+
+    assert_eq!(drive.states("main_chain").iter().filter(|state| **state == "experiment").count(), 2);
+    let report = json(&scene.path("run/controller.json"));
+    assert_eq!(report["axes"]["drive"]["repetitions_done"], 1, "{after}: the aborted one, again");
+    let last = position[position.len() - 1];
+    assert!((last - 0.4).abs() < 0.002, "{after}: driven to its end, {last} m");
+    drive
+}
+
+#[test]
+fn with_restart_the_aborted_repetition_begins_anew_by_itself_without_a_jump() {
+    let scene = back("restart");
+    let drive = expect_smooth_restart(&scene, "restart");
+    let chain = ["ready", "tripped", "waiting-for-release", "recovering", "ready"];
+    assert_eq!(drive.states("emergency_stop_chain"), chain);
+    let begins = drive.cycles()[drive.first("main_chain", "initial-positioning", TRIP)];
+    assert!(begins < START, "by itself, in cycle {begins}");
+    let summary = figures(&scene);
+    let jump = summary["figures"]["restart_jump_m"].as_f64().expect("bench summary tells it");
+    eprintln!("bench summary: {:.2} mm in the 0.2 s after the valve is commanded again", jump * 1e3);
+    // A sinoid of at least 0.5 s, and where the carriage was released at all.
+    assert!(jump < 200.0 * RESTART_M_PER_MS, "{jump} m");
+}
+
+#[test]
+fn on_start_the_aborted_repetition_waits_for_the_console_and_begins_anew_without_a_jump() {
+    let scene = back("on-start");
+    let drive = expect_smooth_restart(&scene, "on-start");
+    let chain = ["ready", "tripped", "waiting-for-release", "recovering", "waiting-for-start", "ready"];
+    assert_eq!(drive.states("emergency_stop_chain"), chain);
+    let begins = drive.cycles()[drive.first("main_chain", "initial-positioning", TRIP)];
+    assert!((START + 1..START + 4).contains(&begins), "{begins}");
+}
+
+#[test]
+fn nobody_is_told_to_start_while_the_stop_is_held() {
+    let scene = Scene::new(&FAST.replace("\"end\"", "\"restart\""));
+    let held = run(&scene, |cycle| (cycle == TRIP).then(|| stop(false)));
+    let _ = held.expect_code(1).expect_said(&["drive: the emergency stop is tripped"]);
+    let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
+    assert_eq!(drive.states("emergency_stop_chain").last(), Some(&"waiting-for-release"));
+    assert!(drive.numbers("enabled")[TRIP + 2..].iter().all(|enabled| *enabled == 0.0), "shut for 29 s");
+    let released = read(&scene.path("run/bus.log"))
+        .into_iter()
+        .any(|logged| matches!(logged.frame, Frame::DriveEmergencyStop(_) | Frame::LoadEmergencyStop(_)));
+    assert!(!released, "the controllers hold no stop of their own, and withdraw none");
+}

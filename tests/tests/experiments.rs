@@ -1,0 +1,88 @@
+//! Every shipped experiment runs to its end, passes its own bounds, and is listed with its sentence.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::process::Running;
+use system_tests::records::json;
+use system_tests::scene::{SHORT, Scene};
+
+fn shipped() -> Vec<(String, PathBuf)> {
+    let folder = workspace().join("controller/experiments");
+    let entries = std::fs::read_dir(&folder).expect("the folder of experiments");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let mut named: Vec<_> = paths
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .map(|path| (path.file_stem().expect("a name").to_string_lossy().into_owned(), path))
+        .collect();
+    named.sort();
+    assert!(named.iter().any(|(name, _)| name == "point-to-point"), "{named:?}");
+    named
+}
+
+fn about(path: &Path) -> String {
+    let text = std::fs::read_to_string(path).expect("it is listed");
+    let line = text.lines().find_map(|line| line.strip_prefix("about = \""));
+    let line = line.unwrap_or_else(|| panic!("{}: no about", path.display()));
+    line.strip_suffix('"').expect("a text in quotes").to_owned()
+}
+
+/// What went wrong with a rehearsal of an experiment, if anything did.
+fn rehearse(name: &str, path: &Path) -> Result<(), String> {
+    let scene = Scene::new(SHORT);
+    let out = scene.path("run");
+    let rehearsal = scene.rehearsal().experiment(path).out(&out).with("--seconds 86400").start().wait();
+    if rehearsal.code != Some(0) {
+        return Err(format!("{name}: rehearsed with code {:?}:\n{}", rehearsal.code, rehearsal.stderr));
+    }
+    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    let summary = Running::start("bench summary", bench.arg("summary").arg(&out)).wait();
+    let bounds = &json(&out.join("summary.json"))["thresholds"];
+    if summary.code != Some(0) {
+        return Err(format!(
+            "{name}: bench summary gives {:?}: {}\n{bounds:#}",
+            summary.code, summary.stdout
+        ));
+    }
+    eprintln!("{name}: passed {} bound(s)", bounds.as_object().map_or(0, serde_json::Map::len));
+    Ok(())
+}
+
+#[test]
+fn every_experiment_is_rehearsed_to_its_end_and_passes_its_own_bounds() {
+    let failures: Vec<_> = shipped().iter().filter_map(|(name, path)| rehearse(name, path).err()).collect();
+    assert!(failures.is_empty(), "{} failed:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn a_bound_that_is_broken_fails_the_experiment() {
+    let (_, path) = shipped().into_iter().find(|(name, _)| name == "point-to-point").expect("shipped");
+    let text = std::fs::read_to_string(&path).expect("it is listed");
+    let bound = "position_error_dynamic_m = 0.005";
+    assert!(text.contains(bound), "'{bound}' is not in {}", path.display());
+    let scene = Scene::new(SHORT);
+    let strict = scene.write("strict.toml", &text.replace(bound, "position_error_dynamic_m = 1e-9"));
+    let out = scene.path("run");
+    let programs = workspace().join("controller/programs");
+    let options = format!("--programs {}", programs.display());
+    let _ = scene.rehearsal().experiment(&strict).out(&out).with(&options).start().wait().expect_code(0);
+    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    let _ = Running::start("bench summary", bench.arg("summary").arg(&out)).wait().expect_code(1);
+}
+
+#[test]
+fn the_list_names_each_experiment_with_its_sentence() {
+    let mut script = Command::new(workspace().join("scripts/run"));
+    let listed = Running::start("scripts/run --list", script.arg("--list")).wait().expect_code(0).stdout;
+    let lines: Vec<_> = listed.lines().filter_map(|line| line.split_once(' ')).collect();
+    let experiments = shipped();
+    assert_eq!(lines.len(), experiments.len(), "{listed}");
+    for (name, path) in &experiments {
+        let sentence = about(path);
+        assert!(sentence.len() > 20, "{name}: '{sentence}' is no sentence");
+        assert!(
+            lines.iter().any(|(listed, text)| listed == name && text.trim() == sentence),
+            "{name}: {listed}"
+        );
+    }
+}

@@ -1,0 +1,116 @@
+//! The sensors of one axis fall silent while the rig goes on: that axis shuts its valve and trips the emergency stop.
+//!
+//! The test plays the rig, for no wire loses frames of one identifier alone. It goes on when the axis whose sensors come has
+//! answered, so that times are counted in its own cycles, whatever the machine does.
+
+use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors, Tick};
+use std::time::Duration;
+use system_tests::launch::Pace;
+use system_tests::peer::{Packet, Peer};
+use system_tests::process::PATIENCE;
+use system_tests::records::json;
+use system_tests::scene::{SHORT, Scene};
+
+const SILENT_FROM: u64 = 800;
+/// Five ticks, one every ten cycles.
+const AT_EARLIEST: u64 = SILENT_FROM + 40;
+const AT_LATEST: u64 = SILENT_FROM + 60;
+const CYCLES: u64 = 4000;
+
+/// What the controllers did, by the rig's cycles.
+#[derive(Debug, Default)]
+struct Heard {
+    stop: Option<(u64, EmergencyStop)>,
+    /// Commands of the silent axis that open its valve from its last sensors on.
+    opened: Vec<u64>,
+}
+
+fn send(peer: &Peer, frame: Frame) {
+    peer.send(&frame.encode().expect("in range").to_bytes());
+}
+
+/// Publishes a cycle of a rig whose carriage rests at 0.1 m; `silent` gets no sensors.
+fn publish(peer: &Peer, cycle: u64, silent: Option<&str>, emergency_stop: bool) {
+    let sensors = Sensors {
+        position_m: 0.1,
+        pressure_a_pa: 4e5,
+        pressure_b_pa: 4e5,
+        alive: (cycle % 16) as u8,
+        ..Sensors::default()
+    };
+    if silent != Some("drive") {
+        send(peer, Frame::DriveSensors(sensors));
+    }
+    if silent != Some("load") {
+        send(peer, Frame::LoadSensors(Sensors { position_m: 0.5, ..sensors }));
+    }
+    if cycle.is_multiple_of(10) {
+        send(peer, Frame::Tick(Tick { cycle: cycle as u32, ..Tick::default() }));
+    }
+    if cycle % 10 == 5 {
+        send(
+            peer,
+            Frame::RigStatus(RigStatus { supply_pressure_pa: 7e5, emergency_stop, ..RigStatus::default() }),
+        );
+    }
+}
+
+/// Plays the rig; `silent` names the axis whose sensors stop.
+fn play(peer: &Peer, silent: &str) -> Heard {
+    let mut heard = Heard::default();
+    for cycle in 0..CYCLES {
+        publish(peer, cycle, (cycle >= SILENT_FROM).then_some(silent), heard.stop.is_some());
+        loop {
+            let Some(packet) = peer.receive(if cycle == 0 { PATIENCE } else { Duration::from_secs(2) })
+            else {
+                // The controllers have ended: two seconds after the fault.
+                return heard;
+            };
+            let Packet::Frame(frame) = packet else { continue };
+            match (silent, Frame::decode(&frame)) {
+                ("drive", Ok(Frame::DriveEmergencyStop(stop)))
+                | ("load", Ok(Frame::LoadEmergencyStop(stop))) => {
+                    heard.stop = heard.stop.or(Some((cycle, stop)));
+                }
+                ("drive", Ok(Frame::DriveValveCommand(command)))
+                | ("load", Ok(Frame::LoadValveCommand(command)))
+                    if cycle > SILENT_FROM && command.enable =>
+                {
+                    heard.opened.push(cycle);
+                }
+                ("drive", Ok(Frame::LoadValveCommand(command)))
+                | ("load", Ok(Frame::DriveValveCommand(command)))
+                    if u64::from(command.echo) == cycle % 4096 =>
+                {
+                    break;
+                }
+                _ => {}
+            }
+        }
+    }
+    heard
+}
+
+#[test]
+fn an_axis_without_sensors_trips_the_emergency_stop_after_five_ticks_of_the_rig() {
+    for silent in ["drive", "load"] {
+        let scene = Scene::new(SHORT);
+        let host = scene.bus_host("");
+        let rig = scene.peer();
+        let controller = scene.controller(Pace::Real).with("--no-realtime --bus-grace 60").start();
+        scene.wait_for_peers(2);
+        let heard = play(&rig, silent);
+        let ended = controller.wait().expect_code(1);
+        let _ = ended.expect_said(&[&format!("stopped before the end: {silent}: sensor-loss")]);
+        let (cycle, stop) = heard.stop.expect("it trips the emergency stop");
+        assert_eq!((stop.reason, stop.release), (EmergencyStopReason::SensorLoss, false), "{silent}");
+        eprintln!("{silent}: emergency stop {} cycles after the last sensors", cycle - SILENT_FROM + 1);
+        assert!((AT_EARLIEST..=AT_LATEST).contains(&cycle), "{silent}: in cycle {cycle}");
+        assert!(heard.opened.is_empty(), "{silent}: opened without sensors in {:?}", heard.opened);
+        let report = json(&scene.path("controller/controller.json"));
+        assert_eq!(report["axes"][silent]["chain_state"], "fault");
+        let other = if silent == "drive" { "load" } else { "drive" };
+        assert_eq!(report["axes"][other]["chain_state"], "aborted", "{other} follows");
+        drop(host);
+    }
+}

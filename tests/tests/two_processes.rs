@@ -1,0 +1,134 @@
+//! One process for both axes, one for each, or a rehearsal without a bus: the same run, to the byte.
+//!
+//! The axes know each other as over the bus wherever they live, so nothing else may differ. Two members of the lockstep barrier
+//! do not come to the same order of frames by chance: a run of thousands of cycles would show it.
+
+use std::time::Duration;
+use system_tests::axis_table::AxisTable;
+use system_tests::binaries::workspace;
+use system_tests::launch::{Launch, Pace};
+use system_tests::records::{bus_log, json};
+use system_tests::scene::{LINKED, SHORT, Scene};
+
+/// What a rehearsal leaves too.
+const TABLES: [&str; 4] = ["measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv"];
+
+/// Who controls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cast {
+    OneProcess,
+    DriveFirst,
+    LoadFirst,
+    Rehearsal,
+}
+
+/// The shipped programs, for what names them.
+fn with_programs(launch: Launch) -> Launch {
+    let programs = workspace().join("controller/programs");
+    launch.with(&format!("--programs {}", programs.display()))
+}
+
+/// Runs the experiment to its end, everything into one folder, as `scripts/run` does.
+fn run(experiment: &str, cast: Cast) -> Scene {
+    let scene = Scene::new(experiment);
+    let out = scene.path("run");
+    if cast == Cast::Rehearsal {
+        let _ = with_programs(scene.rehearsal().out(&out)).start().wait().expect_code(0);
+        return scene;
+    }
+    let axes: &[&str] = match cast {
+        Cast::OneProcess => &["both"],
+        Cast::LoadFirst => &["load", "drive"],
+        _ => &["drive", "load"],
+    };
+    let emulator =
+        scene.emulator(Pace::Lockstep).out(&out).with(&format!("--members {}", axes.len())).start();
+    let controllers: Vec<_> = axes
+        .iter()
+        .map(|axis| {
+            let controller = with_programs(scene.axis_controller(Pace::Lockstep, axis).out(&out)).start();
+            // Long enough for the first to be on the bus before the second.
+            std::thread::sleep(Duration::from_millis(100));
+            controller
+        })
+        .collect();
+    let _ = emulator.wait().expect_code(0);
+    controllers.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
+    scene
+}
+
+fn expect_same(one: &Scene, other: &Scene, files: &[&str], what: &str) {
+    for file in files {
+        let path = |scene: &Scene| scene.path("run").join(file);
+        assert!(one.same(&path(one), &path(other)), "{file} differs, {what}");
+    }
+}
+
+/// Holds all four ways against each other. Returns the run of one process.
+fn expect_all_the_same(experiment: &str) -> Scene {
+    let one = run(experiment, Cast::OneProcess);
+    for cast in [Cast::DriveFirst, Cast::LoadFirst] {
+        let two = run(experiment, cast);
+        expect_same(&one, &two, &[&TABLES[..], &["bus.log"]].concat(), &format!("{cast:?}"));
+    }
+    let rehearsal = run(experiment, Cast::Rehearsal);
+    expect_same(&one, &rehearsal, &TABLES, "rehearsed");
+    assert!(!rehearsal.path("run/bus.log").exists(), "a rehearsal has no bus");
+    one
+}
+
+fn shipped(name: &str) -> String {
+    let file = workspace().join(format!("controller/experiments/{name}.toml"));
+    std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
+}
+
+fn states(scene: &Scene, axis: &str) -> Vec<String> {
+    let table = AxisTable::read(&scene.path("run").join(format!("controller-{axis}.csv")));
+    table.states("main_chain").into_iter().map(str::to_owned).collect()
+}
+
+#[test]
+fn the_linked_experiment_of_the_paper_is_the_same_in_one_process_in_two_and_rehearsed() {
+    let one = expect_all_the_same(&shipped("load-step"));
+    let load = AxisTable::read(&one.path("run/controller-load.csv"));
+    assert!(load.len() > 6000, "{} rows", load.len());
+    let (force, opening) = (load.numbers("force_N"), load.numbers("opening"));
+    let experiment = load.first("main_chain", "experiment", 0);
+    // The force of the step is pressed for by the load and met by the drive.
+    let pressed = force[experiment + 3000..experiment + 5900].iter().sum::<f64>() / 2900.0;
+    assert!((pressed - 400.0).abs() < 40.0, "{pressed} N of 400 N on average after the step");
+    assert!(opening.iter().any(|opening| *opening != 0.0));
+}
+
+#[test]
+fn two_repetitions_are_the_same_in_one_process_in_two_and_rehearsed() {
+    let repeated = LINKED.replacen("[run]\n", "[run]\nrepetitions = 2\n", 1);
+    let one = expect_all_the_same(&repeated);
+    for axis in ["drive", "load"] {
+        let seen = states(&one, axis);
+        let experiments = seen.iter().filter(|state| *state == "experiment").count();
+        assert_eq!(experiments, 2, "{axis}: {seen:?}");
+        let report = json(&one.path("run/controller.json"));
+        assert_eq!(report["axes"][axis]["repetitions_done"], 2, "{axis}");
+    }
+}
+
+#[test]
+fn an_axis_that_the_experiment_leaves_out_is_the_same_in_one_process_in_two_and_rehearsed() {
+    let one = expect_all_the_same(SHORT);
+    let load = AxisTable::read(&one.path("run/controller-load.csv"));
+    assert!(load.numbers("enabled").iter().all(|enabled| *enabled == 0.0), "its valve is held shut");
+    assert_eq!(states(&one, "load"), states(&one, "drive"), "it goes along");
+    assert!(bus_log(&one.path("run/bus.log")).len() > 4 * load.len());
+}
+
+#[test]
+fn a_process_for_each_axis_leaves_a_report_of_its_own() {
+    let two = run(SHORT, Cast::DriveFirst);
+    for (axis, other) in [("drive", "load"), ("load", "drive")] {
+        let report = json(&two.path("run").join(format!("controller-{axis}.json")));
+        assert_eq!(report["axes"][axis]["chain_state"], "done");
+        assert!(report["axes"][other].is_null(), "{axis} knows of {other} by the bus alone");
+    }
+    assert!(!two.path("run/controller.json").exists());
+}
