@@ -21,7 +21,7 @@ struct Subject {
     set: &'static [&'static str],
 }
 
-const SUBJECTS: [Subject; 4] = [
+const SUBJECTS: [Subject; 5] = [
     Subject {
         name: "valve shut",
         load: "force-manual",
@@ -29,6 +29,12 @@ const SUBJECTS: [Subject; 4] = [
     },
     Subject { name: "P alone", load: "force-plain", set: &["load.algorithm.velocity_feed_forward=0"] },
     Subject { name: "P and feed-forward, no distinction", load: "force-plain", set: &[] },
+    // No hand is as fast: as in manual-move-plain.
+    Subject {
+        name: "always as at standstill, no distinction",
+        load: "force-manual",
+        set: &["load.force-chain.moving_m_per_s=1"],
+    },
     Subject { name: "manual mode, with its distinction", load: "force-manual", set: &[] },
 ];
 
