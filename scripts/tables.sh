@@ -1,6 +1,8 @@
-# Sourced: tables that an example of the controller prints, shown or put between the two marks of a page.
+# shellcheck shell=bash
+# Sourced, with `root` set: tables that an example of the controller prints, shown or put between the two marks of a page.
 
 # tables EXAMPLE PAGE [--write]
+# shellcheck disable=SC2154 # root is the sourcing script's
 tables() {
     local text
     text=$(mktemp)

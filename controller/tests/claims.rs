@@ -73,6 +73,13 @@ fn fig_9_with_the_map() {
 }
 
 #[test]
+fn fig_9_with_the_papers_two_laws_and_a_soft_drive() {
+    let drive = Some("position-paper-linked");
+    let broken = broken_of_fig_9(rehearsed(&Made { drive, ..load_step("force-paper-linked", &[]) }));
+    assert!(broken.is_empty(), "{broken:?}");
+}
+
+#[test]
 fn the_map_at_least_halves_the_settling_of_p_with_the_same_drive() {
     let settling_s = |load| rehearsed(&load_step(load, &[]))("force_settling_s");
     let (p_s, map_s) = (settling_s("force-p"), settling_s("force-pid-map"));
