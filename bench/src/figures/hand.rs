@@ -1,8 +1,8 @@
 //! The load axis moved by hand: what the hand has to push.
 //!
-//! Unlinked, the load's force sensor reads the hand; beside the carriage it may read the linkage, so there nothing is
-//! taken. Whether the axis moves is taken from its position and not from what the controller thinks, so that controllers
-//! with and without a distinction of cases are judged alike.
+//! Unlinked, the load's force sensor reads the hand; beside the carriage it may read the linkage, so there nothing is taken.
+//! Whether the axis moves is taken from its position and not from what the controller thinks, so that controllers with and
+//! without a distinction of cases are judged alike.
 
 use super::force::NOISE_S;
 use super::{Definition, Family, Figures};
@@ -29,8 +29,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "hand_force_mean_n",
             unit: "N",
-            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s, more than 5 mm from \
-                the carriage",
+            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s, \
+                      more than 5 mm from the carriage",
         },
         Definition {
             name: "hand_force_largest_n",
@@ -45,8 +45,8 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "hand_valve_unrest_ratio",
             unit: "1",
-            meaning: "share of the cycles in which the load's valve is moved, in the last 0.3 s of the experiment, the \
-                hand being gone",
+            meaning: "share of the cycles in which the load's valve is moved, in the last 0.3 s of the experiment, \
+                      the hand being gone",
         },
     ],
     compute,

@@ -18,7 +18,7 @@ const NOISE_S: f64 = 0.01;
 const MAXIMUM_S: f64 = 0.02;
 /// Share of the largest error that a maximum reaches, and share by which the error falls between two maxima.
 const MAXIMUM_SHARE: f64 = 0.5;
-const FALL_SHARE: f64 = 0.15;
+const FALL_SHARE: f64 = 0.25;
 
 /// The family.
 pub(super) const FAMILY: Family = Family {
@@ -32,14 +32,14 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "position_error_maxima",
             unit: "1",
-            meaning: "maxima of |error| above half the largest in the longest move, smoothed over 20 ms, the error \
-                falling by 15 % of the largest between them",
+            meaning: "maxima of |error| above half the largest in the longest move, smoothed over 20 ms, the error falling by \
+                      a quarter of the largest between them",
         },
         Definition {
             name: "position_rest_peak_to_peak_m",
             unit: "m",
-            meaning: "largest peak to peak of the position sensor in the last 0.5 s of the rests of the set-point, \
-                waiting before and after included",
+            meaning: "largest peak to peak of the position sensor in the last 0.5 s of the rests of the set-point, waiting \
+                      before and after included",
         },
         Definition {
             name: "position_rest_peak_to_peak_smoothed_m",

@@ -36,7 +36,7 @@ pub(super) const FAMILY: Family = Family {
             name: "relieve_s",
             unit: "s",
             meaning: "until |force| (smoothed over 5 ms) stays below a tenth of that before or 10 N, whichever is larger; \
-                absent when it does not",
+                      absent when it does not",
         },
     ],
     compute,
