@@ -3,7 +3,7 @@
 //! The test plays the rig, for no wire loses frames of one identifier alone. It goes on when the axis whose sensors come has
 //! answered, so that times are counted in its own cycles, whatever the machine does.
 
-use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors, Tick};
+use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, MainChainState, RigStatus, Sensors, Tick};
 use std::time::Duration;
 use system_tests::launch::Pace;
 use system_tests::peer::{Packet, Peer};
@@ -21,6 +21,8 @@ const CYCLES: u64 = 4000;
 #[derive(Debug, Default)]
 struct Heard {
     stop: Option<(u64, EmergencyStop)>,
+    /// The other axis says that it aborted.
+    aborted: Option<u64>,
     /// Commands of the silent axis that open its valve from its last sensors on.
     opened: Vec<u64>,
 }
@@ -72,6 +74,12 @@ fn play(peer: &Peer, silent: &str) -> Heard {
                 | ("load", Ok(Frame::LoadEmergencyStop(stop))) => {
                     heard.stop = heard.stop.or(Some((cycle, stop)));
                 }
+                ("drive", Ok(Frame::LoadChainStatus(status)))
+                | ("load", Ok(Frame::DriveChainStatus(status)))
+                    if status.main_chain == MainChainState::Aborted =>
+                {
+                    heard.aborted = heard.aborted.or(Some(cycle));
+                }
                 ("drive", Ok(Frame::DriveValveCommand(command)))
                 | ("load", Ok(Frame::LoadValveCommand(command)))
                     if cycle > SILENT_FROM && command.enable =>
@@ -106,6 +114,9 @@ fn an_axis_without_sensors_trips_the_emergency_stop_after_five_ticks_of_the_rig(
         assert_eq!((stop.reason, stop.release), (EmergencyStopReason::SensorLoss, false), "{silent}");
         eprintln!("{silent}: emergency stop {} cycles after the last sensors", cycle - SILENT_FROM + 1);
         assert!((AT_EARLIEST..=AT_LATEST).contains(&cycle), "{silent}: in cycle {cycle}");
+        // By the stop itself, not by the rig's status five cycles after the tick.
+        let aborted = heard.aborted.expect("the other axis aborts");
+        assert!(aborted - cycle <= 2, "{silent}: the other axis aborts {} cycles later", aborted - cycle);
         assert!(heard.opened.is_empty(), "{silent}: opened without sensors in {:?}", heard.opened);
         let report = json(&scene.path("controller/controller.json"));
         assert_eq!(report["axes"][silent]["chain_state"], "fault");
