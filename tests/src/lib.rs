@@ -4,7 +4,9 @@
 //!   Scene ── a folder of its own: socket, rig file, experiment file, one output folder for each program
 //!     └─ Launch ── command line ──► Running ── signals, deadlines, stderr ──► Ended ── exit code
 //!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
-//!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised
+//!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
+//!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
+//!   own ───── algorithms in C, built as a user builds them
 //! ```
 //!
 //! Nothing here waits without a limit; what is waited for, and what the programs said, stands in the panic. Programs are
