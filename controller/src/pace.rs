@@ -13,12 +13,12 @@ use std::time::{Duration, Instant as WallInstant};
 
 /// Longest wait for a frame before looking at the world again.
 const PATIENCE: Duration = Duration::from_millis(20);
-/// Silence of the sensors after which a person is told; the rig shuts its valve by itself.
+/// Silence of the rig after which a person is told; the rig shuts its valve by itself.
 const SILENCE: Duration = Duration::from_millis(200);
 /// Silence after Done that counts as the rig's end.
 const DONE_SILENCE: Duration = Duration::from_secs(1);
 /// Cycles after an abort or a fault during which the valve is still told to stay shut and the record goes on.
-const STOPPED_CYCLES: u64 = 2000;
+pub(crate) const STOPPED_CYCLES: u64 = 2000;
 /// Answers that the allocation count leaves out at the start.
 const WARM_UP: u64 = 1000;
 /// Period of the answers, ns.
@@ -37,6 +37,18 @@ pub enum End {
     Stopped,
     /// Lockstep: a member was not done in time.
     LockstepTimeout,
+}
+
+/// Controllers on their bus, and what may end their run.
+pub struct Ride<'a> {
+    /// The controllers.
+    pub station: &'a mut Station,
+    /// Their peer on the bus.
+    pub bus: &'a mut dyn Bus,
+    /// How long the rig may be silent.
+    pub grace: Duration,
+    /// Set by a signal.
+    pub interrupt: &'a Interrupt,
 }
 
 /// What a pace measured.
@@ -66,16 +78,14 @@ impl Paced {
 }
 
 /// Answers frames as they arrive.
-pub fn run_real(
-    station: &mut Station,
-    bus: &mut dyn Bus,
-    clock: &impl Clock,
-    grace: Duration,
-    interrupt: &Interrupt,
-) -> Paced {
+pub fn run_real(ride: Ride<'_>, clock: &impl Clock) -> Paced {
+    let Ride { station, bus, grace, interrupt } = ride;
     let mut paced = Paced::new();
     let wakes = if station.has(Axis::Drive) { DRIVE_SENSORS.id } else { LOAD_SENSORS.id };
-    let mut last_frame = WallInstant::now();
+    // What others say is no life of the rig: it sends sensors and ticks.
+    let life = |station: &Station| (station.view().received(), station.view().cycle());
+    let mut alive = life(station);
+    let mut last_life = WallInstant::now();
     let mut last_answer_ns = None;
     let mut silent = false;
     // Not being connected yet is no loss; only what was up can be lost.
@@ -88,9 +98,7 @@ pub fn run_real(
             watch = Some(realtime::allocations::watch());
         }
         let woke_ns = clock.now().as_nanos();
-        let mut heard = false;
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
-            heard = true;
             // Every frame's own waiting counts, so that a stall shows with all the frames that waited for its end.
             if frame.standard_id() == Some(wakes) {
                 paced.wakeup_ns.record(woke_ns.saturating_sub(stamp_ns));
@@ -109,10 +117,11 @@ pub fn run_real(
         if station.ending() {
             break End::RigEnded;
         }
-        if heard {
-            last_frame = WallInstant::now();
+        let alive_before = std::mem::replace(&mut alive, life(station));
+        if alive != alive_before {
+            last_life = WallInstant::now();
         }
-        let quiet = last_frame.elapsed();
+        let quiet = last_life.elapsed();
         ever_up |= bus.is_up();
         if ever_up && bus.is_up() != was_up {
             was_up = bus.is_up();
@@ -145,13 +154,8 @@ pub fn run_real(
 ///
 /// # Errors
 /// [`BusError::NoBarrier`] on a bus without one.
-pub fn run_lockstep(
-    station: &mut Station,
-    bus: &mut dyn Bus,
-    name: &str,
-    grace: Duration,
-    interrupt: &Interrupt,
-) -> Result<Paced, BusError> {
+pub fn run_lockstep(ride: Ride<'_>, name: &str) -> Result<Paced, BusError> {
+    let Ride { station, bus, grace, interrupt } = ride;
     bus.join_lockstep(Role::Member, name)?;
     let mut paced = Paced::new();
     let mut waiting_since = None;

@@ -86,48 +86,58 @@ impl Tables {
     }
 }
 
-/// Writes rows and tells news until the senders are gone. Returns the news, and why writing stopped, if it did.
-pub fn run(
-    mut tables: Tables,
-    records: &Receiver<AxisRecord>,
-    news: &Receiver<News>,
-    mut watcher: Option<Watcher>,
-    failed: impl Fn(),
-) -> (Vec<News>, Option<String>) {
-    let mut told = Vec::new();
-    let mut last_flush = Instant::now();
-    let mut failure: Option<String> = None;
-    loop {
-        let finished = loop {
-            match records.try_recv() {
-                Ok(record) if failure.is_none() => {
-                    failure = tables.write(&record).err().map(|error| error.to_string());
+/// The thread that empties the queues.
+pub struct Writer {
+    /// The files.
+    pub tables: Tables,
+    /// Their rows.
+    pub records: Receiver<AxisRecord>,
+    /// What a person is told.
+    pub news: Receiver<News>,
+    /// Who looks at the program files, if anybody does.
+    pub watcher: Option<Watcher>,
+}
+
+impl Writer {
+    /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more.
+    /// Returns the news, and why writing stopped, if it did.
+    pub fn run(self, failed: impl Fn()) -> (Vec<News>, Option<String>) {
+        let Self { mut tables, records, news, mut watcher } = self;
+        let mut told = Vec::new();
+        let mut last_flush = Instant::now();
+        let mut failure: Option<String> = None;
+        loop {
+            let finished = loop {
+                match records.try_recv() {
+                    Ok(record) if failure.is_none() => {
+                        failure = tables.write(&record).err().map(|error| error.to_string());
+                    }
+                    Ok(_) => {}
+                    Err(TryRecvError::Empty) => break false,
+                    Err(TryRecvError::Disconnected) => break true,
                 }
-                Ok(_) => {}
-                Err(TryRecvError::Empty) => break false,
-                Err(TryRecvError::Disconnected) => break true,
+            };
+            if let Some(watcher) = &mut watcher {
+                watcher.look();
             }
-        };
-        if let Some(watcher) = &mut watcher {
-            watcher.look();
+            for item in news.try_iter() {
+                eprintln!("controller: {}", sentence(item));
+                told.push(item);
+            }
+            if failure.is_none() && (finished || last_flush.elapsed() > FLUSH_PERIOD) {
+                last_flush = Instant::now();
+                failure = tables.write_out().err().map(|error| error.to_string());
+            }
+            if let Some(failure) = &failure {
+                eprintln!("controller: cannot write {failure}; free space or choose another --out");
+                failed();
+                return (told, Some(failure.clone()));
+            }
+            if finished {
+                return (told, None);
+            }
+            std::thread::sleep(POLL_PERIOD);
         }
-        for item in news.try_iter() {
-            eprintln!("controller: {}", sentence(item));
-            told.push(item);
-        }
-        if failure.is_none() && (finished || last_flush.elapsed() > FLUSH_PERIOD) {
-            last_flush = Instant::now();
-            failure = tables.write_out().err().map(|error| error.to_string());
-        }
-        if let Some(failure) = &failure {
-            eprintln!("controller: cannot write {failure}; free space or choose another --out");
-            failed();
-            return (told, Some(failure.clone()));
-        }
-        if finished {
-            return (told, None);
-        }
-        std::thread::sleep(POLL_PERIOD);
     }
 }
 

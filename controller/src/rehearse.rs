@@ -136,7 +136,6 @@ fn save(
         simulated_s / ended.took_s
     );
     let out = &arguments.files.out;
-    let empty = || Recorder::new().percentiles();
     let report = Report {
         schema_version: SCHEMA_VERSION,
         command_line: std::env::args().collect(),
@@ -149,9 +148,9 @@ fn save(
         rig_cycles_skipped: 0,
         frames_ignored: station.ignored(),
         bus: BusCounters::default(),
-        wakeup_ns: empty(),
-        execution_ns: empty(),
-        period_error_ns: empty(),
+        wakeup_ns: no_times(),
+        execution_ns: no_times(),
+        period_error_ns: no_times(),
         allocations_in_cycle: None,
         records_dropped: station.records_dropped(),
         realtime_granted: Vec::new(),
@@ -169,24 +168,22 @@ fn save(
         "rig_setup": scene,
     });
     write_json(&out.join("run.json"), &run).map_err(RunError::output)?;
-    write_json(&out.join("summary.json"), &summary(cycles, exit, &ended_because, &ended.told, empty()))
-        .map_err(RunError::output)?;
+    write_json(&out.join("summary.json"), &summary(ended, exit, &ended_because)).map_err(RunError::output)?;
     Ok(exit)
 }
 
+fn no_times() -> Percentiles {
+    Recorder::new().percentiles()
+}
+
 /// The keys of `summary.json` that others read; what only a bus or a clock has is 0 or empty.
-fn summary(
-    cycles: u64,
-    exit: Exit,
-    ended_because: &str,
-    events: &[serde_json::Value],
-    none: Percentiles,
-) -> serde_json::Value {
+fn summary(ended: &Ended, exit: Exit, ended_because: &str) -> serde_json::Value {
+    let none = no_times();
     json!({
         "schema_version": SCHEMA_VERSION,
         "position_error_dynamic_m": null,
         "position_error_static_m": null,
-        "cycles": cycles,
+        "cycles": ended.rehearsal.cycles(),
         "skipped": 0,
         "overruns": 0,
         "frames_sent": 0,
@@ -200,6 +197,6 @@ fn summary(
         "records_dropped": 0,
         "passed": exit == Exit::Good,
         "ended_because": ended_because,
-        "events": events,
+        "events": ended.told,
     })
 }

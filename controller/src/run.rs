@@ -1,9 +1,9 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
 use crate::cli::{Axes, Pace, RunArguments};
-use crate::pace::{self, End, Paced};
+use crate::pace::{self, End, Paced, Ride};
 use crate::plugin::PluginError;
-use crate::recording::{self, Tables};
+use crate::recording::{Tables, Writer};
 use crate::report::{self, AxisReport, Report};
 use crate::setup::{Inputs, Mode};
 use crate::station::{IgnoredFrames, News, Outlets, Station};
@@ -93,8 +93,9 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let asking = &interrupt;
-        let writer = scope.spawn(move || recording::run(tables, &records, &news, watcher, || asking.ask()));
-        let work = scope.spawn(|| work(arguments, station, &inputs, bus.as_mut(), &interrupt));
+        let writer = scope.spawn(move || Writer { tables, records, news, watcher }.run(|| asking.ask()));
+        let parts = Work { arguments, inputs: &inputs, station, bus: bus.as_mut(), interrupt: &interrupt };
+        let work = scope.spawn(|| parts.run());
         let finished = join(work);
         let (told, failure) = join(writer);
         save(
@@ -123,31 +124,37 @@ struct Ended {
     output_failed: bool,
 }
 
-fn work(
-    arguments: &RunArguments,
-    mut station: Station,
-    inputs: &Inputs,
-    bus: &mut dyn Bus,
-    interrupt: &Interrupt,
-) -> Result<Finished, RunError> {
-    let grants = acquire_realtime(arguments);
-    let grace = Duration::from_secs_f64(arguments.bus_grace);
-    let paced = match arguments.pace {
-        Pace::Real => pace::run_real(&mut station, bus, &MonotonicClock, grace, interrupt),
-        Pace::Lockstep => {
-            pace::run_lockstep(&mut station, bus, member_name(arguments.axis), grace, interrupt)?
-        }
-    };
-    Ok(Finished {
-        paced,
-        grants,
-        bus: *bus.counters(),
-        axes: AxisReport::of_station(&station, inputs),
-        answered: station.answered(),
-        skipped: station.view().skipped(),
-        ignored: station.ignored(),
-        records_dropped: station.records_dropped(),
-    })
+/// What the thread of the controllers works with.
+struct Work<'a> {
+    arguments: &'a RunArguments,
+    inputs: &'a Inputs,
+    station: Station,
+    bus: &'a mut dyn Bus,
+    interrupt: &'a Interrupt,
+}
+
+impl Work<'_> {
+    /// The station goes at the end, and with it the sending ends of the recorder's queues.
+    fn run(self) -> Result<Finished, RunError> {
+        let Self { arguments, inputs, mut station, bus, interrupt } = self;
+        let grants = acquire_realtime(arguments);
+        let grace = Duration::from_secs_f64(arguments.bus_grace);
+        let ride = Ride { station: &mut station, bus: &mut *bus, grace, interrupt };
+        let paced = match arguments.pace {
+            Pace::Real => pace::run_real(ride, &MonotonicClock),
+            Pace::Lockstep => pace::run_lockstep(ride, member_name(arguments.axis))?,
+        };
+        Ok(Finished {
+            paced,
+            grants,
+            bus: *bus.counters(),
+            axes: AxisReport::of_station(&station, inputs),
+            answered: station.answered(),
+            skipped: station.view().skipped(),
+            ignored: station.ignored(),
+            records_dropped: station.records_dropped(),
+        })
+    }
 }
 
 /// Name in the lockstep barrier.

@@ -1,7 +1,11 @@
 //! Faults of the bus and on it, in real time on the embedded bus: hosts that go, hosts too many, a second controller,
 //! a listener that does not listen.
 
+use protocol::can::CanFrame;
 use rustix::process::Signal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use system_tests::account::of_sensors;
 use system_tests::events::{self, expect_valve_shut_between};
 use system_tests::launch::Pace;
@@ -143,6 +147,32 @@ fn a_bus_that_stays_away_ends_both_with_complete_files() {
     );
     let _ = Table::read(&scene.path("emulator/truth.csv"));
     assert_eq!(count(&json(&scene.path("controller/controller.json")), "/bus/disconnects"), 1);
+}
+
+#[test]
+fn a_rig_that_was_killed_is_missed_while_others_still_talk() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let host = scene.bus_host("");
+    let emulator = scene.emulator(Pace::Real).start();
+    let mut controller = scene.controller(Pace::Real).with("--repeat --bus-grace 2").start();
+    let stranger = scene.peer();
+    scene.wait_for_rows("emulator", UNDER_WAY);
+    let _ = emulator.kill();
+    let over = Arc::new(AtomicBool::new(false));
+    let told_over = Arc::clone(&over);
+    let chatter = std::thread::spawn(move || {
+        let frame = CanFrame::new(0x7F0, &[1]).to_bytes();
+        while !told_over.load(Ordering::Relaxed) {
+            stranger.send(&frame);
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    });
+    controller.wait_for("no sensors for 0.2 s");
+    let _ = controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    over.store(true, Ordering::Relaxed);
+    chatter.join().expect("the stranger talked to the end");
+    drop(host);
 }
 
 #[test]
