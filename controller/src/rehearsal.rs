@@ -6,10 +6,11 @@
 //! ```
 //!
 //! The frames are the bus's own, coded and decoded, and the order is that of the lockstep barrier: what is rehearsed gives
-//! the same measurement, to the byte, as emulator and controllers in lockstep. This is the only place where the controller
-//! looks into the plant; the rehearsed controllers see the frames alone.
+//! the same measurement, to the byte, as emulator and controllers in lockstep. Only here and in [`crate::tune`], which tries
+//! programs out, does the controller look into the plant; the rehearsed controllers see the frames alone.
 
 use crate::axis::{AxisController, AxisRecord};
+use crate::pace::STOPPED_CYCLES;
 use crate::station::{News, Outlets, Station};
 use crossbeam_channel::{Receiver, bounded};
 use plant::scene::{Action, HandForces, Holder, Outcome, RigCall};
@@ -24,15 +25,11 @@ use protocol::frames::{
     ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors as SensorFrame, Tick,
     ValveCommand,
 };
+use protocol::periods;
 use std::time::Duration;
 
-/// Period of tick and status, cycles, and the cycle within it that carries the status: the rig's.
-const SLOW_PERIOD: u64 = 10;
-const STATUS_PHASE: u64 = 5;
 /// Rows and news of a cycle: two and some.
 const OUTLET_ROOM: usize = 64;
-/// Cycles that a run goes on after it was stopped for good, as on a bus.
-const STOPPED_CYCLES: u64 = 2000;
 
 /// What a rehearsal is made of.
 pub struct RehearsalParts<'a> {
@@ -154,11 +151,11 @@ impl Rehearsal {
         let [drive, load] = readings;
         self.hand_over(&Frame::DriveSensors(sensor_frame(drive, cycle)));
         self.hand_over(&Frame::LoadSensors(sensor_frame(load, cycle)));
-        if cycle.is_multiple_of(SLOW_PERIOD) {
+        if periods::tick_is_due(cycle) {
             let tick = Tick { cycle: cycle as u32, lockstep: true, ..Tick::default() };
             self.hand_over(&Frame::Tick(tick));
         }
-        if cycle % SLOW_PERIOD == STATUS_PHASE {
+        if periods::status_is_due(cycle) {
             let status = RigStatus {
                 supply_pressure_pa: self.plant.supply_pressure_pa(),
                 linked: self.plant.linked(),

@@ -42,15 +42,17 @@ pub struct Recorder {
     /// Lockstep waits for the writer rather than lose a record: simulated time has no deadline.
     waits: bool,
     dropped: u64,
+    writer_alive: Weak<()>,
     _alive: Arc<()>,
 }
 
 /// The receiving ends, held by the writer.
 pub struct Records {
-    cycles: Receiver<CycleRecord>,
+    pub(crate) cycles: Receiver<CycleRecord>,
     frames: Receiver<FrameRecord>,
     events: Receiver<Event>,
     sender_alive: Weak<()>,
+    _alive: Arc<()>,
 }
 
 /// Makes the queues. With `waits`, a full queue holds the sender up instead of losing the record.
@@ -61,15 +63,17 @@ pub fn queues(waits: bool) -> (Recorder, Records) {
     let (event_sender, events) = bounded(EVENT_QUEUE);
     let alive = Arc::new(());
     let sender_alive = Arc::downgrade(&alive);
+    let writer = Arc::new(());
     let recorder = Recorder {
         cycles: cycle_sender,
         frames: frame_sender,
         events: event_sender,
         waits,
         dropped: 0,
+        writer_alive: Arc::downgrade(&writer),
         _alive: alive,
     };
-    (recorder, Records { cycles, frames, events, sender_alive })
+    (recorder, Records { cycles, frames, events, sender_alive, _alive: writer })
 }
 
 impl Records {
@@ -95,10 +99,10 @@ impl Recorder {
         self.dropped += hand_over(&self.events, event, self.waits);
     }
 
-    /// Whether a cycle can be recorded now.
+    /// Whether there is no room for a cycle, and a writer who will make some.
     #[must_use]
-    pub fn has_room(&self) -> bool {
-        !self.cycles.is_full()
+    pub fn is_full(&self) -> bool {
+        self.cycles.is_full() && self.writer_alive.strong_count() > 0
     }
 
     /// Records lost to full queues.

@@ -15,7 +15,7 @@ use crate::console::Command;
 use crate::event::{Event, EventKind};
 use crate::live_cycles::LiveCycles;
 use crate::recording::{FrameRecord, Recorder};
-use crate::telegrams::{self, CommandState, SLOW_PERIOD, STATUS_PHASE, SaturatedSensors};
+use crate::telegrams::{self, CommandState, SaturatedSensors, TickCause};
 use crossbeam_channel::Receiver;
 use plant::scene::{Action, HandForces, Holder};
 use plant::tables::CycleRecord;
@@ -25,10 +25,11 @@ use protocol::can::CanFrame;
 use protocol::frames::{
     ChainStatus, DecodeError, ECHO_RANGE, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
 };
+use protocol::periods;
 use realtime::Recorder as Histogram;
 use std::time::Duration;
 
-/// Longest wait for room in the recorder's queue, in ms; a writer that is slower than this has failed.
+/// Longest wait for room in the recorder's queue after a stall, in ms; a writer that is slower than this has failed.
 const LONGEST_WAIT_MS: u32 = 2000;
 
 /// Places of the hands that push.
@@ -146,8 +147,9 @@ impl Station {
         self.skipped += count;
         self.live.skipped(first, count);
         self.tell(first + count, EventKind::Skipped { cycles: count });
+        let mut left_ms = LONGEST_WAIT_MS;
         for cycle in first..first + count {
-            self.wait_for_writer();
+            self.wait_for_writer(&mut left_ms);
             self.begin(cycle);
             self.sample();
             self.advance(cycle);
@@ -155,11 +157,9 @@ impl Station {
     }
 
     /// After a stall longer than the queue, waiting for the writer costs nothing that is not lost already.
-    fn wait_for_writer(&self) {
-        for _ in 0..LONGEST_WAIT_MS {
-            if self.recorder.has_room() {
-                return;
-            }
+    fn wait_for_writer(&self, left_ms: &mut u32) {
+        while *left_ms > 0 && self.recorder.is_full() {
+            *left_ms -= 1;
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -181,7 +181,7 @@ impl Station {
         let drive = Frame::DriveSensors(telegrams::sensors(drive, cycle));
         let load = Frame::LoadSensors(telegrams::sensors(load, cycle));
         if after_miss {
-            self.send(&telegrams::tick(cycle, self.skipped, true, self.lockstep, false), bus);
+            self.send_tick(TickCause::Miss, cycle, bus);
         }
         // Ahead of the sensors, which wake the controllers.
         if let Some(call) = self.people.rig_call(cycle) {
@@ -191,10 +191,10 @@ impl Station {
         self.sent_ns[(cycle % ECHO_RANGE) as usize] = sent_ns.unwrap_or(0);
         self.live.sent(cycle);
         self.send(&load, bus);
-        if cycle.is_multiple_of(SLOW_PERIOD) && !after_miss {
-            self.send(&telegrams::tick(cycle, self.skipped, false, self.lockstep, false), bus);
+        if periods::tick_is_due(cycle) && !after_miss {
+            self.send_tick(TickCause::Period, cycle, bus);
         }
-        if cycle % SLOW_PERIOD == STATUS_PHASE {
+        if periods::status_is_due(cycle) {
             let commands = CommandState {
                 stale: self.commands.each_ref().map(CommandIntake::stale),
                 two_sources: self.commands.each_ref().map(CommandIntake::disputed),
@@ -210,7 +210,7 @@ impl Station {
 
     /// Says farewell: a tick that tells the controllers that no more sensors come after `cycle`.
     pub fn publish_end(&mut self, cycle: u64, bus: &mut dyn Bus) {
-        self.send(&telegrams::tick(cycle, self.skipped, false, self.lockstep, true), bus);
+        self.send_tick(TickCause::Farewell, cycle, bus);
     }
 
     /// Takes a frame that arrived before `cycle`.
@@ -269,20 +269,21 @@ impl Station {
     /// Latches the commands for `cycle`, records it, and steps the plant to the start of the next.
     pub fn act(&mut self, cycle: u64) {
         for axis in Axis::ALL {
-            let intake = &mut self.commands[axis as usize];
-            let change = intake.latch(cycle, &self.live);
-            // Commands count as 0 while the emergency stop is tripped, and the record shows what acts.
-            let opening = if self.plant.emergency_stop() { 0.0 } else { intake.opening() };
-            self.inputs.valve[axis as usize] = plant::quantise_valve(opening);
-            if let Some(change) = change {
+            if let Some(change) = self.commands[axis as usize].latch(cycle, &self.live) {
                 self.tell(cycle, change_event(change, axis));
             }
         }
         self.advance(cycle);
     }
 
+    /// Records `cycle` with what acts over it, and steps the plant: for cycles that were sent and for those that were missed.
     fn advance(&mut self, cycle: u64) {
         self.hold_hands();
+        for (valve, intake) in self.inputs.valve.iter_mut().zip(&self.commands) {
+            // Commands count as 0 while the emergency stop is tripped, and the record shows what acts.
+            let opening = if self.plant.emergency_stop() { 0.0 } else { intake.opening() };
+            *valve = plant::quantise_valve(opening);
+        }
         self.recorder.cycle(CycleRecord {
             cycle,
             valve: self.inputs.valve,
@@ -290,6 +291,10 @@ impl Station {
             truth: self.plant.truth(&self.inputs),
         });
         self.plant.step(&self.inputs);
+    }
+
+    fn send_tick(&mut self, cause: TickCause, cycle: u64, bus: &mut dyn Bus) {
+        self.send(&telegrams::tick(cause, cycle, self.skipped, self.lockstep), bus);
     }
 
     fn send(&mut self, frame: &Frame, bus: &mut dyn Bus) -> Option<u64> {
@@ -409,3 +414,6 @@ fn change_event(change: Change, axis: Axis) -> EventKind {
         Change::OneSource => EventKind::OneSource(axis),
     }
 }
+
+#[cfg(test)]
+mod tests;

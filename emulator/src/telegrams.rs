@@ -1,16 +1,9 @@
-//! What the rig says on the bus: sensors every cycle, tick and status every ten.
-//!
-//! Tick and status are five cycles apart, so that no millisecond carries both.
+//! What the rig says on the bus: sensors every cycle, tick and status every ten ([`protocol::periods`]).
 
 use plant::scene::RigCall;
 use plant::{AxisReadings, Plant};
 use protocol::can::CanFrame;
 use protocol::frames::{ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors, Tick};
-
-/// Period of tick and status in cycles.
-pub const SLOW_PERIOD: u64 = 10;
-/// Cycle within the period in which the status is sent; the tick is sent in cycle 0.
-pub const STATUS_PHASE: u64 = 5;
 
 /// Sensors of one axis in `cycle`.
 #[must_use]
@@ -24,9 +17,21 @@ pub fn sensors(readings: &AxisReadings, cycle: u64) -> Sensors {
     }
 }
 
+/// What a tick is sent for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TickCause {
+    /// Its period is over.
+    Period,
+    /// Cycles were missed; the sensors of its cycle follow.
+    Miss,
+    /// No more sensors come.
+    Farewell,
+}
+
 /// The tick of `cycle`, with `skipped` cycles in all so far.
 #[must_use]
-pub fn tick(cycle: u64, skipped: u64, catch_up: bool, lockstep: bool, ending: bool) -> Frame {
+pub fn tick(cause: TickCause, cycle: u64, skipped: u64, lockstep: bool) -> Frame {
+    let (catch_up, ending) = (cause == TickCause::Miss, cause == TickCause::Farewell);
     // Both counters wrap as their fields in rig.dbc do.
     Frame::Tick(Tick { cycle: cycle as u32, skipped: skipped as u16, catch_up, lockstep, ending })
 }
@@ -116,6 +121,11 @@ mod tests {
         for added_mass_kg in [weights.min, weights.max] {
             assert!(plant.set_added_mass_kg(added_mass_kg).is_ok(), "{added_mass_kg} kg");
         }
+    }
+
+    #[test]
+    fn the_rig_repeats_its_emergency_stop_as_often_as_the_wire_says() {
+        assert_eq!(plant::scene::REPEAT_CYCLES, protocol::periods::EMERGENCY_STOP_CYCLES);
     }
 
     #[test]

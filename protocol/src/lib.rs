@@ -6,4 +6,5 @@ pub mod can;
 pub mod checksum;
 pub mod exit;
 pub mod frames;
+pub mod periods;
 pub mod run_folder;
