@@ -11,6 +11,7 @@
 
 use crate::figures::{self, Figures, position};
 use crate::record::{self, Record};
+use crate::reports::{self, Reports};
 use crate::{SummaryError, thresholds};
 use protocol::run_folder::write_json;
 use serde_json::{Map, Value, json};
@@ -96,38 +97,34 @@ fn add_controllers(
     run: &mut Map<String, Value>,
     folder: &Path,
 ) -> Result<(), SummaryError> {
-    let mut axes = Map::new();
-    let mut take = |path: &Path| -> Result<Option<(Value, Value)>, SummaryError> {
-        if !path.exists() {
-            return Ok(None);
-        }
-        let told = read_object(path)?;
-        if let Some(own) = told.get("axes").and_then(Value::as_object) {
-            axes.extend(own.clone());
-        }
+    let reports = reports::read(folder)?;
+    let split = |told: &Map<String, Value>| {
         let figures: Map<_, _> =
-            PROCESS_FIGURES.iter().map(|key| ((*key).to_owned(), known(&told, key).clone())).collect();
+            PROCESS_FIGURES.iter().map(|key| ((*key).to_owned(), known(told, key).clone())).collect();
         let apart = |key: &str| key != "axes" && !PROCESS_FIGURES.contains(&key);
-        let used: Map<_, _> = told.into_iter().filter(|(key, _)| apart(key)).collect();
-        Ok(Some((Value::Object(figures), Value::Object(used))))
+        let used = told.iter().filter(|(key, _)| apart(key));
+        let used: Map<_, _> = used.map(|(key, value)| (key.clone(), value.clone())).collect();
+        (Value::Object(figures), Value::Object(used))
     };
-    if let Some((figures, used)) = take(&folder.join("controller.json"))? {
-        summary.insert("controller".into(), figures);
-        run.insert("controller".into(), used);
-    } else {
-        let (mut figures, mut used) = (Map::new(), Map::new());
-        for axis in ["drive", "load"] {
-            if let Some(own) = take(&folder.join(format!("controller-{axis}.json")))? {
-                figures.insert(axis.into(), own.0);
-                used.insert(axis.into(), own.1);
+    match &reports {
+        Reports::None => return Ok(()),
+        Reports::Both(told) => {
+            let (figures, used) = split(told);
+            summary.insert("controller".into(), figures);
+            run.insert("controller".into(), used);
+        }
+        Reports::Each(each) => {
+            let (mut figures, mut used) = (Map::new(), Map::new());
+            for (axis, told) in each {
+                let own = split(told);
+                figures.insert((*axis).into(), own.0);
+                used.insert((*axis).into(), own.1);
             }
+            summary.insert("controllers".into(), Value::Object(figures));
+            run.insert("controllers".into(), Value::Object(used));
         }
-        if figures.is_empty() {
-            return Ok(());
-        }
-        summary.insert("controllers".into(), Value::Object(figures));
-        run.insert("controllers".into(), Value::Object(used));
     }
+    let axes = reports.axes();
     let lost = axes.values().filter_map(|axis| total(&axis["sensors_lost"]));
     let at_controller = lost.reduce(|sum, count| sum + count);
     let at_rig = known(summary, "frames_lost_at_rig").as_u64();
@@ -326,12 +323,25 @@ mod tests {
 
     #[test]
     fn an_error_that_no_controller_told_is_computed_from_its_table() {
-        let folder = folder(&[("controller.json", json!({}))]);
+        let folder = folder(&[("controller.json", json!({ "axes": { "drive": {} } }))]);
         let rows = "time_s,main_chain,set_position_m,position_m,moving\n0.0,experiment,0.2,0.197,1\n0.001,experiment,0.2,0.2,1\n";
         std::fs::write(folder.path().join("controller-drive.csv"), rows).unwrap();
         let joined = join(folder.path()).unwrap();
         assert!((joined.figure("position_error_dynamic_m").as_f64().unwrap() - 0.003).abs() < 1e-12);
         assert!(joined.passed());
+    }
+
+    #[test]
+    fn a_table_of_an_axis_that_no_report_names_is_of_an_earlier_run() {
+        let alone = json!({ "ended_well": true, "axes": { "drive": { "sensors_lost": 0 } } });
+        let folder = folder(&[("controller-drive.json", alone)]);
+        let rows = "time_s,main_chain,opening\n0.0,experiment,0.5\n0.001,experiment,0.5\n";
+        for axis in ["drive", "load"] {
+            std::fs::write(folder.path().join(format!("controller-{axis}.csv")), rows).unwrap();
+        }
+        let record = join(folder.path()).unwrap().record;
+        assert!(!record.drive.numbers("opening").is_empty());
+        assert!(record.load.numbers("opening").is_empty() && !record.load_acts());
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`series`] | a quantity over time: smoothing, slopes, stretches |
 //! | [`tables_read`] | a CSV table as columns of numbers and of states |
+//! | [`reports`] | what the controllers tell of themselves, and so which tables are of the run |
 //! | [`record`] | all tables of a run: its moves, rests and steps |
 //! | [`figures`] | what a run adds up to in named numbers, one file for each family |
 //! | [`join`] | joins what emulator and controllers left in a run's folder into one summary |
@@ -25,6 +26,7 @@ pub mod grid;
 pub mod join;
 pub mod picture;
 pub mod record;
+pub mod reports;
 pub mod runs;
 pub mod series;
 pub mod spread;

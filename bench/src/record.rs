@@ -5,6 +5,7 @@
 //! figures that would need it.
 
 use crate::SummaryError;
+use crate::reports;
 use crate::series::{Series, Span};
 use crate::tables_read::{self, Table};
 use std::path::Path;
@@ -66,18 +67,23 @@ pub struct Record {
     pub experiment: toml::Table,
 }
 
-/// Reads the tables of `folder`.
+/// Reads the tables of `folder`; of the controllers' those of the axes that the reports name, since another may be of an earlier run.
 ///
 /// # Errors
-/// [`SummaryError::Read`]: a table that is there and cannot be read.
+/// [`SummaryError::Read`]: a table or a report that is there and cannot be read.
 pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryError> {
     let table = |name: &str, numbers: &[&'static str], states: &[&'static str]| {
         let path = folder.join(name);
         if path.exists() { tables_read::read(&path, numbers, states) } else { Ok(Table::default()) }
     };
+    let axes = reports::read(folder)?.axes();
+    let of_axis = |axis: &str| {
+        let own = axes.contains_key(axis).then(|| format!("controller-{axis}.csv"));
+        own.map_or_else(|| Ok(Table::default()), |name| table(&name, CONTROLLER_NUMBERS, CHAINS))
+    };
     Ok(Record {
-        drive: table("controller-drive.csv", CONTROLLER_NUMBERS, CHAINS)?,
-        load: table("controller-load.csv", CONTROLLER_NUMBERS, CHAINS)?,
+        drive: of_axis("drive")?,
+        load: of_axis("load")?,
         measured: table("measurement.csv", MEASURED, &[])?,
         truth: table("truth.csv", TRUE, &[])?,
         experiment,

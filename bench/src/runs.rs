@@ -141,11 +141,12 @@ pub fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
     }
 }
 
-/// What an experiment asks of the rig: its state at the start, and the set-points of both axes.
+/// What an experiment asks of the rig: its state at the start, how it is run, and the set-points of both axes.
 fn asked(experiment: &toml::Table) -> toml::Table {
-    const OWN: [&str; 3] = ["program", "change", "position-p"];
+    // `start` is left out too: runs are laid over each other from their experiment's begin, whoever gave the sign for it.
+    const OWN: [&str; 3] = ["program", "change", "start"];
     let mut asked = toml::Table::new();
-    for key in ["rig", "drive", "load"] {
+    for key in ["rig", "run", "drive", "load"] {
         if let Some(table) = experiment.get(key).and_then(toml::Value::as_table) {
             let kept = table.iter().filter(|(key, _)| !OWN.contains(&key.as_str()));
             let kept: toml::Table = kept.map(|(key, value)| (key.clone(), value.clone())).collect();
@@ -177,6 +178,7 @@ pub(crate) mod made {
             measured += &format!("{time:.3},{is},0.1\n");
         }
         fs::write(folder.join("controller-drive.csv"), controller).unwrap();
+        fs::write(folder.join("controller-drive.json"), r#"{ "axes": { "drive": {} } }"#).unwrap();
         fs::write(folder.join("measurement.csv"), measured).unwrap();
         folder
     }
@@ -207,6 +209,19 @@ mod tests {
         let (_parent, other) = runs(&[&with("p", 0.4), &with("p", 0.3)]);
         let message = expect_one_experiment(&other).unwrap_err().to_string();
         assert!(message.contains("--anyway") && message.contains("run-1"), "{message}");
+    }
+
+    #[test]
+    fn how_an_experiment_is_run_counts_and_who_starts_it_does_not() {
+        let with = |run: &str| format!("title = \"a\"\n[run]\nsettling_s = 0.5\n{run}\n");
+        let (_parent, same) = runs(&[&with(""), &with("start = \"on-start\"")]);
+        assert!(expect_one_experiment(&same).is_ok());
+        for other in ["repetitions = 2", "after_emergency_stop = \"restart\""] {
+            let (_parent, runs) = runs(&[&with(""), &with(other)]);
+            assert!(expect_one_experiment(&runs).is_err(), "{other}");
+        }
+        let (_parent, runs) = runs(&[&with(""), &with("").replace("0.5", "0.2")]);
+        assert!(expect_one_experiment(&runs).is_err());
     }
 
     #[test]

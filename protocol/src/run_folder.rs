@@ -22,7 +22,8 @@ pub fn new_folder() -> PathBuf {
 }
 
 /// Files that programs write at the end of a run, or at its start in one go: what is left of an earlier run is none of this
-/// one's. The tables are not among them, since each is made anew by its writer's start.
+/// one's. The tables are not among them: each is made anew at its writer's start, and a controller may start before the rig.
+/// A controller's table whose axis no report of the run names is therefore of an earlier run.
 pub const RESULTS: &[&str] = &[
     "run.json",
     "summary.json",

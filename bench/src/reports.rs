@@ -1,0 +1,53 @@
+//! What the controllers of a run tell of themselves: `controller.json` (one process for both axes), or `controller-drive.json` and
+//! `controller-load.json` (a process each).
+//!
+//! The rig removes the reports of an earlier run when it starts, and not the tables, which a controller that started before
+//! it may be writing. So the reports say which tables are of this run: those of the axes that they name.
+
+use crate::SummaryError;
+use crate::join::read_object;
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// The reports of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reports {
+    /// No controller left one.
+    None,
+    /// One process for both axes.
+    Both(Map<String, Value>),
+    /// A process for each axis, those that left one.
+    Each(Vec<(&'static str, Map<String, Value>)>),
+}
+
+/// Reads the reports in `folder`.
+///
+/// # Errors
+/// [`SummaryError::Read`]: a report that is there and cannot be read.
+pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
+    let read = |name: &str| {
+        let path = folder.join(name);
+        path.exists().then(|| read_object(&path)).transpose()
+    };
+    if let Some(both) = read("controller.json")? {
+        return Ok(Reports::Both(both));
+    }
+    let mut each = Vec::new();
+    for axis in ["drive", "load"] {
+        each.extend(read(&format!("controller-{axis}.json"))?.map(|told| (axis, told)));
+    }
+    Ok(if each.is_empty() { Reports::None } else { Reports::Each(each) })
+}
+
+impl Reports {
+    /// What they say of each axis that they name.
+    #[must_use]
+    pub fn axes(&self) -> Map<String, Value> {
+        let of = |told: &Map<String, Value>| told.get("axes").and_then(Value::as_object).cloned();
+        match self {
+            Self::None => Map::new(),
+            Self::Both(told) => of(told).unwrap_or_default(),
+            Self::Each(each) => each.iter().filter_map(|(_, told)| of(told)).flatten().collect(),
+        }
+    }
+}
