@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced, with `root` set: tables that an example of the controller prints, shown or put between the two marks of a page.
+# Sourced, with `root` set: tables that an example of the system tests prints, shown or put between the two marks of a page.
 
 # tables EXAMPLE PAGE [--write]
 # shellcheck disable=SC2154 # root is the sourcing script's
@@ -8,7 +8,7 @@ tables() {
     text=$(mktemp)
     # shellcheck disable=SC2064 # expanded now: local is gone at the end
     trap "rm -f '$text'" EXIT
-    cargo run --quiet --release --manifest-path "$root/Cargo.toml" -p controller --example "$1" >"$text"
+    cargo run --quiet --release --manifest-path "$root/Cargo.toml" -p system-tests --example "$1" >"$text"
     if [ "${3:-}" != --write ]; then
         cat "$text"
         return

@@ -21,10 +21,10 @@ enum { GAIN, INTEGRAL_TIME, TRACKING_TIME, FEED_FORWARD, DEAD_ZONE, COUNT };
 
 static const struct airbench_parameter PARAMETERS[COUNT] = {
     [GAIN] = {"gain_per_s", "1/s", 0.0, 100.0, 20.0, "velocity for each error"},
-    [INTEGRAL_TIME] = {"integral_time_s", "s", 0.05, 1000.0, 0.5, "time in which the integral does what the gain does at once"},
+    [INTEGRAL_TIME] = {"integral_time_s", "s", 0.05, 1000.0, 2.0, "time in which the integral does what the gain does at once"},
     [TRACKING_TIME] = {"tracking_time_s", "s", 0.005, 10.0, 0.05, "time in which the integral follows a limited valve"},
     [FEED_FORWARD] = {"velocity_feed_forward", "", 0.0, 2.0, 1.0, "share of the set-point's rate that is fed forward"},
-    [DEAD_ZONE] = {"dead_zone_m", "m", 0.0, 0.01, 0.0003, "error that the integral leaves alone"},
+    [DEAD_ZONE] = {"dead_zone_m", "m", 0.0, 0.01, 0.001, "error that the integral leaves alone"},
 };
 
 struct position_pi {

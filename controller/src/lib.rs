@@ -12,7 +12,7 @@
 //! | [`chains`] | the sequence chains: main, force, matching, emergency stop |
 //! | [`program`] | tasks of an axis, composed in a file; [`pre_controller`], [`post_controller`], [`linearisation`] |
 //! | [`algorithm`], [`algorithms`], [`parameters`] | what an algorithm is, those shipped, their parameters |
-//! | [`rest_zone`], [`tune`] | when a rod is left alone; figures and margins of a program |
+//! | [`rest_zone`] | when a rod is left alone |
 //! | [`plugin`], [`guard`] | algorithms from shared libraries, the watch over every algorithm |
 //! | [`set_point`] | motion laws, forces, loads |
 //! | [`experiment`], [`setup`] | experiment files, and controllers made of them |
@@ -46,5 +46,4 @@ pub mod run;
 pub mod set_point;
 pub mod setup;
 pub mod station;
-pub mod tune;
 pub mod watch;

@@ -7,6 +7,7 @@
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   own ───── algorithms in C, built as a user builds them
+//!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
 //! Nothing here waits without a limit; what is waited for, and what the programs said, stands in the panic. Programs are
@@ -26,4 +27,5 @@ pub mod process;
 pub mod records;
 pub mod scene;
 pub mod skip;
+pub mod tune;
 pub mod turn;

@@ -17,7 +17,7 @@ static PARAMETERS: [Parameter; 5] = [
     Parameter::new(
         ("integral_time_s", "s"),
         [0.05, 1000.0],
-        0.5,
+        2.0,
         "time in which the integral does what the gain does at once",
     ),
     Parameter::new(
@@ -32,7 +32,7 @@ static PARAMETERS: [Parameter; 5] = [
         1.0,
         "share of the set-point's rate that is fed forward",
     ),
-    Parameter::new(("dead_zone_m", "m"), [0.0, 0.01], 0.0003, "error that the integral leaves alone"),
+    Parameter::new(("dead_zone_m", "m"), [0.0, 0.01], 0.001, "error that the integral leaves alone"),
 ];
 
 #[derive(Default)]

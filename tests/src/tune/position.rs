@@ -13,10 +13,10 @@
 //! of stick and slip, 1 to 2 mm every few seconds, is no oscillation; it shows in the figure `rest_peak_to_peak_m`, which
 //! is judged apart.
 
-use crate::guard::AlgorithmFault;
-use crate::program::{Demand, Hand, Program};
-use crate::set_point::{ForceSetPoint, SetPoint, SmoothWay};
 use crate::tune::{Trial, TrialError, largest_factor, means, peak_to_peak};
+use controller::guard::AlgorithmFault;
+use controller::program::{Demand, Hand, Program};
+use controller::set_point::{ForceSetPoint, SetPoint, SmoothWay};
 use plant::{Inputs, Plant, RigParameters, Setup, quantise_valve};
 use protocol::frames::Sensors;
 use std::collections::VecDeque;
@@ -217,12 +217,12 @@ impl Figures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::program::file::Source;
+    use controller::program::file::Source;
     use plant::Axis;
     use std::path::Path;
 
     fn shipped(name: &str) -> Program {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("programs/{name}.toml"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../controller/programs/{name}.toml"));
         Source::read(&path).unwrap().program(Axis::Drive, &RigParameters::baseline(), false).unwrap()
     }
 

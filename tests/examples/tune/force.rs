@@ -2,9 +2,9 @@
 
 use crate::cases::{Case, Made, figures};
 use crate::{corners, mark};
-use controller::tune::rehearsed::{gain_margin, worst_gain_margin};
-use controller::tune::{Trial, TrialError, in_parallel};
 use std::error::Error;
+use system_tests::tune::rehearsed::{gain_margin, worst_gain_margin};
+use system_tests::tune::{Trial, TrialError, in_parallel};
 
 struct Ladder {
     load: &'static str,

@@ -8,11 +8,11 @@ use controller::axis::AxisRecord;
 use controller::cli::FileArguments;
 use controller::rehearsal::Rehearsed;
 use controller::setup::Inputs;
-use controller::tune::rehearsed::{self, Run};
-use controller::tune::{Trial, TrialError};
 use plant::{Axis, Scene};
 use std::error::Error;
 use std::path::{Path, PathBuf};
+use system_tests::tune::rehearsed::{self, Run};
+use system_tests::tune::{Trial, TrialError};
 
 /// An experiment with the programs that it is tried with.
 pub(crate) struct Case {
@@ -38,7 +38,7 @@ pub(crate) struct Made<'a> {
 impl Case {
     /// Reads the files.
     pub(crate) fn new(made: &Made) -> Result<Self, Box<dyn Error>> {
-        let room = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller");
         let program = |name: Option<&str>| Some(room.join(format!("programs/{}.toml", name?)));
         let files = FileArguments {
             rig: room.join("../plant/rig.toml"),

@@ -5,15 +5,15 @@
 //! | [`position`] | a position program alone on moves: errors, steps, margins of gain and delay |
 //! | [`rehearsed`] | a whole experiment, both axes with their chains: its rows, and the margin of a linked rig |
 //!
-//! The programs are the real ones, made for the nominal rig. The loop's factor multiplies the K_V tables of the plant and not those of
-//! the programs: what the valves pass is what every loop goes through, so a factor of 2 without oscillation is a gain margin of
-//! 2, whatever the algorithm. Linked, both axes' loops are multiplied at once.
+//! The programs are the real ones, made for the nominal rig. The loop's factor multiplies the K_V tables of the plant and not
+//! those of the programs: what the valves pass is what every loop goes through, so a factor of 2 without oscillation is a gain
+//! margin of 2, whatever the algorithm. Linked, both axes' loops are multiplied at once.
 
 pub mod position;
 pub mod rehearsed;
 
-use crate::guard::AlgorithmFault;
-use crate::run::RunError;
+use controller::guard::AlgorithmFault;
+use controller::run::RunError;
 use plant::{ParameterError, RigParameters};
 use std::sync::Mutex;
 

@@ -1,8 +1,8 @@
 //! A table of subjects by figures, each the mean and the range over some kinds of noise.
 
 use crate::cases::{Case, Made, figures};
-use controller::tune::{Trial, TrialError, in_parallel};
 use std::error::Error;
+use system_tests::tune::{Trial, TrialError, in_parallel};
 
 /// Seeds of the sensors' noise.
 pub(crate) const SEEDS: [u64; 5] = [1, 2, 3, 4, 5];

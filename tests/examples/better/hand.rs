@@ -3,11 +3,11 @@
 use crate::cases::{Case, Made, figures};
 use crate::sheet::{SEEDS, Spread};
 use controller::rehearsal::Rehearsed;
-use controller::tune::rehearsed::{self, Run};
-use controller::tune::{Trial, TrialError, in_parallel};
 use plant::Axis;
 use plant::scene::{Arm, Hand, Part};
 use std::error::Error;
+use system_tests::tune::rehearsed::{self, Run};
+use system_tests::tune::{Trial, TrialError, in_parallel};
 
 const EXPERIMENT: &str = "manual-let-go";
 /// A small pull that stays when the hand has let go, as of a cable, N; and until when, s.

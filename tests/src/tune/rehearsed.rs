@@ -5,15 +5,16 @@
 //!                 ╰── ripple ──╯          ╰──── lasting oscillation ────╯
 //! ```
 //!
-//! A linked rig *oscillates* when its run is not done (a chain waited in vain for standstill, or a fault stopped it), or when in each of
-//! the last three half seconds of the experiment the drive's position moves by more than [`STILL_M`] or the load's force by more
-//! than [`STILL_N`], or when in motion, from 1 s to 0.5 s before the drive's set-point comes to rest, the force has a ripple of more than
-//! [`RIPPLE_N`]: at rest a dead zone may hide what the loop does. In the last half second of the motion the rod may stick and hop,
-//! which is no oscillation. Each is asked of [`SEEDS`] kinds of noise: one that hunts does not do so each time.
+//! A linked rig *oscillates* when its run is not done (a chain waited in vain for standstill, or a fault stopped it), or when in
+//! each of the last three half seconds of the experiment the drive's position moves by more than [`STILL_M`] or the load's force
+//! by more than [`STILL_N`], or when in motion, from 1 s to 0.5 s before the drive's set-point comes to rest, the force has a
+//! ripple of more than [`RIPPLE_N`]: at rest a dead zone may hide what the loop does. In the last half second of the motion the
+//! rod may stick and hop, which is no oscillation. Each is asked of [`SEEDS`] kinds of noise: one that hunts does not do so each
+//! time.
 
 use super::{Trial, TrialError, in_parallel, means, peak_to_peak};
-use crate::rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
-use crate::setup::{Inputs, Mode};
+use controller::rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
+use controller::setup::{Inputs, Mode};
 use plant::{Axis, Scene};
 use protocol::frames::MainChainState;
 

@@ -6,8 +6,8 @@ mod cases;
 mod force;
 mod position;
 
-use controller::tune::{MASSES_KG, SUPPLIES_BAR, Trial};
 use std::error::Error;
+use system_tests::tune::{MASSES_KG, SUPPLIES_BAR, Trial};
 
 fn main() -> Result<(), Box<dyn Error>> {
     position::tables()?;

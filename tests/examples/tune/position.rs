@@ -3,11 +3,11 @@
 use crate::{corners, mark, nominal};
 use controller::program::Program;
 use controller::program::file::{ProgramError, Source};
-use controller::tune::position::{POINT_TO_POINT, STEP, attempt, delay_margin, gain_margin};
-use controller::tune::{Trial, TrialError, in_parallel};
 use plant::{Axis, RigParameters};
 use std::error::Error;
 use std::path::Path;
+use system_tests::tune::position::{POINT_TO_POINT, STEP, attempt, delay_margin, gain_margin};
+use system_tests::tune::{Trial, TrialError, in_parallel};
 
 const GAIN: &str = "algorithm.gain_per_s";
 const PROGRAMS: [(&str, &[f64]); 3] = [
@@ -19,7 +19,7 @@ const PROGRAMS: [(&str, &[f64]); 3] = [
 /// Prints them all.
 pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
     for (name, gains) in PROGRAMS {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("programs/{name}.toml"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../controller/programs/{name}.toml"));
         let shipped = Shipped { source: Source::read(&path)?, rig: RigParameters::baseline() };
         println!("\n### {name}\n");
         shipped.by_gain(gains)?;

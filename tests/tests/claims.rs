@@ -7,10 +7,10 @@ mod cases;
 
 use cases::{Case, Made, figures};
 use controller::program::file::Source;
-use controller::tune::Trial;
-use controller::tune::position::{EXCITATION, attempt};
 use plant::{Axis, RigParameters};
 use std::path::Path;
+use system_tests::tune::Trial;
+use system_tests::tune::position::{EXCITATION, attempt};
 
 /// Corners that margins are held in, kg and bar: nominal, light and weak, heavy and strong.
 const CORNERS: [(f64, f64); 3] = [(0.0, 7.0), (0.0, 5.0), (20.0, 8.0)];
@@ -98,7 +98,7 @@ fn twice_the_loop_leaves_the_map_still() {
 
 #[test]
 fn twice_the_loop_leaves_the_cascade_still() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs/position-cascade.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/programs/position-cascade.toml");
     let source = Source::read(&path).unwrap();
     for (added_mass_kg, supply_bar) in CORNERS {
         let trial = Trial { added_mass_kg, supply_bar, loop_factor: 2.0, ..Trial::default() };
