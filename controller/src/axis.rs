@@ -32,7 +32,7 @@ use protocol::frames::{
 use work::{Asked, Seen, Work};
 
 /// Period of status and values, in cycles.
-const SLOW_PERIOD: u64 = 10;
+const SLOW_PERIOD: u64 = protocol::periods::CHAIN_CYCLES;
 /// Cycles within the period in which status and values of drive and load are sent: none falls on the rig's tick (0) or status
 /// (5), nor on another.
 const SLOW_PHASES: [[u64; 2]; 2] = [[2, 3], [7, 8]];

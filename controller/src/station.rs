@@ -25,7 +25,7 @@ use std::collections::VecDeque;
 /// than its partner gives it up for its silence, so that the cause is named.
 const SILENT_TICKS: u64 = 5;
 /// Cycles from tick to tick.
-const TICK_PERIOD: u64 = 10;
+const TICK_PERIOD: u64 = protocol::periods::TICK_CYCLES;
 /// Frames of a partner that wait for their cycle; a cycle has three at most.
 const MAIL_ROOM: usize = 16;
 

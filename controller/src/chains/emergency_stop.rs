@@ -37,7 +37,7 @@ use protocol::frames::{EmergencyStop, EmergencyStopChainState, EmergencyStopReas
 use std::fmt;
 
 /// Cycles between two frames of a stop that is held.
-const REPEAT_CYCLES: u64 = 100;
+const REPEAT_CYCLES: u64 = protocol::periods::EMERGENCY_STOP_CYCLES;
 /// Shortest stay in tripped: the rig has told ten times by then whether it is tripped.
 const TRIPPED_SHORTEST_S: f64 = 0.1;
 /// Longest stay in tripped, whatever the axis still does.
