@@ -40,7 +40,7 @@ fn write(out: &mut impl Write) -> io::Result<()> {
 }
 
 fn table(out: &mut impl Write, parameters: &[Parameter]) -> io::Result<()> {
-    for Parameter { name, unit, least, most, default, meaning } in parameters {
+    for Parameter { name, unit, least, most, default, meaning, .. } in parameters {
         writeln!(out, "  {name:28} {unit:9} {least:8} to {most:<8} default {default:<8} {meaning}")?;
     }
     writeln!(out)

@@ -26,11 +26,12 @@ use std::ops::Range;
 
 /// Multiple of the basic cycle of a task; the first parameter of each.
 pub const EVERY_CYCLES: Parameter =
-    Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms");
+    Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms")
+        .whole();
 /// Seconds of one cycle.
 const CYCLE_S: f64 = 1e-3;
-/// Longest time between two steps that a filter or an algorithm is told, in cycles: a stall is no reason for a jump.
-const LONGEST_PERIOD: u64 = 100;
+/// A task that is so many cycles late begins anew: a stall is no reason for a jump.
+const STALLED: u64 = 100;
 
 /// A parameter of a program under its full name.
 #[derive(Clone, Debug)]
@@ -84,11 +85,16 @@ pub enum Task {
     Settled,
 }
 
-/// The algorithm that the force chain uses, and the two of its values that the chain sets each cycle.
+/// The algorithm that the force chain uses, and the two of its values in which the chain has a say each cycle.
 struct GivingWay {
     slot: Slot,
+    /// Places among the slot's values.
     moving: usize,
     limit_m_per_s: usize,
+    /// What the chain decided last: whether the rod moves, and its limit, m/s.
+    decided: (bool, Option<f64>),
+    /// The slot's values with that in them; the user's own stay what they are.
+    effective: Vec<f64>,
 }
 
 /// The program of one axis.
@@ -111,10 +117,17 @@ impl Program {
     /// Takes the sensors of `cycle`: the pre-controller's task.
     pub fn observe(&mut self, cycle: u64, sensors: &Sensors, supply_pressure_pa: f64) {
         let parameters = &self.values[self.tasks[Task::PreController as usize].clone()];
-        let Some(passed) = due(self.observed, cycle, parameters) else { return };
+        let passed = match due(self.observed, cycle, parameters) {
+            Due::NotYet => return,
+            Due::After(passed) => passed,
+            Due::Anew => {
+                self.pre.reset();
+                parameters[0]
+            }
+        };
         self.observed = Some(cycle);
         self.ready.supply_pressure_pa = supply_pressure_pa;
-        self.pre.step(sensors, passed as f64 * CYCLE_S, parameters, &mut self.ready);
+        self.pre.step(sensors, passed * CYCLE_S, parameters, &mut self.ready);
     }
 
     /// The opening for `demand`, from the algorithm that has the axis.
@@ -130,17 +143,20 @@ impl Program {
         ready.set_acceleration_m_per_s2 = direction * demand.position.acceleration_m_per_s2;
         ready.set_force_n = demand.force.force_n;
         ready.set_force_rate_n_per_s = demand.force.rate_n_per_s;
-        let (slot, other) = match (hand, &mut self.giving_way) {
-            (Hand::ForceChain, Some(giving_way)) => (&mut giving_way.slot, Some(&mut self.user)),
-            (_, other) => (&mut self.user, other.as_mut().map(|giving_way| &mut giving_way.slot)),
+        let wanted = match (hand, &mut self.giving_way) {
+            (Hand::ForceChain, Some(giving_way)) => {
+                self.user.stepped = None;
+                giving_way.step(cycle, ready, &self.values)?
+            }
+            (_, other) => {
+                if let Some(giving_way) = other {
+                    giving_way.slot.stepped = None;
+                }
+                self.user.step(cycle, ready, &self.values[self.user.values.clone()])?
+            }
         };
-        if let Some(other) = other {
-            other.stepped = None;
-        }
-        slot.step(cycle, ready, &self.values)?;
-        let wanted = slot.wanted_m_per_s;
         let parameters = &self.values[self.tasks[Task::PostController as usize].clone()];
-        if due(self.post_stepped, cycle, parameters).is_some() {
+        if due(self.post_stepped, cycle, parameters) != Due::NotYet {
             self.post_stepped = Some(cycle);
             self.output = self.post.step(wanted, ready, parameters);
             self.ready.applied_velocity_m_per_s = self.output.applied_velocity_m_per_s;
@@ -176,11 +192,15 @@ impl Program {
 
     /// Tells the algorithm of the force chain what the chain has decided.
     pub fn give_way(&mut self, chain: &ForceOutput) {
-        if let Some(GivingWay { moving, limit_m_per_s, .. }) = &self.giving_way {
-            self.values[*moving] = f64::from(u8::from(chain.feed_forward));
-            let most = self.variables[*limit_m_per_s].parameter.most;
-            self.values[*limit_m_per_s] = chain.limit_m_per_s.unwrap_or(most);
+        if let Some(giving_way) = &mut self.giving_way {
+            giving_way.decided = (chain.feed_forward, chain.limit_m_per_s);
         }
+    }
+
+    /// Whether there is an algorithm for the force chain.
+    #[must_use]
+    pub fn gives_way(&self) -> bool {
+        self.giving_way.is_some()
     }
 
     /// Values of a task, in the order of its table.
@@ -259,7 +279,8 @@ impl Program {
     /// Changes the variable at `place`; acts from the next cycle on.
     ///
     /// # Errors
-    /// [`OutOfRange`] when it does not allow the value; it keeps its own.
+    /// [`OutOfRange`] when it does not allow the value; it keeps its own. What is read at the start only is set all the same:
+    /// who changes it while running asks [`Parameter::check_change`] before.
     pub fn set(&mut self, place: usize, value: f64) -> Result<(), OutOfRange> {
         self.values[place] = self.variables[place].parameter.check(value)?;
         Ok(())
@@ -267,25 +288,57 @@ impl Program {
 }
 
 impl Slot {
-    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<(), AlgorithmFault> {
-        let (every, parameters) = values[self.values.clone()].split_at(1);
-        let Some(passed) = due(self.stepped, cycle, every) else { return Ok(()) };
-        ready.period_s = passed as f64 * CYCLE_S;
-        if self.stepped.is_none() {
-            ready.period_s = every[0] * CYCLE_S;
-            self.algorithm.reset(ready, parameters)?;
+    /// The wanted velocity, with the `values` of this slot.
+    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<f64, AlgorithmFault> {
+        let (every, parameters) = values.split_at(1);
+        match due(self.stepped, cycle, every) {
+            Due::NotYet => return Ok(self.wanted_m_per_s),
+            Due::After(passed) => ready.period_s = passed * CYCLE_S,
+            Due::Anew => {
+                ready.period_s = every[0] * CYCLE_S;
+                self.algorithm.reset(ready, parameters)?;
+            }
         }
         self.stepped = Some(cycle);
         self.wanted_m_per_s = 0.0;
         self.wanted_m_per_s = self.algorithm.step(ready, parameters)?;
-        Ok(())
+        Ok(self.wanted_m_per_s)
     }
 }
 
-/// Cycles since the last step of a task if it is due at `cycle`; its multiple is its first parameter.
-fn due(last: Option<u64>, cycle: u64, parameters: &[f64]) -> Option<u64> {
-    let every = parameters[0] as u64;
-    let Some(last) = last else { return Some(1) };
-    let passed = cycle.saturating_sub(last);
-    (passed >= every).then(|| passed.clamp(1, LONGEST_PERIOD.max(every)))
+impl GivingWay {
+    /// The wanted velocity: the chain says whether the rod moves, and the lower one of its limit and the user's holds.
+    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<f64, AlgorithmFault> {
+        let (moves, limit_m_per_s) = self.decided;
+        self.effective.copy_from_slice(&values[self.slot.values.clone()]);
+        self.effective[self.moving] = f64::from(u8::from(moves));
+        let limit = &mut self.effective[self.limit_m_per_s];
+        *limit = limit.min(limit_m_per_s.unwrap_or(f64::INFINITY));
+        self.slot.step(cycle, ready, &self.effective)
+    }
 }
+
+/// Whether a task is due.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Due {
+    /// Its multiple is not over.
+    NotYet,
+    /// It is, so many cycles after its last step.
+    After(f64),
+    /// There was no last step, or it is too long ago to go on from it.
+    Anew,
+}
+
+/// Whether a task is due at `cycle`; its multiple is its first parameter.
+fn due(last: Option<u64>, cycle: u64, parameters: &[f64]) -> Due {
+    let every = parameters[0] as u64;
+    let Some(last) = last else { return Due::Anew };
+    match cycle.saturating_sub(last) {
+        passed if passed < every => Due::NotYet,
+        passed if passed >= every + STALLED => Due::Anew,
+        passed => Due::After(passed as f64),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -127,7 +127,7 @@ impl Inputs {
         let Some(section) = section else { return Ok(()) };
         let (asked, able) = (section.set_points.quantity(), program.controls());
         if asked == able {
-            return Ok(());
+            return self.check_gives_way(axis, section, program);
         }
         let name = |quantity| match quantity {
             Quantity::Position => "positions",
@@ -143,6 +143,27 @@ impl Inputs {
         )))
     }
 
+    /// An axis that presses gives way too: on linked rods while the drive is positioned, to relieve stress, to a hand.
+    fn check_gives_way(
+        &self,
+        axis: Axis,
+        section: &AxisExperiment,
+        program: &Program,
+    ) -> Result<(), RunError> {
+        if section.set_points.quantity() == Quantity::Position || program.gives_way() {
+            return Ok(());
+        }
+        let source = self.programs[axis.index()].as_ref();
+        Err(RunError::Input(format!(
+            "{}: no [giving-way]: the {} axis has set-points of forces ({}:{}), and its force chain needs an algorithm to relieve \
+             stress and to give way; add\n[giving-way]\nname = \"force-manual\"",
+            source.map_or(Path::new("(none)"), |source| source.path.as_path()).display(),
+            axis.name(),
+            self.experiment_file.display(),
+            section.program.line,
+        )))
+    }
+
     fn changes(
         &self,
         axis: Axis,
@@ -155,7 +176,7 @@ impl Inputs {
                 .map_err(|error| RunError::Input(format!("{at}: {error}")))?;
             let value = program.variables()[place]
                 .parameter
-                .check(change.value)
+                .check_change(change.value)
                 .map_err(|error| RunError::Input(format!("{at}: {error}")))?;
             Ok(PlannedChange { at_s: change.at_s, place, value })
         });
@@ -267,3 +288,6 @@ fn read(path: &Path) -> Result<String, RunError> {
     std::fs::read_to_string(path)
         .map_err(|error| RunError::Input(format!("cannot read {}: {error}", path.display())))
 }
+
+#[cfg(test)]
+mod tests;

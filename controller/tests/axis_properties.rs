@@ -177,6 +177,7 @@ fn drive_through(
                 let place = place % program.variables().len();
                 let parameter = &program.variables()[place].parameter;
                 let value = parameter.least + share * (parameter.most - parameter.least);
+                let value = if parameter.whole { value.round() } else { value };
                 prop_assert!(program.set(place, value).is_ok());
             }
             Happening::Skipped(cycles) => cycle += cycles,

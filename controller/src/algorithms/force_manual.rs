@@ -13,7 +13,7 @@
 //! feed-forward. Once the rod moves, a dead zone would be a force for the hand, and k_f x' lets the air follow the rod. A
 //! rod let go in motion slides on by v b / (c (1 - k_f)), since only its spring stops it: k_f = 1 is the ideal for the hand
 //! and never stops. b: viscous friction, N s/m; c: stiffness of the air, N/m. The limit is for high forces in the
-//! beginning. Which case it is, and which limit, the force chain decides and sets in each cycle.
+//! beginning. Which case it is, and which lower limit, the force chain decides in each cycle.
 //!
 //! Source: [Neugebauer 2011, section 4], manual mode.
 
@@ -47,13 +47,13 @@ static PARAMETERS: [Parameter; 5] = [
         ("moving", ""),
         [0.0, 1.0],
         0.0,
-        "from 0.5 on the rod counts as moving; set by the force chain",
+        "from 0.5 on the rod counts as moving; in [giving-way] the force chain decides it",
     ),
     Parameter::new(
         ("limit_m_per_s", "m/s"),
         [0.0, 5.0],
         1.0,
-        "largest velocity either way; set by the force chain",
+        "largest velocity either way; in [giving-way] the force chain may lower it",
     ),
 ];
 

@@ -208,7 +208,7 @@ const LARGEST_M_PER_S: f64 = 5.0;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::algorithms::laws;
+    use crate::algorithms::laws::{self, Stuck};
 
     const CYCLE_S: f64 = 1e-3;
 
@@ -276,6 +276,15 @@ mod tests {
 
     #[test]
     fn a_valve_that_cannot_follow_does_not_wind_it_up() {
+        // 1500 N over 100 s: 150 N in 10 s, of a limit of 500 N.
+        let parameters = &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 500.0)];
+        let held = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
+        let back = Ready { set_force_n: -15.0, ..moving_at(0.1) };
+        laws::does_not_wind_up(&KIND, &Stuck { parameters, held, back });
+    }
+
+    #[test]
+    fn after_a_step_that_the_valve_cannot_follow_it_turns_in_time() {
         let parameters = defaults();
         for shut in [false, true] {
             let mut algorithm = ForcePidMap::new(&RigParameters::baseline());

@@ -62,9 +62,51 @@ pub(super) fn check(kind: &Kind) {
     TestRunner::default().run(&inputs, claim).unwrap_or_else(|error| panic!("{}: {error}", kind.name));
 }
 
-/// After 10 s of an error that the valve does nothing about, or that it follows but the rod does not, the result turns its sign
-/// within `within_s` when the error does; with the parameters' defaults, at the edge of what an integral part may take in.
-pub(super) fn recovers(kind: &Kind, at_rest: &Ready, within_s: f64) {
+/// An error that the valve cannot work off, and what comes after it.
+pub(super) struct Stuck<'a> {
+    /// Parameters that differ from their defaults: an integral part so slow, with limit and zone so wide, that neither of these
+    /// stops it in 10 s.
+    pub parameters: &'a [(usize, f64)],
+    /// The large error.
+    pub held: Ready,
+    /// What comes of it in the end, for 0.5 s: some per cent of the other sign.
+    pub back: Ready,
+}
+
+/// An integral part does not grow while the valve cannot follow: after 10 s of it the algorithm goes on as after 1 s, whether the
+/// valve is at its limit or does nothing at all. With a valve that follows, and a rod that does not, it does grow: else nothing
+/// were claimed.
+pub(super) fn does_not_wind_up(kind: &Kind, stuck: &Stuck<'_>) {
+    let mut parameters: Vec<_> = kind.parameters.iter().map(|parameter| parameter.default).collect();
+    stuck.parameters.iter().for_each(|(place, value)| parameters[*place] = *value);
+    let after = |held_s: f64, valve: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        let mut algorithm = (kind.make)(&RigParameters::baseline());
+        let mut ready = stuck.held;
+        algorithm.reset(&ready, &parameters);
+        for _ in 0..(held_s / ready.period_s).round() as usize {
+            ready.applied_velocity_m_per_s = valve(algorithm.step(&ready, &parameters));
+        }
+        ready = Ready { applied_velocity_m_per_s: ready.applied_velocity_m_per_s, ..stuck.back };
+        let mut step = |_| {
+            let result = algorithm.step(&ready, &parameters);
+            ready.applied_velocity_m_per_s = valve(result);
+            result
+        };
+        (0..500).map(&mut step).collect()
+    };
+    // Filters within an algorithm have settled after 1 s, to this, m/s.
+    let differ = |valve: &dyn Fn(f64) -> f64| {
+        let (long, short) = (after(10.0, valve), after(1.0, valve));
+        long.iter().zip(&short).map(|(long, short)| (long - short).abs()).fold(0.0, f64::max) > 1e-6
+    };
+    assert!(!differ(&|result: f64| result.clamp(-0.6, 0.6)), "{}: wound up at the valve's limit", kind.name);
+    assert!(!differ(&|_| 0.0), "{}: wound up with the valve shut", kind.name);
+    assert!(differ(&|result| result), "{}: its integral part does nothing here", kind.name);
+}
+
+/// After 10 s of an error at the edge of what an integral part may take in, its limit lets the result turn its sign within
+/// `within_s` when the error does; with the parameters' defaults.
+pub(super) fn keeps_its_limit(kind: &Kind, at_rest: &Ready, within_s: f64) {
     let parameters: Vec<_> = kind.parameters.iter().map(|parameter| parameter.default).collect();
     for error_m in [0.3, 0.0029] {
         for stuck in [false, true] {

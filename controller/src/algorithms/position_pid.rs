@@ -116,7 +116,7 @@ impl Algorithm for PositionPid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::algorithms::laws;
+    use crate::algorithms::laws::{self, Stuck};
 
     const AT_REST: Ready = Ready {
         period_s: 1e-3,
@@ -150,8 +150,18 @@ mod tests {
 
     #[test]
     fn it_does_not_wind_up() {
+        // 0.3 m over 100 s: 30 mm in 10 s, of a limit of 100 mm.
+        let parameters =
+            &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 0.1), (INTEGRAL_ZONE, 0.5), (REST_ZONE, 0.0)];
+        let held = Ready { set_position_m: 0.5, ..AT_REST };
+        let back = Ready { set_position_m: 0.19, ..AT_REST };
+        laws::does_not_wind_up(&KIND, &Stuck { parameters, held, back });
+    }
+
+    #[test]
+    fn its_integral_keeps_its_limit() {
         // The integral's limit is 3 mm; 2.9 mm take it back in 2 * 3 / 2.9 s of an integral time of 1 s at most, but the
         // error itself turns the sign as soon as the integral is below it.
-        laws::recovers(&KIND, &AT_REST, 2.1);
+        laws::keeps_its_limit(&KIND, &AT_REST, 2.1);
     }
 }

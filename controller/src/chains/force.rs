@@ -43,7 +43,8 @@ pub const PARAMETERS: &[Parameter] = &[
     Parameter::new(("still_for_s", "s"), [0.0, 1.0], 0.1, "how long it must not, to be at standstill again"),
     Parameter::new(("relieved_n", "N"), [0.1, 2000.0], 20.0, "mean force of a relieved system"),
     Parameter::new(("relieved_for_s", "s"), [0.0, 60.0], 0.3, "how long it must be lower, at standstill"),
-    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 15.0, "how long relieving may take"),
+    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 15.0, "how long relieving may take")
+        .at_start_only(),
 ];
 
 /// Time constant of the mean force, s.

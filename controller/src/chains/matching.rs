@@ -30,7 +30,8 @@ pub const PARAMETERS: &[Parameter] = &[
     Parameter::new(("rest_s", "s"), [0.0, 60.0], 0.2, "how long the partner must have been at rest before"),
     Parameter::new(("moved_m", "m"), [1e-5, 0.1], 0.3e-3, "range of a position that counts as movement"),
     Parameter::new(("offset_most_m", "m"), [1e-4, 0.5], 5e-3, "largest plausible offset"),
-    Parameter::new(("match_timeout_s", "s"), [0.1, 600.0], 10.0, "how long matching may take"),
+    Parameter::new(("match_timeout_s", "s"), [0.1, 600.0], 10.0, "how long matching may take")
+        .at_start_only(),
 ];
 
 /// What the linkage's gap leaves open in a matched offset, to each side, m.

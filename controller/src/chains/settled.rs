@@ -18,15 +18,19 @@ pub const TABLE: &str = "settled";
 
 /// Bounds, in the order of the slices.
 pub const PARAMETERS: &[Parameter] = &[
-    Parameter::new(("still_m", "m"), [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest"),
-    Parameter::new(("position_error_m", "m"), [1e-5, 0.5], 2e-3, "largest position error of a settled axis"),
-    Parameter::new(("force_error_n", "N"), [0.1, 2000.0], 20.0, "largest mean force error of a settled axis"),
+    Parameter::new(("still_m", "m"), [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest")
+        .at_start_only(),
+    Parameter::new(("position_error_m", "m"), [1e-5, 0.5], 2e-3, "largest position error of a settled axis")
+        .at_start_only(),
+    Parameter::new(("force_error_n", "N"), [0.1, 2000.0], 20.0, "largest mean force error of a settled axis")
+        .at_start_only(),
     Parameter::new(
         ("force_error_n_per_n", "N/N"),
         [0.0, 1.0],
         0.1,
         "the same as a share of the force set-point",
-    ),
+    )
+    .at_start_only(),
 ];
 
 /// Cycles of one bucket, and the longest gap between samples.

@@ -115,7 +115,7 @@ mod tests {
             (parameter("a", [1.0, 1.0], 1.0), "range 1 to 1"),
             (parameter("a", [0.0, f64::NAN], 0.0), "must be finite"),
             (parameter("a", [f64::NEG_INFINITY, 0.0], 0.0), "must be finite"),
-            (parameter("a", [0.0, 1.0], 2.0), "a = 2 "),
+            (parameter("a", [0.0, 1.0], 2.0), "a = 2;"),
             (parameter("a", [0.0, 1.0], f64::NAN), "a = NaN"),
         ];
         for (bad, words) in cases {

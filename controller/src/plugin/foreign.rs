@@ -153,6 +153,8 @@ unsafe fn read_parameters(descriptor: &Descriptor) -> Result<Vec<Parameter>, Wro
                 most,
                 default: default_value,
                 meaning: text(meaning, &what("meaning"))?.into(),
+                whole: false,
+                at_start_only: false,
             })
         }
     };

@@ -44,6 +44,12 @@ pub struct ProgramError(String);
 
 type Section = BTreeMap<String, Spanned<toml::Value>>;
 
+/// Texts of a program by their full key, such as `algorithm.name`.
+pub type Makings = BTreeMap<String, String>;
+
+/// Full key of the linearisation.
+const LINEARISATION: &str = "post-controller.linearisation";
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct File {
@@ -95,6 +101,29 @@ impl Source {
 
     fn parse(&self) -> Result<File, ProgramError> {
         toml::from_str(&self.text).map_err(|error| ProgramError(format!("{}: {error}", self.path.display())))
+    }
+
+    /// What the file says besides numbers, by its full key: what a program is made of, and cannot change while it runs.
+    ///
+    /// # Errors
+    /// [`ProgramError`] when it is no TOML of this form.
+    pub fn makings(&self) -> Result<Makings, ProgramError> {
+        let File { algorithm, post_controller, giving_way, .. } = self.parse()?;
+        let giving_way = giving_way.map(Spanned::into_inner).unwrap_or_default();
+        let sections = [
+            ("algorithm", algorithm.into_inner()),
+            ("giving-way", giving_way),
+            ("post-controller", post_controller),
+        ];
+        let mut makings = Makings::from([(LINEARISATION.to_owned(), Law::ChokedExhaust.name().to_owned())]);
+        for (name, section) in sections {
+            for (key, value) in section {
+                if let toml::Value::String(text) = value.into_inner() {
+                    makings.insert(format!("{name}.{key}"), text);
+                }
+            }
+        }
+        Ok(makings)
     }
 
     /// The program of `axis` that the file describes, for a rig of these nominal numbers. The time that an algorithm takes is
@@ -218,11 +247,12 @@ impl Reader<'_> {
         let slot = self.slot("giving-way", section)?;
         let find = |name: &str| {
             let name = format!("giving-way.{name}");
-            self.variables.iter().position(|variable| variable.name == name)
+            self.variables[slot.values.clone()].iter().position(|variable| variable.name == name)
         };
         match (slot.controls, find("moving"), find("limit_m_per_s")) {
             (Quantity::Force, Some(moving), Some(limit_m_per_s)) => {
-                Ok(GivingWay { slot, moving, limit_m_per_s })
+                let effective = self.values[slot.values.clone()].to_vec();
+                Ok(GivingWay { slot, moving, limit_m_per_s, decided: (false, None), effective })
             }
             _ => Err(self.error(
                 place,
@@ -232,13 +262,12 @@ impl Reader<'_> {
     }
 
     fn linearisation(&self, asked: Option<Spanned<toml::Value>>) -> Result<Linearisation, ProgramError> {
-        let asked = self.take_text("post-controller.linearisation", asked)?;
+        let asked = self.take_text(LINEARISATION, asked)?;
         let law = match &asked {
             None => Law::ChokedExhaust,
             Some(asked) => Law::by_name(asked.as_ref()).ok_or_else(|| {
                 let names = Law::ALL.map(Law::name).join(", ");
-                let problem =
-                    format!("post-controller.linearisation = \"{}\"; there are {names}", asked.as_ref());
+                let problem = format!("{LINEARISATION} = \"{}\"; there are {names}", asked.as_ref());
                 self.error(asked.span().start, &problem)
             })?,
         };
@@ -313,6 +342,7 @@ opening_limit = 0.5
                 "gain_per_s = 300",
                 ["p.toml:7", "algorithm.gain_per_s = 300", "0 to 200 1/s"],
             ),
+            ("every_cycles = 2", "every_cycles = 2.5", ["p.toml:6", "every_cycles = 2.5", "a whole number"]),
             ("gain_per_s = 20", "gain_per_s = nan", ["p.toml:7", "NaN", "0 to 200"]),
             ("gain_per_s = 20", "gain = 20", ["p.toml:7", "algorithm.gain: no such", "gain_per_s"]),
             ("gain_per_s = 20", "gain_per_s = \"20\"", ["p.toml:7", "gain_per_s", "not a number"]),

@@ -27,7 +27,7 @@ const SUBJECTS: [Subject; 5] = [
         load: "force-manual",
         set: &["load.giving-way.gain_m_per_n_s=0", "load.giving-way.velocity_feed_forward=0"],
     },
-    Subject { name: "P alone", load: "force-plain", set: &["load.algorithm.velocity_feed_forward=0"] },
+    Subject { name: "P alone", load: "force-plain", set: &["load.giving-way.velocity_feed_forward=0"] },
     Subject { name: "P and feed-forward, no distinction", load: "force-plain", set: &[] },
     // No hand is as fast: as in manual-move-plain.
     Subject {
