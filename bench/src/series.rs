@@ -6,6 +6,8 @@
 
 /// Times that differ by less are the same: far below a cycle, far above a rounding.
 const SAME_S: f64 = 1e-7;
+/// Longest gap that does not end a stretch, s: cycles that a late rig skipped are in no table of a controller, and time went on.
+const LONGEST_GAP_S: f64 = 0.1;
 
 /// Samples of one quantity.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -266,13 +268,14 @@ impl Series {
         self.stretches_of(|before, value| before.is_none_or(|before| before == value))
     }
 
-    /// Cuts the samples wherever `goes_on` of a value and the one before says no, and at gaps of more than two cycles.
+    /// Cuts the samples wherever `goes_on` of a value and the one before says no, and at gaps longer than [`LONGEST_GAP_S`].
     fn stretches_of(&self, goes_on: impl Fn(Option<f64>, f64) -> bool) -> Vec<Span> {
         let period_s = self.period_s();
         let mut stretches: Vec<Span> = Vec::new();
         let mut before: Option<(f64, f64)> = None;
         for (time, value) in self.iter() {
-            let near = before.is_some_and(|(earlier, _)| time - earlier < 2.5 * period_s);
+            let longest_s = LONGEST_GAP_S.max(2.5 * period_s);
+            let near = before.is_some_and(|(earlier, _)| time - earlier < longest_s);
             match stretches.last_mut() {
                 Some(open) if near && goes_on(before.map(|(_, value)| value), value) => {
                     open.to_s = time + period_s;
