@@ -97,7 +97,7 @@ fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the
     let of_peer = |index: usize| &report["peers"][index]["dropped_at_queue"];
     let log = bus_log(&scene.path("emulator/bus.log"));
     for id in [0x110_u16, 0x111, 0x120, 0x121, 0x130, 0x140, 0x150, 0x151, 0x152] {
-        let of_id = |frames: &[protocol::can::CanFrame]| {
+        let of_id = |frames: &[CanFrame]| {
             frames.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
         };
         let dropped = count_of_id(of_peer(0), &format!("{id:03X}"));
