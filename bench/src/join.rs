@@ -169,14 +169,13 @@ fn against(summary: &Map<String, Value>, judged: &Map<String, Value>, is_rehears
         against.push(format!("the {who} did not end well"));
     }
     // Null: the controller is of an earlier version that does not say, or is not ours.
-    let ended_badly = |told: &Value| told["ended_well"] == Value::Bool(false);
-    if ended_badly(known(summary, "controller")) {
-        against.push("the controller did not end well".into());
-    }
+    let ended_badly = |who: &str, told: &Value| {
+        let why = told["ended_because"].as_str().map_or_else(String::new, |why| format!(": {why}"));
+        (told["ended_well"] == Value::Bool(false)).then(|| format!("the {who} did not end well{why}"))
+    };
+    against.extend(ended_badly("controller", known(summary, "controller")));
     for (axis, told) in known(summary, "controllers").as_object().into_iter().flatten() {
-        if ended_badly(told) {
-            against.push(format!("the {axis} controller did not end well"));
-        }
+        against.extend(ended_badly(&format!("{axis} controller"), told));
     }
     let broken = judged.iter().filter(|(_, entry)| !thresholds::is_kept(entry));
     against.extend(broken.map(|(name, _)| format!("bound broken: {name}")));
@@ -281,7 +280,11 @@ mod tests {
         };
         for (summary, controller, against) in [
             (good, nothing.clone(), json!([])),
-            (rig(json!({})), json!({ "ended_well": false }), json!(["the controller did not end well"])),
+            (
+                rig(json!({})),
+                json!({ "ended_well": false, "ended_because": "stopped" }),
+                json!(["the controller did not end well: stopped"]),
+            ),
             (json!({ "passed": false }), nothing.clone(), json!(["the emulator did not end well"])),
             (
                 rig(json!({ "records_dropped": 3 })),

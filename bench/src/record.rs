@@ -67,7 +67,8 @@ pub struct Record {
     pub experiment: toml::Table,
 }
 
-/// Reads the tables of `folder`; of the controllers' those of the axes that the reports name, since another may be of an earlier run.
+/// Reads the tables of `folder`; of the controllers' those of the axes that the reports name, since another may be of an
+/// earlier run.
 ///
 /// # Errors
 /// [`SummaryError::Read`]: a table or a report that is there and cannot be read.

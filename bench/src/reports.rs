@@ -1,5 +1,5 @@
-//! What the controllers of a run tell of themselves: `controller.json` (one process for both axes), or `controller-drive.json` and
-//! `controller-load.json` (a process each).
+//! What the controllers of a run tell of themselves: `controller.json` (one process for both axes), or
+//! `controller-drive.json` and `controller-load.json` (a process each).
 //!
 //! The rig removes the reports of an earlier run when it starts, and not the tables, which a controller that started before
 //! it may be writing. So the reports say which tables are of this run: those of the axes that they name.

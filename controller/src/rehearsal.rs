@@ -6,8 +6,8 @@
 //! ```
 //!
 //! The frames are the bus's own, coded and decoded, and the order is that of the lockstep barrier: what is rehearsed gives
-//! the same measurement, to the byte, as emulator and controllers in lockstep. Only here and in [`crate::tune`], which tries
-//! programs out, does the controller look into the plant; the rehearsed controllers see the frames alone.
+//! the same measurement, to the byte, as emulator and controllers in lockstep. This is the only place where the controller
+//! looks into the plant (tuning, which does too, belongs to the tests); the rehearsed controllers see the frames alone.
 
 use crate::axis::{AxisController, AxisRecord};
 use crate::pace::STOPPED_CYCLES;
