@@ -11,7 +11,8 @@
 //! ```
 //!
 //! An axis under force control holds its valve shut while the rods are not linked, save where it gives way to a hand: with
-//! nothing to press against it would run into its end.
+//! nothing to press against it would run into its end. From the ramp to the force on until it is done that is a fault, also
+//! with a force of zero: nothing was pressed, and nobody shall take it for an experiment.
 
 use crate::algorithm::Ready;
 use crate::chains::force::{ForceAsked, ForceChain, ForceInputs};
@@ -193,6 +194,7 @@ impl Work {
             pressing.force.restart(0);
             pressing.matching.restart(0);
             pressing.plan.source.reset();
+            pressing.told = (ForceChainState::Idle, MatchingChainState::Idle);
             (pressing.step, pressing.fault) = (0, None);
         }
     }
@@ -206,6 +208,7 @@ impl Pressing {
             self.plan.source.reset();
         }
         let asked = self.force_asked(output.phase, linked);
+        self.fault = self.fault.or(self.not_linked(output.state, linked));
         let matching = asked != ForceAsked::Idle && self.matches(output.phase);
         self.advance_matching(matching, linked, seen, program);
         let ready = *program.ready();
@@ -252,6 +255,13 @@ impl Pressing {
             Phase::Experiment { .. } => ForceAsked::LoadProfile,
             Phase::HoldEnd => ForceAsked::Done,
         }
+    }
+
+    fn not_linked(&self, state: MainChainState, linked: bool) -> Option<Fault> {
+        use MainChainState::{Experiment, FinalSettling, InitialForce, Settling};
+        let presses =
+            !self.plan.manual && matches!(state, InitialForce | Settling | Experiment | FinalSettling);
+        (presses && !linked).then_some(Fault::NotLinked)
     }
 
     fn matches(&self, phase: Phase) -> bool {
