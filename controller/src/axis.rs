@@ -33,17 +33,12 @@ use changes::Changes;
 use heard::Heard;
 use plant::Axis;
 use protocol::frames::{
-    ALIVE_RANGE, ChainStatus, ChainValues, DRIVE_CHAIN_VALUES, ECHO_RANGE, EmergencyStop,
-    EmergencyStopChainState, Frame, MainChainState, RigStatus, Sensors, ValveCommand,
+    ALIVE_RANGE, ECHO_RANGE, EmergencyStop, EmergencyStopChainState, Frame, MainChainState, RigStatus,
+    Sensors, ValveCommand,
 };
 use range::Range;
 use slow::Slow;
 use work::{Asked, Seen, Work};
-
-/// Positions and forces that the values can carry; those of both axes are alike.
-const LEAST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].min;
-const MOST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].max;
-const MOST_N: f64 = DRIVE_CHAIN_VALUES.signals[2].max;
 
 /// What an axis controller is made of.
 pub struct AxisParts {
@@ -219,28 +214,6 @@ impl AxisController {
         }
     }
 
-    fn record(&self, cycle: u64, sensors: &Sensors, command: &ValveCommand) -> AxisRecord {
-        let geometry = self.program.geometry();
-        let status = self.status();
-        let asked = self.asked.as_ref();
-        AxisRecord {
-            axis: self.axis,
-            cycle,
-            main: status.main_chain,
-            force_chain: status.force_chain,
-            matching: status.matching_chain,
-            emergency_stop: status.emergency_stop_chain,
-            set_position: asked.filter(|_| self.work.is_position()).map(|asked| asked.demand.position),
-            set_force: asked.filter(|_| !self.work.is_position()).map(|asked| asked.demand.force),
-            position_m: sensors.position_m - geometry.offset_m,
-            velocity_m_per_s: geometry.direction() * self.program.ready().velocity_m_per_s,
-            force_n: sensors.force_n,
-            wanted_velocity_m_per_s: asked.map_or(0.0, |asked| self.program.wanted_m_per_s(asked.hand)),
-            opening: command.opening,
-            enabled: command.enable,
-        }
-    }
-
     fn answer_with(&mut self, cycle: u64, command: ValveCommand, record: Option<AxisRecord>) -> Answer {
         let status = self.status();
         let due = self.slow.due(cycle, &status);
@@ -257,42 +230,6 @@ impl AxisController {
             values: due.values.then(|| self.values()),
             news,
             record,
-        }
-    }
-
-    /// Status for the bus.
-    #[must_use]
-    pub fn status(&self) -> ChainStatus {
-        let (main_chain, ok, repetition) =
-            self.leading.output().map_or((MainChainState::WaitingForRig, false, 0), |output| {
-                (output.state, output.ok, output.repetition)
-            });
-        ChainStatus {
-            main_chain,
-            force_chain: self.work.force_chain(main_chain),
-            matching_chain: self.work.matching_chain(),
-            emergency_stop_chain: self.leading.emergency_stop(),
-            ok,
-            experiment: self.main_config.experiment,
-            // The counter wraps as its field in rig.dbc does.
-            repetition: repetition as u8,
-        }
-    }
-
-    /// Values for the bus.
-    fn values(&self) -> ChainValues {
-        let average_m = self.average.value();
-        let demand = self.asked.as_ref().map(|asked| asked.demand);
-        let set_position_m = match demand {
-            Some(demand) if self.work.is_position() => demand.position.position_m,
-            _ => average_m,
-        };
-        let now_m = self.average.last();
-        ChainValues {
-            averaged_position_m: average_m.clamp(LEAST_M, MOST_M),
-            position_set_point_m: set_position_m.clamp(LEAST_M, MOST_M),
-            force_set_point_n: demand.map_or(0.0, |demand| demand.force.force_n.clamp(-MOST_N, MOST_N)),
-            control_error_m: if self.work.is_position() { set_position_m - now_m } else { 0.0 },
         }
     }
 

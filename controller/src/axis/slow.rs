@@ -1,13 +1,19 @@
-//! When status and values of an axis are sent: every ten cycles, and at once when the status is another.
+//! Status and values of an axis: what they are, and when they are sent: every ten cycles, and at once when the status is another.
 
+use super::AxisController;
 use plant::Axis;
-use protocol::frames::ChainStatus;
+use protocol::frames::{ChainStatus, ChainValues, DRIVE_CHAIN_VALUES, MainChainState};
 
 /// Period of status and values, in cycles.
 const PERIOD: u64 = 10;
 /// Cycles within the period in which status and values of drive and load are sent: none falls on the rig's tick (0) or status
 /// (5), nor on another.
 const PHASES: [[u64; 2]; 2] = [[2, 3], [7, 8]];
+
+/// Positions and forces that the values can carry; those of both axes are alike.
+const LEAST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].min;
+const MOST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].max;
+const MOST_N: f64 = DRIVE_CHAIN_VALUES.signals[2].max;
 
 /// What was sent last.
 pub(super) struct Slow {
@@ -39,6 +45,44 @@ impl Slow {
         let [status_due, values] = [0, 1].map(|which| changed || periods[which] != self.periods[which]);
         (self.periods, self.told) = (periods, *status);
         Due { status: status_due, values, other_state }
+    }
+}
+
+impl AxisController {
+    /// Status for the bus.
+    #[must_use]
+    pub fn status(&self) -> ChainStatus {
+        let (main_chain, ok, repetition) =
+            self.leading.output().map_or((MainChainState::WaitingForRig, false, 0), |output| {
+                (output.state, output.ok, output.repetition)
+            });
+        ChainStatus {
+            main_chain,
+            force_chain: self.work.force_chain(main_chain),
+            matching_chain: self.work.matching_chain(),
+            emergency_stop_chain: self.leading.emergency_stop(),
+            ok,
+            experiment: self.main_config.experiment,
+            // The counter wraps as its field in rig.dbc does.
+            repetition: repetition as u8,
+        }
+    }
+
+    /// Values for the bus.
+    pub(super) fn values(&self) -> ChainValues {
+        let average_m = self.average.value();
+        let demand = self.asked.as_ref().map(|asked| asked.demand);
+        let set_position_m = match demand {
+            Some(demand) if self.work.is_position() => demand.position.position_m,
+            _ => average_m,
+        };
+        let now_m = self.average.last();
+        ChainValues {
+            averaged_position_m: average_m.clamp(LEAST_M, MOST_M),
+            position_set_point_m: set_position_m.clamp(LEAST_M, MOST_M),
+            force_set_point_n: demand.map_or(0.0, |demand| demand.force.force_n.clamp(-MOST_N, MOST_N)),
+            control_error_m: if self.work.is_position() { set_position_m - now_m } else { 0.0 },
+        }
     }
 }
 

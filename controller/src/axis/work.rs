@@ -11,8 +11,9 @@
 //! ```
 //!
 //! An axis under force control holds its valve shut while the rods are not linked, save where it gives way to a hand: with
-//! nothing to press against it would run into its end. From the ramp to the force on until it is done that is a fault, also
-//! with a force of zero: nothing was pressed, and nobody shall take it for an experiment.
+//! nothing to press against it would run into its end. From its first step of preparing, or
+//! the ramp to the force, until it is done that is a fault, also with a force of zero: nothing was pressed, and nobody shall
+//! take it for an experiment.
 
 use crate::algorithm::Ready;
 use crate::chains::force::{ForceAsked, ForceChain, ForceInputs};
@@ -258,10 +259,13 @@ impl Pressing {
     }
 
     fn not_linked(&self, state: MainChainState, linked: bool) -> Option<Fault> {
-        use MainChainState::{Experiment, FinalSettling, InitialForce, Settling};
-        let presses =
-            !self.plan.manual && matches!(state, InitialForce | Settling | Experiment | FinalSettling);
-        (presses && !linked).then_some(Fault::NotLinked)
+        use MainChainState::{Experiment, FinalSettling, InitialForce, Preparing, Settling};
+        let needed = match state {
+            Preparing => self.step < self.plan.prepare.len(),
+            InitialForce | Settling | Experiment | FinalSettling => true,
+            _ => false,
+        };
+        (needed && !self.plan.manual && !linked).then_some(Fault::NotLinked)
     }
 
     fn matches(&self, phase: Phase) -> bool {
