@@ -7,7 +7,7 @@
 //!                                     └───────────── prepared, fault ◄──────────┘
 //! ```
 //!
-//! Both axes run the same main chain and know each other through [`Partner`] alone: an OK flag, the states of the chains and
+//! [`leading`] wires the first two. Both axes run the same main chain and know each other through [`Partner`] alone: an OK flag, the states of the chains and
 //! a few values. What the partner sends in a cycle is seen in the next one.
 //!
 //! Every chain has the same form: `advance` notes what it is told, asks the pure `decide` for at most one edge, and goes it
@@ -22,6 +22,7 @@ mod duo;
 pub mod emergency_stop;
 pub mod fault;
 pub mod force;
+pub mod leading;
 pub mod main;
 pub mod matching;
 pub mod settled;

@@ -1,25 +1,35 @@
 //! Figures of the position control, taken cycle by cycle: dynamic and static error (bus.md, A run's folder).
 //!
 //! Dynamic: largest |set-point - position sensor| while the set-point moves. Static: largest of the mean |error| over the last
-//! 0.2 s of each rest. Both over the experiment alone, not over the way to it.
+//! 0.2 s of each rest. Both over the experiment alone, not over the way to it, and over repetitions that were driven through: one
+//! that was cut off counts for nothing.
 
 use crate::set_point::SetPoint;
 
 /// Samples of the last 0.2 s of a rest.
 const STATIC_WINDOW: usize = 200;
 
+/// Both errors.
+#[derive(Clone, Copy, Debug, Default)]
+struct Errors {
+    moving_m: Option<f64>,
+    resting_m: Option<f64>,
+}
+
 /// The figures so far.
 #[derive(Debug)]
 pub struct PositionFigures {
-    largest_moving_m: Option<f64>,
-    largest_resting_m: Option<f64>,
+    /// Of the repetitions that were driven through.
+    kept: Errors,
+    /// Of the one that is being driven.
+    now: Errors,
     window_m: [f64; STATIC_WINDOW],
     rested: usize,
 }
 
 impl Default for PositionFigures {
     fn default() -> Self {
-        Self { largest_moving_m: None, largest_resting_m: None, window_m: [0.0; STATIC_WINDOW], rested: 0 }
+        Self { kept: Errors::default(), now: Errors::default(), window_m: [0.0; STATIC_WINDOW], rested: 0 }
     }
 }
 
@@ -29,20 +39,31 @@ impl PositionFigures {
         let error_m = (set_point.position_m - position_m).abs();
         if set_point.moving {
             self.end_rest();
-            self.largest_moving_m =
-                Some(self.largest_moving_m.map_or(error_m, |largest| largest.max(error_m)));
+            self.now.moving_m = larger(self.now.moving_m, Some(error_m));
         } else {
             self.window_m[self.rested % STATIC_WINDOW] = error_m;
             self.rested += 1;
         }
     }
 
+    /// The repetition, if one is being driven, has come to its end.
+    pub fn end_repetition(&mut self) {
+        self.end_rest();
+        let now = std::mem::take(&mut self.now);
+        self.kept.moving_m = larger(self.kept.moving_m, now.moving_m);
+        self.kept.resting_m = larger(self.kept.resting_m, now.resting_m);
+    }
+
+    /// The repetition, if one is being driven, was cut off.
+    pub fn drop_repetition(&mut self) {
+        (self.now, self.rested) = (Errors::default(), 0);
+    }
+
     /// Closes the rest that is going on, if any; a rest shorter than the window says nothing.
-    pub fn end_rest(&mut self) {
+    fn end_rest(&mut self) {
         if self.rested >= STATIC_WINDOW {
             let mean_m = self.window_m.iter().sum::<f64>() / STATIC_WINDOW as f64;
-            self.largest_resting_m =
-                Some(self.largest_resting_m.map_or(mean_m, |largest| largest.max(mean_m)));
+            self.now.resting_m = larger(self.now.resting_m, Some(mean_m));
         }
         self.rested = 0;
     }
@@ -50,13 +71,20 @@ impl PositionFigures {
     /// Dynamic error, m; `None` before the set-point moved.
     #[must_use]
     pub fn dynamic_m(&self) -> Option<f64> {
-        self.largest_moving_m
+        larger(self.kept.moving_m, self.now.moving_m)
     }
 
     /// Static error, m; `None` before a rest was long enough.
     #[must_use]
     pub fn static_m(&self) -> Option<f64> {
-        self.largest_resting_m
+        larger(self.kept.resting_m, self.now.resting_m)
+    }
+}
+
+fn larger(one: Option<f64>, other: Option<f64>) -> Option<f64> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.max(other)),
+        (one, other) => one.or(other),
     }
 }
 
@@ -83,7 +111,21 @@ mod tests {
     fn a_short_rest_says_nothing() {
         let mut figures = PositionFigures::default();
         (0..199).for_each(|_| figures.take(&SetPoint::at_rest(0.2), 0.3));
-        figures.end_rest();
+        figures.end_repetition();
         assert_eq!((figures.dynamic_m(), figures.static_m()), (None, None));
+    }
+
+    #[test]
+    fn a_repetition_that_was_cut_off_counts_for_nothing() {
+        let mut figures = PositionFigures::default();
+        let moving = SetPoint { position_m: 0.2, moving: true, ..SetPoint::default() };
+        figures.take(&moving, 0.199);
+        figures.end_repetition();
+        figures.take(&moving, 0.0);
+        (0..300).for_each(|_| figures.take(&SetPoint::at_rest(0.2), 0.0));
+        figures.drop_repetition();
+        figures.end_repetition();
+        assert!((figures.dynamic_m().unwrap() - 0.001).abs() < 1e-15);
+        assert_eq!(figures.static_m(), None);
     }
 }

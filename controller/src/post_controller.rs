@@ -59,6 +59,11 @@ impl PostController {
         Self { linearisation, shut: true }
     }
 
+    /// Forgets what it did, as after [`PostController::new`].
+    pub fn restart(&mut self) {
+        self.shut = true;
+    }
+
     /// Turns a finite wanted velocity into an opening.
     pub fn step(&mut self, wanted_m_per_s: f64, ready: &Ready, parameters: &[f64]) -> Output {
         if parameters[MANUAL] >= 0.5 {

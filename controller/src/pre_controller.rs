@@ -147,9 +147,15 @@ impl PreController {
         }
     }
 
-    /// Forgets all samples.
+    /// Forgets all samples: what comes next is taken at its word.
     pub fn reset(&mut self) {
         self.memory = None;
+    }
+
+    /// Forgets all samples and the offset: they were another rig's.
+    pub fn restart(&mut self) {
+        self.memory = None;
+        self.geometry.offset_m = 0.0;
     }
 
     /// Takes the sensors that came `period_s` after the last ones, and fills in what was measured of `ready`.

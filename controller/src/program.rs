@@ -175,10 +175,17 @@ impl Program {
         self.ready.applied_velocity_m_per_s = 0.0;
     }
 
-    /// The rig's time began again: nothing that was seen holds.
+    /// The rig's time began again, or it is another rig: nothing that was seen holds, the matched offset no more than the rest.
     pub fn restart(&mut self) {
+        self.restart_algorithms();
         self.shut();
-        self.pre.reset();
+        self.user.wanted_m_per_s = 0.0;
+        if let Some(giving_way) = &mut self.giving_way {
+            giving_way.slot.wanted_m_per_s = 0.0;
+        }
+        self.pre.restart();
+        self.post.restart();
+        self.ready = Ready::default();
         self.observed = None;
     }
 

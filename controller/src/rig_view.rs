@@ -13,6 +13,8 @@
 use plant::Axis;
 use protocol::frames::{ALIVE_RANGE, RigStatus, Sensors, Tick};
 
+/// Cycles for which a status of the rig holds: ten of its periods.
+const STATUS_HOLDS_CYCLES: u64 = 100;
 /// The tick counts skipped cycles modulo this.
 const SKIPPED_RANGE: u64 = 1 << 16;
 
@@ -71,7 +73,8 @@ pub struct RigView {
     received: PerAxis,
     account: Option<Account>,
     lost: PerAxis,
-    status: Option<RigStatus>,
+    /// With the cycle in which it came.
+    status: Option<(u64, RigStatus)>,
 }
 
 impl RigView {
@@ -101,6 +104,10 @@ impl RigView {
             _ => u64::from(tick.cycle),
         };
         self.settle_account(tick, cycle);
+        if let (None, Some((came, _))) = (self.cycle, &mut self.status) {
+            // It came before anything told the time.
+            *came = cycle;
+        }
         self.cycle = Some(cycle);
         match (restarted, tick.ending) {
             (true, _) => TickNews::Restarted,
@@ -128,7 +135,7 @@ impl RigView {
 
     /// Takes the rig's status.
     pub fn take_status(&mut self, status: RigStatus) {
-        self.status = Some(status);
+        self.status = Some((self.cycle.unwrap_or(0), status));
     }
 
     /// The newest sensors of an axis with their cycle, once for each frame; `None` before the first tick.
@@ -147,10 +154,15 @@ impl RigView {
         self.cycle
     }
 
-    /// What the rig says of itself; `None` until it said something.
+    /// What the rig says of itself; `None` until it said something, and when that is older than 100 cycles.
+    ///
+    /// Cycles that the rig skipped make it older too: after those it is the next status that counts. What an axis does while
+    /// there is none stands in [`AxisController::answer`](crate::axis::AxisController::answer).
     #[must_use]
     pub fn status(&self) -> Option<&RigStatus> {
-        self.status.as_ref()
+        let (came, status) = self.status.as_ref()?;
+        let age = self.cycle.map_or(0, |cycle| cycle.saturating_sub(*came));
+        (age <= STATUS_HOLDS_CYCLES).then_some(status)
     }
 
     /// Sensor frames received.
@@ -280,6 +292,21 @@ mod tests {
         view.take_status(RigStatus { emergency_stop: true, ..RigStatus::default() });
         view.take_tick(&tick(0, 0));
         assert!(view.status().is_none());
+    }
+
+    #[test]
+    fn a_status_holds_for_a_hundred_cycles() {
+        let mut view = RigView::default();
+        view.take_status(RigStatus::default());
+        // The first time that is known: what came before it is as new.
+        view.take_tick(&tick(5000, 0));
+        assert!(view.status().is_some());
+        play(&mut view, 5001..5101, &[]);
+        assert!(view.status().is_some(), "in cycle {:?}", view.cycle());
+        view.take_sensors(Axis::Drive, sensors(5101));
+        assert!(view.status().is_none());
+        view.take_status(RigStatus::default());
+        assert!(view.status().is_some());
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! Times and ways are the rig's; they are told, and held against what `bench summary` makes of the same files.
 
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand};
+use rustix::process::Signal;
 use serde_json::Value;
 use std::process::Command;
 use system_tests::axis_table::AxisTable;
@@ -13,7 +14,8 @@ use system_tests::launch::Pace;
 use system_tests::own;
 use system_tests::process::{Ended, Running};
 use system_tests::records::{Table, json};
-use system_tests::scene::Scene;
+use system_tests::scene::{LINKED, Scene};
+use system_tests::turn;
 
 /// 0.3 m in 0.5 s: 1.2 m/s at its fastest, which the valve gives for a moment only.
 const FAST: &str = r#"title = "fast"
@@ -219,6 +221,55 @@ fn on_start_the_aborted_repetition_waits_for_the_console_and_begins_anew_without
     assert_eq!(drive.states("emergency_stop_chain"), chain);
     let begins = drive.cycles()[drive.first("main_chain", "initial-positioning", TRIP)];
     assert!((START + 1..START + 4).contains(&begins), "{begins}");
+}
+
+/// The first time that the set-point is past 0.28 m, and never again.
+const FAILS_ONCE: &str = "({ static int failed; const int now = !failed && count > 200 && ready->set_position_m > 0.28; failed |= now; now; })";
+
+#[test]
+fn a_controllers_own_fault_is_released_by_the_console_and_the_repetition_begins_anew() {
+    let scene = Scene::new(&FAST.replace("\"end\"", "\"restart\""));
+    own::failing(&scene, FAILS_ONCE, &[]);
+    scene.write("program.toml", own::PROGRAM);
+    let _ = run(&scene, |cycle| (cycle == RELEASE).then(|| stop(true))).expect_code(0);
+    let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
+    let chain = ["ready", "tripped", "waiting-for-release", "recovering", "ready"];
+    assert_eq!(drive.states("emergency_stop_chain"), chain);
+    let states = drive.states("main_chain");
+    assert_eq!(states.iter().filter(|state| **state == "fault").count(), 1, "{states:?}");
+    assert_eq!(states.iter().filter(|state| **state == "experiment").count(), 2, "{states:?}");
+    assert_eq!(states.last(), Some(&"done"));
+    let withdrawn = read(&scene.path("run/bus.log"))
+        .into_iter()
+        .filter(|logged| matches!(logged.frame, Frame::DriveEmergencyStop(stop) if stop.release));
+    assert_eq!(withdrawn.count(), 1, "it withdraws its own stop with one frame");
+}
+
+#[test]
+fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release() {
+    let _machine = turn::take();
+    let scene = Scene::new(&LINKED.replace("[run]\n", "[run]\nafter_emergency_stop = \"restart\"\n"));
+    let emulator = scene.emulator(Pace::Real).start();
+    let [mut drive, load] = ["drive", "load"].map(|axis| scene.axis_controller(Pace::Real, axis).start());
+    drive.wait_for("experiment: ");
+    load.signal(Signal::STOP);
+    drive.wait_for("partner-lost");
+    load.signal(Signal::CONT);
+    // The load has heard of it, and tripped is left after 1 s at the latest.
+    scene.wait_for_more_rows("emulator", 1500);
+    scene.peer().send(&stop(true).encode().expect("in range").to_bytes());
+    for controller in [drive, load] {
+        let _ = controller.wait().expect_code(0);
+    }
+    emulator.signal(Signal::INT);
+    let _ = emulator.wait();
+    for (axis, ended) in [("drive", "fault"), ("load", "aborted")] {
+        let table = AxisTable::read(&scene.path("controller").join(format!("controller-{axis}.csv")));
+        let states = table.states("main_chain");
+        assert!(states.contains(&ended), "{axis}: {states:?}");
+        assert_eq!(states.iter().filter(|state| **state == "experiment").count(), 2, "{axis}: {states:?}");
+        assert_eq!(states.last(), Some(&"done"), "{axis}");
+    }
 }
 
 #[test]

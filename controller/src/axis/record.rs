@@ -1,11 +1,12 @@
 //! What an axis hands over in a cycle: to the bus, to a person, to the record.
 
+use super::AxisController;
 use crate::set_point::{ForceSetPoint, SetPoint};
 use crate::station::News;
 use plant::Axis;
 use protocol::frames::{
     ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, ForceChainState, MainChainState,
-    MatchingChainState, ValveCommand,
+    MatchingChainState, Sensors, ValveCommand,
 };
 
 /// The answer to the sensors of a cycle.
@@ -56,4 +57,29 @@ pub struct AxisRecord {
     pub opening: f64,
     /// Whether the valve is asked to act.
     pub enabled: bool,
+}
+
+impl AxisController {
+    /// The row of `cycle`.
+    pub(super) fn record(&self, cycle: u64, sensors: &Sensors, command: &ValveCommand) -> AxisRecord {
+        let geometry = self.program.geometry();
+        let status = self.status();
+        let asked = self.asked.as_ref();
+        AxisRecord {
+            axis: self.axis,
+            cycle,
+            main: status.main_chain,
+            force_chain: status.force_chain,
+            matching: status.matching_chain,
+            emergency_stop: status.emergency_stop_chain,
+            set_position: asked.filter(|_| self.work.is_position()).map(|asked| asked.demand.position),
+            set_force: asked.filter(|_| !self.work.is_position()).map(|asked| asked.demand.force),
+            position_m: sensors.position_m - geometry.offset_m,
+            velocity_m_per_s: geometry.direction() * self.program.ready().velocity_m_per_s,
+            force_n: sensors.force_n,
+            wanted_velocity_m_per_s: asked.map_or(0.0, |asked| self.program.wanted_m_per_s(asked.hand)),
+            opening: command.opening,
+            enabled: command.enable,
+        }
+    }
 }

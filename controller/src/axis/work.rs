@@ -11,7 +11,9 @@
 //! ```
 //!
 //! An axis under force control holds its valve shut while the rods are not linked, save where it gives way to a hand: with
-//! nothing to press against it would run into its end.
+//! nothing to press against it would run into its end. From its first step of preparing, or
+//! the ramp to the force, until it is done that is a fault, also with a force of zero: nothing was pressed, and nobody shall
+//! take it for an experiment.
 
 use crate::algorithm::Ready;
 use crate::chains::force::{ForceAsked, ForceChain, ForceInputs};
@@ -193,6 +195,7 @@ impl Work {
             pressing.force.restart(0);
             pressing.matching.restart(0);
             pressing.plan.source.reset();
+            pressing.told = (ForceChainState::Idle, MatchingChainState::Idle);
             (pressing.step, pressing.fault) = (0, None);
         }
     }
@@ -206,6 +209,7 @@ impl Pressing {
             self.plan.source.reset();
         }
         let asked = self.force_asked(output.phase, linked);
+        self.fault = self.fault.or(self.not_linked(output.state, linked));
         let matching = asked != ForceAsked::Idle && self.matches(output.phase);
         self.advance_matching(matching, linked, seen, program);
         let ready = *program.ready();
@@ -252,6 +256,16 @@ impl Pressing {
             Phase::Experiment { .. } => ForceAsked::LoadProfile,
             Phase::HoldEnd => ForceAsked::Done,
         }
+    }
+
+    fn not_linked(&self, state: MainChainState, linked: bool) -> Option<Fault> {
+        use MainChainState::{Experiment, FinalSettling, InitialForce, Preparing, Settling};
+        let needed = match state {
+            Preparing => self.step < self.plan.prepare.len(),
+            InitialForce | Settling | Experiment | FinalSettling => true,
+            _ => false,
+        };
+        (needed && !self.plan.manual && !linked).then_some(Fault::NotLinked)
     }
 
     fn matches(&self, phase: Phase) -> bool {

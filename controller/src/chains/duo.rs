@@ -1,10 +1,9 @@
 //! Two chains that talk to each other, for tests: what one says in a cycle the other sees in the next.
 //!
-//! The order within a cycle is the one that an axis controller must keep: emergency stop chain, main chain, trip by a
-//! fault, frame.
+//! Each is wired as in an axis controller, by the same [`Leading`].
 
-use super::emergency_stop::{EmergencyStopChain, StopConfig, StopInputs};
-use super::main::{Lengths, MainChain, MainConfig, MainInputs, MainOutput, OwnAxis, Phase};
+use super::leading::{Leading, LeadingInputs};
+use super::main::{Lengths, MainConfig, MainOutput, OwnAxis, Phase};
 use super::settled::ControlError;
 use super::{AfterStop, Console, Fault, Partner};
 use protocol::frames::{
@@ -16,8 +15,7 @@ pub(super) const SUPPLY_PA: f64 = 7e5;
 
 /// One axis controller with what its sensors show.
 pub(super) struct One {
-    pub(super) main: MainChain,
-    pub(super) stop: EmergencyStopChain,
+    pub(super) leading: Leading,
     pub(super) position_m: f64,
     pub(super) error: ControlError,
     pub(super) prepared: bool,
@@ -32,7 +30,6 @@ pub(super) struct One {
     partner: Partner,
     pub(super) output: Option<MainOutput>,
     experiment: u8,
-    needs_partner: bool,
     /// States as they were entered.
     pub(super) seen: Vec<(u64, MainChainState)>,
     /// It holds the emergency stop, as the rig knows it.
@@ -41,13 +38,9 @@ pub(super) struct One {
 
 impl One {
     pub(super) fn new(config: MainConfig) -> Self {
-        let stop =
-            StopConfig { after_emergency_stop: config.after_emergency_stop, supply_pressure_pa: SUPPLY_PA };
         Self {
             experiment: config.experiment,
-            needs_partner: config.partner_needed,
-            main: MainChain::new(config),
-            stop: EmergencyStopChain::new(stop),
+            leading: Leading::new(config, SUPPLY_PA),
             position_m: 0.1,
             error: ControlError::None,
             prepared: true,
@@ -63,7 +56,7 @@ impl One {
     }
 
     pub(super) fn state(&self) -> MainChainState {
-        self.main.entered().state
+        self.leading.entered().state
     }
 
     pub(super) fn fault(&self) -> Option<Fault> {
@@ -71,14 +64,14 @@ impl One {
     }
 
     pub(super) fn stop_state(&self) -> EmergencyStopChainState {
-        self.stop.state()
+        self.leading.emergency_stop()
     }
 
     fn status(&self) -> Option<ChainStatus> {
         let output = self.output?;
         Some(ChainStatus {
             main_chain: output.state,
-            emergency_stop_chain: self.stop.state(),
+            emergency_stop_chain: self.leading.emergency_stop(),
             ok: output.ok,
             experiment: self.experiment,
             repetition: output.repetition as u8,
@@ -97,42 +90,29 @@ impl One {
         if !self.alive {
             return None;
         }
-        let partner_fresh = !self.needs_partner || self.partner.fresh(cycle).is_some();
-        let emergency_stop = self.stop.advance(&StopInputs {
+        let own = self.sensors.then_some(OwnAxis { position_m: self.position_m, error: self.error });
+        let output = self.leading.advance(&LeadingInputs {
             cycle,
             rig: Some(rig),
-            frame,
-            console,
-            at_standstill: true,
-            partner_fresh,
-            sensors_fresh: self.sensors,
-        });
-        let own = self.sensors.then_some(OwnAxis { position_m: self.position_m, error: self.error });
-        let output = self.main.advance(&MainInputs {
-            cycle,
             own,
             prepared: self.prepared,
             partner: self.partner,
-            emergency_stop,
+            frame,
             console,
             fault: self.fault,
         });
-        let newly = self.fault().is_none();
-        if let Some(fault) = output.fault.filter(|_| newly) {
-            self.stop.trip(fault, cycle);
-        }
         assert!(
             !output.ok || !matches!(output.state, MainChainState::Aborted | MainChainState::Fault),
             "an ended chain is never OK"
         );
-        if emergency_stop != EmergencyStopChainState::Ready {
+        if self.stop_state() != EmergencyStopChainState::Ready {
             assert_eq!(output.phase, Phase::Shut, "an emergency stop shuts in its cycle");
         }
         if self.seen.last().is_none_or(|(_, state)| *state != output.state) {
             self.seen.push((cycle, output.state));
         }
         self.output = Some(output);
-        let sent = self.stop.frame_due(cycle)?;
+        let sent = self.leading.frame_due(cycle)?;
         self.holds = !sent.release;
         (!sent.release).then_some(sent.reason)
     }

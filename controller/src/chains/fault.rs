@@ -28,9 +28,11 @@ pub enum Fault {
     MatchingTimeout,
     /// The matched offset is no sensor's offset.
     OffsetImplausible,
-    /// The own sensors are silent or saturated.
+    /// An axis that presses has nothing to press against.
+    NotLinked,
+    /// The own sensors are silent.
     SensorLoss,
-    /// A measured value left its allowed range.
+    /// An own force or pressure sensor was saturated for half a second.
     LimitExceeded,
     /// The algorithm gave no number, or did not come back in time.
     ControllerFault,
@@ -38,7 +40,7 @@ pub enum Fault {
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::PartnerMissing,
         Self::PartnerOtherExperiment,
         Self::PartnerLost,
@@ -49,6 +51,7 @@ impl Fault {
         Self::RelieveTimeout,
         Self::MatchingTimeout,
         Self::OffsetImplausible,
+        Self::NotLinked,
         Self::SensorLoss,
         Self::LimitExceeded,
         Self::ControllerFault,
@@ -68,6 +71,7 @@ impl Fault {
             Self::RelieveTimeout => "relieve-timeout",
             Self::MatchingTimeout => "matching-timeout",
             Self::OffsetImplausible => "offset-implausible",
+            Self::NotLinked => "not-linked",
             Self::SensorLoss => "sensor-loss",
             Self::LimitExceeded => "limit-exceeded",
             Self::ControllerFault => "controller-fault",
@@ -89,6 +93,7 @@ impl Fault {
             | Self::PreparationTimeout
             | Self::RelieveTimeout
             | Self::MatchingTimeout
+            | Self::NotLinked
             | Self::ControllerFault => EmergencyStopReason::ControllerFault,
         }
     }
@@ -119,8 +124,15 @@ impl Fault {
             Self::OffsetImplausible => {
                 "the matched offset is too large for a sensor's: see whether the axes are really linked"
             }
-            Self::SensorLoss => "the own sensors fell silent or left their range",
-            Self::LimitExceeded => "a measured value left its allowed range",
+            Self::NotLinked => {
+                "the rods are not linked, so there is nothing to press against: link them, in an experiment's file by \
+                 linked = true in [rig]"
+            }
+            Self::SensorLoss => "the own sensors fell silent for 50 ms: see whether the rig still sends them",
+            Self::LimitExceeded => {
+                "the own force or a chamber's pressure was beyond its sensor's range for half a second: look for a blocked \
+                 axis, too high a supply, or a broken sensor"
+            }
             Self::ControllerFault => "the algorithm gave no number or missed its time",
         }
     }

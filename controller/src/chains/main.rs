@@ -151,6 +151,7 @@ impl MainChain {
 
     /// The rig's time begins anew at `cycle`: so does the chain.
     pub fn restart(&mut self, cycle: u64) {
+        self.settled.clear();
         self.enter_waiting_for_rig(MainCause::RigRestarted, cycle);
     }
 

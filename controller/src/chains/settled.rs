@@ -124,7 +124,7 @@ impl Settled {
         Self { bounds, buckets: [None; BUCKETS], seen: None, since: None, still: false }
     }
 
-    /// Takes the sample of `cycle`: filtered position and control error.
+    /// Takes the sample of `cycle`: position sensor less its offset, unfiltered, and control error.
     pub fn take(&mut self, cycle: u64, position_m: f64, error: ControlError) {
         let gap = self.seen.is_some_and(|(_, last)| cycle < last || cycle - last > BUCKET_CYCLES);
         if gap {

@@ -169,7 +169,7 @@ fn a_start_before_settling_is_none() {
 fn a_start_that_only_one_heard_travels_by_the_ok_flag() {
     let mut duo = Duo::new(&MainConfig { start: Start::OnStart, ..short() });
     duo.run(3000);
-    duo.axes[1].main.advance(&MainInputs {
+    duo.axes[1].leading.main.advance(&MainInputs {
         cycle: duo.cycle,
         own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
         partner: Partner {
@@ -192,14 +192,14 @@ fn an_abort_ends_every_state_and_does_not_trip() {
         duo.step();
         assert_eq!(duo.states(), [S::Aborted; 2], "{state}");
         assert_eq!(duo.axes[0].output.unwrap().phase, Phase::Shut);
-        assert_eq!(duo.axes[0].main.entered().cause, MainCause::Console);
+        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::Console);
         duo.run(5000);
         assert_eq!(duo.states(), [S::Aborted; 2], "a person's abort is not undone by itself");
         assert_eq!(duo.axes[0].stop_state(), EmergencyStopChainState::Ready);
         duo.console.start = true;
         duo.run(10);
         assert_eq!(duo.states(), [S::InitialPositioning; 2]);
-        assert_eq!(duo.axes[0].main.entered().cause, MainCause::Started);
+        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::Started);
     }
 }
 
@@ -208,12 +208,13 @@ fn an_abort_that_only_one_heard_ends_both() {
     for state in RUNNING {
         let mut duo = both_in(state);
         duo.axes[1]
+            .leading
             .main
             .enter_aborted(MainCause::Console, &MainInputs { cycle: duo.cycle, ..Default::default() });
         // Within the grace of a start it waits for a partner that is still aborted.
         duo.run(if state == S::InitialPositioning { 100 } else { 2 });
         assert_eq!(duo.states(), [S::Aborted; 2], "{state}");
-        assert_eq!(duo.axes[0].main.entered().cause, MainCause::PartnerAborted);
+        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::PartnerAborted);
     }
 }
 
@@ -240,14 +241,14 @@ fn an_emergency_stop_aborts_every_state_and_the_run_begins_again_by_itself() {
         duo.console_holds = true;
         duo.step();
         assert_eq!(duo.states(), [S::Aborted; 2], "{state}");
-        assert_eq!(duo.axes[0].main.entered().cause, MainCause::EmergencyStop);
+        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::EmergencyStop);
         duo.axes.iter_mut().for_each(|axis| (axis.position_m, axis.prepared) = (0.15, true));
         duo.stop_and_release();
         assert_eq!(duo.states(), [S::Aborted; 2]);
         // Recovered for 0.2 s.
         duo.run(210);
         assert_eq!(duo.states(), [S::InitialPositioning; 2], "{state}");
-        assert_eq!(duo.axes[0].main.entered().cause, MainCause::Recovered);
+        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::Recovered);
         let phase = duo.axes[0].output.unwrap().phase;
         assert!(matches!(phase, Phase::Approach { from_m: 0.15, .. }), "{phase:?}");
         duo.run(6000);
@@ -312,7 +313,7 @@ fn a_fault_of_the_axis_ends_every_state_and_trips() {
         assert_eq!(duo.axes[0].output.unwrap().phase, Phase::Shut);
         duo.step();
         assert_eq!(duo.states(), [S::Fault, S::Aborted], "the partner is stopped in the next cycle");
-        assert_eq!(duo.axes[0].stop.holds(), Some(Fault::LimitExceeded));
+        assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::LimitExceeded));
         duo.run(5000);
         assert_eq!(duo.states(), [S::Fault, S::Aborted], "nobody has released");
         duo.axes[0].fault = None;
@@ -336,9 +337,9 @@ fn a_restarted_rig_restarts_the_chain_from_every_state() {
     for mut duo in all {
         for axis in &mut duo.axes {
             axis.fault = None;
-            axis.main.restart(0);
-            axis.stop.restart(0);
-            assert_eq!(axis.main.entered().cause, MainCause::RigRestarted);
+            axis.leading.main.restart(0);
+            axis.leading.stop.restart(0);
+            assert_eq!(axis.leading.main.entered().cause, MainCause::RigRestarted);
         }
         assert_eq!(duo.states(), [S::WaitingForRig; 2]);
     }
@@ -349,7 +350,7 @@ fn two_chains_begin_again_with_the_rigs_time() {
     let mut duo = both_in(S::Experiment);
     duo.cycle = 0;
     duo.axes.iter_mut().for_each(|axis| {
-        axis.main.restart(0);
+        axis.leading.main.restart(0);
         axis.seen.clear();
     });
     duo.run(4000);

@@ -8,7 +8,7 @@ use std::fmt;
 /// Own sensors in this cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnAxis {
-    /// Filtered position, rig coordinates, m.
+    /// Position sensor as it came, less the matched offset, rig coordinates, m.
     pub position_m: f64,
     /// What keeps the axis from its set-point.
     pub error: ControlError,

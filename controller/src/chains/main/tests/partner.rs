@@ -41,10 +41,10 @@ fn a_lost_partner_cannot_be_released_before_it_is_heard() {
     assert_eq!(duo.faults(), [Some(Fault::PartnerLost), None]);
     duo.console.release = true;
     duo.run(1000);
-    assert_eq!(duo.axes[0].stop.holds(), Some(Fault::PartnerLost));
+    assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::PartnerLost));
     duo.axes[1].heard = true;
     duo.run(1000);
-    assert_eq!(duo.axes[0].stop.holds(), Some(Fault::PartnerLost), "the release came too early");
+    assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::PartnerLost), "the release came too early");
     duo.console.release = true;
     duo.run(400);
     assert_eq!(duo.states(), [S::InitialPositioning; 2]);
@@ -235,7 +235,7 @@ fn a_partner_that_is_a_little_later_on_the_way_back_is_waited_for() {
 fn a_partner_that_stays_aborted_on_the_way_back_ends_it_until_a_person_starts() {
     let mut duo = recovering_apart(110);
     assert_eq!(duo.states(), [S::Aborted; 2]);
-    assert_eq!(duo.axes[0].main.entered().cause, MainCause::PartnerAborted);
+    assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::PartnerAborted);
     // The second still goes by itself, is left alone, and gives up too.
     duo.run(1000);
     assert_eq!(duo.states(), [S::Aborted; 2]);
@@ -250,7 +250,7 @@ fn both_go_on_with_the_later_repetition() {
     duo.run_to(S::Experiment);
     duo.stop_and_release();
     for (index, repetition) in [(0, 6), (1, 7)] {
-        duo.axes[index].main.repetition = repetition;
+        duo.axes[index].leading.main.repetition = repetition;
     }
     duo.run(300);
     assert_eq!(duo.states(), [S::InitialPositioning; 2]);
@@ -272,7 +272,7 @@ fn nobody_goes_back_before_the_partner_has_ended_and_its_emergency_stop_chain_is
         duo.step();
         let cycle = duo.cycle;
         let status = ChainStatus { main_chain, emergency_stop_chain, ..ChainStatus::default() };
-        let output = duo.axes[0].main.advance(&MainInputs {
+        let output = duo.axes[0].leading.main.advance(&MainInputs {
             cycle,
             own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
             partner: Partner { status: Some(status), values: None, heard: Some(cycle) },

@@ -1,0 +1,72 @@
+//! What an axis heard since its last answer: partner, emergency stops, console.
+
+use crate::chains::{Console, Partner};
+use plant::Axis;
+use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
+
+/// What was heard.
+pub(super) struct Heard {
+    own: Axis,
+    experiment: u8,
+    pub(super) partner: Partner,
+    partner_spoke: bool,
+    pub(super) console: Console,
+    pub(super) stop: Option<EmergencyStopReason>,
+    /// Cycle answered last.
+    answered: Option<u64>,
+}
+
+impl Heard {
+    /// Nothing, by the axis `own` in experiment number `experiment`.
+    pub(super) fn new(own: Axis, experiment: u8) -> Self {
+        Self {
+            own,
+            experiment,
+            partner: Partner::default(),
+            partner_spoke: false,
+            console: Console::default(),
+            stop: None,
+            answered: None,
+        }
+    }
+
+    /// Takes a frame; those of the own axis are of another controller and nothing to go by.
+    pub(super) fn take(&mut self, frame: &Frame) {
+        match (self.own, frame) {
+            (Axis::Load, Frame::DriveChainStatus(status)) | (Axis::Drive, Frame::LoadChainStatus(status)) => {
+                self.partner.status = Some(*status);
+                self.partner_spoke = true;
+            }
+            (Axis::Load, Frame::DriveChainValues(values)) | (Axis::Drive, Frame::LoadChainValues(values)) => {
+                self.partner.values = Some(*values);
+            }
+            (Axis::Load, Frame::DriveEmergencyStop(stop))
+            | (Axis::Drive, Frame::LoadEmergencyStop(stop))
+            | (_, Frame::RigEmergencyStop(stop)) => self.take_stop(stop),
+            (_, Frame::ConsoleEmergencyStop(stop)) => {
+                self.console.release |= stop.release;
+                self.take_stop(stop);
+            }
+            (_, Frame::RunControl(control)) => self.console.take_run_control(control, self.experiment),
+            _ => {}
+        }
+    }
+
+    fn take_stop(&mut self, stop: &EmergencyStop) {
+        if !stop.release {
+            self.stop = Some(stop.reason);
+        }
+    }
+
+    /// Notes when the partner was heard. Cycles that the rig skipped, or that this process missed, are no silence of its: it
+    /// had nothing to answer, or nobody listened.
+    pub(super) fn listen(&mut self, cycle: u64) {
+        let missed = self.answered.map_or(0, |last| cycle.saturating_sub(last + 1));
+        self.answered = Some(cycle);
+        let heard = &mut self.partner.heard;
+        *heard = heard.map(|heard| heard + missed);
+        if std::mem::take(&mut self.partner_spoke) {
+            *heard = Some(cycle);
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Whether the own sensors are still within their range, by what the rig says of them.
+//!
+//! Force and pressures count, the position does not: a carriage at its end reads beyond the range whenever the noise is on
+//! that side. A status tells of the cycles since the one before, so its word holds until the next one; half a second of
+//! nothing else is 50 of them. Counted are cycles that were answered with a fresh status and in a run: in a standstill after an
+//! emergency stop trapped air presses as long as it wants, and a person must be able to release.
+
+use crate::chains::Fault;
+use crate::chains::main::Phase;
+use plant::Axis;
+use protocol::frames::RigStatus;
+
+/// Cycles after which a sensor that is saturated in all of them is a fault.
+const LONGEST: u32 = 500;
+
+/// For how long each of the own sensors has been saturated: force, pressures of cap and rod side.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Range([u32; 3]);
+
+impl Range {
+    /// Takes the rig's word for a cycle.
+    pub(super) fn take(&mut self, axis: Axis, rig: Option<&RigStatus>, phase: Phase) -> Option<Fault> {
+        let Some(rig) = rig.filter(|_| phase != Phase::Shut) else {
+            *self = Self::default();
+            return None;
+        };
+        let saturated = match axis {
+            Axis::Drive => {
+                [rig.drive_force_saturated, rig.drive_pressure_a_saturated, rig.drive_pressure_b_saturated]
+            }
+            Axis::Load => {
+                [rig.load_force_saturated, rig.load_pressure_a_saturated, rig.load_pressure_b_saturated]
+            }
+        };
+        for (count, saturated) in self.0.iter_mut().zip(saturated) {
+            *count = if saturated { *count + 1 } else { 0 };
+        }
+        (self.0.iter().any(|count| *count > LONGEST)).then_some(Fault::LimitExceeded)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn first(rig: &RigStatus, axis: Axis, phase: Phase) -> Option<usize> {
+        let mut range = Range::default();
+        (0..2000).position(|_| range.take(axis, Some(rig), phase) == Some(Fault::LimitExceeded))
+    }
+
+    #[test]
+    fn force_or_pressure_beyond_the_range_for_half_a_second_of_a_run_is_a_fault() {
+        let force = RigStatus { drive_force_saturated: true, ..RigStatus::default() };
+        let pressure = RigStatus { load_pressure_b_saturated: true, ..RigStatus::default() };
+        assert_eq!(first(&force, Axis::Drive, Phase::HoldStart), Some(500));
+        assert_eq!(first(&pressure, Axis::Load, Phase::HoldStart), Some(500));
+        assert_eq!(first(&force, Axis::Load, Phase::HoldStart), None, "the other axis's");
+        assert_eq!(first(&force, Axis::Drive, Phase::Shut), None, "not in a run");
+    }
+
+    #[test]
+    fn a_carriage_at_its_end_is_none() {
+        let ends = RigStatus {
+            drive_position_saturated: true,
+            load_position_saturated: true,
+            ..RigStatus::default()
+        };
+        for axis in Axis::ALL {
+            assert_eq!(first(&ends, axis, Phase::HoldStart), None);
+        }
+    }
+
+    #[test]
+    fn a_status_within_the_range_begins_the_count_anew() {
+        let force = RigStatus { drive_force_saturated: true, ..RigStatus::default() };
+        let mut range = Range::default();
+        for cycle in 0..5000 {
+            let rig = if cycle % 400 < 10 { RigStatus::default() } else { force };
+            assert_eq!(range.take(Axis::Drive, Some(&rig), Phase::HoldEnd), None, "cycle {cycle}");
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Status and values of an axis: what they are, and when they are sent: every ten cycles, and at once when the status is another.
+
+use super::AxisController;
+use plant::Axis;
+use protocol::frames::{ChainStatus, ChainValues, DRIVE_CHAIN_VALUES, MainChainState};
+
+/// Period of status and values, in cycles.
+const PERIOD: u64 = protocol::periods::CHAIN_CYCLES;
+/// Cycles within the period in which status and values of drive and load are sent: none falls on the rig's tick (0) or status
+/// (5), nor on another.
+const PHASES: [[u64; 2]; 2] = [[2, 3], [7, 8]];
+
+/// Positions and forces that the values can carry; those of both axes are alike.
+const LEAST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].min;
+const MOST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].max;
+const MOST_N: f64 = DRIVE_CHAIN_VALUES.signals[2].max;
+
+/// What was sent last.
+pub(super) struct Slow {
+    phases: [u64; 2],
+    told: ChainStatus,
+    /// Periods of status and values in which they were sent last.
+    periods: [u64; 2],
+}
+
+/// What is to be sent.
+pub(super) struct Due {
+    pub(super) status: bool,
+    pub(super) values: bool,
+    /// The main chain is in another state than was told last.
+    pub(super) other_state: bool,
+}
+
+impl Slow {
+    pub(super) fn new(axis: Axis) -> Self {
+        Self { phases: PHASES[axis.index()], told: ChainStatus::default(), periods: [0; 2] }
+    }
+
+    /// What is due in `cycle`, and counts as sent.
+    pub(super) fn due(&mut self, cycle: u64, status: &ChainStatus) -> Due {
+        let changed = *status != self.told;
+        let other_state = status.main_chain != self.told.main_chain;
+        // Counted, so that a cycle that was skipped puts off what was due in it and does not drop it.
+        let periods = self.phases.map(|phase| (cycle + PERIOD - phase) / PERIOD);
+        let [status_due, values] = [0, 1].map(|which| changed || periods[which] != self.periods[which]);
+        (self.periods, self.told) = (periods, *status);
+        Due { status: status_due, values, other_state }
+    }
+}
+
+impl AxisController {
+    /// Status for the bus.
+    #[must_use]
+    pub fn status(&self) -> ChainStatus {
+        let (main_chain, ok, repetition) =
+            self.leading.output().map_or((MainChainState::WaitingForRig, false, 0), |output| {
+                (output.state, output.ok, output.repetition)
+            });
+        ChainStatus {
+            main_chain,
+            force_chain: self.work.force_chain(main_chain),
+            matching_chain: self.work.matching_chain(),
+            emergency_stop_chain: self.leading.emergency_stop(),
+            ok,
+            experiment: self.main_config.experiment,
+            // The counter wraps as its field in rig.dbc does.
+            repetition: repetition as u8,
+        }
+    }
+
+    /// Values for the bus.
+    pub(super) fn values(&self) -> ChainValues {
+        let average_m = self.average.value();
+        let demand = self.asked.as_ref().map(|asked| asked.demand);
+        let set_position_m = match demand {
+            Some(demand) if self.work.is_position() => demand.position.position_m,
+            _ => average_m,
+        };
+        let now_m = self.average.last();
+        ChainValues {
+            averaged_position_m: average_m.clamp(LEAST_M, MOST_M),
+            position_set_point_m: set_position_m.clamp(LEAST_M, MOST_M),
+            force_set_point_n: demand.map_or(0.0, |demand| demand.force.force_n.clamp(-MOST_N, MOST_N)),
+            control_error_m: if self.work.is_position() { set_position_m - now_m } else { 0.0 },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_skipped_cycle_puts_off_what_was_due_in_it() {
+        let mut slow = Slow::new(Axis::Drive);
+        let status = ChainStatus::default();
+        let sent = |slow: &mut Slow, cycles: std::ops::Range<u64>| {
+            cycles.filter(|cycle| slow.due(*cycle, &status).status).collect::<Vec<_>>()
+        };
+        assert_eq!(sent(&mut slow, 0..25), [2, 12, 22]);
+        assert_eq!(sent(&mut slow, 35..45), [35, 42]);
+    }
+
+    #[test]
+    fn another_status_is_sent_at_once() {
+        let mut slow = Slow::new(Axis::Load);
+        (0..20).for_each(|cycle| drop(slow.due(cycle, &ChainStatus::default())));
+        let other = ChainStatus { ok: true, ..ChainStatus::default() };
+        let due = slow.due(20, &other);
+        assert!(due.status && due.values && !due.other_state);
+        assert!(!slow.due(21, &other).status);
+    }
+}
