@@ -155,8 +155,8 @@ impl Inputs {
         }
         let source = self.programs[axis.index()].as_ref();
         Err(RunError::Input(format!(
-            "{}: no [giving-way]: the {} axis has set-points of forces ({}:{}), and its force chain needs an algorithm to relieve \
-             stress and to give way; add\n[giving-way]\nname = \"force-manual\"",
+            "{}: no [giving-way]: the {} axis has set-points of forces ({}:{}), and its force chain needs an algorithm to \
+             relieve stress and to give way; add\n[giving-way]\nname = \"force-manual\"",
             source.map_or(Path::new("(none)"), |source| source.path.as_path()).display(),
             axis.name(),
             self.experiment_file.display(),

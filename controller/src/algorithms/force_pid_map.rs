@@ -277,10 +277,10 @@ mod tests {
     #[test]
     fn a_valve_that_cannot_follow_does_not_wind_it_up() {
         // 1500 N over 100 s: 150 N in 10 s, of a limit of 500 N.
-        let parameters = &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 500.0)];
+        let changed = &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 500.0)];
         let held = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
         let back = Ready { set_force_n: -15.0, ..moving_at(0.1) };
-        laws::does_not_wind_up(&KIND, &Stuck { parameters, held, back });
+        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
     }
 
     #[test]

@@ -62,11 +62,14 @@ pub(super) fn check(kind: &Kind) {
     TestRunner::default().run(&inputs, claim).unwrap_or_else(|error| panic!("{}: {error}", kind.name));
 }
 
+/// Place of a parameter and its value.
+pub(super) type Changed = (usize, f64);
+
 /// An error that the valve cannot work off, and what comes after it.
 pub(super) struct Stuck<'a> {
     /// Parameters that differ from their defaults: an integral part so slow, with limit and zone so wide, that neither of these
     /// stops it in 10 s.
-    pub parameters: &'a [(usize, f64)],
+    pub changed: &'a [Changed],
     /// The large error.
     pub held: Ready,
     /// What comes of it in the end, for 0.5 s: some per cent of the other sign.
@@ -78,7 +81,7 @@ pub(super) struct Stuck<'a> {
 /// were claimed.
 pub(super) fn does_not_wind_up(kind: &Kind, stuck: &Stuck<'_>) {
     let mut parameters: Vec<_> = kind.parameters.iter().map(|parameter| parameter.default).collect();
-    stuck.parameters.iter().for_each(|(place, value)| parameters[*place] = *value);
+    stuck.changed.iter().for_each(|(place, value)| parameters[*place] = *value);
     let after = |held_s: f64, valve: &dyn Fn(f64) -> f64| -> Vec<f64> {
         let mut algorithm = (kind.make)(&RigParameters::baseline());
         let mut ready = stuck.held;

@@ -254,11 +254,11 @@ mod tests {
     #[test]
     fn it_does_not_wind_up() {
         // 0.2 m at 300 N/(m s): 600 N in 10 s, of a limit of 1000 N.
-        let parameters =
+        let changed =
             &[(INTEGRAL_GAIN, 300.0), (INTEGRAL_LIMIT, 1000.0), (INTEGRAL_ZONE, 0.5), (REST_ZONE, 0.0)];
         let held = Ready { set_position_m: 0.4, ..balanced() };
         let back = Ready { set_position_m: 0.19, ..balanced() };
-        laws::does_not_wind_up(&KIND, &Stuck { parameters, held, back });
+        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
     }
 
     #[test]

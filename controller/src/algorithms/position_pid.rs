@@ -151,11 +151,11 @@ mod tests {
     #[test]
     fn it_does_not_wind_up() {
         // 0.3 m over 100 s: 30 mm in 10 s, of a limit of 100 mm.
-        let parameters =
+        let changed =
             &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 0.1), (INTEGRAL_ZONE, 0.5), (REST_ZONE, 0.0)];
         let held = Ready { set_position_m: 0.5, ..AT_REST };
         let back = Ready { set_position_m: 0.19, ..AT_REST };
-        laws::does_not_wind_up(&KIND, &Stuck { parameters, held, back });
+        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
     }
 
     #[test]
