@@ -7,8 +7,8 @@
 //!                                     └───────────── prepared, fault ◄──────────┘
 //! ```
 //!
-//! [`leading`] wires the first two. Both axes run the same main chain and know each other through [`Partner`] alone: an OK flag, the states of the chains and
-//! a few values. What the partner sends in a cycle is seen in the next one.
+//! [`leading`] wires the first two. Both axes run the same main chain and know each other through [`Partner`] alone: an OK flag,
+//! the states of the chains and a few values. What the partner sends in a cycle is seen in the next one.
 //!
 //! Every chain has the same form: `advance` notes what it is told, asks the pure `decide` for at most one edge, and goes it
 //! through the `enter_…` of the new state, the only writer of that state, which notes its cause. So every state lasts for at

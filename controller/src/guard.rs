@@ -10,12 +10,13 @@
 //!
 //! A finite result of any size passes: the post-controller limits it to what the valve can do. Time is watched where it
 //! is real; a rehearsal and a run in lockstep have no clock here, so that their results do not depend on the machine.
-//! The watch sees a step only when it has returned: for one that never does, the rig shuts its valve on commands older than 20
-//! cycles, and the barrier of a lockstep run times out.
+//! The watch sees a step only when it has returned. For one that never does, the rig shuts its valve on commands older than 20
+//! cycles, the partner misses this controller, and another thread ends the process: see [`Stuck`].
 
 use crate::algorithm::{Algorithm, Ready};
 use realtime::{Clock, Instant};
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant as WallInstant};
 
 /// One step longer than this is a fault: 20 cycles, after which the rig itself calls commands stale.
 pub const LONGEST_ONCE: Duration = Duration::from_millis(20);
@@ -23,6 +24,41 @@ pub const LONGEST_ONCE: Duration = Duration::from_millis(20);
 pub const LONGEST_EACH: Duration = Duration::from_millis(1);
 /// How many successive steps over [`LONGEST_EACH`] are a fault.
 pub const SUCCESSIVE: u32 = 10;
+
+/// After how much wall time in one call an algorithm counts as one that never returns.
+pub const NEVER: Duration = Duration::from_secs(2);
+
+/// Calls of algorithms begun and ended in this process: odd while one is being called. All are called by one thread.
+static CALLS: AtomicU64 = AtomicU64::new(0);
+
+/// Looks, from another thread, for an algorithm that never returns: nothing else can end its process in good order, for the
+/// thread that would take Ctrl-C is the one that is stuck.
+#[derive(Debug)]
+pub struct Stuck {
+    seen: u64,
+    since: WallInstant,
+}
+
+impl Default for Stuck {
+    fn default() -> Self {
+        Self { seen: CALLS.load(Ordering::Relaxed), since: WallInstant::now() }
+    }
+}
+
+impl Stuck {
+    /// Whether an algorithm has been in one and the same call for [`NEVER`].
+    pub fn look(&mut self) -> bool {
+        let calls = CALLS.load(Ordering::Relaxed);
+        if calls != self.seen || calls.is_multiple_of(2) {
+            (self.seen, self.since) = (calls, WallInstant::now());
+        }
+        self.since.elapsed() > NEVER
+    }
+}
+
+/// What a person is told of an algorithm that never returns.
+pub const STUCK: &str = "an algorithm has not returned for 2 s; its valve is shut by the rig for want of commands. What was \
+recorded so far is saved; look for an endless loop or a wait in the step of the library";
 
 /// Why an algorithm is no longer asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -78,7 +114,9 @@ impl Guarded {
     pub fn reset(&mut self, ready: &Ready, parameters: &[f64]) -> Result<(), AlgorithmFault> {
         self.unless_latched()?;
         let started = self.now();
+        CALLS.fetch_add(1, Ordering::Relaxed);
         self.algorithm.reset(ready, parameters);
+        CALLS.fetch_add(1, Ordering::Relaxed);
         // Only too slow at once: a reset may take longer than a step.
         self.slow = 0;
         match self.took(started) {
@@ -94,7 +132,9 @@ impl Guarded {
     pub fn step(&mut self, ready: &Ready, parameters: &[f64]) -> Result<f64, AlgorithmFault> {
         self.unless_latched()?;
         let started = self.now();
+        CALLS.fetch_add(1, Ordering::Relaxed);
         let result = self.algorithm.step(ready, parameters);
+        CALLS.fetch_add(1, Ordering::Relaxed);
         let took = self.took(started);
         if !result.is_finite() {
             return Err(self.latch(AlgorithmFault::NotANumber));

@@ -3,6 +3,7 @@
 //! A thread of its own polls the queues, so that the 1 ms path wakes nobody.
 
 use crate::axis::AxisRecord;
+use crate::guard::Stuck;
 use crate::station::News;
 use crate::watch::Watcher;
 use crossbeam_channel::{Receiver, TryRecvError};
@@ -99,13 +100,15 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more.
+    /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
+    /// which does not return, when an algorithm never does, with everything written.
     /// Returns the news, and why writing stopped, if it did.
-    pub fn run(self, failed: impl Fn()) -> (Vec<News>, Option<String>) {
+    pub fn run(self, failed: impl Fn(), stuck: impl Fn()) -> (Vec<News>, Option<String>) {
         let Self { mut tables, records, news, mut watcher } = self;
         let mut told = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
+        let mut watch = Stuck::default();
         loop {
             let finished = loop {
                 match records.try_recv() {
@@ -119,6 +122,11 @@ impl Writer {
             };
             if let Some(watcher) = &mut watcher {
                 watcher.look();
+            }
+            if watch.look() {
+                // The process ends here; a failure of the last write has nobody left to be told to.
+                let _ = tables.write_out();
+                stuck();
             }
             for item in news.try_iter() {
                 eprintln!("controller: {}", sentence(item));

@@ -53,6 +53,8 @@ pub struct Rehearsal {
     wire: Wire,
     records: Receiver<AxisRecord>,
     news: Receiver<News>,
+    /// Position, force, pressures of each axis that saturated since the last status.
+    saturated: [[bool; 4]; 2],
     cycle: u64,
     closing: bool,
 }
@@ -100,6 +102,7 @@ impl Rehearsal {
             wire: Wire::default(),
             records,
             news,
+            saturated: [[false; 4]; 2],
             cycle: 0,
             closing: false,
         })
@@ -142,6 +145,13 @@ impl Rehearsal {
     }
 
     fn publish(&mut self, cycle: u64, readings: &[AxisReadings; 2]) {
+        for (saturated, axis) in self.saturated.iter_mut().zip(readings) {
+            let sensors = [&axis.position, &axis.force, &axis.pressure_a, &axis.pressure_b];
+            saturated
+                .iter_mut()
+                .zip(sensors)
+                .for_each(|(saturated, reading)| *saturated |= reading.saturated);
+        }
         // Ahead of the sensors, as the rig does.
         if let Some(call) = self.people.rig_call(cycle) {
             let release = call == RigCall::Release;
@@ -156,7 +166,16 @@ impl Rehearsal {
             self.hand_over(&Frame::Tick(tick));
         }
         if periods::status_is_due(cycle) {
+            let [drive, load] = std::mem::take(&mut self.saturated);
             let status = RigStatus {
+                drive_position_saturated: drive[0],
+                drive_force_saturated: drive[1],
+                drive_pressure_a_saturated: drive[2],
+                drive_pressure_b_saturated: drive[3],
+                load_position_saturated: load[0],
+                load_force_saturated: load[1],
+                load_pressure_a_saturated: load[2],
+                load_pressure_b_saturated: load[3],
                 supply_pressure_pa: self.plant.supply_pressure_pa(),
                 linked: self.plant.linked(),
                 emergency_stop: self.plant.emergency_stop(),

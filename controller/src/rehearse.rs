@@ -3,6 +3,7 @@
 //! It leaves what a run on a bus leaves, save for what only a bus has: no `bus.log`, no latencies.
 
 use crate::cli::RehearseArguments;
+use crate::guard::{STUCK, Stuck};
 use crate::recording::{Tables, sentence};
 use crate::rehearsal::{Rehearsal, RehearsalParts};
 use crate::report::{self, AxisReport, Report};
@@ -17,7 +18,7 @@ use protocol::run_folder::{LineFile, SCHEMA_VERSION, clear_results, write_json};
 use realtime::{Interrupt, Percentiles, Recorder};
 use serde_json::json;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Rehearses as the command line asks.
 ///
@@ -34,6 +35,7 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     std::fs::create_dir_all(out)
         .and_then(|()| clear_results(out))
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
+    end_when_stuck();
     let started = Instant::now();
     let mut files = Files::create(out, &scene).map_err(RunError::output)?;
     let cycles = (arguments.seconds * 1000.0).round() as u64;
@@ -51,6 +53,18 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     files.write_out().map_err(RunError::output)?;
     let ended = Ended { rehearsal, interrupted, told, news, took_s: started.elapsed().as_secs_f64() };
     save(arguments, &inputs, &scene, &ended)
+}
+
+/// Ends the process when an algorithm never returns, which this thread could not.
+fn end_when_stuck() {
+    std::thread::spawn(|| {
+        let mut watch = Stuck::default();
+        while !watch.look() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        eprintln!("controller: {STUCK}");
+        std::process::exit(Exit::BoundBroken as i32);
+    });
 }
 
 /// A rehearsal of what was read.

@@ -1,6 +1,7 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
 use crate::cli::{Axes, Pace, RunArguments};
+use crate::guard::STUCK;
 use crate::pace::{self, End, Paced, Ride};
 use crate::plugin::PluginError;
 use crate::recording::{Tables, Writer};
@@ -9,11 +10,13 @@ use crate::setup::{Inputs, Mode};
 use crate::station::{IgnoredFrames, News, Outlets, Station};
 use crate::watch;
 use crossbeam_channel::bounded;
+use plant::Axis;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
 use protocol::run_folder::{SCHEMA_VERSION, write_json};
 use realtime::{Clock, Grants, Interrupt, MonotonicClock, Request};
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Rows that fit the queue: 16 s of both axes.
@@ -93,7 +96,10 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let asking = &interrupt;
-        let writer = scope.spawn(move || Writer { tables, records, news, watcher }.run(|| asking.ask()));
+        let writer = scope.spawn(move || {
+            let writer = Writer { tables, records, news, watcher };
+            writer.run(|| asking.ask(), || end_stuck(out, axes))
+        });
         let parts = Work { arguments, inputs: &inputs, station, bus: bus.as_mut(), interrupt: &interrupt };
         let work = scope.spawn(|| parts.run());
         let finished = join(work);
@@ -104,6 +110,19 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
             Ended { started, finished: finished?, told, output_failed: failure.is_some() },
         )
     })
+}
+
+/// Ends the process whose loop is stuck in an algorithm, for good: its thread cannot be asked to.
+fn end_stuck(out: &Path, axes: &[Axis]) {
+    eprintln!("controller: {STUCK}");
+    let exit = Exit::BoundBroken;
+    let report = serde_json::json!({
+        "schema_version": SCHEMA_VERSION, "ended_well": false, "ended_because": STUCK,
+    });
+    if let Err(error) = write_json(&out.join(format!("{}.json", report::name(axes))), &report) {
+        eprintln!("controller: cannot write {error}");
+    }
+    std::process::exit(exit as i32);
 }
 
 struct Finished {

@@ -100,6 +100,20 @@ fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
 }
 
 #[test]
+fn a_library_that_never_returns_ends_the_controller_with_what_was_recorded() {
+    let scene = scene();
+    own::failing(&scene, "count > 200 && (pause(), 0)", &["-D_DEFAULT_SOURCE", "-include", "unistd.h"]);
+    let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
+    let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
+    let _ = ended.expect_said(&["has not returned for 2 s"]);
+    let report = json(&scene.path("controller/controller.json"));
+    assert!(report["ended_because"].as_str().expect("a reason").contains("has not returned"));
+    // All that was answered before is on disk.
+    assert!(AxisTable::read(&scene.path("controller/controller-drive.csv")).cycles().len() > 150);
+    drop(emulator);
+}
+
+#[test]
 fn a_library_of_another_version_is_refused_before_anything_runs() {
     let scene = scene();
     own::failing(&scene, "0", &["-DVERSION=99"]);

@@ -104,7 +104,9 @@ mod tests {
     #[test]
     fn another_status_is_sent_at_once() {
         let mut slow = Slow::new(Axis::Load);
-        (0..20).for_each(|cycle| drop(slow.due(cycle, &ChainStatus::default())));
+        for cycle in 0..20 {
+            let _ = slow.due(cycle, &ChainStatus::default());
+        }
         let other = ChainStatus { ok: true, ..ChainStatus::default() };
         let due = slow.due(20, &other);
         assert!(due.status && due.values && !due.other_state);
