@@ -71,11 +71,15 @@ pub(super) fn still(rests: &[Span]) -> impl Iterator<Item = Span> {
     long.map(|rest| Span { to_s: rest.to_s - 0.5 * NOISE_S, ..rest.last(STILL_S) })
 }
 
+/// Ways that differ by less, in shares of the longer, are equal: a late rig skips the samples at an end.
+const SAME_WAY: f64 = 0.01;
+
 /// The move over the longest way; the first of equals.
 fn longest(record: &Record, moves: &[Span]) -> Option<Span> {
     let set_point = record.drive.numbers("set_position_m");
     let ways = moves.iter().filter_map(|span| Some((span, set_point.within(span).peak_to_peak()?)));
-    ways.reduce(|longest, other| if other.1 > longest.1 { other } else { longest }).map(|(span, _)| *span)
+    ways.reduce(|longest, other| if other.1 * (1.0 - SAME_WAY) > longest.1 { other } else { longest })
+        .map(|(span, _)| *span)
 }
 
 /// Number of separate maxima of |error|.
