@@ -39,7 +39,11 @@ fn change(first: Option<f64>, other: Option<f64>) -> String {
         (Some(first), Some(other)) if first == other => "0 %".into(),
         (Some(first), Some(other)) if first != 0.0 => {
             let change = 100.0 * (other - first) / first.abs();
-            if change.abs() > MOST_CHANGE { "-".into() } else { format!("{change:+.1} %") }
+            if change.abs() > MOST_CHANGE {
+                format!("over {MOST_CHANGE} %")
+            } else {
+                format!("{change:+.1} %")
+            }
         }
         _ => "-".into(),
     }
@@ -134,7 +138,7 @@ mod tests {
         assert_eq!(change(Some(-2.0), Some(-3.0)), "-50.0 %");
         assert_eq!(change(Some(0.0), Some(0.0)), "0 %");
         assert_eq!(change(Some(0.0), Some(3.0)), "-");
-        assert_eq!(change(Some(1e-16), Some(3.0)), "-");
+        assert_eq!(change(Some(1e-16), Some(3.0)), "over 1000 %");
         assert_eq!(change(None, Some(3.0)), "-");
     }
 }

@@ -78,7 +78,14 @@ impl Inputs {
                 RunError::Input(format!("{place}: program of the {} axis: {error}", axis.name()))
             })?);
         }
-        let overrides = files.set.iter().map(|text| parse_override(text)).collect::<Result<_, _>>()?;
+        let overrides = files.set.iter().map(|text| parse_override(text)).collect::<Result<Vec<_>, _>>()?;
+        if let Some((axis, name, _)) = overrides.iter().find(|(axis, ..)| programs[axis.index()].is_none()) {
+            let axis = axis.name();
+            return Err(RunError::Input(format!(
+                "--set {axis}.{name}: {} has no [{axis}], so that axis has no variables",
+                files.experiment.display()
+            )));
+        }
         let experiment_file = files.experiment.clone();
         Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
     }

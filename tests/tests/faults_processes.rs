@@ -13,16 +13,8 @@ use system_tests::turn;
 /// Rows after which the valve moves.
 const UNDER_WAY: usize = 900;
 /// States of the main chain from the restart on, when all goes well.
-const STATES: [&str; 8] = [
-    "waiting-for-rig",
-    "initial-positioning",
-    "preparing",
-    "initial-force",
-    "settling",
-    "experiment",
-    "final-settling",
-    "done",
-];
+const STATES: [&str; 7] =
+    ["initial-positioning", "preparing", "initial-force", "settling", "experiment", "final-settling", "done"];
 const STOPPED: Duration = Duration::from_millis(200);
 
 /// Emulator and controller under way; the experiment repeats until the emulator is interrupted.
