@@ -105,3 +105,11 @@ fn a_multiple_that_is_no_whole_number_is_refused_on_the_command_line_and_in_a_pl
     let change = "[[load.change]]\nat_s = 0.5\nparameter = \"algorithm.every_cycles\"\nvalue = 2.5\n";
     expect_refused(controllers(&format!("{EXPERIMENT}{change}"), LOAD, &[]), &whole);
 }
+
+#[test]
+fn a_variable_of_an_axis_that_the_experiment_leaves_out_is_refused() {
+    let alone = &EXPERIMENT[..EXPERIMENT.find("[load]").unwrap()];
+    assert!(controllers(alone, LOAD, &["drive.algorithm.gain_per_s=10"]).is_ok());
+    let set = ["load.algorithm.gain_m_per_n_s=0.01"];
+    expect_refused(controllers(alone, LOAD, &set), &["--set load.algorithm", "experiment.toml", "no [load]"]);
+}
