@@ -1,14 +1,16 @@
-//! The 1 ms path of both shipped programs allocates nothing: ten seconds on a real bus after the first of warm-up.
+//! The 1 ms path of both shipped programs allocates nothing: ten seconds and more on a real bus after the first of warm-up, of a
+//! drive alone, and of linked axes with force control and every chain at work.
 //!
 //! The programs are built once more, with the allocator that counts inside the 1 ms path; nothing else differs. That this
 //! counter does count is proven where it lives: `realtime/tests/allocations.rs`,
 //! `a_push_is_counted_inside_the_watch_and_not_outside`.
 
 use protocol::can::CanFrame;
+use system_tests::axis_table::AxisTable;
 use system_tests::binaries::Build;
 use system_tests::launch::Pace;
 use system_tests::records::{count, json};
-use system_tests::scene::{RESTLESS, Scene};
+use system_tests::scene::{LINKED, RESTLESS, Scene};
 use system_tests::turn;
 
 #[test]
@@ -36,6 +38,32 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     assert!(count(&controller, "/cycles_answered") > 10_000, "the controller took part throughout");
     assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
     assert_eq!(count(&controller, "/allocations_in_cycle"), 0);
+}
+
+#[test]
+fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
+    let _machine = turn::take();
+    let scene = Scene::new(LINKED);
+    let emulator = scene.emulator(Pace::Real).build(Build::CountingAllocations).with("--seconds 14").start();
+    let controller = scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat").start();
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    // Past the warm-up of 1 s both axes have been through every state of the way, and into the next repetition.
+    let load = AxisTable::read(&scene.path("controller/controller-load.csv"));
+    let late = load.cycles().iter().position(|cycle| *cycle >= 1500).expect("rows after the warm-up");
+    for (column, state) in [
+        ("main_chain", "preparing"),
+        ("main_chain", "initial-force"),
+        ("main_chain", "experiment"),
+        ("main_chain", "final-settling"),
+        ("matching_chain", "averaging"),
+        ("force_chain", "load-profile"),
+        ("force_chain", "standstill"),
+    ] {
+        assert!(load.texts(column)[late..].iter().any(|text| *text == state), "{state} after the warm-up");
+    }
+    assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/allocations_in_cycle"), 0);
+    assert_eq!(count(&json(&scene.path("controller/controller.json")), "/allocations_in_cycle"), 0);
 }
 
 #[test]

@@ -29,10 +29,11 @@
 //! Source: [Neugebauer 2011, section 5] supposes that such a cascade does better than P; air and friction from
 //! rig-model.md.
 
+use super::position_p::{VELOCITY_FEED_FORWARD, gain};
 use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
 use crate::linearisation::Air;
 use crate::parameters::Parameter;
-use crate::rest_zone::RestZone;
+use crate::rest_zone::{self, RestZone};
 use plant::RigParameters;
 
 /// In the list of algorithms.
@@ -58,13 +59,8 @@ const FRICTION_SPEED: usize = 10;
 const LOAD: usize = 11;
 const REST_ZONE: usize = 12;
 static PARAMETERS: [Parameter; 13] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 15.0, "velocity for each error"),
-    Parameter::new(
-        ("velocity_feed_forward", ""),
-        [0.0, 2.0],
-        1.0,
-        "share of the set-point's rate that is fed forward",
-    ),
+    gain(15.0),
+    VELOCITY_FEED_FORWARD,
     Parameter::new(
         ("velocity_gain_n_s_per_m", "N/(m/s)"),
         [0.0, 20_000.0],
@@ -115,12 +111,7 @@ static PARAMETERS: [Parameter; 13] = [
         1.0,
         "share of the measured force between rod and carriage that is compensated",
     ),
-    Parameter::new(
-        ("rest_zone_m", "m"),
-        [0.0, 0.01],
-        2e-4,
-        "error within which a standing rod is left alone",
-    ),
+    rest_zone::parameter(2e-4),
 ];
 
 /// Largest result, m/s: several times what any valve of this rig gives.

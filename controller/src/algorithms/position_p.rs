@@ -11,7 +11,7 @@
 
 use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
 use crate::parameters::Parameter;
-use crate::rest_zone::RestZone;
+use crate::rest_zone::{self, RestZone};
 
 /// In the list of algorithms.
 pub const KIND: Kind = Kind {
@@ -22,24 +22,23 @@ pub const KIND: Kind = Kind {
     make: |_| Box::new(PositionP::default()),
 };
 
+/// The gain that every position algorithm has, with its default, 1/s.
+pub(super) const fn gain(default_per_s: f64) -> Parameter {
+    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], default_per_s, "velocity for each error")
+}
+
+/// The feed-forward that every position algorithm has.
+pub(super) const VELOCITY_FEED_FORWARD: Parameter = Parameter::new(
+    ("velocity_feed_forward", ""),
+    [0.0, 2.0],
+    1.0,
+    "share of the set-point's rate that is fed forward",
+);
+
 const GAIN: usize = 0;
 const FEED_FORWARD: usize = 1;
 const REST_ZONE: usize = 2;
-static PARAMETERS: [Parameter; 3] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 20.0, "velocity for each error"),
-    Parameter::new(
-        ("velocity_feed_forward", ""),
-        [0.0, 2.0],
-        1.0,
-        "share of the set-point's rate that is fed forward",
-    ),
-    Parameter::new(
-        ("rest_zone_m", "m"),
-        [0.0, 0.01],
-        5e-4,
-        "error within which a standing rod is left alone",
-    ),
-];
+static PARAMETERS: [Parameter; 3] = [gain(20.0), VELOCITY_FEED_FORWARD, rest_zone::parameter(5e-4)];
 
 /// The algorithm.
 #[derive(Debug, Default)]

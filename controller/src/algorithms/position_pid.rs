@@ -15,9 +15,10 @@
 //!
 //! Source: [Åström, Hägglund 1995], PID in the ideal form; the derivative filter is the pre-controller's.
 
+use super::position_p::{VELOCITY_FEED_FORWARD, gain};
 use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
 use crate::parameters::Parameter;
-use crate::rest_zone::RestZone;
+use crate::rest_zone::{self, RestZone};
 
 /// In the list of algorithms.
 pub const KIND: Kind = Kind {
@@ -36,13 +37,8 @@ const INTEGRAL_ZONE: usize = 4;
 const DERIVATIVE_TIME: usize = 5;
 const REST_ZONE: usize = 6;
 static PARAMETERS: [Parameter; 7] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 30.0, "velocity for each error"),
-    Parameter::new(
-        ("velocity_feed_forward", ""),
-        [0.0, 2.0],
-        1.0,
-        "share of the set-point's rate that is fed forward",
-    ),
+    gain(30.0),
+    VELOCITY_FEED_FORWARD,
     Parameter::new(
         ("integral_time_s", "s"),
         [0.0, 100.0],
@@ -67,12 +63,7 @@ static PARAMETERS: [Parameter; 7] = [
         0.12,
         "time over which the error is extrapolated by its rate",
     ),
-    Parameter::new(
-        ("rest_zone_m", "m"),
-        [0.0, 0.01],
-        3e-4,
-        "error within which a standing rod is left alone",
-    ),
+    rest_zone::parameter(3e-4),
 ];
 
 /// Largest result, m/s: several times what any valve of this rig gives.
