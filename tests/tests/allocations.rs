@@ -60,7 +60,7 @@ fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
         ("force_chain", "load-profile"),
         ("force_chain", "standstill"),
     ] {
-        assert!(load.texts(column)[late..].iter().any(|text| *text == state), "{state} after the warm-up");
+        assert!(load.texts(column)[late..].contains(&state), "{state} after the warm-up");
     }
     assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/allocations_in_cycle"), 0);
     assert_eq!(count(&json(&scene.path("controller/controller.json")), "/allocations_in_cycle"), 0);
