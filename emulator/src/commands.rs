@@ -54,14 +54,14 @@ pub struct CommandIntake {
 }
 
 impl CommandIntake {
-    /// Takes a well-formed command that arrived before `cycle`. True when it was accepted.
-    pub fn take(&mut self, command: ValveCommand, cycle: u64, live: &LiveCycles) -> bool {
+    /// Takes a well-formed command that arrived before the cycle that was sent last acts. True when it was accepted.
+    pub fn take(&mut self, command: ValveCommand, live: &LiveCycles) -> bool {
         if live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES) {
             self.counters.refused_stale += 1;
             self.refused_since_accepted += 1;
             return false;
         }
-        if let Step::Continues { lost } = self.sources.note(command.alive, cycle) {
+        if let Step::Continues { lost } = self.sources.note(command.alive, live.count()) {
             // A refused frame leaves a gap in the counters of those accepted, but it came.
             self.counters.lost += lost.saturating_sub(self.refused_since_accepted);
         }
@@ -71,8 +71,8 @@ impl CommandIntake {
         true
     }
 
-    /// Latches what acts over `cycle`, the last command taken being the one that counts.
-    pub fn latch(&mut self, cycle: u64, live: &LiveCycles) -> Option<Change> {
+    /// Latches what acts over the cycle that was sent last, the last command taken being the one that counts.
+    pub fn latch(&mut self, live: &LiveCycles) -> Option<Change> {
         let too_old =
             |command: &ValveCommand| live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES);
         let expired = self.acting.as_ref().is_some_and(too_old);
@@ -80,7 +80,8 @@ impl CommandIntake {
             self.acting = None;
             self.counters.expired += 1;
         }
-        let disputed = self.sources.two_sources(cycle);
+        // In cycles that were sent, as all ages are: a stall of the rig is no silence of the sender.
+        let disputed = self.sources.two_sources(live.count());
         let quarrel_changed = disputed != self.disputed;
         self.disputed = disputed;
         self.counters.two_sources += u64::from(quarrel_changed && disputed);
@@ -154,10 +155,10 @@ mod tests {
         fn cycle(&mut self, answer: Option<f64>) -> Option<Change> {
             if let Some(opening) = answer {
                 let command = self.command(opening, self.cycle - 1);
-                self.intake.take(command, self.cycle, &self.live);
+                self.intake.take(command, &self.live);
             }
             self.live.sent(self.cycle);
-            let change = self.intake.latch(self.cycle, &self.live);
+            let change = self.intake.latch(&self.live);
             self.cycle += 1;
             change
         }
@@ -194,7 +195,7 @@ mod tests {
         for _ in 0..30 {
             let intruder = ValveCommand { opening: 1.0, alive: 15 - bench.alive, echo: 0, enable: true };
             let intruder = ValveCommand { echo: (bench.cycle - 1) as u16, ..intruder };
-            bench.intake.take(intruder, bench.cycle, &bench.live);
+            bench.intake.take(intruder, &bench.live);
             bench.cycle(Some(0.5));
         }
         // Both fall silent: the quarrel and the command's life end within the same few cycles.
@@ -215,7 +216,7 @@ mod tests {
         }
         for echo in [0, 79, 500, 4000] {
             let command = bench.command(-1.0, echo);
-            assert!(!bench.intake.take(command, bench.cycle, &bench.live), "echo {echo}");
+            assert!(!bench.intake.take(command, &bench.live), "echo {echo}");
         }
         assert_eq!((bench.intake.opening(), bench.intake.counters().refused_stale), (0.5, 4));
     }
@@ -226,7 +227,7 @@ mod tests {
         bench.cycle(None);
         (0..40).for_each(|_| assert_eq!(bench.cycle(Some(0.5)), None));
         let stale = bench.command(0.5, 2);
-        bench.intake.take(stale, bench.cycle, &bench.live);
+        bench.intake.take(stale, &bench.live);
         bench.cycle(Some(0.5));
         assert_eq!((bench.intake.counters().refused_stale, bench.intake.counters().lost), (1, 0));
     }
@@ -237,7 +238,7 @@ mod tests {
         bench.cycle(None);
         for opening in [0.1, 0.2, 0.3] {
             let command = bench.command(opening, 0);
-            bench.intake.take(command, 1, &bench.live);
+            bench.intake.take(command, &bench.live);
         }
         bench.cycle(None);
         assert_eq!(bench.intake.opening(), 0.3);
@@ -248,7 +249,7 @@ mod tests {
         let mut bench = Bench::default();
         bench.cycle(None);
         let command = ValveCommand { enable: false, ..bench.command(0.5, 0) };
-        bench.intake.take(command, 1, &bench.live);
+        bench.intake.take(command, &bench.live);
         bench.cycle(None);
         assert_eq!((bench.intake.opening(), bench.intake.stale()), (0.0, false));
     }
@@ -261,7 +262,7 @@ mod tests {
         for _ in 0..30 {
             let intruder = ValveCommand { opening: 1.0, alive: 15 - bench.alive, echo: 0, enable: true };
             let intruder = ValveCommand { echo: (bench.cycle - 1) as u16, ..intruder };
-            bench.intake.take(intruder, bench.cycle, &bench.live);
+            bench.intake.take(intruder, &bench.live);
             changes.extend(bench.cycle(Some(0.5)));
         }
         assert_eq!((changes.as_slice(), bench.intake.opening()), (&[Change::TwoSources][..], 0.0));

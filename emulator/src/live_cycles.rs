@@ -40,6 +40,12 @@ impl LiveCycles {
         self.sent_count[slot(cycle)] = Some(self.sent);
     }
 
+    /// Cycles sent so far.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.sent
+    }
+
     /// Cycles sent since the one that `echo` answers, the newest sent cycle having age 0; `None` when the echo's
     /// cycle was never sent.
     #[must_use]

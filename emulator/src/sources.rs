@@ -10,8 +10,8 @@
 //!   two in step:                  4 4 5 5 6 6      steps 0 1 0 1      every second one
 //! ```
 //!
-//! Four breaks within 20 cycles latch the fault; it goes when none was seen for 20 cycles, which is what one sender
-//! falling silent brings about (bus.md, Frames).
+//! Cycles are those that were sent: what a late rig skipped is no silence of a sender. Four breaks within 20 cycles latch the
+//! fault; it goes when none was seen for 20 cycles, which is what one sender falling silent brings about (bus.md, Frames).
 
 use protocol::frames::ALIVE_RANGE;
 

@@ -218,12 +218,12 @@ impl Station {
         self.recorder.frame(FrameRecord { stamp_ns, frame: *frame });
         match Frame::decode(frame) {
             Ok(Frame::DriveValveCommand(command)) => {
-                if self.commands[0].take(command, cycle, &self.live) {
+                if self.commands[0].take(command, &self.live) {
                     self.note_round_trip(command, stamp_ns);
                 }
             }
             Ok(Frame::LoadValveCommand(command)) => {
-                self.commands[1].take(command, cycle, &self.live);
+                self.commands[1].take(command, &self.live);
             }
             Ok(Frame::ConsoleEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Console, stop, cycle),
             Ok(Frame::DriveEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Drive, stop, cycle),
@@ -269,7 +269,7 @@ impl Station {
     /// Latches the commands for `cycle`, records it, and steps the plant to the start of the next.
     pub fn act(&mut self, cycle: u64) {
         for axis in Axis::ALL {
-            if let Some(change) = self.commands[axis as usize].latch(cycle, &self.live) {
+            if let Some(change) = self.commands[axis as usize].latch(&self.live) {
                 self.tell(cycle, change_event(change, axis));
             }
         }
