@@ -16,6 +16,7 @@
 //! | [`grid`] | a table of words in Markdown and HTML |
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
 //! | [`spread`] | how much the figures of repetitions spread |
+//! | [`report`] | the latency report |
 //! | [`cli`] | the command line |
 
 pub mod cli;
@@ -26,6 +27,7 @@ pub mod grid;
 pub mod join;
 pub mod picture;
 pub mod record;
+pub mod report;
 pub mod reports;
 pub mod runs;
 pub mod series;

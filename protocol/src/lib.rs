@@ -8,3 +8,4 @@ pub mod exit;
 pub mod frames;
 pub mod periods;
 pub mod run_folder;
+pub mod timing;

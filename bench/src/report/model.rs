@@ -1,0 +1,355 @@
+//! What a latency report says, before it becomes a page: this is `report.json`, schema `airbench-latency-report` version 1.
+//!
+//! Times are ns in whole numbers where they were measured, s where a person reads them against a run; every key has its unit.
+//! Nothing is NaN: what was not measured is null or missing from its list.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Name of the schema.
+pub const SCHEMA: &str = "airbench-latency-report";
+/// Goes up when a key changes its meaning or goes.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The whole report.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Heading.
+    pub title: String,
+    /// When the report was made, s since 1970.
+    pub made_unix_s: f64,
+    /// May these figures be quoted as latencies of this machine, and what was left uncontrolled.
+    pub claim: Claim,
+    /// Where and how it was measured.
+    pub conditions: Conditions,
+    /// All runs together: distributions added up, the reference's too.
+    pub distributions: Vec<Distribution>,
+    /// Ours against the reference, pair by pair.
+    pub ratios: Vec<Ratio>,
+    /// The worst events of all runs, worst first, ten at most.
+    pub worst: Vec<Event>,
+    /// What disturbed the runs, the most telling first; empty when nothing was found.
+    pub findings: Vec<Finding>,
+    /// The runs one by one.
+    pub runs: Vec<RunPart>,
+    /// Groups of runs side by side, when several were compared.
+    pub comparison: Option<Comparison>,
+    /// The bounds of the threshold file, if one was given.
+    pub bounds: Vec<BoundResult>,
+}
+
+/// Whether the runs support a latency claim.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Claim {
+    /// Whether they do.
+    pub supported: bool,
+    /// One plain sentence.
+    pub sentence: String,
+    /// Why not, or what weakens it, a sentence each.
+    pub reasons: Vec<String>,
+    /// What was not controlled, a sentence each.
+    pub not_controlled: Vec<String>,
+}
+
+/// Where and how it was measured.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Conditions {
+    /// Facts of machine, kernel, limits and build, in the order in which they are shown.
+    pub machine: Vec<Fact>,
+    /// What each program was started with.
+    pub command_lines: Vec<Fact>,
+    /// What the system granted and refused.
+    pub privileges: Vec<Fact>,
+    /// The load generator with its settings; null when none was told of.
+    pub load_generator: Option<String>,
+    /// The reference with its command line; null without one.
+    pub reference: Option<String>,
+    /// Why there is no reference, if there is none.
+    pub reference_missing_because: Option<String>,
+    /// Whether the spin-gap probe watched the machine.
+    pub probe: bool,
+}
+
+/// A name and what stands behind it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fact {
+    /// What it is.
+    pub name: String,
+    /// Its value.
+    pub value: String,
+}
+
+/// Where a distribution comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// The rig's process.
+    Emulator,
+    /// A controller's process.
+    Controller,
+    /// Both, joined on one clock.
+    Joined,
+    /// Measured by another program in the same session.
+    Reference,
+}
+
+/// A distribution of lengths of time.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Distribution {
+    /// Tag in the `.hlog`, such as `emulator-wakeup`.
+    pub name: String,
+    /// Where it comes from.
+    pub source: Source,
+    /// What it is, for a person.
+    pub about: String,
+    /// Its percentiles.
+    pub percentiles_ns: PercentilesNs,
+    /// Bins on a logarithmic axis, those that are not empty, rising.
+    pub bins: Vec<Bin>,
+    /// The largest value of each second.
+    pub maxima: Vec<Maximum>,
+}
+
+/// Percentiles in ns; null when nothing was measured, or too little for that percentile to differ from the maximum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PercentilesNs {
+    /// Half.
+    pub p50: Option<u64>,
+    /// 90 %.
+    pub p90: Option<u64>,
+    /// 99 %.
+    pub p99: Option<u64>,
+    /// 99.9 %.
+    pub p999: Option<u64>,
+    /// 99.99 %.
+    pub p9999: Option<u64>,
+    /// Largest.
+    pub max: Option<u64>,
+    /// Samples.
+    pub count: u64,
+}
+
+/// A bin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Bin {
+    /// Lower end, ns, included.
+    pub from_ns: u64,
+    /// Upper end, ns, not included.
+    pub to_ns: u64,
+    /// Samples.
+    pub count: u64,
+}
+
+/// The largest value of a second.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Maximum {
+    /// Which run, from 0.
+    pub run: usize,
+    /// Second of that run.
+    pub second: u64,
+    /// Largest value, ns.
+    pub max_ns: u64,
+}
+
+/// Ours against a reference over several pairs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Ratio {
+    /// Such as `emulator-wakeup p50 / cyclictest p50`.
+    pub name: String,
+    /// Each pair: ours, reference, in ns.
+    pub pairs_ns: Vec<(u64, u64)>,
+    /// Median of the pairs' ratios.
+    pub median: f64,
+    /// Interval of the median, from its order statistics; null with fewer pairs than six.
+    pub interval: Option<(f64, f64)>,
+    /// Confidence of that interval, such as 0.979 for the second and ninth of ten.
+    pub confidence: Option<f64>,
+}
+
+/// Why something was late or lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// The rig's process was stopped and continued by a signal.
+    EmulatorStopped,
+    /// A controller's process was.
+    ControllerStopped,
+    /// Another thread of the same or higher priority had the CPU.
+    CpuContention,
+    /// The thread had to wait for pages.
+    PageFaults,
+    /// A peer does not read its queue.
+    SlowListener,
+    /// Frames were lost on the wire.
+    FrameLoss,
+    /// The wall clock was stepped; nothing followed from it.
+    ClockStep,
+    /// The machine stood still: no thread of it ran, the operating system's own interrupts included.
+    MachineStoodStill,
+    /// Nothing that was recorded explains it.
+    Unexplained,
+}
+
+/// One late cycle, or several in a row.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Event {
+    /// Which run, from 0.
+    pub run: usize,
+    /// Which process: `emulator`, `controller`, `controller-drive`, `controller-load`.
+    pub process: String,
+    /// The rig's cycle that was late.
+    pub cycle: u64,
+    /// The rig's time, s.
+    pub at_s: f64,
+    /// How late it woke, ns.
+    pub late_ns: u64,
+    /// How much later than usual it was done after waking, ns.
+    pub slow_ns: u64,
+    /// Cycles missed.
+    pub skipped: u64,
+    /// Why.
+    pub cause: Cause,
+    /// One sentence for a person.
+    pub sentence: String,
+    /// What speaks for it, and what against, a sentence each.
+    pub evidence: Vec<String>,
+    /// Rows of both processes around it, by process.
+    pub around: BTreeMap<String, Vec<AroundRow>>,
+    /// Gaps of the probe around it.
+    pub probe: Vec<ProbeGap>,
+}
+
+/// One cycle near an event, times against the event's due time.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct AroundRow {
+    /// The rig's cycle.
+    pub cycle: u64,
+    /// Due, us from the event's due time.
+    pub due_us: f64,
+    /// Wake-up latency, us.
+    pub late_us: f64,
+    /// From waking to done, us.
+    pub execution_us: f64,
+    /// Time that it waited for the CPU, us.
+    pub run_delay_us: f64,
+    /// Page faults, minor and major.
+    pub faults: u64,
+    /// Involuntary context switches.
+    pub involuntary_switches: u64,
+    /// CPU.
+    pub cpu: u64,
+}
+
+/// A gap that a spinning thread saw.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProbeGap {
+    /// CPU.
+    pub cpu: u64,
+    /// Its beginning, us from the event's due time.
+    pub from_us: f64,
+    /// Its length, us.
+    pub length_us: f64,
+    /// Whether another thread had that CPU; if not, the CPU itself stood still.
+    pub another_ran: bool,
+}
+
+/// Something that disturbed the runs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Finding {
+    /// What.
+    pub cause: Cause,
+    /// How often, in events or frames.
+    pub count: u64,
+    /// One sentence for a person.
+    pub sentence: String,
+}
+
+/// One run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RunPart {
+    /// Its folder.
+    pub folder: String,
+    /// Group, for comparisons.
+    pub group: String,
+    /// Start, s since 1970.
+    pub started_unix_s: f64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// Figures that are counts: cycles, skipped, frames lost and the like, by their keys in summary.json.
+    pub counts: BTreeMap<String, u64>,
+    /// Percentiles of each distribution of this run, the reference beside it included.
+    pub percentiles_ns: BTreeMap<String, PercentilesNs>,
+    /// Gaps and bursts of each cyclic frame at each receiver.
+    pub arrivals: Vec<ArrivalRow>,
+    /// Whether the emulator's verdict was good.
+    pub passed: bool,
+}
+
+/// How regularly a cyclic frame came.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ArrivalRow {
+    /// Who received it: `emulator`, `controller`.
+    pub receiver: String,
+    /// The frame, such as `DriveSensors`.
+    pub frame: String,
+    /// Its period, ms.
+    pub period_ms: u64,
+    /// Frames that came.
+    pub count: u64,
+    /// Intervals longer than one and a half periods.
+    pub gaps: u64,
+    /// Intervals shorter than half a period.
+    pub bursts: u64,
+    /// Percentiles of the intervals.
+    pub interval_ns: PercentilesNs,
+}
+
+/// Groups of runs side by side.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Names of the groups, the first being what the others are held against.
+    pub groups: Vec<String>,
+    /// A row for each figure.
+    pub rows: Vec<ComparisonRow>,
+}
+
+/// One figure over the groups.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ComparisonRow {
+    /// Such as `emulator-wakeup p99`.
+    pub figure: String,
+    /// A cell for each group.
+    pub cells: Vec<ComparisonCell>,
+}
+
+/// One figure of one group.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ComparisonCell {
+    /// Median over the group's runs, ns.
+    pub median_ns: u64,
+    /// Least and largest over the group's runs, ns.
+    pub range_ns: (u64, u64),
+    /// Change of the median against the first group, %; null in the first.
+    pub change_percent: Option<f64>,
+    /// Whether that is beyond the noise of repeated runs; null when there are too few to tell.
+    pub beyond_noise: Option<bool>,
+}
+
+/// A bound and whether it was kept.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct BoundResult {
+    /// Figure as the threshold file names it.
+    pub figure: String,
+    /// Its value; null when it was not measured, which breaks the bound.
+    pub value: Option<f64>,
+    /// Smallest allowed.
+    pub min: Option<f64>,
+    /// Largest allowed.
+    pub max: Option<f64>,
+    /// Whether it was kept.
+    pub kept: bool,
+}

@@ -1,0 +1,264 @@
+//! When everything of a cycle happened: the rows of `emulator-timing.csv`, `controller-timing.csv` and of a flight recorder's dump.
+//!
+//! Both processes write the same columns on the same clock (CLOCK_MONOTONIC, one for all processes of a host), so that a row of
+//! the rig and a row of a controller of one cycle tell how long a frame was on its way between them:
+//!
+//! ```text
+//!   rig         due ─ woke ─ send ─ receive ─ step ─ done          due: the cycle's scheduled time
+//!                            │sensors handed over      ▲command that answers an earlier cycle arrived
+//!                            ▼ one way                 │ one way
+//!   controller               due ─ woke ─ receive ─ step ─ send ─ done   due: arrival of the sensors that wake it
+//! ```
+//!
+//! Stamps are ns of that clock, 0 where there is none; stages are lengths in ns. Counts are those of the cycle alone.
+
+use std::io::{self, Write};
+use std::num::ParseIntError;
+
+/// The exchange of sensors and command of one axis in a cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Exchange {
+    /// Rig: when the sensors of this cycle were handed to the bus. Controller: when they arrived at its queue. 0: not.
+    pub sensors_ns: u64,
+    /// Rig: when the command that acts from this cycle on arrived, if a new one does. Controller: when its answer was handed to
+    /// the bus. 0: none.
+    pub command_ns: u64,
+    /// Cycle whose sensors that command answers; meaningless when `command_ns` is 0.
+    pub answers: u64,
+}
+
+/// What the kernel counted of the thread during a cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Vitals {
+    /// Page faults served without the disk.
+    pub minor_faults: u64,
+    /// Page faults that had to read from it.
+    pub major_faults: u64,
+    /// Times the thread gave the CPU away to wait; one a cycle is usual.
+    pub voluntary_switches: u64,
+    /// Times another thread took the CPU from it.
+    pub involuntary_switches: u64,
+    /// Time that the thread was ready to run and another one had the CPU, ns; 0 where the kernel does not tell.
+    pub run_delay_ns: u64,
+    /// Times the process was continued after a stop (SIGCONT).
+    pub continued: u64,
+    /// CPU on which the cycle ended.
+    pub cpu: u64,
+}
+
+/// One cycle of one process.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CycleTiming {
+    /// The rig's cycle.
+    pub cycle: u64,
+    /// Cycles right before this one that the rig missed, or that the controller never had sensors of.
+    pub skipped: u64,
+    /// When it was due.
+    pub due_ns: u64,
+    /// When the thread woke for it.
+    pub woke_ns: u64,
+    /// Length of the stage that takes frames.
+    pub receive_ns: u64,
+    /// Length of the stage that computes.
+    pub step_ns: u64,
+    /// Length of the stage that sends frames.
+    pub send_ns: u64,
+    /// When everything of the cycle was done.
+    pub done_ns: u64,
+    /// Exchange of the drive axis.
+    pub drive: Exchange,
+    /// Exchange of the load axis.
+    pub load: Exchange,
+    /// What the kernel counted.
+    pub vitals: Vitals,
+}
+
+/// Columns in their order, as the head line names them. The only place where they stand.
+pub const COLUMNS: [&str; 21] = [
+    "cycle",
+    "skipped",
+    "due_ns",
+    "woke_ns",
+    "receive_ns",
+    "step_ns",
+    "send_ns",
+    "done_ns",
+    "drive_sensors_ns",
+    "drive_command_ns",
+    "drive_answers_cycle",
+    "load_sensors_ns",
+    "load_command_ns",
+    "load_answers_cycle",
+    "minor_faults",
+    "major_faults",
+    "voluntary_switches",
+    "involuntary_switches",
+    "run_delay_ns",
+    "continued",
+    "cpu",
+];
+
+impl CycleTiming {
+    /// The values in the order of [`COLUMNS`].
+    #[must_use]
+    pub fn values(&self) -> [u64; COLUMNS.len()] {
+        let Self { drive, load, vitals, .. } = self;
+        [
+            self.cycle,
+            self.skipped,
+            self.due_ns,
+            self.woke_ns,
+            self.receive_ns,
+            self.step_ns,
+            self.send_ns,
+            self.done_ns,
+            drive.sensors_ns,
+            drive.command_ns,
+            drive.answers,
+            load.sensors_ns,
+            load.command_ns,
+            load.answers,
+            vitals.minor_faults,
+            vitals.major_faults,
+            vitals.voluntary_switches,
+            vitals.involuntary_switches,
+            vitals.run_delay_ns,
+            vitals.continued,
+            vitals.cpu,
+        ]
+    }
+
+    /// The row with these values.
+    #[must_use]
+    pub fn from_values(values: &[u64; COLUMNS.len()]) -> Self {
+        let [cycle, skipped, due_ns, woke_ns, receive_ns, step_ns, send_ns, done_ns, rest @ ..] = *values;
+        let [d_sensors, d_command, d_answers, l_sensors, l_command, l_answers, vitals @ ..] = rest;
+        let [minor, major, voluntary, involuntary, run_delay_ns, continued, cpu] = vitals;
+        Self {
+            cycle,
+            skipped,
+            due_ns,
+            woke_ns,
+            receive_ns,
+            step_ns,
+            send_ns,
+            done_ns,
+            drive: Exchange { sensors_ns: d_sensors, command_ns: d_command, answers: d_answers },
+            load: Exchange { sensors_ns: l_sensors, command_ns: l_command, answers: l_answers },
+            vitals: Vitals {
+                minor_faults: minor,
+                major_faults: major,
+                voluntary_switches: voluntary,
+                involuntary_switches: involuntary,
+                run_delay_ns,
+                continued,
+                cpu,
+            },
+        }
+    }
+}
+
+/// Writes the head line.
+///
+/// # Errors
+/// What `out` says.
+pub fn write_head(out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "{}", COLUMNS.join(","))
+}
+
+/// Writes a row.
+///
+/// # Errors
+/// What `out` says.
+pub fn write_row(out: &mut impl Write, row: &CycleTiming) -> io::Result<()> {
+    for (place, value) in row.values().iter().enumerate() {
+        if place > 0 {
+            out.write_all(b",")?;
+        }
+        write!(out, "{value}")?;
+    }
+    out.write_all(b"\n")
+}
+
+/// What a table of cycles has wrong.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TableError {
+    /// Not the columns that this version writes.
+    #[error("line 1: columns are not those of a timing table: {0}")]
+    Head(String),
+    /// A row that is cut short or longer.
+    #[error("line {line}: {found} values where {} are expected", COLUMNS.len())]
+    Width {
+        /// Line in the file, from 1.
+        line: usize,
+        /// Values found.
+        found: usize,
+    },
+    /// A value that is no whole number.
+    #[error("line {line}, {column}: {reason}")]
+    Value {
+        /// Line in the file, from 1.
+        line: usize,
+        /// Name of the column.
+        column: &'static str,
+        /// What the parser said.
+        reason: ParseIntError,
+    },
+}
+
+/// Reads a table; a last line without its end, which a killed process may leave, is left out.
+///
+/// # Errors
+/// [`TableError`] with line and column.
+pub fn read(text: &str) -> Result<Vec<CycleTiming>, TableError> {
+    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+    let mut lines = whole.lines().enumerate();
+    let head = lines.next().map_or("", |(_, head)| head);
+    if !head.split(',').eq(COLUMNS) {
+        return Err(TableError::Head(head.chars().take(200).collect()));
+    }
+    lines.map(|(index, line)| read_row(line, index + 1)).collect()
+}
+
+fn read_row(text: &str, line: usize) -> Result<CycleTiming, TableError> {
+    let mut values = [0; COLUMNS.len()];
+    let found = text.split(',').count();
+    if found != COLUMNS.len() {
+        return Err(TableError::Width { line, found });
+    }
+    for ((value, column), cell) in values.iter_mut().zip(COLUMNS).zip(text.split(',')) {
+        *value = cell.parse().map_err(|reason| TableError::Value { line, column, reason })?;
+    }
+    Ok(CycleTiming::from_values(&values))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(start: u64) -> CycleTiming {
+        CycleTiming::from_values(&std::array::from_fn(|place| start + place as u64))
+    }
+
+    #[test]
+    fn a_table_reads_what_was_written_and_leaves_out_a_half_line() {
+        let rows = [row(0), row(100)];
+        assert_eq!(row(7).values(), std::array::from_fn(|place| 7 + place as u64));
+        let mut text = Vec::new();
+        write_head(&mut text).unwrap();
+        rows.iter().for_each(|row| write_row(&mut text, row).unwrap());
+        text.extend_from_slice(b"3,4");
+        assert_eq!(read(std::str::from_utf8(&text).unwrap()).unwrap(), rows);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_place() {
+        assert!(matches!(read("a,b\n"), Err(TableError::Head(_))));
+        let head = COLUMNS.join(",");
+        let told = read(&format!("{head}\n1,2\n")).unwrap_err().to_string();
+        assert!(told.starts_with("line 2: 2 values"), "{told}");
+        let values = ["1"; COLUMNS.len()].join(",").replacen("1,", "x,", 1);
+        let told = read(&format!("{head}\n{values}\n")).unwrap_err().to_string();
+        assert!(told.starts_with("line 2, cycle: "), "{told}");
+    }
+}
