@@ -5,6 +5,7 @@ pub mod bus_load;
 pub mod can;
 pub mod checksum;
 pub mod exit;
+pub mod flight_dump;
 pub mod frames;
 pub mod periods;
 pub mod run_folder;
