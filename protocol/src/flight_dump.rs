@@ -8,6 +8,7 @@
 //! ```
 
 use crate::can::CanFrame;
+use crate::candump::{self, FrameRecord};
 use crate::run_folder::{SCHEMA_VERSION, write_json};
 use crate::timing::{CycleTiming, write_head, write_row};
 use serde::Serialize;
@@ -83,9 +84,8 @@ pub fn write<'a>(
     })?;
     write_file(&folder.join("bus.log"), |out| {
         frames.into_iter().try_for_each(|(stamp_ns, frame)| {
-            let microseconds = (stamp_ns + log.epoch_offset_ns) / 1000;
-            let (seconds, fraction) = (microseconds / 1_000_000, microseconds % 1_000_000);
-            writeln!(out, "({seconds:010}.{fraction:06}) {} {frame}", log.interface)
+            let record = FrameRecord { stamp_ns, frame: *frame };
+            candump::write_line(out, &log.interface, log.epoch_offset_ns, &record)
         })
     })?;
     write_json(&folder.join("event.json"), event)

@@ -3,6 +3,7 @@
 pub mod bus;
 pub mod bus_load;
 pub mod can;
+pub mod candump;
 pub mod checksum;
 pub mod exit;
 pub mod flight_dump;

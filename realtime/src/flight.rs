@@ -10,8 +10,8 @@
 //!                                                  ▲ further triggers join; the most severe names the dump
 //! ```
 //! A stall counts to the event: the window begins 1 s before the thread should have woken. Dumps beyond [`MOST_DUMPS`] are not
-//! kept: the least severe goes, which may be the new one. A signal (somebody asked) outranks a fault, that an overrun, that a cycle that
-//! was late or slow; within a kind the longer one is the more severe.
+//! kept: the least severe goes, which may be the new one. A signal (somebody asked) outranks a fault, that an overrun, that a
+//! cycle that was late or slow; within a kind the longer one is the more severe.
 //!
 //! Nothing here touches a file or a clock: times are handed in, dumps go to a closure.
 //!
@@ -209,12 +209,20 @@ struct Pending {
     to: Instant,
 }
 
+/// Where a dump goes.
+enum Room {
+    Free,
+    InPlaceOf(Trigger),
+    None,
+}
+
 /// The ring.
 #[derive(Debug)]
 pub struct FlightRecorder<R, F> {
     rows: VecDeque<R>,
     frames: VecDeque<F>,
-    pending: Option<Pending>,
+    /// Windows that wait for their end, which follow one another.
+    pending: VecDeque<Pending>,
     kept: Vec<Trigger>,
     dropped: u64,
 }
@@ -226,7 +234,7 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
         Self {
             rows: VecDeque::with_capacity(ROWS),
             frames: VecDeque::with_capacity(FRAMES),
-            pending: None,
+            pending: VecDeque::new(),
             kept: Vec::with_capacity(MOST_DUMPS),
             dropped: 0,
         }
@@ -242,44 +250,43 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
         push(&mut self.frames, frame, FRAMES);
     }
 
-    /// Something happened. It joins a window that waits for its end, save one that is over already, which is to be handed out
-    /// first ([`FlightRecorder::advance`]).
+    /// Something happened. It joins the window that it lies in, or begins a new one.
     pub fn trigger(&mut self, trigger: Trigger) {
         let from = trigger.at.saturating_sub(Duration::from_nanos(trigger.late_ns.saturating_add(BEFORE_NS)));
-        match &mut self.pending {
-            Some(pending) => {
+        match self.pending.back_mut() {
+            Some(pending) if trigger.at <= pending.to => {
                 pending.from = pending.from.min(from);
                 if trigger.severity > pending.trigger.severity {
                     pending.trigger = trigger;
                 }
             }
-            None => {
+            _ => {
                 let to = trigger.at + Duration::from_nanos(AFTER_NS);
-                self.pending = Some(Pending { trigger, from, to });
+                self.pending.push_back(Pending { trigger, from, to });
             }
         }
     }
 
-    /// Hands out the window that is over at `now`, if there is one. Asked at each poll, after rows and frames were taken.
-    pub fn advance(&mut self, now: Instant, write: impl FnOnce(Dump<'_, R, F>)) {
-        if self.pending.is_some_and(|pending| now >= pending.to) {
-            self.finish(write);
+    /// Hands out each window that is over at `now`. Asked at each poll, after rows and frames were taken.
+    pub fn advance(&mut self, now: Instant, mut write: impl FnMut(Dump<'_, R, F>)) {
+        while let Some(pending) = self.pending.pop_front_if(|pending| now >= pending.to) {
+            self.hand_out(pending, &mut write);
         }
     }
 
-    /// Hands out the window that waits, over or not: at the end of a run.
-    pub fn finish(&mut self, write: impl FnOnce(Dump<'_, R, F>)) {
-        let Some(Pending { trigger, from, to }) = self.pending.take() else { return };
-        let replaces = if self.kept.len() < MOST_DUMPS {
-            None
-        } else {
-            // The oldest of equals goes last: what began a trouble tells more than its hundredth repetition.
-            let least = self.kept.iter().enumerate().rev().min_by_key(|(_, kept)| kept.severity);
-            self.dropped += 1;
-            match least.map(|(place, kept)| (place, kept.severity)) {
-                Some((place, severity)) if severity < trigger.severity => Some(self.kept.remove(place)),
-                _ => return,
-            }
+    /// Hands out the windows that wait, over or not: at the end of a run.
+    pub fn finish(&mut self, mut write: impl FnMut(Dump<'_, R, F>)) {
+        while let Some(pending) = self.pending.pop_front() {
+            self.hand_out(pending, &mut write);
+        }
+    }
+
+    fn hand_out(&mut self, pending: Pending, write: &mut impl FnMut(Dump<'_, R, F>)) {
+        let Pending { trigger, from, to } = pending;
+        let replaces = match self.make_room(&trigger) {
+            Room::Free => None,
+            Room::InPlaceOf(less_severe) => Some(less_severe),
+            Room::None => return,
         };
         self.kept.push(trigger);
         let within = |at_ns: u64| (from.as_nanos()..=to.as_nanos()).contains(&at_ns);
@@ -288,6 +295,21 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
         // A command is read a cycle after it arrived.
         frames.sort_by_key(|frame| frame.at_ns());
         write(Dump { trigger, from, to, rows, frames, replaces });
+    }
+
+    fn make_room(&mut self, trigger: &Trigger) -> Room {
+        if self.kept.len() < MOST_DUMPS {
+            return Room::Free;
+        }
+        self.dropped += 1;
+        // Of equals the newest goes: what began a trouble tells more than its hundredth repetition.
+        let least = self.kept.iter().enumerate().rev().min_by_key(|(_, kept)| kept.severity);
+        match least.map(|(place, kept)| (place, kept.severity)) {
+            Some((place, severity)) if severity < trigger.severity => {
+                Room::InPlaceOf(self.kept.remove(place))
+            }
+            _ => Room::None,
+        }
     }
 
     /// Dumps kept.
@@ -384,6 +406,20 @@ mod tests {
         flight.trigger(Trigger::other(Severity::Fault, 4002, at(4002)));
         flight.finish(|dump| named.push((dump.trigger.cycle, dump.to)));
         assert_eq!(named[1], (4001, at(4300)));
+    }
+
+    #[test]
+    fn an_event_after_a_window_that_nobody_handed_out_yet_begins_one_of_its_own() {
+        let mut flight = fed(2000);
+        flight.trigger(overrun(2000, 1));
+        // Stopped within the window, continued long after it.
+        flight.row(At(7000 * MS));
+        flight.trigger(overrun(7000, 4900));
+        let mut named = Vec::new();
+        flight.advance(at(7004), |dump| named.push((dump.trigger.cycle, dump.rows.len())));
+        assert_eq!(named, [(2000, 1002)]);
+        flight.advance(at(7300), |dump| named.push((dump.trigger.cycle, dump.rows.len())));
+        assert_eq!(named[1], (7000, 902));
     }
 
     #[test]

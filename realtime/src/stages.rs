@@ -10,7 +10,7 @@
 //!
 //! | tag | sample |
 //! |---|---|
-//! | `-wakeup` | woke − due of each cycle that was due, missed ones too, each against its own scheduled time (coordinated omission, see [`crate::periodic`]) |
+//! | `-wakeup` | woke − due of each cycle that was due, missed ones too (coordinated omission, [`crate::periodic`]) |
 //! | `-receive`, `-step`, `-send` | length of the stage |
 //! | `-execution` | done − woke |
 //! | `-completion` | done − due |
@@ -32,8 +32,8 @@
 //! let figures = account.finish(MonotonicClock.now())?;
 //! # Ok(()) }
 //! ```
-//! A controller has no schedule of its own: it is due when the sensors that wake it arrive. It says `skipped: 0`, and tells the sensors
-//! that waited meanwhile one by one with [`StageAccount::record_waited`].
+//! A controller has no schedule of its own: it is due when the sensors that wake it arrive. It says `skipped: 0`, and tells the
+//! sensors that waited meanwhile one by one with [`StageAccount::record_waited`].
 //!
 //! Without dropped rows the totals equal those of the loop ([`crate::LoopStatistics`]); a test holds them together.
 
