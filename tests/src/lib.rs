@@ -7,6 +7,7 @@
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   own ───── algorithms in C, built as a user builds them
+//!   disturb ─ disturbances whose cause a report has to name
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
@@ -18,6 +19,7 @@ pub mod account;
 pub mod axis_table;
 pub mod binaries;
 pub mod bus_cycles;
+pub mod disturb;
 pub mod events;
 pub mod launch;
 pub mod load;
