@@ -3,5 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`model`] | what a report says: `report.json` |
+//! | [`page`] | the report as one page |
 
 pub mod model;
+pub mod page;
