@@ -3,7 +3,6 @@
 use super::markup::{Cell, Table, none, number, paragraph, words as text};
 use super::words::{self, NOTHING};
 use crate::report::model::{BoundResult, Comparison, ComparisonCell};
-use crate::table::short;
 
 /// The groups with their changes against the first.
 pub(super) fn comparison(comparison: Option<&Comparison>) -> String {
@@ -51,8 +50,7 @@ fn noise(beyond: Option<bool>) -> &'static str {
 /// The bounds, kept or broken.
 pub(super) fn bounds(bounds: &[BoundResult]) -> String {
     let mut table = Table::new("Bounds", ["figure", "value", "at least", "at most", "verdict"]);
-    let told =
-        |value: Option<f64>| value.filter(|value| value.is_finite()).map_or_else(|| NOTHING.into(), short);
+    let told = |value: Option<f64>| value.map_or_else(|| NOTHING.into(), words::short);
     for bound in bounds {
         let value = if bound.value.is_some() { told(bound.value) } else { "not measured".into() };
         let verdict = if bound.kept { "kept" } else { "broken" };

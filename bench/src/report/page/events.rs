@@ -1,7 +1,7 @@
 //! The worst events, a card each, and the findings over all runs.
 
-use super::markup::{Table, folded, list, none, number, words as text};
-use super::timeline::timeline;
+use super::markup::{Cell, Table, folded, list, none, number, words as text};
+use super::timeline::{by_process, timeline};
 use super::words;
 use crate::page_style::escaped;
 use crate::report::model::{AroundRow, Event, Finding, Report};
@@ -79,12 +79,12 @@ fn rows(event: &Event, place: usize) -> String {
     ];
     let mut table = Table::new(label, head);
     let mut left_out = 0;
-    for (process, around) in &event.around {
+    for (process, around) in by_process(event) {
         let room = MOST_ROWS / event.around.len().max(1);
         let shown = nearest(around, room);
         left_out += around.len() - shown.len();
         for row in shown {
-            let is_hit = *process == event.process && row.cycle == event.cycle;
+            let is_hit = process == event.process && row.cycle == event.cycle;
             let us = |value: f64| number(words::decimal(value, 1));
             table.marked_row(
                 if is_hit { "hit" } else { "" },
@@ -144,7 +144,7 @@ pub(super) fn findings(findings: &[Finding]) -> String {
         table.row([
             text(words::cause(finding.cause)),
             number(words::count(finding.count)),
-            text(&finding.sentence),
+            Cell::Sentence(finding.sentence.clone()),
         ]);
     }
     table.html_or("None: nothing was found that disturbed the runs.")

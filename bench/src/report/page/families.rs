@@ -56,7 +56,7 @@ fn kind(distribution: &Distribution) -> Kind {
     let name = distribution.name.as_str();
     let ends = |ends: &[&str]| ends.iter().any(|end| name.ends_with(end));
     match name {
-        _ if distribution.source == Source::Reference && name.contains("ping-pong") => Kind::RoundTrip,
+        _ if name.contains("ping-pong") => Kind::RoundTrip,
         _ if distribution.source == Source::Reference => Kind::Wakeup,
         _ if ends(&["wakeup"]) => Kind::Wakeup,
         _ if ends(&["round-trip"]) => Kind::RoundTrip,

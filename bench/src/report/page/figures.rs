@@ -1,6 +1,7 @@
 //! Key figures, ours beside the reference, and how many times the reference ours are, pair by pair.
 
 use super::families::Family;
+use super::histograms::scrolling;
 use super::markup::{Cell, Table, folded, none, number, paragraph, words as text};
 use super::svg::{Drawing, Look, Scale, stroke, text as label};
 use super::words::{self, NOTHING};
@@ -72,7 +73,7 @@ pub(super) fn ratios(ratios: &[Ratio]) -> String {
         }
     }
     let said = "Each dot is a pair: our run and the reference's slice beside it, one after the other on the same CPU. The \
-                bar is the interval of the median, which ranks give without assuming a distribution; fewer than six \
+                diamond is the median, the bar its interval, which ranks give without assuming a distribution; fewer than six \
                 pairs give none. Left of 1 ours is the shorter.";
     let pairs = folded("Each pair", &pairs.html_or("No pair was measured."));
     format!("{}{}{}{pairs}", paragraph(said), forest(ratios), table.html_or("No ratio was measured."))
@@ -129,7 +130,7 @@ fn forest(ratios: &[Ratio]) -> String {
         title: "Ratios of ours to the reference",
         description: "The same numbers stand in the table below.",
     };
-    format!("<figure>\n<div class=\"chart full\">\n{}</div>\n</figure>\n", drawing.with(&drawn))
+    format!("<figure>\n{}</figure>\n", scrolling("full", "Ratios", &drawing.with(&drawn)))
 }
 
 fn axis(scale: &Scale, bottom: f64) -> String {

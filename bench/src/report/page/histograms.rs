@@ -32,8 +32,8 @@ pub(super) const HALF: Size = Size { width: 560.0, height: 320.0, class: "half" 
 
 /// Room for labels, in pixels.
 pub(super) const LEFT: f64 = 74.0;
-pub(super) const RIGHT: f64 = 16.0;
-pub(super) const TOP: f64 = 12.0;
+pub(super) const RIGHT: f64 = 30.0;
+const TOP: f64 = 12.0;
 pub(super) const FOOT: f64 = 46.0;
 
 /// All histograms.
@@ -49,15 +49,24 @@ pub(super) fn histograms(families: &[Family<'_>]) -> String {
     format!("<div class=\"charts\">\n{charts}</div>\n")
 }
 
-/// A figure with its heading and legend around a drawing.
+/// A figure: heading, drawing, and its legend if it needs one. The legend stands below, so that drawings side by side stand level.
 pub(super) fn figure(size: &Size, heading: (&str, &str), legend: &str, drawing: &str) -> String {
     let wide = if size.class == FULL.class { " class=\"wide\"" } else { "" };
+    let legend =
+        if legend.is_empty() { String::new() } else { format!("<ul class=\"legend\">\n{legend}</ul>\n") };
     format!(
-        "<figure{wide}>\n<figcaption>{} <span class=\"soft\">{}</span></figcaption>\n<ul class=\"legend\">\n{legend}</ul>\n\
-         <div class=\"chart {}\">\n{drawing}</div>\n</figure>\n",
+        "<figure{wide}>\n<figcaption>{} <span class=\"soft\">{}</span></figcaption>\n{}{legend}</figure>\n",
         escaped(heading.0),
         escaped(heading.1),
-        size.class
+        scrolling(size.class, heading.0, drawing)
+    )
+}
+
+/// The box in which a drawing scrolls, by keyboard too, where the page is narrower than what can be read.
+pub(super) fn scrolling(class: &str, name: &str, drawing: &str) -> String {
+    let name = escaped(name);
+    format!(
+        "<div class=\"chart {class}\" tabindex=\"0\" role=\"group\" aria-label=\"{name}\">\n{drawing}</div>\n"
     )
 }
 
@@ -74,10 +83,10 @@ fn chart(family: &Family<'_>, size: &Size) -> String {
     let x = Scale::logarithmic(times, (LEFT, size.width - RIGHT));
     let y = Scale::logarithmic((NO_SAMPLE, whole_decades(1.0, most as f64).1), (bottom, TOP));
     let mut drawn = axes(&x, &y, size);
-    // The reference lies behind.
-    for (look, distribution) in members.iter().rev() {
-        drawn += &curve(*look, distribution, &x, &y);
-    }
+    // The grey area lies behind, the first of ours in front.
+    let (area, lines): (Vec<_>, Vec<_>) =
+        members.iter().copied().rev().partition(|(look, _)| *look == Look::Reference(0));
+    drawn.extend(area.into_iter().chain(lines).map(|(look, one)| curve(look, one, &x, &y)));
     let legend: String = members
         .iter()
         .map(|(look, one)| {
@@ -110,7 +119,7 @@ fn axes(x: &Scale, y: &Scale, size: &Size) -> String {
 }
 
 /// The label of a vertical axis.
-pub(super) fn upright_label(label: &str, across: (f64, f64)) -> String {
+fn upright_label(label: &str, across: (f64, f64)) -> String {
     let middle = 0.5 * (across.0 + across.1);
     format!(
         "<text class=\"middle\" transform=\"translate(13 {middle:.1}) rotate(-90)\">{}</text>\n",

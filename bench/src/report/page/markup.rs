@@ -5,8 +5,10 @@ use std::fmt::Write as _;
 
 /// A cell of a table.
 pub(super) enum Cell {
-    /// Text, left-aligned.
+    /// A few words, left-aligned, in one line.
     Words(String),
+    /// A sentence, which may be broken.
+    Sentence(String),
     /// A number, right-aligned.
     Number(String),
     /// Text with something said below it in small letters.
@@ -32,7 +34,7 @@ impl Cell {
 
     fn html(&self) -> String {
         match self {
-            Self::Words(text) | Self::Number(text) => escaped(text),
+            Self::Words(text) | Self::Sentence(text) | Self::Number(text) => escaped(text),
             Self::About(text, about) if about.is_empty() => escaped(text),
             Self::About(text, about) => {
                 format!("{}<span class=\"about\">{}</span>", escaped(text), escaped(about))
@@ -76,7 +78,11 @@ impl Table {
             if let Some(is_number) = self.numbers.get_mut(place) {
                 *is_number |= cell.is_number();
             }
-            let class = if cell.is_number() { " class=\"n\"" } else { "" };
+            let class = match cell {
+                Cell::Number(_) => " class=\"n\"",
+                Cell::Sentence(_) => " class=\"long\"",
+                _ => "",
+            };
             let (tag, scope) = if place == 0 { ("th", " scope=\"row\"") } else { ("td", "") };
             let _ = write!(self.rows, "<{tag}{scope}{class}>{}</{tag}>", cell.html());
         }

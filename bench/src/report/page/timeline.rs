@@ -8,12 +8,13 @@
 //!   CPU 1       ████      gap of the probe: black when the CPU itself stood still, hatched when another thread ran
 //! ```
 
+use super::histograms::scrolling;
 use super::markup::none;
 use super::svg::{
     Drawing, Look, Place, Scale, bar, legend_entry, line, stroke, text, time_axis, whole_decades,
 };
 use super::words;
-use crate::report::model::{AroundRow, Event};
+use crate::report::model::{AroundRow, Event, ProbeGap};
 use std::collections::BTreeSet;
 
 const WIDTH: f64 = 960.0;
@@ -23,23 +24,45 @@ const TOP: f64 = 10.0;
 /// Lower end of the upper part.
 const UPPER: f64 = 170.0;
 const LANE: f64 = 26.0;
-/// Shown before the due time and after the end of the lateness, at the least, us.
-const MARGIN_US: f64 = 5000.0;
-/// More gaps are a hum, not a picture.
+/// Shown before the due time, and after the end of the lateness at the least, us.
+const BEFORE_US: f64 = 3000.0;
+const AFTER_US: f64 = 5000.0;
+/// CPUs drawn.
 const MOST_LANES: usize = 8;
+/// Cycles whose markers do not touch each other.
+const MOST_MARKERS: usize = 90;
 
 /// Stretch that is shown, us from the event's due time.
 fn window(event: &Event) -> (f64, f64) {
     let length_us = (event.late_ns.saturating_add(event.slow_ns)) as f64 * 1e-3;
-    let margin_us = (0.5 * length_us).max(MARGIN_US);
-    let starts = event
-        .around
-        .values()
-        .flatten()
-        .map(|row| row.due_us)
-        .chain(event.probe.iter().map(|gap| gap.from_us));
-    let first = starts.filter(|start| start.is_finite()).fold(0.0, f64::min);
-    ((-margin_us).max(first - 500.0), length_us + margin_us)
+    // A long stall is seen in its place: more is shown around it, before it no more than there is.
+    let room_us = 0.5 * length_us;
+    let starts = event.around.values().flatten().map(|row| row.due_us);
+    let first_us = starts.filter(|start| start.is_finite()).fold(0.0, f64::min);
+    (first_us.max(-room_us.max(BEFORE_US)) - 0.1 * BEFORE_US, length_us + room_us.max(AFTER_US))
+}
+
+/// The rows of each process, the rig's first.
+pub(super) fn by_process(event: &Event) -> Vec<(&str, &[AroundRow])> {
+    let mut processes: Vec<_> =
+        event.around.iter().map(|(process, rows)| (process.as_str(), rows.as_slice())).collect();
+    processes.sort_by_key(|(process, _)| *process != "emulator");
+    processes
+}
+
+/// The CPUs whose gaps are drawn, those with the longest, and how many are left out.
+fn lanes(gaps: &[ProbeGap]) -> (BTreeSet<u64>, usize) {
+    let mut longest_first: Vec<_> = gaps.iter().collect();
+    longest_first.sort_by(|one, other| other.length_us.total_cmp(&one.length_us));
+    let mut lanes = BTreeSet::new();
+    for gap in longest_first {
+        if lanes.len() < MOST_LANES {
+            lanes.insert(gap.cpu);
+        }
+    }
+    let all: BTreeSet<_> = gaps.iter().map(|gap| gap.cpu).collect();
+    let left_out = all.len() - lanes.len();
+    (lanes, left_out)
 }
 
 /// Whether all of it can be drawn.
@@ -51,9 +74,8 @@ fn is_known(row: &AroundRow) -> bool {
 pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
     let (from_us, to_us) = window(event);
     let x = Scale::linear((from_us * 1e-3, to_us * 1e-3), (LEFT, RIGHT));
-    let processes: Vec<(&String, Vec<&AroundRow>)> = event
-        .around
-        .iter()
+    let processes: Vec<(&str, Vec<&AroundRow>)> = by_process(event)
+        .into_iter()
         .map(|(process, rows)| {
             let end_us = |row: &AroundRow| row.due_us + row.late_us + row.execution_us;
             let shown = |row: &&AroundRow| is_known(row) && row.due_us <= to_us && end_us(row) >= from_us;
@@ -63,12 +85,9 @@ pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
     if processes.iter().all(|(_, rows)| rows.is_empty()) && event.probe.is_empty() {
         return none("No cycles around it were recorded.");
     }
-    let mut cpus: BTreeSet<u64> = event.probe.iter().map(|gap| gap.cpu).collect();
-    while cpus.len() > MOST_LANES {
-        cpus.pop_last();
-    }
+    let (cpus, left_out) = lanes(&event.probe);
     let bottom = UPPER + 12.0 + LANE * (processes.len() + cpus.len()) as f64;
-    let mut drawn = time_grid(&x, bottom) + &upper(&processes, &x);
+    let mut drawn = time_grid(&x, bottom) + &upper(&processes, &x, from_us);
     let mut y = UPPER + 12.0;
     for (index, (process, rows)) in processes.iter().enumerate() {
         drawn += &lane_name(process, y);
@@ -92,17 +111,23 @@ pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
         title: "Cycles around the event",
         description: &event.sentence,
     };
-    let watched = if event.probe.is_empty() && is_probed {
+    let watched = if left_out > 0 {
+        none(&format!(
+            "{} with shorter gaps: in the table below.",
+            words::counted(left_out as u64, "CPU", "CPUs")
+        ))
+    } else if event.probe.is_empty() && is_probed {
         none("The probe saw no gap around it.")
     } else if event.probe.is_empty() {
         none("No probe watched the machine.")
     } else {
         String::new()
     };
+    let gaps = event.probe.iter().map(|gap| gap.another_ran).collect();
     format!(
-        "<figure>\n<ul class=\"legend\">\n{}</ul>\n<div class=\"chart full\">\n{}</div>\n{watched}</figure>\n",
-        legend(&processes, &event.probe.iter().map(|gap| gap.another_ran).collect()),
-        drawing.with(&drawn)
+        "<figure>\n{}<ul class=\"legend\">\n{}</ul>\n{watched}</figure>\n",
+        scrolling("full", "Cycles around the event", &drawing.with(&drawn)),
+        legend(&processes, &gaps)
     )
 }
 
@@ -126,7 +151,7 @@ fn short(value: f64) -> String {
 }
 
 /// Lateness and execution of each cycle.
-fn upper(processes: &[(&String, Vec<&AroundRow>)], x: &Scale) -> String {
+fn upper(processes: &[(&str, Vec<&AroundRow>)], x: &Scale, from_us: f64) -> String {
     let values =
         || processes.iter().flat_map(|(_, rows)| rows.iter().flat_map(|row| [row.late_us, row.execution_us]));
     let low = values().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min);
@@ -139,16 +164,20 @@ fn upper(processes: &[(&String, Vec<&AroundRow>)], x: &Scale) -> String {
     drawn += &stroke("edge", (LEFT, TOP), (LEFT, UPPER));
     for (index, (_, rows)) in processes.iter().enumerate() {
         let look = Look::Ours(index);
-        let places = |value: fn(&AroundRow) -> f64| -> Vec<Place> {
-            rows.iter().map(|row| (x.at(row.due_us * 1e-3), y.at(value(row) * 1e3))).collect()
-        };
-        let (late, execution) = (places(|row| row.late_us), places(|row| row.execution_us));
-        drawn += &line(&format!("line thin {}", look.class()), &execution);
-        drawn += &line(&format!("line {}", look.class()), &late);
-        // Where markers would touch, the lines say it all.
-        if late.len() <= 90 {
-            drawn.extend(execution.iter().map(|place| look.marker(*place, true)));
-            drawn.extend(late.iter().map(|place| look.marker(*place, false)));
+        // Cycles that were missed have no row: no line leads over them.
+        let in_sight = rows.iter().copied().filter(|row| row.due_us >= from_us).collect::<Vec<_>>();
+        for piece in in_sight.chunk_by(|one, other| one.cycle + 1 == other.cycle) {
+            let places = |value: fn(&AroundRow) -> f64| -> Vec<Place> {
+                piece.iter().map(|row| (x.at(row.due_us * 1e-3), y.at(value(row) * 1e3))).collect()
+            };
+            let (late, execution) = (places(|row| row.late_us), places(|row| row.execution_us));
+            drawn += &line(&format!("line thin {}", look.class()), &execution);
+            drawn += &line(&format!("line {}", look.class()), &late);
+            // Where markers would touch, the lines say it all.
+            if in_sight.len() <= MOST_MARKERS || piece.len() == 1 {
+                drawn.extend(execution.iter().map(|place| look.marker(*place, true)));
+                drawn.extend(late.iter().map(|place| look.marker(*place, false)));
+            }
         }
         drawn.push('\n');
     }
@@ -169,7 +198,7 @@ fn lane_bars(row: &AroundRow, look: Look, y: f64, x: &Scale) -> String {
     waiting + &bar(&format!("bar {class}"), (woke, y + 5.0), (done, y + LANE - 5.0))
 }
 
-fn legend(processes: &[(&String, Vec<&AroundRow>)], gaps: &BTreeSet<bool>) -> String {
+fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>) -> String {
     let mut entries = String::new();
     for (index, (process, _)) in processes.iter().enumerate() {
         let look = Look::Ours(index);

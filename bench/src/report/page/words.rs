@@ -1,6 +1,7 @@
 //! Numbers, instants and causes as a person reads them on the page. What is no number is a dash, never NaN.
 
 use crate::report::model::Cause;
+use crate::table;
 
 /// What stands where nothing was measured.
 pub(super) const NOTHING: &str = "–";
@@ -36,6 +37,14 @@ pub(super) fn decimal(value: f64, digits: usize) -> String {
     let sign = if value < 0.0 && !is_zero { "−" } else { "" };
     let point = if fraction.is_empty() { "" } else { "." };
     format!("{sign}{}{point}{fraction}", in_threes(whole))
+}
+
+/// A number of any size and unit: whole, or with four digits that count.
+pub(super) fn short(value: f64) -> String {
+    match value {
+        value if value.is_finite() && value.fract() != 0.0 => table::short(value),
+        value => decimal(value, 0),
+    }
 }
 
 /// A change in per cent with its sign.
@@ -132,6 +141,7 @@ mod tests {
         assert_eq!(count(999), "999");
         assert_eq!(decimal(-1234.56, 1), "−1\u{202f}234.6");
         assert_eq!(decimal(-0.01, 1), "0.0");
+        assert_eq!([59_000.0, 48.3, f64::NAN].map(short), ["59\u{202f}000", "48.30", NOTHING]);
         assert_eq!((decimal(f64::NAN, 1), decimal(f64::INFINITY, 0)), (NOTHING.into(), NOTHING.into()));
         assert_eq!(
             (change(0.04), change(-3.0), change(f64::NAN)),
