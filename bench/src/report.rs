@@ -24,6 +24,7 @@
 //! | [`markdown`] | the summary for a merge request, and the short table |
 //! | [`jitterdebugger`] | wake-up latencies in its JSON |
 //! | [`output`] | all files of a report |
+//! | [`page`] | the report as one page |
 
 pub mod bounds;
 pub mod cause;
@@ -42,6 +43,7 @@ pub mod kinds;
 pub mod markdown;
 pub mod model;
 pub mod output;
+pub mod page;
 pub mod parts;
 pub mod probe;
 pub mod ratios;
