@@ -16,6 +16,7 @@
 //! | [`periodic`] | the loop, its re-arm rule, what happens on an overrun |
 //! | [`histogram`] | recorders that never allocate, percentiles, HdrHistogram logs |
 //! | [`privileges`] | what the thread asks of the system, what it got, what was refused and how to get it |
+//! | [`machine`] | facts of the machine: kernel, processors, interrupts, memory, limits, build |
 //! | [`signals`] | Ctrl-C and SIGTERM as a flag |
 //! | [`allocations`] | an allocator that counts, for the proof that a cycle allocates nothing |
 //!
@@ -38,6 +39,7 @@
 pub mod allocations;
 pub mod clock;
 pub mod histogram;
+pub mod machine;
 pub mod periodic;
 pub mod privileges;
 pub mod signals;
@@ -45,6 +47,7 @@ mod virtual_clock;
 
 pub use clock::{Clock, Instant, MonotonicClock, VirtualClock};
 pub use histogram::{Percentiles, Recorder, write_hlog};
+pub use machine::Machine;
 pub use periodic::{
     ConfigError, Cycle, LoopStatistics, Overrun, OverrunPolicy, PeriodicConfig, PeriodicLoop, UnknownPolicy,
 };

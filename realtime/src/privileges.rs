@@ -226,7 +226,7 @@ fn online_cpus() -> Vec<usize> {
 }
 
 /// Reads the kernel's list format, as in `0-3,8`.
-fn parse_cpu_list(text: &str) -> Option<Vec<usize>> {
+pub(crate) fn parse_cpu_list(text: &str) -> Option<Vec<usize>> {
     let mut cpus = Vec::new();
     for part in text.trim().split(',') {
         let (first, last) = part.split_once('-').unwrap_or((part, part));

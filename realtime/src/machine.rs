@@ -1,0 +1,127 @@
+//! Facts of the machine without which a latency figure means nothing: kernel, processors, interrupts, memory, limits, build.
+//!
+//! Two figures can be compared when the machines under them are known; a reader who doubts a figure asks first for the
+//! preemption model, the governor, the hypervisor and the throttle. So all of it is read once, at the start of a run, and
+//! stands in its record. What cannot be read says so, with the reason: absence must not look like a good answer.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `files` | reading below a root, so that tests bring their own `/proc` and `/sys` |
+//! | `kernel` | release, preemption model, clock source, hypervisor, throttling |
+//! | `processors` | model, SMT, frequency, idle states, which CPU takes which interrupt |
+//! | `memory` | memory, swap, huge pages, limits of the process, load |
+//! | `build` | what this program was built with and from |
+//!
+//! # Source
+//! In the kernel's tree: `Documentation/admin-guide/{kernel-parameters,sysctl/kernel}`, `Documentation/admin-guide/pm/{cpufreq,cpuidle}`,
+//! `Documentation/core-api/irq/irq-affinity`, `Documentation/ABI/testing/sysfs-devices-system-cpu`; `man 5 proc`.
+
+mod build;
+mod files;
+mod kernel;
+mod memory;
+mod processors;
+
+pub use build::Build;
+pub use kernel::{Hypervisor, Preemption, Throttling};
+pub use memory::{Limits, Memory};
+pub use processors::InterruptsOfCpu;
+
+use files::Root;
+use serde::Serialize;
+use std::path::Path;
+
+/// The machine as a run found it. Lists of CPUs and interrupts are in the kernel's form: `0-3,8`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Machine {
+    /// Release of the kernel.
+    pub kernel_release: String,
+    /// Its build, with the compiler that made it.
+    pub kernel_build: String,
+    /// How the kernel lets an urgent thread take the CPU.
+    pub preemption: Preemption,
+    /// What the kernel was started with.
+    pub kernel_command_line: String,
+    /// Model of the processor.
+    pub processor: String,
+    /// CPUs that run.
+    pub processors_online: String,
+    /// CPUs that this process may use.
+    pub processors_allowed: String,
+    /// Simultaneous multithreading: whether, and which CPUs share a core.
+    pub smt: String,
+    /// Frequency of each group of CPUs: driver, governor, range; or that nobody here sets it.
+    pub frequency: Vec<String>,
+    /// Driver and governor of the idle states.
+    pub idle_driver: String,
+    /// Idle states of the first CPU, with the time to leave each.
+    pub idle_states: Vec<String>,
+    /// Clock source in use.
+    pub clock_source: String,
+    /// Clock sources that there are.
+    pub clock_sources_available: String,
+    /// Whether this is a virtual machine.
+    pub hypervisor: Hypervisor,
+    /// How much of each period real-time threads may have.
+    pub rt_throttling: Throttling,
+    /// CPUs that the scheduler leaves alone.
+    pub isolated: String,
+    /// CPUs without a periodic tick.
+    pub nohz_full: String,
+    /// CPUs that an interrupt without a wish of its own may go to.
+    pub interrupts_default: String,
+    /// Which interrupts may and do go where.
+    pub interrupts: Vec<InterruptsOfCpu>,
+    /// Memory, swap, huge pages.
+    pub memory: Memory,
+    /// What this process may ask of the system.
+    pub limits: Limits,
+    /// Load averages of 1, 5 and 15 minutes when the machine was read.
+    pub load_average: String,
+    /// What this program was built with and from.
+    pub build: Build,
+}
+
+impl Machine {
+    /// Reads the machine that this process runs on.
+    #[must_use]
+    pub fn read() -> Self {
+        Self::below(Path::new("/"))
+    }
+
+    /// Reads a machine whose `proc`, `sys` and `boot` lie in `root`.
+    #[must_use]
+    pub fn below(root: &Path) -> Self {
+        let root = Root::new(root);
+        let frequency = processors::frequency(&root);
+        Self {
+            kernel_release: root.fact("proc/sys/kernel/osrelease"),
+            kernel_build: root.fact("proc/version"),
+            preemption: Preemption::read(&root),
+            kernel_command_line: root.fact("proc/cmdline"),
+            processor: processors::model(&root),
+            processors_online: root.fact("sys/devices/system/cpu/online"),
+            processors_allowed: root.field("proc/self/status", "Cpus_allowed_list"),
+            smt: processors::smt(&root),
+            frequency,
+            idle_driver: processors::idle_driver(&root),
+            idle_states: processors::idle_states(&root),
+            clock_source: root.fact("sys/devices/system/clocksource/clocksource0/current_clocksource"),
+            clock_sources_available: root
+                .fact("sys/devices/system/clocksource/clocksource0/available_clocksource"),
+            hypervisor: Hypervisor::read(&root),
+            rt_throttling: Throttling::read(&root),
+            isolated: root.list("sys/devices/system/cpu/isolated"),
+            nohz_full: root.list("sys/devices/system/cpu/nohz_full"),
+            interrupts_default: processors::default_affinity(&root),
+            interrupts: processors::interrupts(&root),
+            memory: Memory::read(&root),
+            limits: Limits::read(&root),
+            load_average: memory::load_average(&root),
+            build: Build::of_this_program(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
