@@ -13,8 +13,8 @@
 //! | `build` | what this program was built with and from |
 //!
 //! # Source
-//! In the kernel's tree: `Documentation/admin-guide/{kernel-parameters,sysctl/kernel}`, `Documentation/admin-guide/pm/{cpufreq,cpuidle}`,
-//! `Documentation/core-api/irq/irq-affinity`, `Documentation/ABI/testing/sysfs-devices-system-cpu`; `man 5 proc`.
+//! In the kernel's `Documentation`: `admin-guide/{kernel-parameters,sysctl/kernel}`, `admin-guide/pm/{cpufreq,cpuidle}`,
+//! `core-api/irq/irq-affinity`, `ABI/testing/sysfs-devices-system-cpu`; `man 5 proc`.
 
 mod build;
 mod files;
