@@ -16,6 +16,8 @@
 //! | [`grid`] | a table of words in Markdown and HTML |
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
 //! | [`spread`] | how much the figures of repetitions spread |
+//! | [`probe`] | gaps that a spinning thread sees: did the machine stand still, or did another thread run |
+//! | [`ping_pong`] | round trips of 16 bytes between two processes, as a reference |
 //! | [`report`] | the latency report |
 //! | [`cli`] | the command line |
 
@@ -26,6 +28,8 @@ pub mod figures;
 pub mod grid;
 pub mod join;
 pub mod picture;
+pub mod ping_pong;
+pub mod probe;
 pub mod record;
 pub mod report;
 pub mod reports;

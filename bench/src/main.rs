@@ -1,11 +1,13 @@
 //! Process beside plant and controller: sums up, judges, draws and compares what they left behind.
 
 use bench::cli::{CheckArguments, Cli, Command, CompareArguments, SpreadArguments};
+use bench::ping_pong::{self, PingPongError};
 use bench::runs::{self, Run, RunsError};
-use bench::{SummaryError, compare, figures, join, picture, spread, table, thresholds};
+use bench::{SummaryError, compare, figures, join, picture, probe, spread, table, thresholds};
 use clap::Parser;
 use protocol::exit::Exit;
 use protocol::run_folder::write_json;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -20,12 +22,24 @@ fn main() -> ExitCode {
             Ok(Exit::Good)
         }
         Command::CheckExperiment(arguments) => check(&arguments).map_err(RunsError::from),
+        Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
+        Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
+        Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
     };
     let exit = done.unwrap_or_else(|error| {
         eprintln!("bench: {error}");
         Exit::BadInput
     });
     exit.into()
+}
+
+/// How a command of the bench's own measuring ended.
+fn told<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCode {
+    done.unwrap_or_else(|error| {
+        eprintln!("bench: {error}");
+        exit(&error)
+    })
+    .into()
 }
 
 fn print(text: &str) {

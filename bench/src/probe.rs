@@ -103,10 +103,12 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let watched = Watched { stop: Interrupt::default(), dropped: AtomicU64::new(0) };
     let (sender, gaps) = bounded(QUEUE);
     let began_ns = MonotonicClock.now().as_nanos();
-    let (seen, rows) = std::thread::scope(|scope| {
+    let mut table = Table { file, rows: 0, seen: cpus.iter().map(|&cpu| (cpu, Seen::default())).collect() };
+    std::thread::scope(|scope| {
         let (ready, all_ready) = bounded(cpus.len());
         for &cpu in &cpus {
-            let (sender, ready, continued, watched) = (sender.clone(), ready.clone(), continued.clone(), &watched);
+            let (sender, ready, continued, watched) =
+                (sender.clone(), ready.clone(), continued.clone(), &watched);
             let gap_ns = arguments.gap_us * 1000;
             scope.spawn(move || {
                 let begun = begin(cpu);
@@ -122,26 +124,29 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
         let begun = all_ready.iter().collect::<Result<(), _>>();
         let told = begun.and_then(|()| {
             eprintln!("bench: probe watches {}, gaps over {} us", named(&cpus), arguments.gap_us);
-            let mut seen: BTreeMap<usize, Seen> = cpus.iter().map(|&cpu| (cpu, Seen::default())).collect();
-            let rows = write(&gaps, &mut file, &mut seen, || {
-                let time_up = arguments.seconds.is_some_and(|seconds| {
-                    MonotonicClock.now().as_nanos() >= began_ns + (seconds * 1e9) as u64
-                });
-                time_up || interrupt.came()
-            });
-            rows.map(|rows| (seen, rows))
+            let until_ns = arguments.seconds.map(|seconds| began_ns + (seconds * 1e9) as u64);
+            let time_up = || until_ns.is_some_and(|until_ns| MonotonicClock.now().as_nanos() >= until_ns);
+            while !time_up() && !interrupt.came() {
+                std::thread::sleep(TURN);
+                table.take(&gaps)?;
+            }
+            Ok(())
         });
         watched.stop.ask();
         told
     })?;
-    let length_ns = MonotonicClock.now().as_nanos() - began_ns;
-    tell(&seen, length_ns);
+    // A gap that was going on at the end was told when its thread ran again.
+    table.take(&gaps)?;
+    let Table { rows, seen, .. } = table;
+    tell(&seen, MonotonicClock.now().as_nanos() - began_ns);
     let dropped = watched.dropped.load(Ordering::Relaxed);
     if dropped > 0 {
         eprintln!("bench: warning: {dropped} gaps were seen and not kept: the queue to the writer was full");
     }
     if rows > MOST_ROWS {
-        eprintln!("bench: warning: the table ends after {MOST_ROWS} of {rows} gaps; ask for longer ones with --gap-us");
+        eprintln!(
+            "bench: warning: the table ends after {MOST_ROWS} of {rows} gaps; ask for longer ones with --gap-us"
+        );
     }
     Ok(if interrupt.came() { Exit::Interrupted } else { Exit::Good })
 }
@@ -165,14 +170,20 @@ fn begin(cpu: usize) -> Result<(), ProbeError> {
     }
     let idle = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Idle);
     set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, idle).map_err(|error| {
-        ProbeError::Thread { cpu, reason: format!("SCHED_IDLE was refused: {error:?}; without it the probe disturbs") }
+        ProbeError::Thread {
+            cpu,
+            reason: format!("SCHED_IDLE was refused: {error:?}; without it the probe disturbs"),
+        }
     })
 }
 
 fn watch(cpu: usize, gap_ns: u64, continued: Continued, gaps: &Sender<(usize, Gap)>, watched: &Watched) {
     let mut vitals = VitalsReader::new(continued);
     let mut watch = GapWatch::new(gap_ns, MonotonicClock.now().as_nanos());
-    while !watched.stop.came() {
+    let mut going_on = true;
+    while going_on {
+        // Looked at before the clock, so that a gap that outlasts the run is told too.
+        going_on = !watched.stop.came();
         let counts = || {
             let read = vitals.read();
             Counts {
@@ -189,33 +200,32 @@ fn watch(cpu: usize, gap_ns: u64, continued: Continued, gaps: &Sender<(usize, Ga
     }
 }
 
-/// Writes gaps until `is_over`; how many there were.
-fn write(
-    gaps: &Receiver<(usize, Gap)>,
-    file: &mut LineFile,
-    seen: &mut BTreeMap<usize, Seen>,
-    is_over: impl Fn() -> bool,
-) -> Result<u64, ProbeError> {
-    let mut rows = 0;
-    loop {
-        // Asked before the queue is emptied: what was seen until the end is in the table.
-        let over = is_over();
+/// The table on the disk, and what it adds up to.
+struct Table {
+    file: LineFile,
+    rows: u64,
+    seen: BTreeMap<usize, Seen>,
+}
+
+impl Table {
+    /// Writes what waits.
+    fn take(&mut self, gaps: &Receiver<(usize, Gap)>) -> Result<(), ProbeError> {
         for (cpu, gap) in gaps.try_iter() {
-            rows += 1;
-            let of_cpu = seen.entry(cpu).or_default();
-            if gap.another_ran { of_cpu.another_ran += &gap } else { of_cpu.stood_still += &gap }
-            if rows <= MOST_ROWS {
+            self.rows += 1;
+            let of_cpu = self.seen.entry(cpu).or_default();
+            if gap.another_ran {
+                of_cpu.another_ran += &gap
+            } else {
+                of_cpu.stood_still += &gap
+            }
+            if self.rows <= MOST_ROWS {
                 let Gap { from_ns, to_ns, another_ran } = gap;
                 let line = format!("{cpu},{from_ns},{to_ns},{}\n", u8::from(another_ran));
-                file.lines().extend_from_slice(line.as_bytes());
-                file.write_when_full().map_err(ProbeError::Write)?;
+                self.file.lines().extend_from_slice(line.as_bytes());
+                self.file.write_when_full().map_err(ProbeError::Write)?;
             }
         }
-        file.write_out().map_err(ProbeError::Write)?;
-        if over {
-            return Ok(rows);
-        }
-        std::thread::sleep(TURN);
+        self.file.write_out().map_err(ProbeError::Write)
     }
 }
 

@@ -22,5 +22,8 @@ pub struct ProbeArguments {
 
 pub(crate) fn seconds(text: &str) -> Result<f64, String> {
     let allowed = |seconds: &f64| *seconds > 0.0 && *seconds <= 1e7;
-    text.parse().ok().filter(allowed).ok_or_else(|| format!("'{text}' is not a time in seconds above 0, at most 1e7"))
+    text.parse()
+        .ok()
+        .filter(allowed)
+        .ok_or_else(|| format!("'{text}' is not a time in seconds above 0, at most 1e7"))
 }
