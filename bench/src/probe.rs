@@ -121,7 +121,7 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
             });
         }
         drop((sender, ready));
-        let begun = all_ready.iter().collect::<Result<(), _>>();
+        let begun = all_ready.iter().take(cpus.len()).collect::<Result<(), _>>();
         let told = begun.and_then(|()| {
             eprintln!("bench: probe watches {}, gaps over {} us", named(&cpus), arguments.gap_us);
             let until_ns = arguments.seconds.map(|seconds| began_ns + (seconds * 1e9) as u64);
