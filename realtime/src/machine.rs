@@ -23,27 +23,29 @@ mod memory;
 mod processors;
 
 pub use build::Build;
-pub use kernel::{Hypervisor, Preemption, Throttling};
+pub use kernel::{Preemption, Throttling};
 pub use memory::{Limits, Memory};
-pub use processors::InterruptsOfCpu;
 
 use files::Root;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The machine as a run found it. Lists of CPUs and interrupts are in the kernel's form: `0-3,8`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Machine {
-    /// Release of the kernel.
+    /// The kernel: release, build, compiler.
+    pub kernel: String,
+    /// Its release.
     pub kernel_release: String,
-    /// Its build, with the compiler that made it.
-    pub kernel_build: String,
     /// How the kernel lets an urgent thread take the CPU.
     pub preemption: Preemption,
     /// What the kernel was started with.
     pub kernel_command_line: String,
     /// Model of the processor.
     pub processor: String,
+    /// Number of CPUs that run.
+    pub processors: usize,
     /// CPUs that run.
     pub processors_online: String,
     /// CPUs that this process may use.
@@ -51,7 +53,7 @@ pub struct Machine {
     /// Simultaneous multithreading: whether, and which CPUs share a core.
     pub smt: String,
     /// Frequency of each group of CPUs: driver, governor, range; or that nobody here sets it.
-    pub frequency: Vec<String>,
+    pub frequency_governors: Vec<String>,
     /// Driver and governor of the idle states.
     pub idle_driver: String,
     /// Idle states of the first CPU, with the time to leave each.
@@ -60,8 +62,8 @@ pub struct Machine {
     pub clock_source: String,
     /// Clock sources that there are.
     pub clock_sources_available: String,
-    /// Whether this is a virtual machine.
-    pub hypervisor: Hypervisor,
+    /// Signs of a hypervisor below this kernel, or `none`. It can stop all CPUs, and no counter in here tells.
+    pub hypervisor: String,
     /// How much of each period real-time threads may have.
     pub rt_throttling: Throttling,
     /// CPUs that the scheduler leaves alone.
@@ -70,8 +72,8 @@ pub struct Machine {
     pub nohz_full: String,
     /// CPUs that an interrupt without a wish of its own may go to.
     pub interrupts_default: String,
-    /// Which interrupts may and do go where.
-    pub interrupts: Vec<InterruptsOfCpu>,
+    /// Which interrupts may and do go where, by CPU.
+    pub interrupts: BTreeMap<String, String>,
     /// Memory, swap, huge pages.
     pub memory: Memory,
     /// What this process may ask of the system.
@@ -93,23 +95,23 @@ impl Machine {
     #[must_use]
     pub fn below(root: &Path) -> Self {
         let root = Root::new(root);
-        let frequency = processors::frequency(&root);
         Self {
+            kernel: root.fact("proc/version"),
             kernel_release: root.fact("proc/sys/kernel/osrelease"),
-            kernel_build: root.fact("proc/version"),
             preemption: Preemption::read(&root),
             kernel_command_line: root.fact("proc/cmdline"),
             processor: processors::model(&root),
+            processors: processors::count(&root),
             processors_online: root.fact("sys/devices/system/cpu/online"),
             processors_allowed: root.field("proc/self/status", "Cpus_allowed_list"),
             smt: processors::smt(&root),
-            frequency,
+            frequency_governors: processors::frequency(&root),
             idle_driver: processors::idle_driver(&root),
             idle_states: processors::idle_states(&root),
             clock_source: root.fact("sys/devices/system/clocksource/clocksource0/current_clocksource"),
             clock_sources_available: root
                 .fact("sys/devices/system/clocksource/clocksource0/available_clocksource"),
-            hypervisor: Hypervisor::read(&root),
+            hypervisor: kernel::hypervisor(&root),
             rt_throttling: Throttling::read(&root),
             isolated: root.list("sys/devices/system/cpu/isolated"),
             nohz_full: root.list("sys/devices/system/cpu/nohz_full"),

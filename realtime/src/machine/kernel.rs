@@ -1,4 +1,4 @@
-//! What the kernel says of itself: preemption, hypervisor, throttling.
+//! What the kernel says of itself and of what is below it: preemption, hypervisor, throttling.
 
 use super::files::{Root, field};
 use flate2::read::GzDecoder;
@@ -85,46 +85,29 @@ fn configured(root: &Root) -> Option<(&'static str, String)> {
     MODEL_OPTIONS.iter().find(|(option, _)| is_set(option)).map(|(_, model)| (*model, file))
 }
 
-/// Whether this is a virtual machine. What is below it can stop all of its CPUs, and no counter in it tells.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Hypervisor {
-    /// Whether any sign of one was found.
-    pub present: bool,
-    /// The signs, or where none was found.
-    pub signs: Vec<String>,
+/// All signs of a hypervisor, or `none`.
+pub(super) fn hypervisor(root: &Root) -> String {
+    let mut signs = Vec::new();
+    let cpuinfo = root.text("proc/cpuinfo").unwrap_or_default();
+    if field(&cpuinfo, "flags").is_some_and(|flags| flags.split(' ').any(|flag| flag == "hypervisor")) {
+        signs.push("cpuinfo flag 'hypervisor'".to_owned());
+    }
+    signs.extend(root.text("sys/hypervisor/type").map(|kind| format!("/sys/hypervisor/type {kind}")));
+    let sources = root.text("sys/devices/system/clocksource/clocksource0/available_clocksource");
+    let sources = sources.unwrap_or_default();
+    let paravirtual = sources.split(' ').filter(|source| PARAVIRTUAL_CLOCKS.contains(source));
+    signs.extend(paravirtual.map(|source| format!("clock source {source}")));
+    let dmi = |name: &str| root.text(&format!("sys/class/dmi/id/{name}")).unwrap_or_default();
+    let machine = format!("{} {}", dmi("sys_vendor"), dmi("product_name"));
+    if VIRTUAL_MACHINES.iter().any(|name| machine.contains(name)) {
+        signs.push(format!("DMI {}", machine.trim()));
+    }
+    if signs.is_empty() { "none".to_owned() } else { signs.join("; ") }
 }
 
-impl Hypervisor {
-    pub(super) fn read(root: &Root) -> Self {
-        let mut signs = Vec::new();
-        let cpuinfo = root.text("proc/cpuinfo").unwrap_or_default();
-        if field(&cpuinfo, "flags").is_some_and(|flags| flags.split(' ').any(|flag| flag == "hypervisor")) {
-            signs.push("cpuinfo flag 'hypervisor'".to_owned());
-        }
-        signs.extend(root.text("sys/hypervisor/type").map(|kind| format!("/sys/hypervisor/type {kind}")));
-        let sources = root.text("sys/devices/system/clocksource/clocksource0/available_clocksource");
-        let paravirtual = ["kvm-clock", "xen", "hyperv_clocksource_tsc_page", "hyperv_clocksource_msr"];
-        let known = |source: &&str| paravirtual.contains(source);
-        signs.extend(
-            sources
-                .iter()
-                .flat_map(|sources| sources.split(' ').filter(known))
-                .map(|source| format!("clock source {source}")),
-        );
-        let dmi = |name: &str| root.text(&format!("sys/class/dmi/id/{name}"));
-        if let (Some(vendor), product) = (dmi("sys_vendor"), dmi("product_name").unwrap_or_default()) {
-            let machine = format!("{vendor} {product}");
-            if VIRTUAL_MACHINES.iter().any(|name| machine.contains(name)) {
-                signs.push(format!("DMI: {}", machine.trim()));
-            }
-        }
-        let present = !signs.is_empty();
-        if !present {
-            signs.push("none in cpuinfo, /sys/hypervisor, clock sources and DMI".to_owned());
-        }
-        Self { present, signs }
-    }
-}
+/// Clock sources that only a hypervisor offers.
+const PARAVIRTUAL_CLOCKS: [&str; 4] =
+    ["kvm-clock", "xen", "hyperv_clocksource_tsc_page", "hyperv_clocksource_msr"];
 
 /// Words in vendor or product of virtual machines, as systemd-detect-virt knows them.
 const VIRTUAL_MACHINES: [&str; 12] = [

@@ -1,21 +1,9 @@
 //! Processors: what they are, how fast they may run, how deep they may sleep, which interrupts they take.
 
 use super::files::{Root, field, listed, number_in};
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 const CPUS: &str = "sys/devices/system/cpu";
-
-/// Interrupts of one CPU.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct InterruptsOfCpu {
-    /// The CPU.
-    pub cpu: u64,
-    /// Numbers of the interrupts that may come to it.
-    pub may_come: String,
-    /// Those that the kernel sends to it now, by number and name.
-    pub do_come: Vec<String>,
-}
 
 pub(super) fn model(root: &Root) -> String {
     let text = root.text("proc/cpuinfo").unwrap_or_default();
@@ -23,6 +11,12 @@ pub(super) fn model(root: &Root) -> String {
     let names = ["model name", "Model", "Processor", "cpu", "uarch"];
     let found = names.iter().find_map(|name| field(&text, name));
     found.map_or_else(|| "unknown: /proc/cpuinfo names no model".to_owned(), str::to_owned)
+}
+
+/// Number of CPUs that run.
+pub(super) fn count(root: &Root) -> usize {
+    let online = root.text(&format!("{CPUS}/online")).unwrap_or_default();
+    crate::privileges::parse_cpu_list(&online).map_or(0, |cpus| cpus.len())
 }
 
 pub(super) fn smt(root: &Root) -> String {
@@ -101,7 +95,8 @@ pub(super) fn default_affinity(root: &Root) -> String {
     listed(&cpus)
 }
 
-pub(super) fn interrupts(root: &Root) -> Vec<InterruptsOfCpu> {
+/// By CPU: numbers of the interrupts that may come to it, and those that the kernel sends to it now, with their names.
+pub(super) fn interrupts(root: &Root) -> BTreeMap<String, String> {
     let names = interrupt_names(root);
     let mut may: BTreeMap<u64, Vec<u64>> =
         cpus(root).iter().filter_map(|cpu| Some((number_in(cpu)?, Vec::new()))).collect();
@@ -124,10 +119,9 @@ pub(super) fn interrupts(root: &Root) -> Vec<InterruptsOfCpu> {
             }
         }
     }
-    let of_cpu = |(cpu, numbers): (u64, Vec<u64>)| InterruptsOfCpu {
-        cpu,
-        may_come: listed(&numbers),
-        do_come: does.remove(&cpu).unwrap_or_default(),
+    let of_cpu = |(cpu, numbers): (u64, Vec<u64>)| {
+        let come = does.remove(&cpu).map_or_else(|| "none".to_owned(), |names| names.join(", "));
+        (format!("CPU {cpu}"), format!("may come: {}; do come: {come}", listed(&numbers)))
     };
     may.into_iter().map(of_cpu).collect()
 }
