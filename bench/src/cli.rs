@@ -1,5 +1,6 @@
 //! The bench's command line.
 
+use crate::latency_table::LatencyTableArguments;
 use crate::ping_pong::cli::{PingPongArguments, PongArguments};
 use crate::probe::cli::ProbeArguments;
 use clap::{Args, Parser, Subcommand};
@@ -36,6 +37,8 @@ pub enum Command {
     Probe(ProbeArguments),
     /// Measure round trips of 16 bytes between two processes, as a reference for those of rig and controller.
     PingPong(PingPongArguments),
+    /// Print the table of ratios of a latency report, in Markdown.
+    LatencyTable(LatencyTableArguments),
     /// The process that answers; ping-pong starts it.
     #[command(hide = true)]
     Pong(PongArguments),

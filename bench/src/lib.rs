@@ -18,6 +18,7 @@
 //! | [`spread`] | how much the figures of repetitions spread |
 //! | [`probe`] | gaps that a spinning thread sees: did the machine stand still, or did another thread run |
 //! | [`ping_pong`] | round trips of 16 bytes between two processes, as a reference |
+//! | [`latency_table`] | the table of ratios that `scripts/latency` ends with |
 //! | [`report`] | the latency report |
 //! | [`cli`] | the command line |
 
@@ -27,6 +28,7 @@ pub mod drawing;
 pub mod figures;
 pub mod grid;
 pub mod join;
+pub mod latency_table;
 pub mod picture;
 pub mod ping_pong;
 pub mod probe;

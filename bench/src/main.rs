@@ -6,7 +6,7 @@ use bench::cli::{
 use bench::ping_pong::{self, PingPongError};
 use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
-use bench::{SummaryError, compare, figures, join, picture, probe, spread, table, thresholds};
+use bench::{SummaryError, compare, figures, join, latency_table, picture, probe, spread, table, thresholds};
 use clap::Parser;
 use protocol::exit::Exit;
 use protocol::run_folder::write_json;
@@ -27,6 +27,9 @@ fn main() -> ExitCode {
             Ok(Exit::Good)
         }
         Command::CheckExperiment(arguments) => check(&arguments).map_err(Into::into),
+        Command::LatencyTable(arguments) => {
+            latency_table::table(&arguments).map(|text| print(&text)).map(|()| Exit::Good).map_err(Into::into)
+        }
         Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
         Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
         Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
