@@ -1,5 +1,8 @@
 //! The bench's command line.
 
+use crate::latency_table::LatencyTableArguments;
+use crate::ping_pong::cli::{PingPongArguments, PongArguments};
+use crate::probe::cli::ProbeArguments;
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
@@ -30,6 +33,15 @@ pub enum Command {
     Cause(CauseArguments),
     /// Check the bounds of an experiment file: figures that exist, numbers that make sense.
     CheckExperiment(CheckArguments),
+    /// Watch the machine: a thread on each CPU that reads the clock over and over notes when it could not.
+    Probe(ProbeArguments),
+    /// Measure round trips of 16 bytes between two processes, as a reference for those of rig and controller.
+    PingPong(PingPongArguments),
+    /// Print the table of ratios of a latency report, in Markdown.
+    LatencyTable(LatencyTableArguments),
+    /// The process that answers; ping-pong starts it.
+    #[command(hide = true)]
+    Pong(PongArguments),
 }
 
 /// Which run to sum up.

@@ -3,12 +3,14 @@
 use bench::cli::{
     CauseArguments, CheckArguments, Cli, Command, CompareArguments, ReportArguments, SpreadArguments,
 };
+use bench::ping_pong::{self, PingPongError};
 use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
-use bench::{SummaryError, compare, figures, join, picture, spread, table, thresholds};
+use bench::{SummaryError, compare, figures, join, latency_table, picture, probe, spread, table, thresholds};
 use clap::Parser;
 use protocol::exit::Exit;
 use protocol::run_folder::write_json;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -25,12 +27,27 @@ fn main() -> ExitCode {
             Ok(Exit::Good)
         }
         Command::CheckExperiment(arguments) => check(&arguments).map_err(Into::into),
+        Command::LatencyTable(arguments) => {
+            latency_table::table(&arguments).map(|text| print(&text)).map(|()| Exit::Good).map_err(Into::into)
+        }
+        Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
+        Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
+        Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
     };
     let exit = done.unwrap_or_else(|error| {
         eprintln!("bench: {error}");
         Exit::BadInput
     });
     exit.into()
+}
+
+/// How a command of the bench's own measuring ended.
+fn told<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCode {
+    done.unwrap_or_else(|error| {
+        eprintln!("bench: {error}");
+        exit(&error)
+    })
+    .into()
 }
 
 fn print(text: &str) {
