@@ -7,5 +7,7 @@ pub mod checksum;
 pub mod exit;
 pub mod frames;
 pub mod periods;
+pub mod response_time;
 pub mod run_folder;
 pub mod timing;
+pub mod wire_time;
