@@ -66,7 +66,9 @@ impl RunError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Input(_) | Self::Output { .. } | Self::Bus(BusError::NoBarrier { .. }) => Exit::BadInput,
+            Self::Input(_)
+            | Self::Output { .. }
+            | Self::Bus(BusError::NoBarrier { .. } | BusError::TooSlow { .. }) => Exit::BadInput,
             Self::Bus(_) => Exit::BusFailed,
         }
     }
@@ -214,7 +216,7 @@ impl RigWork<'_> {
             Pace::Lockstep => pace::lockstep::run(ride, simulated_ns)?,
         };
         // Taking the figures drops the station and with it the queues' sending ends, which lets the writer finish.
-        let host = bus.host_report().cloned();
+        let host = bus.host_report();
         Ok(LoopOutcome { paced, figures: station.into_figures(), bus: *bus.counters(), host })
     }
 }
