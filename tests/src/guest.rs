@@ -92,22 +92,15 @@ impl Guest {
     }
 
     /// The lines of one run in a log of candump that holds several: from the rig's cycle 0 of the run in `folder` to that of the
-    /// next run in the same log.
+    /// next run of the job, on whatever bus.
     ///
     /// # Panics
     /// When a line has no time stamp.
     #[must_use]
-    pub fn lines_of_run(&self, log: &str, folder: &Path, others: &[PathBuf]) -> String {
-        let zero = |folder: &Path| {
-            json(&folder.join("summary.json"))["bus_log_cycle_zero_s"].as_f64().expect("cycle 0")
-                - BEFORE_CYCLE_ZERO_S
-        };
-        let from_s = zero(folder);
-        let until_s = others
-            .iter()
-            .map(|other| zero(other))
-            .filter(|zero_s| *zero_s > from_s)
-            .fold(f64::INFINITY, f64::min);
+    pub fn lines_of_run(&self, log: &str, folder: &Path) -> String {
+        let from_s = starts_s(folder)[0];
+        let all_s = starts_s(&self.out());
+        let until_s = all_s.into_iter().filter(|other_s| *other_s > from_s).fold(f64::INFINITY, f64::min);
         let text = fs::read_to_string(self.file(log)).expect("a log of candump");
         let of_run = text.lines().filter(|line| {
             let stamp = line.strip_prefix('(').and_then(|line| line.split_once(')')).expect("a stamp").0;
@@ -116,6 +109,22 @@ impl Guest {
         });
         of_run.flat_map(|line| [line, "\n"]).collect()
     }
+}
+
+/// When the runs in and below `folder` began, in s of the wall clock, with what may have been sent before cycle 0.
+fn starts_s(folder: &Path) -> Vec<f64> {
+    let mut found = Vec::new();
+    let summary = folder.join("summary.json");
+    if summary.exists() {
+        let zero_s = json(&summary)["bus_log_cycle_zero_s"].as_f64().expect("cycle 0 in s");
+        found.push(zero_s - BEFORE_CYCLE_ZERO_S);
+    }
+    for entry in fs::read_dir(folder).expect("a folder").filter_map(Result::ok) {
+        if entry.path().is_dir() {
+            found.extend(starts_s(&entry.path()));
+        }
+    }
+    found
 }
 
 /// The data frames with 11-bit identifiers in lines of candump -L.

@@ -46,22 +46,20 @@ fn run_all(kernel: &str, pairs: &Pairs) -> Guest {
     assert!(guest.codes().values().all(|code| *code == 0), "{:?}", guest.codes());
     the_cards_are_set_up_as_asked(&json(&guest.file("guest.json")));
     the_system_granted_real_time(&out.join("cards"));
-    let on_vcan: Vec<_> = vcan_runs.iter().cloned().chain([out.join("errors")]).collect();
     for run in &vcan_runs {
         assert_eq!(json(&run.join("controller.json"))["axes"]["drive"]["chain_state"], "done");
-        candump_agrees(&guest, run, &on_vcan);
+        candump_agrees(&guest, run);
     }
-    let on_cards: Vec<_> = card_runs.iter().chain([&disturbed]).cloned().collect();
     for run in &card_runs {
         assert_eq!(json(&run.join("controller.json"))["axes"]["drive"]["chain_state"], "done");
-        every_frame_on_the_cards_is_accounted_for(&guest, run, &on_cards);
+        every_frame_on_the_cards_is_accounted_for(&guest, run);
     }
     for run in vcan_runs.iter().chain(&card_runs) {
         cyclictest_stands_beside_our_figures(run, kernel);
     }
     a_full_queue_is_counted(&disturbed);
     both_interfaces_went_down_and_came_back(&disturbed);
-    frames_around_the_disturbances_are_accounted_for(&guest, &disturbed, &on_cards);
+    frames_around_the_disturbances_are_accounted_for(&guest, &disturbed);
     error_frames_are_counted_and_change_nothing(&out.join("errors"));
     if !guest.said.contains("this checkout's bench has none") {
         reports_are_kept(kernel);
@@ -114,9 +112,9 @@ fn the_system_granted_real_time(run: &Path) {
 }
 
 /// On vcan0 nothing is lost, and an independent decoder agrees with the run's files.
-fn candump_agrees(guest: &Guest, run: &Path, others: &[PathBuf]) {
+fn candump_agrees(guest: &Guest, run: &Path) {
     let log = tempfile::NamedTempFile::new().unwrap();
-    fs::write(log.path(), guest.lines_of_run("candump.log", run, others)).unwrap();
+    fs::write(log.path(), guest.lines_of_run("candump.log", run)).unwrap();
     let told =
         compare_candump(log.path(), run).unwrap_or_else(|complaint| panic!("{}: {complaint}", run.display()));
     eprintln!("{}: {told}", run.display());
@@ -132,13 +130,13 @@ struct OnCards {
 }
 
 impl OnCards {
-    fn read(guest: &Guest, run: &Path, others: &[PathBuf]) -> Self {
+    fn read(guest: &Guest, run: &Path) -> Self {
         Self {
             summary: json(&run.join("summary.json")),
             controller: json(&run.join("controller.json")),
             can0: InterfaceCounters::during(run, "can0"),
             can1: InterfaceCounters::during(run, "can1"),
-            heard: data_frames(&guest.lines_of_run(LOG_OF_CAN1, run, others)),
+            heard: data_frames(&guest.lines_of_run(LOG_OF_CAN1, run)),
         }
     }
 
@@ -169,8 +167,8 @@ impl OnCards {
     }
 }
 
-fn every_frame_on_the_cards_is_accounted_for(guest: &Guest, run: &Path, others: &[PathBuf]) {
-    let on = OnCards::read(guest, run, others);
+fn every_frame_on_the_cards_is_accounted_for(guest: &Guest, run: &Path) {
+    let on = OnCards::read(guest, run);
     eprintln!("{}: {:?} {:?}", run.display(), on.can0, on.can1);
     assert!(count(&on.summary, "/cycles") > 5000);
     let (from_rig, from_controllers) = on.heard_by_sender();
@@ -297,8 +295,8 @@ fn both_interfaces_went_down_and_came_back(run: &Path) {
     }
 }
 
-fn frames_around_the_disturbances_are_accounted_for(guest: &Guest, run: &Path, others: &[PathBuf]) {
-    let on = OnCards::read(guest, run, others);
+fn frames_around_the_disturbances_are_accounted_for(guest: &Guest, run: &Path) {
+    let on = OnCards::read(guest, run);
     eprintln!("{}: {:?} {:?}", run.display(), on.can0, on.can1);
     let (from_can0, from_controllers) = on.heard_by_sender();
     let (foreign, _) = sent_and_refused_by_cangen(run);
