@@ -8,6 +8,7 @@
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   own ───── algorithms in C, built as a user builds them
+//!   disturb ─ disturbances whose cause a report has to name
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
@@ -19,6 +20,7 @@ pub mod account;
 pub mod axis_table;
 pub mod binaries;
 pub mod bus_cycles;
+pub mod disturb;
 pub mod events;
 pub mod guest;
 pub mod launch;
