@@ -31,14 +31,15 @@ pub enum Command {
     Run(Box<RunArguments>),
     /// Host an embedded bus alone, without a rig.
     Bus(BusArguments),
-    /// Print the worst-case load of the bus, computed from rig.dbc.
+    /// Print the worst-case load of the bus and each frame's worst-case response time, computed from rig.dbc.
     BusLoad,
 }
 
 /// How to run the rig.
 #[derive(Args, Debug)]
 pub struct RunArguments {
-    /// Bus: can://IFACE (SocketCAN) or unix:///PATH[?loss=P&seed=N] (embedded, hosted here).
+    /// Bus: can://IFACE (SocketCAN) or unix:///PATH[?loss=P&seed=N&bitrate=1000000&…] (embedded, hosted here; all options:
+    /// protocol/docs/bus-that-keeps-time.md).
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
     /// Rig file with the plant's numbers.
@@ -107,7 +108,7 @@ pub struct RunArguments {
 /// How to host a bus.
 #[derive(Args, Debug)]
 pub struct BusArguments {
-    /// The embedded bus: unix:///PATH[?loss=P&seed=N].
+    /// The embedded bus: unix:///PATH[?loss=P&seed=N&bitrate=1000000&…].
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
     /// End after this time; without it, on Ctrl-C.

@@ -18,7 +18,7 @@ use crate::recording::evidence::{EvidenceSetup, PROCESS};
 use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::station::{Station, StationFigures, StationParts};
-use crate::summary::{Machine, RunDescription};
+use crate::summary::RunDescription;
 use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
@@ -27,7 +27,9 @@ use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampCl
 use protocol::exit::Exit;
 use protocol::flight_dump;
 use protocol::run_folder::{SCHEMA_VERSION, clear_results, write_json};
-use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, PeriodicConfig, Request};
+use realtime::{
+    Clock, Continued, Freeze, Grants, Interrupt, Machine, MonotonicClock, PeriodicConfig, Request,
+};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -64,7 +66,9 @@ impl RunError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Input(_) | Self::Output { .. } | Self::Bus(BusError::NoBarrier { .. }) => Exit::BadInput,
+            Self::Input(_)
+            | Self::Output { .. }
+            | Self::Bus(BusError::NoBarrier { .. } | BusError::TooSlow { .. }) => Exit::BadInput,
             Self::Bus(_) => Exit::BusFailed,
         }
     }
@@ -212,7 +216,7 @@ impl RigWork<'_> {
             Pace::Lockstep => pace::lockstep::run(ride, simulated_ns)?,
         };
         // Taking the figures drops the station and with it the queues' sending ends, which lets the writer finish.
-        let host = bus.host_report().cloned();
+        let host = bus.host_report();
         Ok(LoopOutcome { paced, figures: station.into_figures(), bus: *bus.counters(), host })
     }
 }

@@ -10,7 +10,7 @@ use crate::station::FrameCounters;
 use plant::Scene;
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
-use realtime::{ArrivalFigures, Percentiles, VitalTotals, WallClockStep};
+use realtime::{ArrivalFigures, Machine, Percentiles, VitalTotals, WallClockStep};
 use serde::Serialize;
 
 /// `run.json`: what a run was made with.
@@ -44,39 +44,6 @@ pub struct RunDescription {
     pub realtime_refused: Vec<String>,
     /// The machine.
     pub machine: Machine,
-}
-
-/// The machine of a run.
-#[derive(Debug, Serialize)]
-pub struct Machine {
-    /// Kernel release and build.
-    pub kernel: String,
-    /// Model name of the processor.
-    pub processor: String,
-    /// Processors that may be used.
-    pub processors: usize,
-    /// Clock source of the kernel.
-    pub clock_source: String,
-}
-
-impl Machine {
-    /// Reads what `/proc` and `/sys` tell; `unknown` where they do not.
-    #[must_use]
-    pub fn read() -> Self {
-        let file = |path: &str| std::fs::read_to_string(path).map(|text| text.trim().to_owned()).ok();
-        let unknown = || "unknown".to_owned();
-        let processor = file("/proc/cpuinfo").and_then(|text| {
-            let line = text.lines().find(|line| line.starts_with("model name"))?;
-            Some(line.split_once(':')?.1.trim().to_owned())
-        });
-        Self {
-            kernel: file("/proc/version").unwrap_or_else(unknown),
-            processor: processor.unwrap_or_else(unknown),
-            processors: std::thread::available_parallelism().map_or(0, usize::from),
-            clock_source: file("/sys/devices/system/clocksource/clocksource0/current_clocksource")
-                .unwrap_or_else(unknown),
-        }
-    }
 }
 
 /// `summary.json` as the emulator knows it.

@@ -9,5 +9,7 @@ pub mod exit;
 pub mod flight_dump;
 pub mod frames;
 pub mod periods;
+pub mod response_time;
 pub mod run_folder;
 pub mod timing;
+pub mod wire_time;

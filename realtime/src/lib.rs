@@ -25,6 +25,7 @@
 //! | [`vitals`] | page faults, switches, run delay and CPU of the real-time thread |
 //! | [`wall_clock`] | whether somebody set the time of day |
 //! | [`privileges`] | what the thread asks of the system, what it got, what was refused and how to get it |
+//! | [`machine`] | facts of the machine: kernel, processors, interrupts, memory, limits, build |
 //! | [`signals`] | Ctrl-C, SIGTERM, SIGUSR1 and SIGCONT as values |
 //! | [`allocations`] | an allocator that counts, for the proof that a cycle allocates nothing |
 //!
@@ -50,6 +51,7 @@ pub mod clock;
 pub mod flight;
 pub mod histogram;
 pub mod interval_log;
+pub mod machine;
 pub mod periodic;
 pub mod privileges;
 pub mod signals;
@@ -63,6 +65,7 @@ pub use clock::{Clock, Instant, MonotonicClock, VirtualClock};
 pub use flight::{FlightRecorder, Lateness, Severity, Stamped, Trigger};
 pub use histogram::{Percentiles, Recorder, write_hlog};
 pub use interval_log::IntervalLog;
+pub use machine::Machine;
 pub use periodic::{
     ConfigError, Cycle, LoopStatistics, Overrun, OverrunPolicy, PeriodicConfig, PeriodicLoop, UnknownPolicy,
 };

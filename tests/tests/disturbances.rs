@@ -1,4 +1,4 @@
-//! Every disturbance of a run is named from its report alone; `scripts/disturb` does this ten times each for the table in the docs.
+//! Every disturbance of a run is named from its report alone; `scripts/disturb` does it ten times each, for the docs.
 
 use std::time::Duration;
 use system_tests::disturb::{self, Disturbance};

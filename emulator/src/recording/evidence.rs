@@ -367,3 +367,6 @@ fn counts_of(row: &CycleTiming) -> VitalCounts {
         cpu: vitals.cpu,
     }
 }
+
+#[cfg(test)]
+mod tests;
