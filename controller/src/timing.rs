@@ -6,8 +6,9 @@
 //! ```
 //!
 //! A row is a cycle that was answered. One process for both axes may wake twice for it, since the load's sensors follow the
-//! drive's: then the lengths of both wake-ups add up in one row, and `done - woke` is longer than their sum by the wait in
-//! between. Within a wake-up the three stages leave no gap.
+//! drive's. Then the lengths of both wake-ups add up in one row, and `done` stands where it would be without the wait in between,
+//! which is the rig's and no work of ours; `command_ns` of the load tells when it was really answered. So receive, step and send
+//! are the whole of `done - woke`.
 //!
 //! Sensors that were overtaken by newer ones before anybody woke are in no row, save as its `skipped`. So that a stall shows
 //! with everything that waited, the waiting of each such frame of the axis that wakes us is handed over by itself.
@@ -174,7 +175,7 @@ impl<C: Clock + Send> Stopwatch<C> {
         let ahead = matches!(cycles, [Some(drive), Some(load)] if load < drive);
         for axis in if ahead { [Axis::Load, Axis::Drive] } else { Axis::ALL } {
             if let Some(cycle) = cycles[axis.index()] {
-                self.put_into_row(axis, cycle, done_ns);
+                self.put_into_row(axis, cycle);
             }
         }
         let WakeUp { woke_ns, received_ns, send_ns, .. } = self.wake_up;
@@ -182,6 +183,7 @@ impl<C: Clock + Send> Stopwatch<C> {
             row.receive_ns += received_ns.saturating_sub(woke_ns);
             row.send_ns += send_ns;
             row.step_ns += done_ns.saturating_sub(received_ns).saturating_sub(send_ns);
+            row.done_ns = row.woke_ns + row.receive_ns + row.step_ns + row.send_ns;
             let missing = [row.drive, row.load].map(|exchange| exchange.sensors_ns == 0);
             if self.own.iter().zip(missing).all(|(own, missing)| !own || !missing) {
                 row.vitals = vitals();
@@ -190,7 +192,7 @@ impl<C: Clock + Send> Stopwatch<C> {
         }
     }
 
-    fn put_into_row(&mut self, axis: Axis, cycle: u64, done_ns: u64) {
+    fn put_into_row(&mut self, axis: Axis, cycle: u64) {
         let waited = if axis == self.wakes { self.waiting.take() } else { None };
         let begins = self.pending.is_none_or(|row| row.cycle != cycle);
         let arrived_ns = std::mem::take(&mut self.arrived_ns[axis.index()]);
@@ -214,7 +216,6 @@ impl<C: Clock + Send> Stopwatch<C> {
             self.pending = Some(CycleTiming { cycle, skipped, due_ns, woke_ns, ..CycleTiming::default() });
         }
         if let Some(row) = &mut self.pending {
-            row.done_ns = done_ns;
             *exchange(row, axis) = Exchange { sensors_ns: arrived_ns, command_ns: handed_ns, answers: cycle };
         }
     }

@@ -63,7 +63,7 @@ pub struct CycleTiming {
     pub step_ns: u64,
     /// Length of the stage that sends frames.
     pub send_ns: u64,
-    /// When everything of the cycle was done.
+    /// When everything of the cycle was done; of a controller, without a wait in between for the other axis's sensors.
     pub done_ns: u64,
     /// Exchange of the drive axis.
     pub drive: Exchange,

@@ -54,7 +54,7 @@ fn expect_one_account(scene: &Scene, name: &str, waking_axis: &str) -> Vec<Cycle
     for row in &rows {
         assert!(row.due_ns <= row.woke_ns && row.woke_ns <= row.done_ns, "{name}: {row:?}");
         let work_ns = row.receive_ns + row.step_ns + row.send_ns;
-        assert!(work_ns <= row.done_ns - row.woke_ns, "{name}: stages within the cycle: {row:?}");
+        assert_eq!(work_ns, row.done_ns - row.woke_ns, "{name}: the stages are the whole of it: {row:?}");
     }
     rows
 }

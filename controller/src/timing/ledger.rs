@@ -7,8 +7,7 @@
 //! ```
 //!
 //! It belongs to the recorder's thread, which may wait for the disk. *Late* is the longest wait of sensors that ended with a
-//! wake-up, *slow* the work of a cycle without the wait for the other axis's sensors, which is not our doing; the histograms of
-//! execution and completion leave that wait out too. *Overrun* is a cycle that has no answer, be its sensors overtaken, lost, or
+//! wake-up, *slow* the work of a cycle. *Overrun* is a cycle that has no answer, be its sensors overtaken, lost, or
 //! never sent: how late we were ourselves says `late_ns` of the event.
 
 use super::{Measured, Passed};
@@ -218,7 +217,7 @@ impl Ledger {
     }
 
     fn take_row(&mut self, row: CycleTiming) -> io::Result<()> {
-        let work_ns = row.receive_ns + row.step_ns + row.send_ns;
+        let work_ns = row.done_ns.saturating_sub(row.woke_ns);
         self.account.record(&CycleStages {
             cycle: row.cycle,
             // Sensors that were overtaken tell themselves how long they waited.
@@ -228,7 +227,7 @@ impl Ledger {
             receive_ns: row.receive_ns,
             step_ns: row.step_ns,
             send_ns: row.send_ns,
-            done_ns: row.woke_ns + work_ns,
+            done_ns: row.done_ns,
         })?;
         let first_ns = *self.first_ns.get_or_insert(row.woke_ns);
         if row.woke_ns.saturating_sub(first_ns) > WARM_UP_NS {
