@@ -116,7 +116,7 @@ fn the_page_of_a_rich_report_holds_everything() {
     assert!(part("conditions").contains("cyclictest --mlockall"));
     report.claim.not_controlled.iter().for_each(|said| assert!(part("not-controlled").contains(said)));
     report.claim.reasons.iter().for_each(|said| assert!(html.contains(said)));
-    assert!(html.contains("✗ These runs do not support a latency claim."));
+    assert!(html.contains("✗ Latency claim: not supported"));
     assert!(html.contains("airbench-latency-report, version 1"));
 }
 
