@@ -1,7 +1,7 @@
 //! The runs one by one: how regularly frames came, what was counted, each run's percentiles.
 
 use super::figures::{PERCENTILES, percentiles};
-use super::markup::{Cell, Table, folded, number, words as text};
+use super::markup::{Cell, Table, folded, list, number, words as text};
 use super::words;
 use crate::report::model::{ArrivalRow, PercentilesNs, RunPart};
 use std::collections::{BTreeMap, BTreeSet};
@@ -86,7 +86,20 @@ pub(super) fn counts(runs: &[RunPart]) -> String {
             Cell::Judged(part.passed, verdict.into()),
         ]);
     }
-    format!("{}{}{}", table.html_or("No run was given."), counted(runs), each_percentiles(runs))
+    format!(
+        "{}{}{}{}",
+        table.html_or("No run was given."),
+        lacking(runs),
+        counted(runs),
+        each_percentiles(runs)
+    )
+}
+
+/// What folders do not hold, and the page therefore does not say.
+fn lacking(runs: &[RunPart]) -> String {
+    let said = runs.iter().enumerate().filter(|(_, part)| !part.lacks.is_empty());
+    let said = said.map(|(run, part)| format!("<h3>Run {run} lacks</h3>\n{}", list(&part.lacks, "")));
+    said.collect()
 }
 
 /// A row for each count, its sum first. Counts of parts that are 0 throughout are folded away; those of the whole always stand.

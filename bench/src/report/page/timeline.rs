@@ -34,6 +34,8 @@ const MOST_LANES: usize = 8;
 /// Cycles whose markers do not touch each other.
 const MOST_MARKERS: usize = 90;
 
+const FALLING: &str = "The falling line: cycles that were missed, each late against its own scheduled time.";
+
 /// Stretch that is shown, us from the event's due time.
 fn window(event: &Event) -> (f64, f64) {
     let length_us = (event.late_ns.saturating_add(event.slow_ns)) as f64 * 1e-3;
@@ -154,10 +156,11 @@ pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
         String::new()
     };
     let gaps = event.probe.iter().map(|gap| gap.another_ran).collect();
+    let falling = if missed.len() > 1 { none(FALLING) } else { String::new() };
     format!(
-        "<figure>\n{}<ul class=\"legend\">\n{}</ul>\n{watched}</figure>\n",
+        "<figure>\n{}<ul class=\"legend\">\n{}</ul>\n{falling}{watched}</figure>\n",
         scrolling("full", "Cycles around the event", &drawing.with(&drawn)),
-        legend(&processes, &gaps, !missed.is_empty())
+        legend(&processes, &gaps)
     )
 }
 
@@ -245,7 +248,7 @@ fn waiting_bar((due_us, woke_us): (f64, f64), look: Look, y: f64, x: &Scale) -> 
     bar(&class, (x.at(due_us * 1e-3), y + 8.0), (x.at(woke_us * 1e-3), y + LANE - 8.0))
 }
 
-fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>, are_missed: bool) -> String {
+fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>) -> String {
     let mut entries = String::new();
     for (index, (process, _)) in processes.iter().enumerate() {
         let look = Look::Ours(index);
@@ -260,10 +263,6 @@ fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>, are_miss
         let sample = bar("bar wait s0", (1.0, 4.5), (24.0, 9.5)) + &bar("bar s0", (24.0, 2.0), (37.0, 12.0));
         entries += &legend_entry(&sample, "lanes: waiting, then running");
     }
-    if are_missed {
-        let sample = line("line r1", &[(1.0, 2.0), (20.0, 4.0), (37.0, 13.0)]);
-        entries += &legend_entry(&sample, "falling: missed cycles, each late against its own time");
-    }
     for another_ran in gaps {
         let (class, what) = if *another_ran {
             ("bar ran", "gap: another thread ran")
@@ -273,4 +272,53 @@ fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>, are_miss
         entries += &legend_entry(&bar(class, (2.0, 2.0), (36.0, 12.0)), what);
     }
     entries
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::model::Cause;
+    use std::collections::BTreeMap;
+
+    fn event(skipped: u64, cycles: &[u64]) -> Event {
+        let row = |cycle: &u64| AroundRow {
+            cycle: *cycle,
+            due_us: (*cycle as f64 - 100.0) * PERIOD_US,
+            late_us: 9.0,
+            execution_us: 20.0,
+            run_delay_us: 0.0,
+            faults: 0,
+            involuntary_switches: 0,
+            cpu: 0,
+        };
+        Event {
+            run: 0,
+            process: "emulator".into(),
+            cycle: 100,
+            at_s: 0.1,
+            late_ns: skipped * 1_000_000 + 9000,
+            slow_ns: 0,
+            skipped,
+            cause: Cause::Unexplained,
+            sentence: String::new(),
+            evidence: Vec::new(),
+            around: BTreeMap::from([("emulator".into(), cycles.iter().map(row).collect())]),
+            probe: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn every_missed_cycle_is_late_against_its_own_time() {
+        let told = missed(&event(3, &[98, 99, 103]));
+        assert_eq!(told, [(0.0, 3009.0), (1000.0, 2009.0), (2000.0, 1009.0), (3000.0, 9.0)]);
+        assert!(missed(&event(0, &[99, 100])).is_empty(), "its row is there");
+        assert!(missed(&event(50_000, &[])).len() <= MOST_MARKERS + 1);
+    }
+
+    #[test]
+    fn all_of_a_long_stall_is_in_sight_and_not_much_else() {
+        let (from_us, to_us) = window(&event(98, &[95, 96, 97, 98, 99, 198, 199]));
+        assert!((-8000.0..-5000.0).contains(&from_us), "{from_us}");
+        assert!((99_000.0..102_000.0).contains(&to_us), "{to_us}");
+    }
 }
