@@ -76,10 +76,11 @@ fn head(report: &Report) -> String {
     let length_s: f64 =
         report.runs.iter().map(|run| run.duration_s).filter(|length| length.is_finite()).sum();
     format!(
-        "<header>\n<h1>{}</h1>\n<p class=\"soft\">{} of {} s together. Made {}.</p>\n{}</header>\n",
+        "<header>\n<h1>{}</h1>\n<p class=\"soft\">{} of {} s{}. Made {}.</p>\n{}</header>\n",
         escaped(&report.title),
         words::counted(number, "run", "runs"),
         words::decimal(length_s, 0),
+        if number == 1 { "" } else { " together" },
         words::instant(report.made_unix_s),
         verdict(&report.claim)
     )
@@ -88,9 +89,9 @@ fn head(report: &Report) -> String {
 /// Whether a latency claim is supported, in a box that says so by sign, word and border.
 fn verdict(claim: &Claim) -> String {
     let (class, sign, word) = if claim.supported {
-        ("verdict", '✓', "These runs support a latency claim.")
+        ("verdict", '✓', "Latency claim: supported")
     } else {
-        ("verdict no", '✗', "These runs do not support a latency claim.")
+        ("verdict no", '✗', "Latency claim: not supported")
     };
     let reasons = if claim.reasons.is_empty() && claim.supported {
         String::new()

@@ -79,10 +79,17 @@ fn chart(family: &Family<'_>, size: &Size) -> String {
     };
     let most = bins().map(|bin| bin.count).max().unwrap_or(1);
     let bottom = size.height - FOOT;
-    let times = whole_decades((low as f64).max(SHORTEST_NS), high as f64);
+    // Much shorter than the shortest half is a rare oddity, not worth decades of the axis: it stands on its end.
+    let medians = members.iter().filter_map(|(_, one)| one.percentiles_ns.p50);
+    let shortest_ns = medians.min().map_or(SHORTEST_NS, |p50| (0.1 * p50 as f64).max(SHORTEST_NS));
+    let times = whole_decades((low as f64).max(shortest_ns), high as f64);
+    let is_cut = (low as f64) < times.0;
     let x = Scale::logarithmic(times, (LEFT, size.width - RIGHT));
     let y = Scale::logarithmic((NO_SAMPLE, whole_decades(1.0, most as f64).1), (bottom, TOP));
     let mut drawn = axes(&x, &y, size);
+    if is_cut {
+        drawn += &text("end", (LEFT - 24.0, bottom + 18.0), "≤");
+    }
     // The grey area lies behind, the first of ours in front.
     let (area, lines): (Vec<_>, Vec<_>) =
         members.iter().copied().rev().partition(|(look, _)| *look == Look::Reference(0));

@@ -1,7 +1,7 @@
 //! The runs one by one: how regularly frames came, what was counted, each run's percentiles.
 
 use super::figures::{PERCENTILES, percentiles};
-use super::markup::{Cell, Table, folded, number, words as text};
+use super::markup::{Cell, Table, folded, list, number, words as text};
 use super::words;
 use crate::report::model::{ArrivalRow, PercentilesNs, RunPart};
 use std::collections::{BTreeMap, BTreeSet};
@@ -86,25 +86,45 @@ pub(super) fn counts(runs: &[RunPart]) -> String {
             Cell::Judged(part.passed, verdict.into()),
         ]);
     }
-    format!("{}{}{}", table.html_or("No run was given."), counted(runs), each_percentiles(runs))
+    format!(
+        "{}{}{}{}",
+        table.html_or("No run was given."),
+        lacking(runs),
+        counted(runs),
+        each_percentiles(runs)
+    )
 }
 
-/// A row for each count, its sum first.
+/// What folders do not hold, and the page therefore does not say.
+fn lacking(runs: &[RunPart]) -> String {
+    let said = runs.iter().enumerate().filter(|(_, part)| !part.lacks.is_empty());
+    let said = said.map(|(run, part)| format!("<h3>Run {run} lacks</h3>\n{}", list(&part.lacks, "")));
+    said.collect()
+}
+
+/// A row for each count, its sum first. Counts of parts that are 0 throughout are folded away; those of the whole always stand.
 fn counted(runs: &[RunPart]) -> String {
     let names: BTreeSet<&str> = runs.iter().flat_map(|run| run.counts.keys().map(String::as_str)).collect();
-    let several = runs.len() > 1;
-    let columns = (0..runs.len()).map(|run| format!("run {run}"));
-    let sum = several.then(|| "all".to_owned());
-    let mut table = Table::new("Counts", ["count".to_owned()].into_iter().chain(sum).chain(columns));
-    for name in names {
-        let value = |run: &RunPart| run.counts.get(name).copied();
-        let sum: u64 = runs.iter().filter_map(value).fold(0, u64::saturating_add);
-        let told = |run: &RunPart| number(value(run).map_or_else(|| words::NOTHING.into(), words::count));
-        let sum = several.then(|| number(words::count(sum)));
-        let cells: Vec<_> = [text(name)].into_iter().chain(sum).chain(runs.iter().map(told)).collect();
-        table.row(cells);
+    let value = |run: &RunPart, name: &str| run.counts.get(name).copied();
+    let is_shown = |name: &&str| !name.contains('.') || runs.iter().any(|run| value(run, name) > Some(0));
+    let (shown, zero): (Vec<_>, Vec<_>) = names.into_iter().partition(is_shown);
+    let table = |names: &[&str]| {
+        let sum = (runs.len() > 1).then(|| "all".to_owned());
+        let columns = (0..runs.len()).map(|run| format!("run {run}"));
+        let mut table = Table::new("Counts", ["count".to_owned()].into_iter().chain(sum).chain(columns));
+        for name in names {
+            let sum = runs.iter().filter_map(|run| value(run, name)).fold(0, u64::saturating_add);
+            let sum = (runs.len() > 1).then(|| number(words::count(sum)));
+            let told = |run| number(value(run, name).map_or_else(|| words::NOTHING.into(), words::count));
+            table.row([text(*name)].into_iter().chain(sum).chain(runs.iter().map(told)));
+        }
+        table.html_or("Nothing was counted.")
+    };
+    if zero.is_empty() {
+        return table(&shown);
     }
-    table.html_or("Nothing was counted.")
+    let summary = format!("{} that are 0 in every run", words::counted(zero.len() as u64, "count", "counts"));
+    table(&shown) + &folded(&summary, &table(&zero))
 }
 
 fn each_percentiles(runs: &[RunPart]) -> String {
