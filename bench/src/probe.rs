@@ -113,10 +113,12 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
             scope.spawn(move || {
                 let begun = begin(cpu);
                 let good = begun.is_ok();
+                // Before it is told: what comes between the telling and a first look would be nobody's gap.
+                let looking = Looking::begin(gap_ns, continued);
                 // Whoever waits for it takes what comes.
                 let _ = ready.send(begun);
                 if good {
-                    watch(cpu, gap_ns, continued, &sender, watched);
+                    looking.go_on(cpu, &sender, watched);
                 }
             });
         }
@@ -177,25 +179,36 @@ fn begin(cpu: usize) -> Result<(), ProbeError> {
     })
 }
 
-fn watch(cpu: usize, gap_ns: u64, continued: Continued, gaps: &Sender<(usize, Gap)>, watched: &Watched) {
-    let mut vitals = VitalsReader::new(continued);
-    let mut watch = GapWatch::new(gap_ns, MonotonicClock.now().as_nanos());
-    let mut going_on = true;
-    while going_on {
-        // Looked at before the clock, so that a gap that outlasts the run is told too.
-        going_on = !watched.stop.came();
-        let counts = || {
-            let read = vitals.read();
-            Counts {
-                voluntary_switches: read.voluntary_switches,
-                involuntary_switches: read.involuntary_switches,
-                run_delay_ns: read.run_delay_ns,
+/// A thread that looks at the clock over and over.
+struct Looking {
+    vitals: VitalsReader,
+    watch: GapWatch,
+}
+
+impl Looking {
+    fn begin(gap_ns: u64, continued: Continued) -> Self {
+        let vitals = VitalsReader::new(continued);
+        Self { vitals, watch: GapWatch::new(gap_ns, MonotonicClock.now().as_nanos()) }
+    }
+
+    fn go_on(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, watched: &Watched) {
+        let mut going_on = true;
+        while going_on {
+            // Looked at before the clock, so that a gap that outlasts the run is told too.
+            going_on = !watched.stop.came();
+            let counts = || {
+                let read = self.vitals.read();
+                Counts {
+                    voluntary_switches: read.voluntary_switches,
+                    involuntary_switches: read.involuntary_switches,
+                    run_delay_ns: read.run_delay_ns,
+                }
+            };
+            if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), counts)
+                && gaps.try_send((cpu, gap)).is_err()
+            {
+                watched.dropped.fetch_add(1, Ordering::Relaxed);
             }
-        };
-        if let Some(gap) = watch.look(MonotonicClock.now().as_nanos(), counts)
-            && gaps.try_send((cpu, gap)).is_err()
-        {
-            watched.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
