@@ -3,6 +3,7 @@
 //! Counting is on the way of a frame, so it keeps identifiers as numbers; they become names when a report is written.
 
 use crate::can::CanFrame;
+use crate::wire_time::WireTimeReport;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -26,9 +27,13 @@ impl FramesById {
     /// Frames of each identifier, by its name.
     #[must_use]
     pub fn by_name(&self) -> BTreeMap<String, u64> {
-        let name =
-            |raw_id: u32| if raw_id < 0x800 { format!("{raw_id:03X}") } else { format!("{raw_id:08X}") };
-        self.0.iter().map(|(raw_id, frames)| (name(*raw_id), *frames)).collect()
+        self.0.iter().map(|(raw_id, frames)| (Self::name_of(*raw_id), *frames)).collect()
+    }
+
+    /// Name of an identifier with the kernel's flags.
+    #[must_use]
+    pub fn name_of(raw_id: u32) -> String {
+        if raw_id < 0x800 { format!("{raw_id:03X}") } else { format!("{raw_id:08X}") }
     }
 }
 
@@ -60,6 +65,9 @@ pub struct HostReport {
     pub malformed: u64,
     /// The peers in the order in which they came.
     pub peers: Vec<PeerReport>,
+    /// What a wire that keeps time counted; left out where it takes none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wire_time: Option<WireTimeReport>,
 }
 
 #[cfg(test)]
