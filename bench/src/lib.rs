@@ -14,6 +14,7 @@
 //! | [`picture`] | the pictures of a run: all of it, and around its step or its emergency stop |
 //! | [`runs`] | several runs: whether they are of one experiment, their figures |
 //! | [`grid`] | a table of words in Markdown and HTML |
+//! | [`page_style`] | what all pages share: stylesheet, frame, text made safe |
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
 //! | [`spread`] | how much the figures of repetitions spread |
 //! | [`report`] | the latency report |
@@ -25,6 +26,7 @@ pub mod drawing;
 pub mod figures;
 pub mod grid;
 pub mod join;
+pub mod page_style;
 pub mod picture;
 pub mod record;
 pub mod report;

@@ -23,6 +23,7 @@
 //! | [`bounds`] | a threshold file held against a report |
 //! | [`markdown`] | the summary for a merge request, and the short table |
 //! | [`jitterdebugger`] | wake-up latencies in its JSON |
+//! | [`page`] | the report as one page |
 //! | [`output`] | all files of a report |
 
 pub mod bounds;
@@ -42,6 +43,7 @@ pub mod kinds;
 pub mod markdown;
 pub mod model;
 pub mod output;
+pub mod page;
 pub mod parts;
 pub mod probe;
 pub mod ratios;
