@@ -31,6 +31,8 @@ pub struct RunFiles {
     pub rows: BTreeMap<String, Vec<CycleTiming>>,
     /// Whether the rows are those of the whole run.
     pub whole: bool,
+    /// The flight recorder's word for how late a process was in a cycle, ns: it knows sensors that waited and were overtaken.
+    pub told_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
     /// Gaps that the probe saw; nothing when it did not run.
     pub gaps: Option<Vec<Gap>>,
     /// The reference beside this run.
@@ -103,7 +105,7 @@ impl RunFiles {
         self.parse(name, |text| serde_json::from_str(text)).unwrap_or_default()
     }
 
-    /// Rows of the flight recorder's dumps, for processes that did not write all of theirs.
+    /// What the flight recorder's dumps tell, and their rows for processes that did not write all of theirs.
     fn take_flights(&mut self) {
         let Ok(entries) = std::fs::read_dir(self.folder.join("flight")) else { return };
         let mut names: Vec<_> =
@@ -113,10 +115,17 @@ impl RunFiles {
         for name in names {
             // PROCESS-CYCLE-TRIGGER, and a process may have a dash in its name.
             let Some(process) = name.rsplitn(3, '-').nth(2) else { continue };
-            if self.rows.contains_key(process) || !PROCESSES.contains(&process) {
+            if !PROCESSES.contains(&process) {
                 continue;
             }
             let process = process.to_owned();
+            let event = self.json(&format!("flight/{name}/event.json"));
+            if let (Some(cycle), Some(late_ns)) = (event["cycle"].as_u64(), event["late_ns"].as_u64()) {
+                self.told_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
+            }
+            if self.rows.contains_key(&process) {
+                continue;
+            }
             let rows = self.parse(&format!("flight/{name}/timing.csv"), timing::read).unwrap_or_default();
             taken.entry(process).or_default().extend(rows.into_iter().map(|row| (row.cycle, row)));
         }

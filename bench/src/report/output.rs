@@ -9,7 +9,7 @@
 //! | `jitterdebugger.json` | jitterplot and its like |
 
 use super::hlog::{self, Interval};
-use super::{Made, ReportError, jitterdebugger, markdown};
+use super::{Made, ReportError, jitterdebugger, markdown, page};
 use protocol::run_folder::write_json;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -29,7 +29,7 @@ pub fn write(made: &Made, folder: &Path, markdown_only: bool) -> Result<(), Repo
     if markdown_only {
         return Ok(());
     }
-    text("report.html", page(made))?;
+    text("report.html", page::page(&made.report))?;
     let path = folder.join("report.json");
     write_json(&path, &made.report).map_err(|error| ReportError::write(&path, error))?;
     let path = folder.join("jitterdebugger.json");
@@ -37,11 +37,6 @@ pub fn write(made: &Made, folder: &Path, markdown_only: bool) -> Result<(), Repo
         .map_err(|error| ReportError::write(&path, error))?;
     let path = folder.join("latency.hlog");
     log(made, &path).map_err(|error| ReportError::write(&path, error))
-}
-
-fn page(made: &Made) -> String {
-    let table = crate::grid::escaped(&markdown::summary(&made.report));
-    format!("<!doctype html><meta charset=\"utf-8\"><title>Latency report</title><pre>{table}</pre>\n")
 }
 
 /// Each distribution of each run as one interval, from the run's start on; the base time is that of the first run.
