@@ -1,7 +1,7 @@
 //! What disturbed the runs as a whole: from the events and from what all processes counted.
 //!
-//! What somebody did comes first, in the order of [`Cause`]: a stopped process, another thread on the CPU, pages, a listener that does
-//! not read, a wire that loses, a stepped clock. What machines do by themselves comes last. A counter is a witness that
+//! What somebody did comes first, in the order of [`Cause`]: a stopped process, another thread on the CPU, pages, a listener that
+//! does not read, a wire that loses, a stepped clock. What machines do by themselves comes last. A counter is a witness that
 //! needs no interpretation, so counters speak even where no late cycle followed.
 
 use super::explain::rules::in_words;
@@ -13,8 +13,8 @@ use serde_json::Value;
 const STORM_FAULTS: u64 = 1000;
 /// Share of cycles with faults that is one.
 const STORM_SHARE: f64 = 0.05;
-/// Contention is a finding from one event of the first length on, or from so many of the second. Less is what interrupts and kernel
-/// threads do now and then, and what a virtual CPU that its host takes away between two threads looks like: it stays with its
+/// Contention is a finding from one event of the first length on, or from so many of the second. Less is what interrupts and
+/// kernel threads do now and then, and what a virtual CPU that its host takes away between two threads looks like: it stays with its
 /// events. A guess, held against ten undisturbed runs by `scripts/disturb`.
 const CONTENTION_LATE_NS: u64 = 4_000_000;
 const CONTENTION_EVENTS: usize = 10;
