@@ -8,8 +8,6 @@ use super::{kinds, reference};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Longest interval of a log whose maximum is one of a second; older logs hold the run in one interval.
-const LONGEST_SECOND_S: f64 = 1.5;
 /// Share of one-way latencies that may be below zero before the report says so.
 const BELOW_ZERO_SHARE: f64 = 0.01;
 
@@ -24,15 +22,7 @@ const SUMMARY_KEYS: [(&str, &str); 4] = [
 /// The distributions of a run, by tag, the reference's among them; tells what could not be had.
 #[must_use]
 pub fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
-    let mut found: BTreeMap<String, Series> = BTreeMap::new();
-    for interval in &run.intervals {
-        let series = found.entry(interval.tag.clone()).or_default();
-        series.samples.add(&interval.samples);
-        if let Some(max_ns) = interval.samples.max_ns().filter(|_| interval.duration_s <= LONGEST_SECOND_S) {
-            let largest = series.maxima_ns.entry(interval.start_s as u64).or_default();
-            *largest = max_ns.max(*largest);
-        }
-    }
+    let mut found = run.logged.clone();
     if run.whole {
         for (process, rows) in &run.rows {
             for (tag, series) in joined::of_rows(process, rows) {
@@ -140,22 +130,20 @@ fn one(tag: &str, samples: &Samples, runs: &[BTreeMap<String, Series>]) -> Distr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::hlog::Interval;
+    use crate::report::hlog::Passing;
     use crate::report::made_up;
     use serde_json::json;
 
-    fn interval(tag: &str, start_s: f64, duration_s: f64, values_ns: &[u64]) -> Interval {
-        Interval { tag: tag.into(), start_s, duration_s, samples: values_ns.iter().copied().collect() }
-    }
-
     #[test]
     fn intervals_add_up_and_each_has_its_maximum() {
-        let intervals = vec![
-            interval("emulator-wakeup", 0.0, 1.0, &[5, 100]),
-            interval("emulator-wakeup", 1.0, 1.0, &[7]),
-            interval("emulator-send", 0.0, 60.0, &[9]),
-        ];
-        let mut run = RunFiles { intervals, ..RunFiles::default() };
+        let mut run = RunFiles::default();
+        let mut take = |tag: &str, start_s: f64, duration_s: f64, values_ns: &[u64]| {
+            let samples: Samples = values_ns.iter().copied().collect();
+            run.take_interval(Passing { tag, start_s, duration_s, histogram: samples.histogram() });
+        };
+        take("emulator-wakeup", 0.0, 1.0, &[5, 100]);
+        take("emulator-wakeup", 1.0, 1.0, &[7]);
+        take("emulator-send", 0.0, 60.0, &[9]);
         let series = of_run(&mut run);
         let runs = [series.clone(), series];
         let shown = shown(&runs, &add_up(&runs));

@@ -13,6 +13,7 @@
 pub mod rules;
 
 use super::files::RunFiles;
+use super::findings::lost_by_gaps;
 use super::joined::PERIOD_NS;
 use super::model::{AroundRow, Event, ProbeGap};
 use super::probe::Gap;
@@ -28,6 +29,8 @@ const CLUSTER_CYCLES: u64 = 5;
 const AROUND_CYCLES: u64 = 5;
 /// Rows after an event in which the count of a SIGCONT may stand: its handler runs in whichever thread comes first.
 const CONTINUED_WITHIN_CYCLES: u64 = 5;
+/// Cycles in a row that were sent and not answered, from which on a controller is taken as not having read them.
+const OVERTAKEN_CYCLES: usize = 2;
 /// Time on each side of an event from which gaps of the probe are shown, ns.
 const GAPS_WITHIN_NS: u64 = 2 * PERIOD_NS;
 /// Gaps shown for an event, the longest.
@@ -79,12 +82,12 @@ fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<Late> {
     let mut executions: Vec<_> = rows.iter().map(execution_ns).collect();
     executions.sort_unstable();
     let usual_ns = executions.get(executions.len() / 2).copied().unwrap_or_default();
-    let rig = if process == "emulator" { None } else { run.rows.get("emulator") };
+    let lost = lost_by_gaps(run);
     let with_late = |place: usize| {
         let row = &rows[place];
         let (missed, due_ns) = match process {
             "emulator" => (row.skipped, row.due_ns.saturating_sub(row.skipped * PERIOD_NS)),
-            _ => missed_by_controller(place, rows, rig.map(Vec::as_slice), run.whole),
+            _ => missed_by_controller(place, process, run, lost),
         };
         let late_ns = row.woke_ns.saturating_sub(due_ns);
         Late { place, missed, due_ns, late_ns, slow_ns: execution_ns(row).saturating_sub(usual_ns) }
@@ -93,31 +96,37 @@ fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<Late> {
     all.filter(|late| late.missed > 0 || late.severity_ns() > EVENT_OVER_NS).collect()
 }
 
-/// Cycles whose sensors a controller had and let pass, and when the first of them arrived: those without a row of its own, less
-/// those that it never had sensors of.
-fn missed_by_controller(
-    place: usize,
-    rows: &[CycleTiming],
-    rig: Option<&[CycleTiming]>,
-    whole: bool,
-) -> (u64, u64) {
+/// Cycles whose sensors a controller had and let pass, and when the first of them arrived.
+///
+/// Its row counts all cycles without one of their own, be their sensors overtaken, lost or never sent. The rig's rows tell which
+/// were sent, and the flight recorder for how long the oldest sensors waited. Without its word, several cycles in a row that were
+/// sent and of which nothing was lost in the whole run must have been overtaken.
+fn missed_by_controller(place: usize, process: &str, run: &RunFiles, lost: u64) -> (u64, u64) {
+    let rows = &run.rows[process];
     let row = &rows[place];
-    let due_ns = row.due_ns;
+    let told_ns = run.told_late_ns.get(process).and_then(|told| told.get(&row.cycle));
+    let own_ns = row.woke_ns.saturating_sub(row.due_ns);
+    let came_ns = told_ns.map(|late_ns| row.woke_ns.saturating_sub((*late_ns).max(own_ns)));
     // Between dumps of the flight recorder lie cycles that nobody missed.
-    let Some(before) = place.checked_sub(1).map(|before| &rows[before]).filter(|_| whole) else {
-        return (0, due_ns);
+    let before = place.checked_sub(1).map(|before| &rows[before]).filter(|_| run.whole);
+    let Some(before) = before.filter(|before| row.cycle > before.cycle + 1) else {
+        return (0, came_ns.unwrap_or(row.due_ns));
     };
-    let between = row.cycle.saturating_sub(before.cycle + 1);
-    let missed = between.saturating_sub(row.skipped);
-    if missed == 0 {
-        return (0, due_ns);
-    }
-    let first = row.cycle - missed;
-    let sent_ns = rig.and_then(|rig| {
-        let sent = &rig[rig.binary_search_by_key(&first, |row| row.cycle).ok()?];
+    let Some(rig) = run.rows.get("emulator") else { return (0, came_ns.unwrap_or(row.due_ns)) };
+    let from = rig.partition_point(|sent| sent.cycle <= before.cycle);
+    let sent_ns = rig[from..].iter().take_while(|sent| sent.cycle < row.cycle).filter_map(|sent| {
         [sent.drive.sensors_ns, sent.load.sensors_ns].into_iter().filter(|ns| *ns > 0).min()
     });
-    (missed, sent_ns.unwrap_or_else(|| due_ns.saturating_sub(missed * PERIOD_NS)).min(due_ns))
+    let (missed, first_ns) = match came_ns {
+        // Sent a moment before they came.
+        Some(came_ns) => (sent_ns.filter(|ns| ns + PERIOD_NS / 2 >= came_ns).count() as u64, came_ns),
+        None => {
+            let sent_ns: Vec<_> = sent_ns.collect();
+            let overtaken = lost == 0 && sent_ns.len() >= OVERTAKEN_CYCLES;
+            if overtaken { (sent_ns.len() as u64, sent_ns[0]) } else { (0, row.due_ns) }
+        }
+    };
+    (missed, first_ns.min(row.due_ns))
 }
 
 fn clusters<'a>(late: &'a [Late], rows: &[CycleTiming]) -> Vec<&'a [Late]> {

@@ -1,6 +1,7 @@
 //! What a run left in its folder, read as far as it is there: what is missing or damaged is told, and the rest is used.
 
-use super::hlog::{self, Interval};
+use super::hlog::{self, Passing};
+use super::joined::Series;
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use protocol::timing::{self, CycleTiming};
@@ -11,6 +12,9 @@ use std::path::{Path, PathBuf};
 
 /// Processes of a run that leave files, by the first part of their files' names.
 pub const PROCESSES: [&str; 4] = ["emulator", "controller", "controller-drive", "controller-load"];
+
+/// Longest interval of a log whose maximum is one of a second; older logs hold the run in one interval.
+const LONGEST_SECOND_S: f64 = 1.5;
 
 /// One run as it was read.
 #[derive(Clone, Debug, Default)]
@@ -25,12 +29,16 @@ pub struct RunFiles {
     pub conditions: Value,
     /// `controller*.json` by process.
     pub controllers: BTreeMap<String, Value>,
-    /// Intervals of all logs, on the time of their own log.
-    pub intervals: Vec<Interval>,
+    /// Distributions of all logs by tag, with the maximum of each second.
+    pub logged: BTreeMap<String, Series>,
+    /// End of the last interval of a log, s from its base time.
+    pub logged_until_s: f64,
     /// Rows of each process, rising by cycle: of the whole run, or those of the flight recorder.
     pub rows: BTreeMap<String, Vec<CycleTiming>>,
     /// Whether the rows are those of the whole run.
     pub whole: bool,
+    /// The flight recorder's word for how late a process was in a cycle, ns: it knows sensors that waited and were overtaken.
+    pub told_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
     /// Gaps that the probe saw; nothing when it did not run.
     pub gaps: Option<Vec<Gap>>,
     /// The reference beside this run.
@@ -61,8 +69,7 @@ impl RunFiles {
                     run.controllers.insert(process.into(), told);
                 }
             }
-            let intervals = run.parse(&format!("{process}.hlog"), hlog::read);
-            run.intervals.extend(intervals.unwrap_or_default().into_iter().map(with_todays_tag));
+            run.take_log(&format!("{process}.hlog"));
             if let Some(rows) = run.parse(&format!("{process}-timing.csv"), timing::read) {
                 run.whole = true;
                 run.rows.insert(process.into(), rows);
@@ -103,7 +110,33 @@ impl RunFiles {
         self.parse(name, |text| serde_json::from_str(text)).unwrap_or_default()
     }
 
-    /// Rows of the flight recorder's dumps, for processes that did not write all of theirs.
+    /// A log, up to where it is damaged.
+    fn take_log(&mut self, name: &str) {
+        let Some(text) = self.text(name) else { return };
+        let read = hlog::each(&text, |passing| self.take_interval(passing));
+        if let Err(error) = read {
+            self.lacks.push(format!("{name} is damaged and was read up to there: {error}"));
+        }
+    }
+
+    /// An interval of a log.
+    pub fn take_interval(&mut self, passing: Passing<'_>) {
+        let Passing { tag, start_s, duration_s, histogram } = passing;
+        // Logs from before the load axis had a round trip of its own name the drive's without its axis.
+        let tag = if tag == "round-trip" { "drive-round-trip" } else { tag };
+        if !self.logged.contains_key(tag) {
+            self.logged.insert(tag.to_owned(), Series::default());
+        }
+        let Some(series) = self.logged.get_mut(tag) else { return };
+        series.samples.add_histogram(histogram);
+        if !histogram.is_empty() && duration_s <= LONGEST_SECOND_S {
+            let largest = series.maxima_ns.entry(start_s as u64).or_default();
+            *largest = histogram.max().max(*largest);
+        }
+        self.logged_until_s = self.logged_until_s.max(start_s + duration_s);
+    }
+
+    /// What the flight recorder's dumps tell, and their rows for processes that did not write all of theirs.
     fn take_flights(&mut self) {
         let Ok(entries) = std::fs::read_dir(self.folder.join("flight")) else { return };
         let mut names: Vec<_> =
@@ -113,10 +146,17 @@ impl RunFiles {
         for name in names {
             // PROCESS-CYCLE-TRIGGER, and a process may have a dash in its name.
             let Some(process) = name.rsplitn(3, '-').nth(2) else { continue };
-            if self.rows.contains_key(process) || !PROCESSES.contains(&process) {
+            if !PROCESSES.contains(&process) {
                 continue;
             }
             let process = process.to_owned();
+            let event = self.json(&format!("flight/{name}/event.json"));
+            if let (Some(cycle), Some(late_ns)) = (event["cycle"].as_u64(), event["late_ns"].as_u64()) {
+                self.told_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
+            }
+            if self.rows.contains_key(&process) {
+                continue;
+            }
             let rows = self.parse(&format!("flight/{name}/timing.csv"), timing::read).unwrap_or_default();
             taken.entry(process).or_default().extend(rows.into_iter().map(|row| (row.cycle, row)));
         }
@@ -138,7 +178,7 @@ impl RunFiles {
         if self.controllers.is_empty() {
             lack("no readable controller*.json: what the controllers counted is not known");
         }
-        if self.intervals.is_empty() {
+        if self.logged.is_empty() {
             lack("no readable *.hlog: percentiles are those of the summaries, without histogram and maxima");
         }
         if !self.whole {
@@ -159,8 +199,7 @@ impl RunFiles {
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         let told = self.summary["cycles"].as_u64().map(|cycles| cycles as f64 * 1e-3);
-        let logged = || self.intervals.iter().map(|part| part.start_s + part.duration_s).fold(0.0, f64::max);
-        told.unwrap_or_else(logged)
+        told.unwrap_or(self.logged_until_s)
     }
 
     /// `summary.json` and each `controller*.json`, by process.
@@ -180,12 +219,4 @@ impl RunFiles {
 
 fn words_of(told: &Value) -> Vec<&str> {
     told["realtime_granted"].as_array().into_iter().flatten().filter_map(Value::as_str).collect()
-}
-
-/// Logs from before the load axis had a round trip of its own name the drive's without its axis.
-fn with_todays_tag(mut interval: Interval) -> Interval {
-    if interval.tag == "round-trip" {
-        interval.tag = "drive-round-trip".into();
-    }
-    interval
 }

@@ -10,6 +10,7 @@
 use super::samples::Samples;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use hdrhistogram::Histogram;
 use hdrhistogram::serialization::interval_log::{
     IntervalLogHistogram, IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry,
     Tag,
@@ -41,38 +42,66 @@ pub struct LogError {
     pub reason: String,
 }
 
-/// Reads all intervals of a log.
+/// A histogram of a stretch of time, as it is read: gone when the next one comes, since an hour of them would fill the memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Passing<'a> {
+    /// Name of the distribution.
+    pub tag: &'a str,
+    /// Start, s from the log's base time.
+    pub start_s: f64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// The samples.
+    pub histogram: &'a Histogram<u64>,
+}
+
+/// Hands each interval of a log to `take`.
 ///
 /// # Errors
-/// [`LogError`] at the first line that is no interval.
-pub fn read(text: &str) -> Result<Vec<Interval>, LogError> {
+/// [`LogError`] at the first line that is no interval; those before it were handed out.
+pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogError> {
     let mut deserializer = Deserializer::new();
-    let mut intervals = Vec::new();
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     for (place, line) in whole.split_inclusive('\n').enumerate() {
         let failed = |reason: String| LogError { line: place + 1, reason };
         for entry in IntervalLogIterator::new(line.as_bytes()) {
             match entry {
                 Ok(LogEntry::Interval(told)) => {
-                    intervals.push(decode(&told, &mut deserializer).map_err(failed)?)
+                    let histogram = decode(&told, &mut deserializer).map_err(failed)?;
+                    take(Passing {
+                        tag: told.tag().map_or("", |tag| tag.as_str()),
+                        start_s: told.start_timestamp().as_secs_f64(),
+                        duration_s: told.duration().as_secs_f64(),
+                        histogram: &histogram,
+                    });
                 }
                 Ok(_) => {}
                 Err(_) => return Err(failed("neither an interval nor a comment".into())),
             }
         }
     }
+    Ok(())
+}
+
+/// Reads a log of few intervals.
+///
+/// # Errors
+/// As [`each`].
+pub fn read(text: &str) -> Result<Vec<Interval>, LogError> {
+    let mut intervals = Vec::new();
+    each(text, |Passing { tag, start_s, duration_s, histogram }| {
+        let samples = Samples::from_histogram(histogram);
+        intervals.push(Interval { tag: tag.to_owned(), start_s, duration_s, samples });
+    })?;
     Ok(intervals)
 }
 
-fn decode(told: &IntervalLogHistogram<'_>, deserializer: &mut Deserializer) -> Result<Interval, String> {
+fn decode(
+    told: &IntervalLogHistogram<'_>,
+    deserializer: &mut Deserializer,
+) -> Result<Histogram<u64>, String> {
     let bytes = STANDARD.decode(told.encoded_histogram()).map_err(|error| error.to_string())?;
-    let histogram = deserializer.deserialize(&mut bytes.as_slice()).map_err(|error| error.to_string())?;
-    Ok(Interval {
-        tag: told.tag().map_or("", |tag| tag.as_str()).to_owned(),
-        start_s: told.start_timestamp().as_secs_f64(),
-        duration_s: told.duration().as_secs_f64(),
-        samples: Samples::from_histogram(&histogram),
-    })
+    deserializer.deserialize(&mut bytes.as_slice()).map_err(|error| error.to_string())
 }
 
 /// Writes intervals, in the order given, as a log with this base time in s since 1970.

@@ -4,8 +4,8 @@
 //! key `distribution` says whose it is. Values are whole us with the fraction left out, as there.
 //!
 //! # Source
-//! jitterdebugger, <https://github.com/igaw/jitterdebugger>, `dump_stats` of format version 2: keys `version`, `sysinfo`, `cpu`, and in
-//! each CPU `histogram` (us to samples), `count`, `min`, `max`, `avg`.
+//! jitterdebugger, <https://github.com/igaw/jitterdebugger>, `dump_stats` of format version 2: keys `version`, `sysinfo`, `cpu`,
+//! and in each CPU `histogram` (us to samples), `count`, `min`, `max`, `avg`.
 
 use super::files::RunFiles;
 use super::samples::Samples;

@@ -206,16 +206,17 @@ fn frames(report: &Report) -> String {
 
 fn conditions(report: &Report) -> String {
     let told = &report.conditions;
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    let mut row = |name: &str, value: &str| rows.push(vec![name.to_owned(), value.to_owned()]);
-    row("load generator", told.load_generator.as_deref().unwrap_or("not told"));
-    row("reference", told.reference.as_deref().unwrap_or("none"));
+    let mut lines: Vec<String> = Vec::new();
+    // A list, because command lines would make a table of any width.
+    let mut line = |name: &str, value: &str| lines.push(format!("{name}: {value}"));
+    line("load generator", told.load_generator.as_deref().unwrap_or("not told"));
+    line("reference", told.reference.as_deref().unwrap_or("none"));
     if let Some(why) = &told.reference_missing_because {
-        row("no reference because", why);
+        line("no reference because", why);
     }
-    row("spin-gap probe", if told.probe { "on" } else { "off" });
+    line("spin-gap probe", if told.probe { "on" } else { "off" });
     for fact in told.command_lines.iter().chain(&told.privileges).chain(&told.machine) {
-        row(&fact.name, &fact.value);
+        line(&fact.name, &fact.value);
     }
-    Grid { head: words(["what", "value"]), rows }.markdown()
+    list(&lines)
 }

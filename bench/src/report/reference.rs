@@ -5,8 +5,8 @@
 //! they are taken as its largest sample, which none of them exceeds.
 //!
 //! # Source
-//! rt-tests 2.4 as Debian 12 ships it: keys `cmdline:` and `thread`, with `histogram`, `cycles`, `max` in each; read from a file it
-//! wrote. `resolution_in_ns` is 1 with `-N`, else 0.
+//! rt-tests 2.4 as Debian 12 ships it: keys `cmdline:` and `thread`, with `histogram`, `cycles`, `max` in each; read from a
+//! file it wrote. `resolution_in_ns` is 1 with `-N`, else 0.
 
 use super::samples::Samples;
 use serde::Deserialize;

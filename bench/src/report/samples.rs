@@ -56,7 +56,8 @@ impl Samples {
         self.add_histogram(&other.histogram);
     }
 
-    fn add_histogram(&mut self, other: &Histogram<u64>) {
+    /// Adds all samples of a histogram with bounds of its own.
+    pub fn add_histogram(&mut self, other: &Histogram<u64>) {
         if self.histogram.add(other).is_err() {
             // Beyond our bound: one by one, clipped.
             other.iter_recorded().for_each(|bin| self.record(bin.value_iterated_to(), bin.count_at_value()));

@@ -84,7 +84,7 @@ fn what_is_missing_or_damaged_is_told_and_the_rest_is_used() {
     let lacks = report.runs[0].lacks.join("\n");
     for words in [
         "summary.json",
-        "emulator.hlog is damaged and was left out: line 1",
+        "emulator.hlog is damaged and was read up to there: line 1",
         "controller-timing.csv is damaged and was left out: line 8",
     ] {
         assert!(lacks.contains(words), "{words} in {lacks}");

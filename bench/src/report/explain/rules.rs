@@ -6,7 +6,7 @@
 //! |---|---|
 //! | the process was continued by SIGCONT in these cycles | emulator-stopped, controller-stopped |
 //! | the probe saw the CPU stand still, no thread running on it, for half of it or more | machine-stood-still |
-//! | the thread waited for the CPU for half of it or more, and the other process was late in the same moment without waiting for one | machine-stood-still |
+//! | as the next, and the other process was late in the same moment without waiting for a CPU | machine-stood-still |
 //! | the thread waited for the CPU for half of it or more | cpu-contention |
 //! | more page faults than 20, or faults that explain a third of it | page-faults |
 //! | the work was slow, nobody else was, and nothing else is known of it | unexplained |
@@ -14,8 +14,8 @@
 //! | the kernel does not tell how long threads wait | unexplained |
 //! | none of these | machine-stood-still, as what is left |
 //!
-//! A late timer interrupt leaves no trace in the scheduler: the thread was not yet ready, so it did not wait, and nobody was ahead
-//! of it. On a virtual machine that is how its host's doings look from inside. What another CPU wakes is ready at once: there
+//! A late timer interrupt leaves no trace in the scheduler: the thread was not yet ready, so it did not wait, and nobody was
+//! ahead of it. On a virtual machine that is how its host's doings look from inside. What another CPU wakes is ready at once: there
 //! a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
 
 use crate::report::model::Cause;

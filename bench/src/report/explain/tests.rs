@@ -45,6 +45,19 @@ fn a_stopped_controller_is_late_from_the_first_sensors_that_it_let_wait() {
 }
 
 #[test]
+fn the_flight_recorder_knows_how_long_sensors_waited() {
+    let mut run = made_up::run(500);
+    made_up::stall(&mut run, "controller", 200, 1_300_000).vitals.continued = 1;
+    run.summary["frames_lost_at_rig"] = 9.into();
+    let quiet = events(0, &run);
+    assert!(quiet.iter().all(|event| event.skipped == 0), "a single cycle may have been lost: {quiet:#?}");
+    run.told_late_ns.insert("controller".into(), BTreeMap::from([(201, 1_310_000)]));
+    let event = one(&run);
+    assert_eq!((event.cause, event.cycle, event.skipped), (Cause::ControllerStopped, 200, 1));
+    assert_eq!(event.late_ns, 1_310_000);
+}
+
+#[test]
 fn sensors_that_were_lost_are_no_missed_cycles() {
     let mut run = made_up::run(500);
     let rows = run.rows.get_mut("controller").unwrap();
