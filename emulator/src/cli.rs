@@ -32,7 +32,16 @@ pub enum Command {
     /// Host an embedded bus alone, without a rig.
     Bus(BusArguments),
     /// Print the worst-case load of the bus and each frame's worst-case response time, computed from rig.dbc.
-    BusLoad,
+    BusLoad(BusLoadArguments),
+}
+
+/// What to print of the bus's load.
+#[derive(Args, Debug)]
+pub struct BusLoadArguments {
+    /// Print a table in Markdown instead: each frame's bound, what the modelled wire shows at its critical instant, and what the
+    /// run of this summary.json, over a bus with a bit rate, showed.
+    #[arg(long, value_name = "SUMMARY")]
+    pub markdown: Option<PathBuf>,
 }
 
 /// How to run the rig.

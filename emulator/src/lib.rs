@@ -15,6 +15,7 @@
 //! | [`console`] | what a person types |
 //! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
 
+pub mod bus_load;
 pub mod cli;
 pub mod commands;
 pub mod console;

@@ -1,6 +1,7 @@
 //! Process 1: the plant behind a bus, in real time.
 
 use clap::Parser;
+use emulator::bus_load;
 use emulator::cli::{BusArguments, Cli, Command, DEFAULT_FIFO_PRIORITY};
 use emulator::run::{self, RunError};
 use protocol::bus::BusUrl;
@@ -17,17 +18,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Bus(arguments) => host_bus(&arguments),
-        Command::BusLoad => {
-            #[allow(clippy::print_stdout)] // the table is the command's result
-            {
-                println!("{}\n", protocol::bus_load::BusLoad::of_rig());
-                println!(
-                    "{}",
-                    protocol::response_time::rig::RigAnalysis::worst_case(protocol::frames::BIT_RATE_PER_S)
-                );
-            }
-            Ok(Exit::Good)
-        }
+        Command::BusLoad(arguments) => bus_load::print(&arguments),
     };
     let exit = result.unwrap_or_else(|error| {
         eprintln!("emulator: {error}");

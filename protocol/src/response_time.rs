@@ -15,12 +15,13 @@
 //! delayed by a frame that was pushed through meanwhile. A response counts from the queue (the paper adds J, which counts from the
 //! event behind it), and to the end of the intermission.
 //!
-//! `rig` knows the frames of `rig.dbc`. What a wire does is modelled apart, in [`crate::wire_time`], and tests hold both against
+//! `rig` knows the frames of `rig.dbc`, `critical` plays their worst case. What a wire does is modelled apart, in [`crate::wire_time`], and tests hold both against
 //! each other.
 //!
 //! Source: Davis, Burns, Bril, Lukkien, "Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised",
 //! Real-Time Systems 35 (2007), section 3.2, and 3.4 for errors.
 
+pub mod critical;
 pub mod rig;
 
 /// How frames of one identifier come at most.

@@ -135,9 +135,13 @@ impl Host {
     pub(super) fn turn(&mut self, patience: Timespec) -> io::Result<()> {
         let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
         let mut events = wait(&self.epoll, &mut room, patience)?;
-        // What arrived before this moment is in a queue by now: asked again, epoll tells all of them.
         let wire_to_ns = self.wire_in_real_time().map(|timed| timed.time_ns(0));
         if wire_to_ns.is_some() {
+            // Who comes is told once; all else again.
+            if events.iter().any(|event| event.data.u64() == LISTENER) {
+                self.let_in();
+            }
+            // What arrived before that moment is in a queue by now: asked again, epoll tells all of them.
             events = wait(&self.epoll, &mut room, NO_WAIT)?;
         }
         for event in events {
@@ -217,6 +221,8 @@ impl Host {
     /// Takes what a peer sent: one batch, then the next peer has its turn, and epoll tells again while more waits. For a wire in
     /// real time all that arrived before `wire_to_ns`.
     fn take_from(&mut self, id: PeerId, wire_to_ns: Option<u64>) {
+        // All queues were read up to where the wire's time stands.
+        self.inbox.begin_another_queue(self.wire_in_real_time().map(TimedWire::read_up_to_ns));
         loop {
             let Some(peer) = self.peers.get(&id) else { return };
             let timed = self.timed.as_ref().filter(|_| wire_to_ns.is_some());

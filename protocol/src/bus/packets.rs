@@ -4,13 +4,17 @@
 //! small `recvmmsg` keeps them. The arrival stamp matters: a command is latched by when it *arrived*, not by when a
 //! late loop came round to read it. Batches matter too: one system call empties a queue and knows that it is empty.
 //!
+//! The kernel stamps by the wall clock, which somebody may set at any time. Arrivals are told by the monotonic clock instead, with
+//! the distance of both as it is now or as it was at the last batch: whichever puts the arrival into the time in which it must
+//! have happened, between the moment in which the queue was last seen empty and now ([`arrival_ns`]).
+//!
 //! Source: `socket(7)` (SO_TIMESTAMPNS, SO_RXQ_OVFL), `recvmmsg(2)`, Linux Documentation/networking/can.rst (MSG_CONFIRM).
 
 #![allow(unsafe_code)] // recvmmsg, sendmmsg and setsockopt, nothing else
 
+use rustix::time::{ClockId, clock_gettime};
 use std::io;
 use std::os::fd::{AsRawFd, BorrowedFd};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Longest packet that is looked at; anything longer is malformed whatever it holds.
 pub(super) const LONGEST_PACKET: usize = 64;
@@ -50,11 +54,17 @@ pub(super) struct Inbox {
     count: usize,
     next: usize,
     newest_ns: u64,
+    clocks: Clocks,
 }
 
 impl Inbox {
     pub(super) const fn new() -> Self {
-        Self { packets: [NO_PACKET; BATCH], count: 0, next: 0, newest_ns: 0 }
+        Self { packets: [NO_PACKET; BATCH], count: 0, next: 0, newest_ns: 0, clocks: Clocks::NEW }
+    }
+
+    /// The next batch is of another queue, which was last seen empty at `empty_ns` of the monotonic clock, if that is known.
+    pub(super) fn begin_another_queue(&mut self, empty_ns: Option<u64>) {
+        (self.newest_ns, self.clocks.empty_ns) = (0, empty_ns);
     }
 
     /// The oldest packet not yet taken. A packet of length 0 says that the peer is gone.
@@ -117,20 +127,29 @@ impl Inbox {
                 )
             }
         };
+        let began_ns = ns_of(ClockId::Monotonic);
         let mut count = take();
         // The kernel tells first, and once, that the other end closed with packets unread; what it had sent comes after.
         if count < 0 && io::Error::last_os_error().raw_os_error() == Some(libc::ECONNRESET) {
             count = take();
         }
-        self.count = usize::try_from(count).map_err(|_| io::Error::last_os_error())?;
+        let taken = usize::try_from(count).map_err(|_| io::Error::last_os_error());
+        self.count = *taken.as_ref().unwrap_or(&0);
+        if self.count > 0 {
+            self.clocks.read();
+        }
         for (packet, header) in self.packets.iter_mut().zip(&headers[..self.count]) {
             // SAFETY: the kernel has just filled this header and the control buffer that it points to.
             let arrived = unsafe { note(packet, header) };
             // The queue is in order of arrival; so are its stamps, whatever the two clocks of a stamp did.
-            packet.stamp_ns = stamp_of(arrived, clock).max(self.newest_ns);
+            let arrived_ns = arrived.map(|arrived| self.clocks.arrival_ns(arrived));
+            packet.stamp_ns = stamp_of(arrived_ns, clock).max(self.newest_ns);
             self.newest_ns = packet.stamp_ns;
         }
-        Ok(())
+        if self.emptied_the_queue() {
+            self.clocks.empty_ns = Some(began_ns);
+        }
+        taken.map(drop)
     }
 }
 
@@ -165,31 +184,78 @@ unsafe fn note(packet: &mut Packet, header: &libc::mmsghdr) -> Option<libc::time
     arrived
 }
 
-/// When a packet arrived, by `clock`. Two clocks make it up; a thread that is held up between reading the one and the other
+/// Two clocks that are read one after the other are read again when that took longer: their distance would be wrong by as much.
+const LONGEST_READING_NS: u64 = 20_000;
+/// Times that it is tried at most.
+const READINGS: usize = 4;
+
+/// What is known of the wall clock against the monotonic one.
+struct Clocks {
+    /// Wall clock less monotonic clock: now, and when the last batch was taken, ns.
+    offsets_ns: [i64; 2],
+    /// The monotonic clock now, ns.
+    now_ns: u64,
+    /// When the queue was last seen empty, by the monotonic clock, ns.
+    empty_ns: Option<u64>,
+}
+
+impl Clocks {
+    const NEW: Self = Self { offsets_ns: [0; 2], now_ns: 0, empty_ns: None };
+
+    fn read(&mut self) {
+        let before_ns = self.offsets_ns[0];
+        for _ in 0..READINGS {
+            let began_ns = ns_of(ClockId::Monotonic);
+            let wall_ns = ns_of(ClockId::Realtime);
+            self.now_ns = ns_of(ClockId::Monotonic);
+            self.offsets_ns[0] = wall_ns as i64 - self.now_ns as i64;
+            if self.now_ns - began_ns < LONGEST_READING_NS {
+                break;
+            }
+        }
+        self.offsets_ns[1] = before_ns;
+    }
+
+    fn arrival_ns(&self, stamp: libc::timespec) -> u64 {
+        let stamp_ns = stamp.tv_sec * 1_000_000_000 + stamp.tv_nsec;
+        arrival_ns(stamp_ns, self.offsets_ns, self.empty_ns, self.now_ns)
+    }
+}
+
+fn ns_of(clock: ClockId) -> u64 {
+    let now = clock_gettime(clock);
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+/// When a packet arrived by the monotonic clock, which stands at `now_ns`: its `stamp_ns` of the wall clock less the `offsets_ns` of
+/// that clock, the newest first, whichever puts it between the time in which the queue was last seen empty and now. A queue never
+/// seen empty may hold a packet for a second. When none does, it is taken as if it had not been stamped: it arrived now.
+///
+/// Of a step that is shorter than the time since the queue was empty both offsets may be plausible; then the stamp is wrong by the step
+/// at most, and still within that time.
+fn arrival_ns(stamp_ns: i64, offsets_ns: [i64; 2], empty_ns: Option<u64>, now_ns: u64) -> u64 {
+    const LONGEST_CREDIBLE_NS: u64 = 1_000_000_000;
+    let since_ns = empty_ns.unwrap_or(now_ns.saturating_sub(LONGEST_CREDIBLE_NS));
+    let slack_ns = LONGEST_READING_NS as i64;
+    let plausible = since_ns as i64 - slack_ns..=now_ns as i64 + slack_ns;
+    let arrivals = offsets_ns.map(|offset_ns| stamp_ns.saturating_sub(offset_ns));
+    let arrived = arrivals.into_iter().find(|arrival_ns| plausible.contains(arrival_ns));
+    arrived.map_or(now_ns, |arrived_ns| (arrived_ns.max(0) as u64).clamp(since_ns, now_ns))
+}
+
+/// A time of the monotonic clock by `clock`; now for what has none. A thread that is held up between reading the one and the other
 /// would stamp the packet too late, so a reading that took long is made again.
-fn stamp_of(arrived: Option<libc::timespec>, clock: &dyn Fn(u64) -> u64) -> u64 {
-    const LONGEST_READING_NS: u64 = 20_000;
-    const READINGS: usize = 4;
-    let Some(arrived) = arrived else { return clock(0) };
+fn stamp_of(arrived_ns: Option<u64>, clock: &dyn Fn(u64) -> u64) -> u64 {
+    let Some(arrived_ns) = arrived_ns else { return clock(0) };
     let mut stamp_ns = 0;
     for _ in 0..READINGS {
         let began_ns = clock(0);
-        stamp_ns = clock(age_of(arrived));
+        stamp_ns = clock(ns_of(ClockId::Monotonic).saturating_sub(arrived_ns));
         if clock(0).saturating_sub(began_ns) < LONGEST_READING_NS {
             break;
         }
     }
     stamp_ns
-}
-
-/// How long before now `stamp` of the wall clock was, in ns. A wall clock that was stepped in between can make a
-/// stamp lie in the future or far in the past: then the age is 0, as if the packet had not been stamped.
-fn age_of(stamp: libc::timespec) -> u64 {
-    const LONGEST_CREDIBLE_NS: u128 = 1_000_000_000;
-    let arrived = stamp.tv_sec as u128 * 1_000_000_000 + stamp.tv_nsec as u128;
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
-    let age = now.saturating_sub(arrived);
-    if age > LONGEST_CREDIBLE_NS { 0 } else { age as u64 }
 }
 
 /// Packets that leave together.
@@ -313,6 +379,32 @@ mod tests {
         assert_eq!((packet.len, packet.bytes[15]), (16, 7));
         // Slept 3 ms since; sleep never returns early, so 2 ms leaves room for clock granularity alone.
         assert!(packet.stamp_ns > 2_000_000, "the clock of this test tells the age itself");
+    }
+
+    /// The machine has run for 100 s; the queue was empty 1 ms ago; the packet arrived 0.4 ms ago.
+    #[test]
+    fn a_step_of_the_wall_clock_changes_no_arrival() {
+        const MS: i64 = 1_000_000;
+        let (now_ns, offset) = (100_000 * MS, 1_700_000_000_000 * MS);
+        let arrived_ns = now_ns - 400_000;
+        let empty = Some((now_ns - MS) as u64);
+        for step in [0, 500 * MS, -500 * MS, 5_000 * MS, -5_000 * MS, 2 * MS, -2 * MS] {
+            // Stamped before the step, and after it.
+            for stamp in [arrived_ns + offset, arrived_ns + offset + step] {
+                let arrival = arrival_ns(stamp, [offset + step, offset], empty, now_ns as u64);
+                assert_eq!(arrival, arrived_ns as u64, "step {step} ns");
+            }
+        }
+        // A queue of which nothing is known: right as long as the clock was not set.
+        let known_ns = arrival_ns(arrived_ns + offset, [offset; 2], None, now_ns as u64);
+        assert_eq!(known_ns, arrived_ns as u64);
+        // Neither offset fits, after two steps: as if not stamped.
+        let lost_ns = arrival_ns(arrived_ns, [offset, offset + MS], empty, now_ns as u64);
+        assert_eq!(lost_ns, now_ns as u64);
+        // It waited for five seconds, which a process that was stopped lets happen.
+        let long_ago = Some((now_ns - 6_000 * MS) as u64);
+        let waited_ns = arrival_ns(now_ns - 5_000 * MS + offset, [offset; 2], long_ago, now_ns as u64);
+        assert_eq!(waited_ns, (now_ns - 5_000 * MS) as u64);
     }
 
     #[test]

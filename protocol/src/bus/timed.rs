@@ -95,6 +95,11 @@ impl TimedWire {
         self.model.now_ns()
     }
 
+    /// The same by the machine's clock, ns.
+    pub(super) fn read_up_to_ns(&self) -> u64 {
+        self.zero_ns + self.model.now_ns()
+    }
+
     /// What happened up to `to_ns`, in order.
     pub(super) fn advance(&mut self, to_ns: u64, events: &mut Vec<WireEvent>) {
         self.model.advance(to_ns, events);

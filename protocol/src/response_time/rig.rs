@@ -113,6 +113,12 @@ impl RigAnalysis {
         self
     }
 
+    /// Bit rate of the wire.
+    #[must_use]
+    pub fn bits_per_s(&self) -> u32 {
+        self.bits_per_s
+    }
+
     /// The frames, the highest priority first.
     #[must_use]
     pub fn frames(&self) -> &[RigFrame] {
