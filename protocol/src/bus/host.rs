@@ -69,6 +69,18 @@ pub struct Host {
     inbox: Inbox,
     for_rig: Option<VecDeque<ForRig>>,
     report: HostReport,
+    /// Peers that went, by their place in the report, with what had passed the wire by then.
+    gone: Vec<(usize, FramesById)>,
+}
+
+/// What became of a packet for a peer.
+enum Sent {
+    /// Its queue took it.
+    Delivered,
+    /// Its queue was full.
+    Dropped,
+    /// It takes no more, and is removed when its end is read.
+    Gone,
 }
 
 impl Host {
@@ -95,6 +107,7 @@ impl Host {
             inbox: Inbox::new(),
             for_rig: None,
             report: HostReport::default(),
+            gone: Vec::new(),
         })
     }
 
@@ -106,7 +119,25 @@ impl Host {
         while !stop.load(Ordering::Relaxed) {
             self.turn(IDLE_WAIT)?;
         }
+        self.close();
         Ok(std::mem::take(&mut self.report))
+    }
+
+    /// Closes the account: what peers have sent is still carried on; what they send from now on they are told is refused.
+    fn close(&mut self) {
+        for peer in self.peers.values() {
+            // A peer that has gone meanwhile is drained and removed below like the others.
+            let _ = rustix::net::shutdown(&peer.socket, rustix::net::Shutdown::Read);
+        }
+        while let Some(id) = self.peers.first_key_value().map(|(id, _)| *id) {
+            // Its last packet is its end, at which it is removed.
+            if !self.take_from(id) {
+                self.remove(id);
+            }
+        }
+        for (place, on_wire_by_then) in self.gone.drain(..) {
+            self.report.peers[place].after_it_left.add_difference(&self.report.on_wire, &on_wire_by_then);
+        }
     }
 
     /// Waits for packets, at most for `patience`, and carries them on.
@@ -120,7 +151,9 @@ impl Host {
         for event in events {
             match event.data.u64() {
                 LISTENER => self.let_in(),
-                peer => self.take_from(peer),
+                peer => {
+                    self.take_from(peer);
+                }
             }
         }
         self.advance_barrier();
@@ -175,31 +208,39 @@ impl Host {
         }
         self.next_peer += 1;
         self.peers.insert(id, Peer { socket, report: self.report.peers.len(), outbox: Outbox::new() });
-        self.report.peers.push(PeerReport { name: process, ..PeerReport::default() });
+        let before_it_came = self.report.on_wire.clone();
+        self.report.peers.push(PeerReport { name: process, before_it_came, ..PeerReport::default() });
     }
 
-    fn take_from(&mut self, id: PeerId) {
-        let Some(peer) = self.peers.get(&id) else { return };
+    /// Takes a batch from a peer; false when there was none.
+    fn take_from(&mut self, id: PeerId) -> bool {
+        let Some(peer) = self.peers.get(&id) else { return false };
         // One batch, then the next peer has its turn; epoll tells again while more waits. Stamps are the peers' affair.
         match self.inbox.fill(peer.socket.as_fd(), Wait::No, &|_| 0) {
             Ok(()) => {}
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
             Err(_) => self.remove(id),
         }
+        let mut any = false;
         while let Some(packet) = self.inbox.take() {
+            any = true;
             // Length 0: the peer is gone.
             if packet.len == 0 {
-                return self.remove(id);
+                self.remove(id);
+                break;
             }
             self.take(id, &packet.bytes[..packet.len]);
         }
+        any
     }
 
     fn take(&mut self, id: PeerId, bytes: &[u8]) {
         let Some(peer) = self.peers.get(&id) else { return };
         let frame = <&[u8; CAN_FRAME_BYTES]>::try_from(bytes).ok().and_then(CanFrame::from_bytes);
         if let Some(frame) = frame {
-            self.report.peers[peer.report].frames_received += 1;
+            let report = &mut self.report.peers[peer.report];
+            report.frames_received += 1;
+            report.received_by_id.count(&frame);
             match &mut self.barrier {
                 Some(barrier) => barrier.post(id, frame),
                 None => self.deliver(&frame, id),
@@ -230,7 +271,9 @@ impl Host {
 
     fn remove(&mut self, id: PeerId) {
         // Closing the descriptor takes it out of the epoll set.
-        self.peers.remove(&id);
+        if let Some(peer) = self.peers.remove(&id) {
+            self.gone.push((peer.report, self.report.on_wire.clone()));
+        }
         if let Some(barrier) = &mut self.barrier {
             barrier.leave(id);
         }
@@ -246,6 +289,7 @@ impl Host {
             }
             return;
         }
+        self.report.on_wire.count(frame);
         let bytes = frame.to_bytes();
         if let Some(for_rig) = &mut self.for_rig
             && from != RIG_HERE
@@ -253,12 +297,20 @@ impl Host {
             for_rig.push_back(ForRig::Frame(*frame));
         }
         for (id, peer) in self.peers.iter_mut().filter(|(id, _)| **id != from) {
+            let report = &mut self.report.peers[peer.report];
             if self.barrier.as_ref().is_some_and(|barrier| barrier.must_not_lose(*id)) {
                 peer.post(&bytes);
-            } else if !peer.send(&bytes) {
-                self.report.peers[peer.report].dropped_at_queue.count(frame);
-                if let Some(barrier) = &mut self.barrier {
-                    barrier.lost(frame, Some(*id));
+                report.delivered.count(frame);
+                continue;
+            }
+            match peer.send(&bytes) {
+                Sent::Delivered => report.delivered.count(frame),
+                Sent::Gone => report.after_it_left.count(frame),
+                Sent::Dropped => {
+                    report.dropped_at_queue.count(frame);
+                    if let Some(barrier) = &mut self.barrier {
+                        barrier.lost(frame, Some(*id));
+                    }
                 }
             }
         }
@@ -304,12 +356,12 @@ impl Host {
 }
 
 impl Peer {
-    /// Sends without blocking; false when the queue did not take the packet.
-    fn send(&self, bytes: &[u8]) -> bool {
+    /// Sends without blocking.
+    fn send(&self, bytes: &[u8]) -> Sent {
         match rustix::net::send(&self.socket, bytes, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
-            // A peer that just went is removed when its end is read; nothing is lost by it.
-            Ok(_) | Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => true,
-            Err(_) => false,
+            Ok(_) => Sent::Delivered,
+            Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => Sent::Gone,
+            Err(_) => Sent::Dropped,
         }
     }
 
