@@ -6,7 +6,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`station`] | frames in, commands out, for the axes of a process |
-//! | [`pace`] | what moves it: the rig's frames, or the barrier |
+//! | [`pace`] | what moves it: the rig's frames, or the barrier; [`farewell`]: how it takes leave |
 //! | [`rig_view`] | cycle numbers, lost frames |
 //! | [`axis`] | one axis controller: chains, work, program put together |
 //! | [`chains`] | the sequence chains: main, force, matching, emergency stop |
@@ -26,6 +26,7 @@ pub mod axis;
 pub mod chains;
 pub mod cli;
 pub mod experiment;
+pub mod farewell;
 pub mod figures;
 pub mod guard;
 pub mod linearisation;

@@ -78,6 +78,8 @@ pub struct AxisReport {
     pub sensors_received: u64,
     /// Sensor frames of the axis that never came.
     pub sensors_lost: u64,
+    /// Those among the sensor frames before the rig's first tick that came; with the lost ones, all that is missing.
+    pub sensors_missed_before_first_tick: u64,
     /// Offset of its position sensor as it was matched, m.
     pub matched_offset_m: f64,
     /// The program file as it stands; null for an axis that held its valve shut.
@@ -105,6 +107,7 @@ impl AxisReport {
             position_error_static_m: controller.figures().static_m(),
             sensors_received: view.received().get(controller.axis()),
             sensors_lost: view.lost().get(controller.axis()),
+            sensors_missed_before_first_tick: view.missed_before_first_tick().get(controller.axis()),
             matched_offset_m: program.geometry().offset_m,
             program_toml: source.map(|source| source.text.clone()),
             program_file: source.map(|source| source.path.display().to_string()),

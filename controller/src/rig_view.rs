@@ -73,6 +73,7 @@ pub struct RigView {
     received: PerAxis,
     account: Option<Account>,
     lost: PerAxis,
+    missed_before_first_tick: PerAxis,
     /// With the cycle in which it came.
     status: Option<(u64, RigStatus)>,
 }
@@ -123,6 +124,11 @@ impl RigView {
         self.skipped += more + passed.saturating_sub(more) / SKIPPED_RANGE * SKIPPED_RANGE;
         let comes_first = tick.catch_up || tick.ending;
         let sent = (cycle + u64::from(!comes_first)).saturating_sub(self.skipped);
+        if self.account.is_none() {
+            for axis in Axis::ALL {
+                *self.missed_before_first_tick.of(axis) += sent.saturating_sub(*self.received.of(axis));
+            }
+        }
         if let Some(last) = self.account {
             for axis in Axis::ALL {
                 let came = *self.received.of(axis) - *last.received.clone().of(axis);
@@ -175,6 +181,13 @@ impl RigView {
     #[must_use]
     pub fn lost(&self) -> PerAxis {
         self.lost
+    }
+
+    /// Sensor frames that the rig had sent by its first tick that came, and that did not come: lost ones, and those from before
+    /// the bus was joined.
+    #[must_use]
+    pub fn missed_before_first_tick(&self) -> PerAxis {
+        self.missed_before_first_tick
     }
 
     /// Cycles that the rig says it skipped.

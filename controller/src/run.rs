@@ -1,6 +1,7 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
 use crate::cli::{Axes, Pace, RunArguments};
+use crate::farewell;
 use crate::guard::STUCK;
 use crate::pace::{self, End, Paced, Ride};
 use crate::plugin::PluginError;
@@ -163,6 +164,9 @@ impl Work<'_> {
             Pace::Real => pace::run_real(ride, &MonotonicClock),
             Pace::Lockstep => pace::run_lockstep(ride, member_name(arguments.axis))?,
         };
+        if arguments.pace == Pace::Real {
+            farewell::hear_out(bus, paced.end == End::RigEnded);
+        }
         Ok(Finished {
             paced,
             grants,
