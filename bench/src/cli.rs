@@ -1,5 +1,6 @@
 //! The bench's command line.
 
+use crate::soak::cli::{ChildArguments, SoakArguments};
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
@@ -26,6 +27,11 @@ pub enum Command {
     Figures,
     /// Check the bounds of an experiment file: figures that exist, numbers that make sense.
     CheckExperiment(CheckArguments),
+    /// Run emulator and controllers over hours, segment by segment, and account for every frame.
+    Soak(Box<SoakArguments>),
+    /// Become a program that ends with the one that starts it; `soak` starts this.
+    #[command(hide = true)]
+    SoakChild(ChildArguments),
 }
 
 /// Which run to sum up.

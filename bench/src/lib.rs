@@ -17,6 +17,7 @@
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
 //! | [`spread`] | how much the figures of repetitions spread |
 //! | [`report`] | the latency report |
+//! | [`soak`] | emulator and controllers over hours, every frame accounted for |
 //! | [`cli`] | the command line |
 
 pub mod cli;
@@ -31,6 +32,7 @@ pub mod report;
 pub mod reports;
 pub mod runs;
 pub mod series;
+pub mod soak;
 pub mod spread;
 pub mod table;
 pub mod tables_read;

@@ -2,6 +2,8 @@
 
 use bench::cli::{CheckArguments, Cli, Command, CompareArguments, SpreadArguments};
 use bench::runs::{self, Run, RunsError};
+use bench::soak::cli::SoakArguments;
+use bench::soak::processes::become_child;
 use bench::{SummaryError, compare, figures, join, picture, spread, table, thresholds};
 use clap::Parser;
 use protocol::exit::Exit;
@@ -20,9 +22,22 @@ fn main() -> ExitCode {
             Ok(Exit::Good)
         }
         Command::CheckExperiment(arguments) => check(&arguments).map_err(RunsError::from),
+        Command::Soak(arguments) => return soak(&arguments),
+        Command::SoakChild(arguments) => {
+            eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));
+            return Exit::BadInput.into();
+        }
     };
     let exit = done.unwrap_or_else(|error| {
         eprintln!("bench: {error}");
+        Exit::BadInput
+    });
+    exit.into()
+}
+
+fn soak(arguments: &SoakArguments) -> ExitCode {
+    let exit = bench::soak::run(arguments).unwrap_or_else(|error| {
+        eprintln!("soak: {error}");
         Exit::BadInput
     });
     exit.into()
