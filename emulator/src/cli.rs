@@ -12,6 +12,9 @@ use std::path::PathBuf;
 /// FIFO priority of the rig loop; above most of the system, below the kernel's own threads at 99.
 pub const DEFAULT_FIFO_PRIORITY: u8 = 80;
 
+/// Lateness that freezes the flight recorder: half a cycle.
+const DEFAULT_FLIGHT_LATE_US: u64 = 500;
+
 /// Emulates the servo-pneumatic rig on a CAN bus.
 #[derive(Debug, Parser)]
 #[command(name = "emulator", version, about, after_help = EXIT_CODE_HELP)]
@@ -28,14 +31,15 @@ pub enum Command {
     Run(Box<RunArguments>),
     /// Host an embedded bus alone, without a rig.
     Bus(BusArguments),
-    /// Print the worst-case load of the bus, computed from rig.dbc.
+    /// Print the worst-case load of the bus and each frame's worst-case response time, computed from rig.dbc.
     BusLoad,
 }
 
 /// How to run the rig.
 #[derive(Args, Debug)]
 pub struct RunArguments {
-    /// Bus: can://IFACE (SocketCAN) or unix:///PATH[?loss=P&seed=N] (embedded, hosted here).
+    /// Bus: can://IFACE (SocketCAN) or unix:///PATH[?loss=P&seed=N&bitrate=1000000&…] (embedded, hosted here; all options:
+    /// protocol/docs/bus-that-keeps-time.md).
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
     /// Rig file with the plant's numbers.
@@ -80,6 +84,15 @@ pub struct RunArguments {
     /// Ask the system for no priority, no locked memory and no latency request.
     #[arg(long)]
     pub no_realtime: bool,
+    /// Write when everything of every cycle happened: emulator-timing.csv.
+    #[arg(long)]
+    pub full_timing: bool,
+    /// Freeze the flight recorder at a wake-up later than this, an execution longer than this, or a missed cycle, in us.
+    #[arg(long, default_value_t = DEFAULT_FLIGHT_LATE_US, value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
+    pub flight_late_us: u64,
+    /// Keep no flight recorder.
+    #[arg(long)]
+    pub no_flight: bool,
     /// Ignore frames of the bench: hand force, link, weights.
     #[arg(long)]
     pub no_bench_frames: bool,
@@ -95,7 +108,7 @@ pub struct RunArguments {
 /// How to host a bus.
 #[derive(Args, Debug)]
 pub struct BusArguments {
-    /// The embedded bus: unix:///PATH[?loss=P&seed=N].
+    /// The embedded bus: unix:///PATH[?loss=P&seed=N&bitrate=1000000&…].
     #[arg(long, default_value_t = BusUrl::default_embedded())]
     pub bus: BusUrl,
     /// End after this time; without it, on Ctrl-C.

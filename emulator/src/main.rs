@@ -20,7 +20,11 @@ fn main() -> ExitCode {
         Command::BusLoad => {
             #[allow(clippy::print_stdout)] // the table is the command's result
             {
-                println!("{}", protocol::bus_load::BusLoad::of_rig());
+                println!("{}\n", protocol::bus_load::BusLoad::of_rig());
+                println!(
+                    "{}",
+                    protocol::response_time::rig::RigAnalysis::worst_case(protocol::frames::BIT_RATE_PER_S)
+                );
             }
             Ok(Exit::Good)
         }

@@ -23,11 +23,13 @@ mod packets;
 mod socket_file;
 mod socket_peer;
 mod tally;
+mod timed;
 mod unix_link;
 mod url;
 mod wire;
 
 use crate::can::CanFrame;
+use crate::response_time::rig::TooSlow;
 use std::time::Duration;
 
 pub use hosted_rig::HostedRig;
@@ -82,6 +84,14 @@ pub enum BusError {
         url: String,
         /// The lock file that the other host holds.
         lock: String,
+    },
+    /// The wire's bit rate does not carry the frames of `rig.dbc`.
+    #[error("bus {url} is refused: {arithmetic}; use bitrate=1000000, or none for a wire that takes no time")]
+    TooSlow {
+        /// The bus as it was asked for.
+        url: String,
+        /// Each frame's share and response time.
+        arithmetic: TooSlow,
     },
     /// SocketCAN has no barrier.
     #[error("{url} cannot run in lockstep: the barrier lives in the embedded bus; use --bus unix:///PATH")]
@@ -153,7 +163,7 @@ pub trait Bus: Send {
     fn leave(&mut self) {}
 
     /// What the bus's host counted, when this peer is the host as well.
-    fn host_report(&self) -> Option<&host::HostReport> {
+    fn host_report(&self) -> Option<host::HostReport> {
         None
     }
 }

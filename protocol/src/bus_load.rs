@@ -23,7 +23,7 @@ use crate::frames::{BIT_RATE_PER_S, MESSAGES, MessageSpec};
 pub const LOAD_LIMIT_PPM: u64 = 700_000;
 
 /// Cyclic load with reserve, in parts per million of the bus.
-pub const LOAD_PPM: u64 = load_ppm();
+pub const LOAD_PPM: u64 = load_ppm_at(BIT_RATE_PER_S);
 
 /// Worst-case bits of the DAQ frame that is held in reserve each millisecond.
 pub const RESERVE_BITS: u32 = worst_case_bits(8);
@@ -82,15 +82,23 @@ const fn bits_down_to_fastest() -> u32 {
 }
 
 const fn share_ppm(bits: u32, period_ms: u32) -> u64 {
-    (bits as u64 * 1_000_000_000).div_ceil(period_ms as u64 * BIT_RATE_PER_S as u64)
+    share_ppm_at(bits, period_ms, BIT_RATE_PER_S)
 }
 
-const fn load_ppm() -> u64 {
-    let (mut ppm, mut index) = (share_ppm(RESERVE_BITS, 1), 0);
+/// Share of a bus of `bits_per_s` that a frame of so many bits takes each period, in parts per million.
+#[must_use]
+pub const fn share_ppm_at(bits: u32, period_ms: u32, bits_per_s: u32) -> u64 {
+    (bits as u64 * 1_000_000_000).div_ceil(period_ms as u64 * bits_per_s as u64)
+}
+
+/// Cyclic load with reserve at `bits_per_s`, in parts per million of the bus.
+#[must_use]
+pub const fn load_ppm_at(bits_per_s: u32) -> u64 {
+    let (mut ppm, mut index) = (share_ppm_at(RESERVE_BITS, 1, bits_per_s), 0);
     while index < MESSAGES.len() {
         let message = MESSAGES[index];
         if message.cycle_time_ms > 0 {
-            ppm += share_ppm(worst_case_bits(message.length), message.cycle_time_ms);
+            ppm += share_ppm_at(worst_case_bits(message.length), message.cycle_time_ms, bits_per_s);
         }
         index += 1;
     }

@@ -70,6 +70,8 @@ pub struct Seen {
     pub delivered: Counts,
     /// Frames that did not fit the queue.
     pub dropped: Counts,
+    /// Frames of others while the peer was off a modelled bus.
+    pub missed_in_bus_off: Counts,
     /// Frames of others after the peer had left.
     pub after: Counts,
 }
@@ -132,6 +134,8 @@ pub struct Party {
 pub struct Wire {
     /// Frames that it lost on purpose.
     pub injected: Counts,
+    /// Frames that a modelled wire never sent: at a full transmit queue, or in bus-off.
+    pub never_sent: Counts,
     /// Frames that passed it.
     pub passed: Counts,
     /// Peers that are none of ours, which may have sent.
@@ -151,9 +155,9 @@ pub struct Row {
     pub sent: u64,
     /// Frames received, by the receiver's count.
     pub received: u64,
-    /// Lost on the wire on purpose, by the host's count.
+    /// Lost on the wire on purpose, or never sent by a modelled one, by the host's count.
     pub lost_on_wire: u64,
-    /// Lost at the receiver's queue, by the host's count; on can:// the kernel's, when it names one identifier only.
+    /// Lost at the receiver's queue, or missed in bus-off, by the host's count; on can:// the kernel's, when it names one identifier only.
     pub lost_at_queue: u64,
     /// Passed before the receiver was on the bus.
     pub before_it_came: u64,
@@ -202,8 +206,8 @@ pub fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
                 receiver: party.name.clone(),
                 sent: *sent,
                 received: party.received.of(id),
-                lost_on_wire: wire.map_or(0, |wire| wire.injected.of(id)),
-                lost_at_queue: seen.dropped.of(id),
+                lost_on_wire: wire.map_or(0, |wire| wire.injected.of(id) + wire.never_sent.of(id)),
+                lost_at_queue: seen.dropped.of(id) + seen.missed_in_bus_off.of(id),
                 before_it_came: seen.before.of(id),
                 after_it_left: seen.after.of(id),
                 missing_by_gaps: party.gaps.get(id).map(|gaps| gaps.missing(*sent)),
@@ -260,7 +264,7 @@ fn check_host(
         }
     }
     for (id, (_, sent)) in senders {
-        let (passed, injected) = (wire.passed.of(id), wire.injected.of(id));
+        let (passed, injected) = (wire.passed.of(id), wire.injected.of(id) + wire.never_sent.of(id));
         if *sent != passed + injected {
             broken.push(format!("{id}: {sent} sent, {passed} passed the wire, {injected} lost on it"));
         }

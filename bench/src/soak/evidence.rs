@@ -101,14 +101,19 @@ impl Evidence {
         let mut wire = Wire {
             injected: counts(&host["injected_loss"]),
             passed: counts(&host["on_wire"]),
-            others: Vec::new(),
+            ..Wire::default()
         };
+        for node in host["wire_time"]["nodes"].as_array().into_iter().flatten() {
+            wire.never_sent.add_all(&counts(&node["dropped_at_full_queue"]));
+            wire.never_sent.add_all(&counts(&node["dropped_in_bus_off"]));
+        }
         for peer in host["peers"].as_array().into_iter().flatten() {
             let seen = Seen {
                 taken: counts(&peer["received_by_id"]),
                 before: counts(&peer["before_it_came"]),
                 delivered: counts(&peer["delivered"]),
                 dropped: counts(&peer["dropped_at_queue"]),
+                missed_in_bus_off: counts(&peer["missed_in_bus_off"]),
                 after: counts(&peer["after_it_left"]),
             };
             let is_of = |party: &&mut Party| {

@@ -3,16 +3,22 @@
 //! One thread, one epoll. A peer that does not read fills its socket's queue; what does not fit is dropped there
 //! and counted by peer and identifier, so that it can be held against the gaps that the peer sees. A frame that the
 //! wire loses (`wire`) is lost for all and counted by identifier. In lockstep, [`super::lockstep`]
-//! decides when frames are delivered. The socket's file and its lock are in `socket_file`.
+//! decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's file and its lock are in `socket_file`.
+
+mod closing;
+mod modelled;
 
 use super::BusError;
 use super::control::{Control, Kind, Role};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
-use super::packets::{Inbox, Outbox, Wait};
+use super::packets::{self, Inbox, Outbox, Wait};
 use super::socket_file::SocketFile;
+use super::timed::TimedWire;
 use super::url::{BusUrl, WireOptions};
 use super::wire::Wire;
-use crate::can::{CAN_FRAME_BYTES, CanFrame};
+use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
+use crate::response_time;
+use crate::wire_time::WireEvent;
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 use rustix::net::SendFlags;
 use std::collections::{BTreeMap, VecDeque};
@@ -34,9 +40,14 @@ const PEER_QUEUE_BYTES: usize = 2 << 20;
 const IDLE_WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 /// Peers that are looked at in one turn; epoll brings the others in the next.
 const EVENTS_A_TURN: usize = 32;
+const NO_WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 0 };
 const LISTENER: u64 = u64::MAX;
 /// The rig that lives in the host's process.
 const RIG_HERE: PeerId = u64::MAX - 1;
+/// The timer of a wire that keeps time.
+const TIMER: u64 = u64::MAX - 2;
+/// A peer that is gone, and of which frames were still on the wire.
+const GONE: PeerId = u64::MAX - 3;
 
 struct Peer {
     socket: OwnedFd,
@@ -64,6 +75,9 @@ pub struct Host {
     peers: BTreeMap<PeerId, Peer>,
     next_peer: PeerId,
     wire: Wire,
+    timed: Option<TimedWire>,
+    /// What the timed wire tells; kept so that it need not be allocated anew.
+    wire_events: Vec<WireEvent>,
     barrier: Option<Barrier>,
     waiting_since: Instant,
     inbox: Inbox,
@@ -71,6 +85,7 @@ pub struct Host {
     report: HostReport,
     /// Peers that went, by their place in the report, with what had passed the wire by then.
     gone: Vec<(usize, FramesById)>,
+    closing: bool,
 }
 
 /// What became of a packet for a peer.
@@ -88,11 +103,18 @@ impl Host {
     ///
     /// # Errors
     /// [`BusError::HostExists`] when a live host serves it; [`BusError::Open`] when folder, lock or socket cannot be made, or
-    /// when the default folder is not this user's alone.
+    /// when the default folder is not this user's alone; [`BusError::TooSlow`] when the bit rate does not carry `rig.dbc`.
     pub fn bind(path: &Path, wire: WireOptions, barrier: Option<BarrierConfig>) -> Result<Self, BusError> {
+        let url = || BusUrl::Unix { path: path.into(), wire }.to_string();
+        if let Some(timing) = wire.timing {
+            response_time::rig::check(timing.bits_per_s)
+                .map_err(|arithmetic| BusError::TooSlow { url: url(), arithmetic })?;
+        }
         let socket_file = SocketFile::bind(path, wire)?;
-        let epoll = listening(&socket_file).map_err(|error| BusError::Open {
-            url: BusUrl::Unix { path: path.into(), wire }.to_string(),
+        let timed = TimedWire::new(&wire).map_err(io::Error::from);
+        let opened = timed.and_then(|timed| Ok((listening(&socket_file, timed.as_ref())?, timed)));
+        let (epoll, timed) = opened.map_err(|error| BusError::Open {
+            url: url(),
             reason: error.to_string(),
             remedy: "raise the limit of open files, see 'ulimit -n'",
         })?;
@@ -102,12 +124,15 @@ impl Host {
             peers: BTreeMap::new(),
             next_peer: 0,
             wire: Wire::new(&wire),
+            timed,
+            wire_events: Vec::new(),
             barrier: barrier.map(Barrier::new),
             waiting_since: Instant::now(),
             inbox: Inbox::new(),
             for_rig: None,
             report: HostReport::default(),
             gone: Vec::new(),
+            closing: false,
         })
     }
 
@@ -119,42 +144,30 @@ impl Host {
         while !stop.load(Ordering::Relaxed) {
             self.turn(IDLE_WAIT)?;
         }
-        self.close();
-        Ok(std::mem::take(&mut self.report))
-    }
-
-    /// Closes the account: what peers have sent is still carried on; what they send from now on they are told is refused.
-    fn close(&mut self) {
-        for peer in self.peers.values() {
-            // A peer that has gone meanwhile is drained and removed below like the others.
-            let _ = rustix::net::shutdown(&peer.socket, rustix::net::Shutdown::Read);
-        }
-        while let Some(id) = self.peers.first_key_value().map(|(id, _)| *id) {
-            // Its last packet is its end, at which it is removed.
-            if !self.take_from(id) {
-                self.remove(id);
-            }
-        }
-        for (place, on_wire_by_then) in self.gone.drain(..) {
-            self.report.peers[place].after_it_left.add_difference(&self.report.on_wire, &on_wire_by_then);
-        }
+        self.close()?;
+        Ok(self.report())
     }
 
     /// Waits for packets, at most for `patience`, and carries them on.
     pub(super) fn turn(&mut self, patience: Timespec) -> io::Result<()> {
         let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
-        let events = match epoll::wait(&self.epoll, &mut room, Some(&patience)) {
-            Ok((events, _)) => &*events,
-            Err(rustix::io::Errno::INTR) => &[],
-            Err(error) => return Err(error.into()),
-        };
+        let mut events = wait(&self.epoll, &mut room, patience)?;
+        // What arrived before this moment is in a queue by now: asked again, epoll tells all of them.
+        let wire_to_ns = self.wire_in_real_time().map(|timed| timed.time_ns(0));
+        if wire_to_ns.is_some() {
+            events = wait(&self.epoll, &mut room, NO_WAIT)?;
+        }
         for event in events {
             match event.data.u64() {
                 LISTENER => self.let_in(),
+                TIMER => {}
                 peer => {
-                    self.take_from(peer);
+                    self.take_from(peer, wire_to_ns);
                 }
             }
+        }
+        if let Some(to_ns) = wire_to_ns {
+            self.advance_wire(to_ns)?;
         }
         self.advance_barrier();
         Ok(())
@@ -165,6 +178,9 @@ impl Host {
         let Some(barrier) = &mut self.barrier else { return false };
         let joined = barrier.join(RIG_HERE, Role::Rig, "rig".into());
         self.for_rig = joined.then(VecDeque::new);
+        if let Some(timed) = self.timed.as_mut().filter(|_| joined) {
+            timed.join(RIG_HERE, None);
+        }
         joined
     }
 
@@ -186,8 +202,9 @@ impl Host {
     }
 
     /// What was counted so far.
-    pub(super) fn report(&self) -> &HostReport {
-        &self.report
+    pub(super) fn report(&self) -> HostReport {
+        let wire_time = self.timed.as_ref().map(|timed| timed.report(&self.report.peers));
+        HostReport { wire_time, ..self.report.clone() }
     }
 
     /// Takes everyone who waits.
@@ -207,43 +224,62 @@ impl Host {
             return;
         }
         self.next_peer += 1;
+        if let Some(timed) = &mut self.timed {
+            // Without stamps its frames enter when they are read: later, and never wrongly.
+            let _ = packets::enable_stamps(socket.as_fd(), false);
+            timed.join(id, Some(self.report.peers.len()));
+        }
         self.peers.insert(id, Peer { socket, report: self.report.peers.len(), outbox: Outbox::new() });
         let before_it_came = self.report.on_wire.clone();
         self.report.peers.push(PeerReport { name: process, before_it_came, ..PeerReport::default() });
     }
 
-    /// Takes a batch from a peer; false when there was none.
-    fn take_from(&mut self, id: PeerId) -> bool {
-        let Some(peer) = self.peers.get(&id) else { return false };
-        // One batch, then the next peer has its turn; epoll tells again while more waits. Stamps are the peers' affair.
-        match self.inbox.fill(peer.socket.as_fd(), Wait::No, &|_| 0) {
-            Ok(()) => {}
-            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
-            Err(_) => self.remove(id),
-        }
-        let mut any = false;
-        while let Some(packet) = self.inbox.take() {
-            any = true;
-            // Length 0: the peer is gone.
-            if packet.len == 0 {
-                self.remove(id);
-                break;
+    /// Takes what a peer sent: one batch, then the next peer has its turn, and epoll tells again while more waits. For a wire in
+    /// real time all that arrived before `wire_to_ns`. False when nothing more waits.
+    fn take_from(&mut self, id: PeerId, wire_to_ns: Option<u64>) -> bool {
+        loop {
+            let Some(peer) = self.peers.get(&id) else { return false };
+            let timed = self.timed.as_ref().filter(|_| wire_to_ns.is_some());
+            // Without a wire that keeps time, stamps are the peers' affair.
+            let stamp = |age_ns| timed.map_or(0, |timed| timed.time_ns(age_ns));
+            match self.inbox.fill(peer.socket.as_fd(), Wait::No, &stamp) {
+                Ok(()) => {}
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
+                Err(_) => self.remove(id),
             }
-            self.take(id, &packet.bytes[..packet.len]);
+            let (full, mut newest_ns) = (!self.inbox.emptied_the_queue(), 0);
+            while let Some(packet) = self.inbox.take() {
+                // Length 0: the peer is gone, and what it sent before has been read.
+                if packet.len == 0 {
+                    // While the host closes, whoever is still there stays to the end of it.
+                    if !self.closing {
+                        self.remove(id);
+                    }
+                    return false;
+                }
+                newest_ns = packet.stamp_ns;
+                self.take(id, &packet.bytes[..packet.len], packet.stamp_ns);
+            }
+            if !full || wire_to_ns.is_none_or(|to_ns| newest_ns > to_ns) {
+                return full;
+            }
         }
-        any
     }
 
-    fn take(&mut self, id: PeerId, bytes: &[u8]) {
+    fn take(&mut self, id: PeerId, bytes: &[u8], stamp_ns: u64) {
         let Some(peer) = self.peers.get(&id) else { return };
         let frame = <&[u8; CAN_FRAME_BYTES]>::try_from(bytes).ok().and_then(CanFrame::from_bytes);
         if let Some(frame) = frame {
             let report = &mut self.report.peers[peer.report];
             report.frames_received += 1;
             report.received_by_id.count(&frame);
-            match &mut self.barrier {
-                Some(barrier) => barrier.post(id, frame),
-                None => self.deliver(&frame, id),
+            // An error frame is none on the wire: it tells of one, and passes by.
+            let on_wire = frame.raw_id() & ERROR_FLAG == 0;
+            match (&mut self.barrier, &mut self.timed) {
+                (Some(barrier), _) => barrier.post(id, frame),
+                (None, Some(timed)) if on_wire => timed.enter(id, &frame, stamp_ns),
+                (None, _) => self.deliver(&frame, id, &[]),
             }
         } else if let Some(control) = Control::from_bytes(bytes) {
             self.obey(id, &control);
@@ -274,13 +310,16 @@ impl Host {
         if let Some(peer) = self.peers.remove(&id) {
             self.gone.push((peer.report, self.report.on_wire.clone()));
         }
+        if let Some(timed) = &mut self.timed {
+            timed.leave(id);
+        }
         if let Some(barrier) = &mut self.barrier {
             barrier.leave(id);
         }
     }
 
-    /// Puts one frame on the wire: to everyone but its sender. What a member of the barrier gets leaves with its Go.
-    fn deliver(&mut self, frame: &CanFrame, from: PeerId) {
+    /// Puts one frame on the wire: to everyone but its sender and the `deaf`. What a member of the barrier gets leaves with its Go.
+    fn deliver(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
         self.report.frames += 1;
         if self.wire.loses_next() {
             self.report.injected_loss.count(frame);
@@ -293,11 +332,19 @@ impl Host {
         let bytes = frame.to_bytes();
         if let Some(for_rig) = &mut self.for_rig
             && from != RIG_HERE
+            && !deaf.contains(&RIG_HERE)
         {
             for_rig.push_back(ForRig::Frame(*frame));
         }
         for (id, peer) in self.peers.iter_mut().filter(|(id, _)| **id != from) {
             let report = &mut self.report.peers[peer.report];
+            if deaf.contains(id) {
+                report.missed_in_bus_off.count(frame);
+                if let Some(barrier) = &mut self.barrier {
+                    barrier.lost(frame, Some(*id));
+                }
+                continue;
+            }
             if self.barrier.as_ref().is_some_and(|barrier| barrier.must_not_lose(*id)) {
                 peer.post(&bytes);
                 report.delivered.count(frame);
@@ -334,8 +381,12 @@ impl Host {
     }
 
     fn carry_out(&mut self, release: Release) {
-        for (frame, from) in &release.frames {
-            self.deliver(frame, *from);
+        if self.timed.is_some() {
+            self.carry_through_wire(&release);
+        } else {
+            for (frame, from) in &release.frames {
+                self.deliver(frame, *from, &[]);
+            }
         }
         let members = self.barrier.as_ref().map_or(0, |barrier| barrier.member_count()) as u8;
         for id in release.go {
@@ -389,10 +440,27 @@ impl Peer {
     }
 }
 
-/// An epoll set that tells of new peers: of each once, so that one who cannot be let in does not keep the host turning.
-fn listening(socket_file: &SocketFile) -> io::Result<OwnedFd> {
+/// An epoll set that tells of new peers: of each once, so that one who cannot be let in does not keep the host turning. And of
+/// the timer of a wire that keeps time.
+fn listening(socket_file: &SocketFile, timed: Option<&TimedWire>) -> io::Result<OwnedFd> {
     let epoll = epoll::create(epoll::CreateFlags::CLOEXEC)?;
     let flags = epoll::EventFlags::IN | epoll::EventFlags::ET;
     epoll::add(&epoll, socket_file, epoll::EventData::new_u64(LISTENER), flags)?;
+    if let Some(timed) = timed {
+        epoll::add(&epoll, timed.timer(), epoll::EventData::new_u64(TIMER), epoll::EventFlags::IN)?;
+    }
     Ok(epoll)
+}
+
+/// Events of the set, none when a signal came first.
+fn wait<'a>(
+    epoll: &OwnedFd,
+    room: &'a mut [MaybeUninit<epoll::Event>],
+    patience: Timespec,
+) -> io::Result<&'a [epoll::Event]> {
+    match epoll::wait(epoll, room, Some(&patience)) {
+        Ok((events, _)) => Ok(events),
+        Err(rustix::io::Errno::INTR) => Ok(&[]),
+        Err(error) => Err(error.into()),
+    }
 }

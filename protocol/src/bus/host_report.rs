@@ -3,6 +3,7 @@
 //! Counting is on the way of a frame, so it keeps identifiers as numbers; they become names when a report is written.
 
 use crate::can::CanFrame;
+use crate::wire_time::WireTimeReport;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -36,9 +37,13 @@ impl FramesById {
     /// Frames of each identifier, by its name.
     #[must_use]
     pub fn by_name(&self) -> BTreeMap<String, u64> {
-        let name =
-            |raw_id: u32| if raw_id < 0x800 { format!("{raw_id:03X}") } else { format!("{raw_id:08X}") };
-        self.0.iter().map(|(raw_id, frames)| (name(*raw_id), *frames)).collect()
+        self.0.iter().map(|(raw_id, frames)| (Self::name_of(*raw_id), *frames)).collect()
+    }
+
+    /// Name of an identifier with the kernel's flags.
+    #[must_use]
+    pub fn name_of(raw_id: u32) -> String {
+        if raw_id < 0x800 { format!("{raw_id:03X}") } else { format!("{raw_id:08X}") }
     }
 }
 
@@ -51,7 +56,7 @@ impl Serialize for FramesById {
 /// What the host saw of one peer. To the frame, for each identifier of others:
 ///
 /// ```text
-///   on_wire = before_it_came + delivered + dropped_at_queue + after_it_left
+///   on_wire = before_it_came + delivered + dropped_at_queue + missed_in_bus_off + after_it_left
 /// ```
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct PeerReport {
@@ -67,6 +72,8 @@ pub struct PeerReport {
     pub delivered: FramesById,
     /// Frames that its full queue did not take, by identifier.
     pub dropped_at_queue: FramesById,
+    /// Frames of the others that passed a modelled wire while the peer was off the bus.
+    pub missed_in_bus_off: FramesById,
     /// Frames of the others that passed the wire when the peer took no more, or had gone.
     pub after_it_left: FramesById,
 }
@@ -84,6 +91,9 @@ pub struct HostReport {
     pub malformed: u64,
     /// The peers in the order in which they came.
     pub peers: Vec<PeerReport>,
+    /// What a wire that keeps time counted; left out where it takes none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wire_time: Option<WireTimeReport>,
 }
 
 #[cfg(test)]

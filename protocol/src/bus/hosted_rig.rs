@@ -85,7 +85,7 @@ impl Bus for HostedRig {
         self.host.take_from_rig(FromRig::Done(cycle));
     }
 
-    fn host_report(&self) -> Option<&HostReport> {
+    fn host_report(&self) -> Option<HostReport> {
         Some(self.host.report())
     }
 }

@@ -112,6 +112,11 @@ impl Barrier {
         }
     }
 
+    /// Whether it is the members' turn, who have the rig's frames then.
+    pub(super) fn members_act(&self) -> bool {
+        self.phase == Phase::MembersAct
+    }
+
     /// Members in the barrier, the rig not counted.
     pub(super) fn member_count(&self) -> usize {
         self.members.len() + self.strangers.len()

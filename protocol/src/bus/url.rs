@@ -1,8 +1,11 @@
-//! Names of buses: `can://IFACE` and `unix:///PATH?loss=0.01&seed=1`.
+//! Names of buses: `can://IFACE` and `unix:///PATH?bitrate=1000000&loss=0.01&seed=1`.
 //!
 //! The options after `?` describe the wire of the embedded bus and count for its host alone; a peer that
-//! only connects carries them without effect.
+//! only connects carries them without effect. Without `bitrate` the wire takes no time, and has no errors.
 
+use super::host_report::FramesById;
+use crate::can::EXTENDED_FLAG;
+use crate::wire_time::{FASTEST_BITS_PER_S, SLOWEST_BITS_PER_S, WireTiming};
 use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;
@@ -32,6 +35,8 @@ pub struct WireOptions {
     pub loss: f64,
     /// Seed of the wire's random numbers.
     pub seed: u64,
+    /// How the wire keeps time; `None` for one that takes none.
+    pub timing: Option<WireTiming>,
 }
 
 /// What is wrong with a bus URL.
@@ -47,9 +52,18 @@ pub enum UrlError {
     #[error("bus '{0}': the socket's path must be absolute and at most 107 bytes, as in unix:///tmp/bus0")]
     Path(String),
     /// An option after `?` that is not known, or a value out of range.
-    #[error("bus option '{0}' is none of loss=0..1, seed=0..18446744073709551615")]
+    #[error(
+        "bus option '{0}' is none of loss=0..1, seed=0..18446744073709551615, bitrate=10000..1000000, and with a bitrate: \
+         error_rate=0..1, errors_id=000..7FF (or 8 digits), errors_from_ms=N, errors_to_ms=N, restart_ms=0..60000"
+    )]
     Option(String),
+    /// An option that only a wire with a bit rate has.
+    #[error("bus option '{0}' says something of a wire that keeps time: add bitrate=1000000")]
+    NeedsBitRate(String),
 }
+
+/// Longest time that a bus-off node may be told to wait, ms.
+const LONGEST_RESTART_MS: u32 = 60_000;
 
 /// Longest path that fits `sockaddr_un` with its closing zero.
 const LONGEST_SOCKET_PATH: usize = 107;
@@ -95,29 +109,102 @@ impl FromStr for BusUrl {
 
 fn parse_wire(options: &str) -> Result<WireOptions, UrlError> {
     let mut wire = WireOptions::default();
+    // Until a bit rate is given, what is said of its errors is kept with the first option that said it.
+    let (mut timing, mut said, mut needs) = (WireTiming::at(FASTEST_BITS_PER_S), false, None);
     for option in options.split('&').filter(|option| !option.is_empty()) {
         let refused = || UrlError::Option(option.into());
-        match option.split_once('=').ok_or_else(refused)? {
-            ("loss", value) => {
-                wire.loss = value.parse().ok().filter(|p| (0.0..=1.0).contains(p)).ok_or_else(refused)?;
+        let (key, value) = option.split_once('=').ok_or_else(refused)?;
+        match key {
+            "loss" => wire.loss = probability(value).ok_or_else(refused)?,
+            "seed" => wire.seed = value.parse().map_err(|_| refused())?,
+            "bitrate" => {
+                let rates = SLOWEST_BITS_PER_S..=FASTEST_BITS_PER_S;
+                timing.bits_per_s =
+                    value.parse().ok().filter(|rate| rates.contains(rate)).ok_or_else(refused)?;
+                said = true;
             }
-            ("seed", value) => wire.seed = value.parse().map_err(|_| refused())?,
-            _ => return Err(refused()),
+            _ => {
+                take_timing(&mut timing, key, value).ok_or_else(refused)?;
+                needs.get_or_insert(option);
+            }
         }
     }
-    Ok(wire)
+    wire.timing = said.then_some(timing);
+    match needs.filter(|_| !said) {
+        Some(option) => Err(UrlError::NeedsBitRate(option.into())),
+        None => Ok(wire),
+    }
+}
+
+fn probability(value: &str) -> Option<f64> {
+    value.parse().ok().filter(|probability| (0.0..=1.0).contains(probability))
+}
+
+/// An option of a wire that keeps time; `None` when it is none, or out of range.
+fn take_timing(timing: &mut WireTiming, key: &str, value: &str) -> Option<()> {
+    match key {
+        "error_rate" => timing.error_rate = probability(value)?,
+        "errors_id" => timing.errors_id = Some(identifier(value)?),
+        "errors_from_ms" => timing.errors_from_ms = value.parse().ok()?,
+        "errors_to_ms" => timing.errors_to_ms = Some(value.parse().ok()?),
+        "restart_ms" => {
+            timing.restart_ms = value.parse().ok().filter(|restart_ms| *restart_ms <= LONGEST_RESTART_MS)?;
+        }
+        _ => return None,
+    }
+    Some(())
+}
+
+/// An identifier as candump writes it: eight digits for 29 bits.
+fn identifier(value: &str) -> Option<u32> {
+    let id = u32::from_str_radix(value, 16).ok()?;
+    let (most, flag) = if value.len() == 8 { (0x1FFF_FFFF, EXTENDED_FLAG) } else { (0x7FF, 0) };
+    (id <= most).then_some(id | flag)
+}
+
+impl fmt::Display for WireOptions {
+    /// What differs from the default, as a URL has it after the path.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut options = Vec::new();
+        if let Some(timing) = &self.timing {
+            let usual = WireTiming::at(timing.bits_per_s);
+            options.push(format!("bitrate={}", timing.bits_per_s));
+            if timing.error_rate > 0.0 {
+                options.push(format!("error_rate={}", timing.error_rate));
+            }
+            if let Some(id) = timing.errors_id {
+                let id = if id & EXTENDED_FLAG == 0 {
+                    FramesById::name_of(id)
+                } else {
+                    format!("{:08X}", id & 0x1FFF_FFFF)
+                };
+                options.push(format!("errors_id={id}"));
+            }
+            if timing.errors_from_ms != usual.errors_from_ms {
+                options.push(format!("errors_from_ms={}", timing.errors_from_ms));
+            }
+            if let Some(to_ms) = timing.errors_to_ms {
+                options.push(format!("errors_to_ms={to_ms}"));
+            }
+            if timing.restart_ms != usual.restart_ms {
+                options.push(format!("restart_ms={}", timing.restart_ms));
+            }
+        }
+        if self.loss > 0.0 {
+            options.push(format!("loss={}", self.loss));
+        }
+        if self.seed != 0 {
+            options.push(format!("seed={}", self.seed));
+        }
+        if options.is_empty() { Ok(()) } else { write!(f, "?{}", options.join("&")) }
+    }
 }
 
 impl fmt::Display for BusUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Can { interface } => write!(f, "can://{interface}"),
-            Self::Unix { path, wire } if *wire == WireOptions::default() => {
-                write!(f, "unix://{}", path.display())
-            }
-            Self::Unix { path, wire } => {
-                write!(f, "unix://{}?loss={}&seed={}", path.display(), wire.loss, wire.seed)
-            }
+            Self::Unix { path, wire } => write!(f, "unix://{}{wire}", path.display()),
         }
     }
 }
@@ -128,7 +215,14 @@ mod tests {
 
     #[test]
     fn urls_survive_being_written_and_read() {
-        for text in ["can://vcan0", "unix:///tmp/a/bus0", "unix:///tmp/bus0?loss=0.25&seed=7"] {
+        for text in [
+            "can://vcan0",
+            "unix:///tmp/a/bus0",
+            "unix:///tmp/bus0?loss=0.25&seed=7",
+            "unix:///tmp/bus0?bitrate=500000",
+            "unix:///b?bitrate=1000000&error_rate=0.125&errors_id=110&errors_from_ms=5&errors_to_ms=9&restart_ms=0&seed=3",
+            "unix:///b?bitrate=1000000&errors_id=00000110",
+        ] {
             assert_eq!(text.parse::<BusUrl>().unwrap().to_string(), text);
         }
         let url = BusUrl::default_embedded();
@@ -155,6 +249,12 @@ mod tests {
             ("unix:///b?loss=1.5", "loss=0..1"),
             ("unix:///b?loss=NaN", "loss=0..1"),
             ("unix:///b?speed=9", "speed=9"),
+            ("unix:///b?bitrate=9999", "bitrate=10000..1000000"),
+            ("unix:///b?bitrate=1000001", "bitrate=10000..1000000"),
+            ("unix:///b?bitrate=1000000&error_rate=2", "error_rate=0..1"),
+            ("unix:///b?bitrate=1000000&errors_id=800", "errors_id=000..7FF"),
+            ("unix:///b?bitrate=1000000&restart_ms=60001", "restart_ms=0..60000"),
+            ("unix:///b?error_rate=0.1", "add bitrate=1000000"),
         ] {
             let message = text.parse::<BusUrl>().unwrap_err().to_string();
             assert!(message.contains(hint), "{text}: {message}");

@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     fn lost_of_ten_thousand(loss: f64, seed: u64) -> Vec<bool> {
-        let mut wire = Wire::new(&WireOptions { loss, seed });
+        let mut wire = Wire::new(&WireOptions { loss, seed, timing: None });
         (0..10_000).map(|_| wire.loses_next()).collect()
     }
 

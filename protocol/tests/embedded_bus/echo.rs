@@ -9,7 +9,7 @@ use protocol::frames::{ALIVE_RANGE, DRIVE_VALVE_COMMAND, ECHO_RANGE, Frame, Sens
 
 fn host(place: &Place, loss: f64) -> RunningHost {
     let barrier = BarrierConfig { members: 0, echo_ids: vec![DRIVE_VALVE_COMMAND.id] };
-    RunningHost::start(&place.socket(), WireOptions { loss, seed: 3 }, Some(barrier))
+    RunningHost::start(&place.socket(), WireOptions { loss, seed: 3, timing: None }, Some(barrier))
 }
 
 fn sensors(cycle: u32) -> CanFrame {

@@ -57,7 +57,7 @@ fn over_lossy_wire(wire: WireOptions) -> (Vec<CanFrame>, [Vec<CanFrame>; 2], Hos
 
 #[test]
 fn injected_loss_is_counted_by_identifier_as_the_receivers_missed_it() {
-    let (sent, [one, two], report) = over_lossy_wire(WireOptions { loss: 0.3, seed: 7 });
+    let (sent, [one, two], report) = over_lossy_wire(WireOptions { loss: 0.3, seed: 7, timing: None });
     assert!(one == two, "a lost frame is lost for all: {} and {} heard", one.len(), two.len());
     let lost = missing(&sent, &one);
     let mut injected = report.injected_loss.by_name();
@@ -69,7 +69,7 @@ fn injected_loss_is_counted_by_identifier_as_the_receivers_missed_it() {
 
 #[test]
 fn the_same_seed_loses_the_same_frames() {
-    let run = |seed| over_lossy_wire(WireOptions { loss: 0.3, seed }).1[0].clone();
+    let run = |seed| over_lossy_wire(WireOptions { loss: 0.3, seed, timing: None }).1[0].clone();
     let first = run(7);
     assert!(first == run(7), "the same seed lost other frames");
     assert!(first != run(8), "another seed lost the same frames");

@@ -190,6 +190,9 @@ const DIMENSIONLESS: &[&str] = &[
     "spool",                 // position of a valve's spool, -1 to 1
     "velocity_feed_forward", // share
     "loss",                  // probability
+    "median",                // of ratios
+    "interval",              // of their median
+    "confidence",            // probability
     "factor",                // of a DBC signal, whose unit is a field beside it
     "offset",                // the same
     "min",                   // the same, and of a key of the parameter table

@@ -36,7 +36,7 @@ fn whole() -> (Vec<Party>, Wire) {
     let wire = Wire {
         injected: Counts::from([("120", 2), ("110", 1)]),
         passed: Counts::from([("110", 995), ("120", 998), ("130", 100)]),
-        others: Vec::new(),
+        ..Wire::default()
     };
     (vec![rig, controller], wire)
 }
