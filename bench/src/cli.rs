@@ -3,6 +3,7 @@
 use crate::latency_table::LatencyTableArguments;
 use crate::ping_pong::cli::{PingPongArguments, PongArguments};
 use crate::probe::cli::ProbeArguments;
+use crate::soak::cli::{ChildArguments, SoakArguments};
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
@@ -33,6 +34,11 @@ pub enum Command {
     Cause(CauseArguments),
     /// Check the bounds of an experiment file: figures that exist, numbers that make sense.
     CheckExperiment(CheckArguments),
+    /// Run emulator and controllers over hours, segment by segment, and account for every frame.
+    Soak(Box<SoakArguments>),
+    /// Become a program that ends with the one that starts it; `soak` starts this.
+    #[command(hide = true)]
+    SoakChild(ChildArguments),
     /// Watch the machine: a thread on each CPU that reads the clock over and over notes when it could not.
     Probe(ProbeArguments),
     /// Measure round trips of 16 bytes between two processes, as a reference for those of rig and controller.

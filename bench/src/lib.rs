@@ -21,6 +21,7 @@
 //! | [`ping_pong`] | round trips of 16 bytes between two processes, as a reference |
 //! | [`latency_table`] | the table of ratios that `scripts/latency` ends with |
 //! | [`report`] | the latency report |
+//! | [`soak`] | emulator and controllers over hours, every frame accounted for |
 //! | [`cli`] | the command line |
 
 pub mod cli;
@@ -39,6 +40,7 @@ pub mod report;
 pub mod reports;
 pub mod runs;
 pub mod series;
+pub mod soak;
 pub mod spread;
 pub mod table;
 pub mod tables_read;

@@ -6,7 +6,11 @@ use bench::cli::{
 use bench::ping_pong::{self, PingPongError};
 use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
-use bench::{SummaryError, compare, figures, join, latency_table, picture, probe, spread, table, thresholds};
+use bench::soak::SoakError;
+use bench::soak::processes::become_child;
+use bench::{
+    SummaryError, compare, figures, join, latency_table, picture, probe, soak, spread, table, thresholds,
+};
 use clap::Parser;
 use protocol::exit::Exit;
 use protocol::run_folder::write_json;
@@ -33,6 +37,11 @@ fn main() -> ExitCode {
         Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
         Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
         Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
+        Command::Soak(arguments) => return told(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
+        Command::SoakChild(arguments) => {
+            eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));
+            return Exit::BadInput.into();
+        }
     };
     let exit = done.unwrap_or_else(|error| {
         eprintln!("bench: {error}");

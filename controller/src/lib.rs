@@ -6,7 +6,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`station`] | frames in, commands out, for the axes of a process |
-//! | [`pace`] | what moves it: the rig's frames, or the barrier |
+//! | [`pace`] | what moves it: the rig's frames, or the barrier; [`farewell`]: how it takes leave |
 //! | [`rig_view`] | cycle numbers, lost, late and duplicate frames |
 //! | [`timing`] | when everything of a cycle happened; histograms, timing tables, flight recorder |
 //! | [`axis`] | one axis controller: chains, work, program put together |
@@ -27,6 +27,7 @@ pub mod axis;
 pub mod chains;
 pub mod cli;
 pub mod experiment;
+pub mod farewell;
 pub mod figures;
 pub mod guard;
 pub mod linearisation;

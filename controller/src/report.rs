@@ -88,6 +88,8 @@ pub struct AxisReport {
     pub sensors_late: u64,
     /// Sensor frames of the axis that came again; they are among those received.
     pub sensors_duplicate: u64,
+    /// Those among the sensor frames before the rig's first tick that came; with the lost ones, all that is missing.
+    pub sensors_missed_before_first_tick: u64,
     /// Offset of its position sensor as it was matched, m.
     pub matched_offset_m: f64,
     /// The program file as it stands; null for an axis that held its valve shut.
@@ -117,6 +119,7 @@ impl AxisReport {
             sensors_lost: view.lost().get(controller.axis()),
             sensors_late: view.late().get(controller.axis()),
             sensors_duplicate: view.duplicate().get(controller.axis()),
+            sensors_missed_before_first_tick: view.missed_before_first_tick().get(controller.axis()),
             matched_offset_m: program.geometry().offset_m,
             program_toml: source.map(|source| source.text.clone()),
             program_file: source.map(|source| source.path.display().to_string()),

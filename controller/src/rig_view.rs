@@ -84,6 +84,7 @@ pub struct RigView {
     duplicate: PerAxis,
     account: Option<Account>,
     lost: PerAxis,
+    missed_before_first_tick: PerAxis,
     /// With the cycle in which it came.
     status: Option<(u64, RigStatus)>,
 }
@@ -149,6 +150,11 @@ impl RigView {
         // A frame that came twice must not hide one that was lost.
         let once = |axis| self.received.get(axis) - self.duplicate.get(axis);
         let received = PerAxis { drive: once(Axis::Drive), load: once(Axis::Load) };
+        if self.account.is_none() {
+            for axis in Axis::ALL {
+                *self.missed_before_first_tick.of(axis) += sent.saturating_sub(received.get(axis));
+            }
+        }
         if let Some(last) = self.account {
             for axis in Axis::ALL {
                 let went = sent - last.sent.min(sent);
@@ -217,6 +223,13 @@ impl RigView {
     #[must_use]
     pub fn duplicate(&self) -> PerAxis {
         self.duplicate
+    }
+
+    /// Sensor frames that the rig had sent by its first tick that came, and that did not come: lost ones, and those from before
+    /// the bus was joined.
+    #[must_use]
+    pub fn missed_before_first_tick(&self) -> PerAxis {
+        self.missed_before_first_tick
     }
 
     /// Cycles that the rig says it skipped.

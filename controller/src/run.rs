@@ -1,6 +1,7 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
 use crate::cli::{Axes, Pace, RunArguments};
+use crate::farewell;
 use crate::guard::STUCK;
 use crate::pace::{self, End, Paced, Ride};
 use crate::plugin::PluginError;
@@ -186,6 +187,9 @@ impl Work<'_> {
             Some(stopwatch) => pace::run_real(ride, stopwatch, continued),
             None => pace::run_lockstep(ride, member_name(arguments.axis))?,
         };
+        if arguments.pace == Pace::Real {
+            farewell::hear_out(bus, paced.end == End::RigEnded);
+        }
         Ok(Finished {
             paced,
             grants,

@@ -22,6 +22,7 @@ pub mod lockstep;
 mod packets;
 mod socket_file;
 mod socket_peer;
+mod tally;
 mod timed;
 mod unix_link;
 mod url;
@@ -32,6 +33,7 @@ use crate::response_time::rig::TooSlow;
 use std::time::Duration;
 
 pub use hosted_rig::HostedRig;
+pub use tally::{FrameTally, OTHERS};
 pub use url::{BusUrl, UrlError, WireOptions};
 
 /// The clock that stamps frames: the time of what happened so many ns ago, in ns since an epoch of the caller's choice.
@@ -118,6 +120,10 @@ pub struct BusCounters {
     pub disconnects: u64,
     /// Times it came back.
     pub reconnects: u64,
+    /// Frames handed to the bus, by identifier.
+    pub sent_by_id: FrameTally,
+    /// Well-formed frames taken from the bus, by identifier.
+    pub received_by_id: FrameTally,
 }
 
 /// A CAN bus as a peer sees it. Nothing here blocks but [`Bus::wait_readable`], and [`Bus::receive`] in a barrier.
@@ -150,6 +156,11 @@ pub trait Bus: Send {
 
     /// Tells the barrier that this member has posted its frames of `cycle`.
     fn done(&mut self, cycle: u32);
+
+    /// Takes no more of what arrives from now on; what has arrived can still be received, to the last frame, after which there
+    /// is [`Received::Nothing`]. So that what the host delivered was also received, and the account has no open end. On
+    /// `can://`, where nobody counts what a peer that goes leaves unread, it does nothing.
+    fn leave(&mut self) {}
 
     /// What the bus's host counted, when this peer is the host as well.
     fn host_report(&self) -> Option<host::HostReport> {

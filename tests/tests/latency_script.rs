@@ -48,29 +48,44 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     let out = folder.path().join("latency");
     let out = out.to_str().expect("a path in ASCII");
     let load = ["--load", "sleep 1000"];
-    let ended = latency(&[&["--pairs", "1", "--seconds", "2", "--out", out][..], &load].concat()).expect_code(0);
-    for part in ["pair 1 of 1, cyclictest:", "left", "drive-round-trip p50 / ping-pong p50 on the same bus", "spinning / 1 us"]
-    {
+    let ended =
+        latency(&[&["--pairs", "1", "--seconds", "2", "--out", out][..], &load].concat()).expect_code(0);
+    for part in [
+        "pair 1 of 1, cyclictest:",
+        "left",
+        "drive-round-trip p50 / ping-pong p50 on the same bus",
+        "spinning / 1 us",
+    ] {
         assert!(ended.stdout.contains(part), "'{part}' is missing in: {}{}", ended.stdout, ended.stderr);
     }
     let run = Path::new(out).join("pair-01/run");
     for file in ["run.json", "summary.json", "ping-pong.json", "conditions.json"] {
         assert!(run.join(file).exists(), "{file}");
     }
-    for file in ["report.html", "report.json", "spin/report.json", "table.md", "pair-01/run-spin/summary.json"] {
+    for file in
+        ["report.html", "report.json", "spin/report.json", "table.md", "pair-01/run-spin/summary.json"]
+    {
         assert!(Path::new(out).join(file).exists(), "{file}");
     }
     let told = json(&run.join("conditions.json"));
-    assert_eq!((told["group"].as_str(), told["load_generator"].as_str()), (Some("plain"), Some("sleep 1000")));
+    assert_eq!(
+        (told["group"].as_str(), told["load_generator"].as_str()),
+        (Some("plain"), Some("sleep 1000"))
+    );
     assert_eq!((told["pair"].as_u64(), told["probe"].as_bool()), (Some(1), Some(false)));
     // Where the package cannot be had, that is told instead.
     if run.join("cyclictest.json").exists() {
-        assert!(told["reference_command"].as_str().is_some_and(|command| command.starts_with("cyclictest -m -p 80")));
+        assert!(
+            told["reference_command"]
+                .as_str()
+                .is_some_and(|command| command.starts_with("cyclictest -m -p 80"))
+        );
         assert!(ended.stdout.contains("emulator-wakeup p99 / cyclictest p99"), "{}", ended.stdout);
     } else {
         let why = told["reference_missing_because"].as_str().expect("a reason");
         skip::tell("a_pair_leaves_runs_references_reports_and_the_table: cyclictest", why);
     }
     // A second measurement into the same folder would mix the two.
-    let _ = latency(&["--pairs", "1", "--seconds", "1", "--out", out]).expect_code(2).expect_said(&["earlier"]);
+    let _ =
+        latency(&["--pairs", "1", "--seconds", "1", "--out", out]).expect_code(2).expect_said(&["earlier"]);
 }

@@ -119,6 +119,8 @@ fn say_farewell(ride: &mut Ride<'_>, inbox: &mut Inbox, cycles: u64) {
             bus.wait_readable(left);
         }
     }
+    bus.leave();
+    inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| station.take(frame, stamp_ns, cycles));
 }
 
 /// Sorts frames by cycle: what arrived after a cycle's start waits for the next one, however late the loop reads.

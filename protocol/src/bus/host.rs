@@ -5,6 +5,7 @@
 //! wire loses (`wire`) is lost for all and counted by identifier. In lockstep, [`super::lockstep`]
 //! decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's file and its lock are in `socket_file`.
 
+mod closing;
 mod modelled;
 
 use super::BusError;
@@ -82,6 +83,19 @@ pub struct Host {
     inbox: Inbox,
     for_rig: Option<VecDeque<ForRig>>,
     report: HostReport,
+    /// Peers that went, by their place in the report, with what had passed the wire by then.
+    gone: Vec<(usize, FramesById)>,
+    closing: bool,
+}
+
+/// What became of a packet for a peer.
+enum Sent {
+    /// Its queue took it.
+    Delivered,
+    /// Its queue was full.
+    Dropped,
+    /// It takes no more, and is removed when its end is read.
+    Gone,
 }
 
 impl Host {
@@ -117,6 +131,8 @@ impl Host {
             inbox: Inbox::new(),
             for_rig: None,
             report: HostReport::default(),
+            gone: Vec::new(),
+            closing: false,
         })
     }
 
@@ -128,6 +144,7 @@ impl Host {
         while !stop.load(Ordering::Relaxed) {
             self.turn(IDLE_WAIT)?;
         }
+        self.close()?;
         Ok(self.report())
     }
 
@@ -148,7 +165,9 @@ impl Host {
             match event.data.u64() {
                 LISTENER => self.let_in(),
                 TIMER => {}
-                peer => self.take_from(peer, wire_to_ns),
+                peer => {
+                    self.take_from(peer, wire_to_ns);
+                }
             }
         }
         if let Some(to_ns) = wire_to_ns {
@@ -215,16 +234,17 @@ impl Host {
             timed.join(id, Some(self.report.peers.len()));
         }
         self.peers.insert(id, Peer { socket, report: self.report.peers.len(), outbox: Outbox::new() });
-        self.report.peers.push(PeerReport { name: process, ..PeerReport::default() });
+        let before_it_came = self.report.on_wire.clone();
+        self.report.peers.push(PeerReport { name: process, before_it_came, ..PeerReport::default() });
     }
 
     /// Takes what a peer sent: one batch, then the next peer has its turn, and epoll tells again while more waits. For a wire in
-    /// real time all that arrived before `wire_to_ns`.
-    fn take_from(&mut self, id: PeerId, wire_to_ns: Option<u64>) {
+    /// real time all that arrived before `wire_to_ns`. False when nothing more waits.
+    fn take_from(&mut self, id: PeerId, wire_to_ns: Option<u64>) -> bool {
         // All queues were read up to where the wire's time stands.
         self.inbox.begin_another_queue(self.wire_in_real_time().map(TimedWire::read_up_to_ns));
         loop {
-            let Some(peer) = self.peers.get(&id) else { return };
+            let Some(peer) = self.peers.get(&id) else { return false };
             let timed = self.timed.as_ref().filter(|_| wire_to_ns.is_some());
             // Without a wire that keeps time, stamps are the peers' affair.
             let stamp = |age_ns| timed.map_or(0, |timed| timed.time_ns(age_ns));
@@ -236,15 +256,19 @@ impl Host {
             }
             let (full, mut newest_ns) = (!self.inbox.emptied_the_queue(), 0);
             while let Some(packet) = self.inbox.take() {
-                // Length 0: the peer is gone.
+                // Length 0: the peer is gone, and what it sent before has been read.
                 if packet.len == 0 {
-                    return self.remove(id);
+                    // While the host closes, whoever is still there stays to the end of it.
+                    if !self.closing {
+                        self.remove(id);
+                    }
+                    return false;
                 }
                 newest_ns = packet.stamp_ns;
                 self.take(id, &packet.bytes[..packet.len], packet.stamp_ns);
             }
             if !full || wire_to_ns.is_none_or(|to_ns| newest_ns > to_ns) {
-                return;
+                return full;
             }
         }
     }
@@ -253,7 +277,9 @@ impl Host {
         let Some(peer) = self.peers.get(&id) else { return };
         let frame = <&[u8; CAN_FRAME_BYTES]>::try_from(bytes).ok().and_then(CanFrame::from_bytes);
         if let Some(frame) = frame {
-            self.report.peers[peer.report].frames_received += 1;
+            let report = &mut self.report.peers[peer.report];
+            report.frames_received += 1;
+            report.received_by_id.count(&frame);
             // An error frame is none on the wire: it tells of one, and passes by.
             let on_wire = frame.raw_id() & ERROR_FLAG == 0;
             match (&mut self.barrier, &mut self.timed) {
@@ -287,7 +313,9 @@ impl Host {
 
     fn remove(&mut self, id: PeerId) {
         // Closing the descriptor takes it out of the epoll set.
-        self.peers.remove(&id);
+        if let Some(peer) = self.peers.remove(&id) {
+            self.gone.push((peer.report, self.report.on_wire.clone()));
+        }
         if let Some(timed) = &mut self.timed {
             timed.leave(id);
         }
@@ -306,6 +334,7 @@ impl Host {
             }
             return;
         }
+        self.report.on_wire.count(frame);
         let bytes = frame.to_bytes();
         if let Some(for_rig) = &mut self.for_rig
             && from != RIG_HERE
@@ -314,16 +343,27 @@ impl Host {
             for_rig.push_back(ForRig::Frame(*frame));
         }
         for (id, peer) in self.peers.iter_mut().filter(|(id, _)| **id != from) {
+            let report = &mut self.report.peers[peer.report];
             if deaf.contains(id) {
+                report.missed_in_bus_off.count(frame);
                 if let Some(barrier) = &mut self.barrier {
                     barrier.lost(frame, Some(*id));
                 }
-            } else if self.barrier.as_ref().is_some_and(|barrier| barrier.must_not_lose(*id)) {
+                continue;
+            }
+            if self.barrier.as_ref().is_some_and(|barrier| barrier.must_not_lose(*id)) {
                 peer.post(&bytes);
-            } else if !peer.send(&bytes) {
-                self.report.peers[peer.report].dropped_at_queue.count(frame);
-                if let Some(barrier) = &mut self.barrier {
-                    barrier.lost(frame, Some(*id));
+                report.delivered.count(frame);
+                continue;
+            }
+            match peer.send(&bytes) {
+                Sent::Delivered => report.delivered.count(frame),
+                Sent::Gone => report.after_it_left.count(frame),
+                Sent::Dropped => {
+                    report.dropped_at_queue.count(frame);
+                    if let Some(barrier) = &mut self.barrier {
+                        barrier.lost(frame, Some(*id));
+                    }
                 }
             }
         }
@@ -373,12 +413,12 @@ impl Host {
 }
 
 impl Peer {
-    /// Sends without blocking; false when the queue did not take the packet.
-    fn send(&self, bytes: &[u8]) -> bool {
+    /// Sends without blocking.
+    fn send(&self, bytes: &[u8]) -> Sent {
         match rustix::net::send(&self.socket, bytes, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
-            // A peer that just went is removed when its end is read; nothing is lost by it.
-            Ok(_) | Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => true,
-            Err(_) => false,
+            Ok(_) => Sent::Delivered,
+            Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => Sent::Gone,
+            Err(_) => Sent::Dropped,
         }
     }
 

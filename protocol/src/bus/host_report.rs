@@ -18,6 +18,16 @@ impl FramesById {
         *self.0.entry(frame.raw_id()).or_default() += 1;
     }
 
+    /// Adds what `later` counted beyond `earlier`.
+    pub(super) fn add_difference(&mut self, later: &Self, earlier: &Self) {
+        for (raw_id, frames) in &later.0 {
+            let more = frames - earlier.0.get(raw_id).copied().unwrap_or(0);
+            if more > 0 {
+                *self.0.entry(*raw_id).or_default() += more;
+            }
+        }
+    }
+
     /// Whether nothing was counted.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -43,15 +53,29 @@ impl Serialize for FramesById {
     }
 }
 
-/// What the host saw of one peer.
+/// What the host saw of one peer. To the frame, for each identifier of others:
+///
+/// ```text
+///   on_wire = before_it_came + delivered + dropped_at_queue + missed_in_bus_off + after_it_left
+/// ```
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct PeerReport {
     /// Name in the barrier, else the process number.
     pub name: String,
     /// Frames taken from the peer.
     pub frames_received: u64,
+    /// The same, by identifier.
+    pub received_by_id: FramesById,
+    /// Frames of the others that passed the wire before the peer was there.
+    pub before_it_came: FramesById,
+    /// Frames that the peer's queue took; what is in it can be received, also when the host has gone.
+    pub delivered: FramesById,
     /// Frames that its full queue did not take, by identifier.
     pub dropped_at_queue: FramesById,
+    /// Frames of the others that passed a modelled wire while the peer was off the bus.
+    pub missed_in_bus_off: FramesById,
+    /// Frames of the others that passed the wire when the peer took no more, or had gone.
+    pub after_it_left: FramesById,
 }
 
 /// What the host counted.
@@ -61,6 +85,8 @@ pub struct HostReport {
     pub frames: u64,
     /// Frames that the wire lost on purpose, by identifier.
     pub injected_loss: FramesById,
+    /// Frames that passed the wire and were for all who were there, by identifier.
+    pub on_wire: FramesById,
     /// Packets that were neither frame nor control packet.
     pub malformed: u64,
     /// The peers in the order in which they came.
@@ -84,7 +110,7 @@ mod tests {
         let report = HostReport { frames: 5, injected_loss: frames, ..HostReport::default() };
         assert_eq!(
             serde_json::to_string(&report).unwrap(),
-            r#"{"frames":5,"injected_loss":{"011":2,"40000110":1,"7FF":1,"80000110":1},"malformed":0,"peers":[]}"#
+            r#"{"frames":5,"injected_loss":{"011":2,"40000110":1,"7FF":1,"80000110":1},"on_wire":{},"malformed":0,"peers":[]}"#
         );
     }
 }

@@ -35,6 +35,7 @@ impl HostedRig {
                 ForRig::Frame(frame) if frame.raw_id() & ERROR_FLAG != 0 => self.counters.error_frames += 1,
                 ForRig::Frame(frame) => {
                     self.counters.received += 1;
+                    self.counters.received_by_id.count(&frame);
                     return Some(Received::Frame(frame, (self.clock)(0)));
                 }
                 ForRig::Barrier(control) => return Some(Received::Barrier(control)),
@@ -50,6 +51,7 @@ impl HostedRig {
 impl Bus for HostedRig {
     fn send(&mut self, frame: &CanFrame) -> Result<u64, SendError> {
         self.counters.sent += 1;
+        self.counters.sent_by_id.count(frame);
         self.host.take_from_rig(FromRig::Frame(*frame));
         Ok((self.clock)(0))
     }

@@ -46,6 +46,8 @@ pub(super) struct SocketPeer<L> {
     /// When the bus was last lost, by the bus's clock: what arrived before says nothing of its return.
     lost_ns: u64,
     next_attempt: Instant,
+    /// Takes nothing more and does not come back.
+    left: bool,
     joined: Option<Control>,
     inbox: Inbox,
     drained: bool,
@@ -82,6 +84,7 @@ impl<L: Link> SocketPeer<L> {
             ever_up: false,
             lost_ns: 0,
             next_attempt: Instant::now(),
+            left: false,
             joined: None,
             inbox: Inbox::new(),
             drained: false,
@@ -111,7 +114,7 @@ impl<L: Link> SocketPeer<L> {
 
     fn try_again(&mut self) {
         let now = Instant::now();
-        if now >= self.next_attempt && self.connect().is_err() {
+        if !self.left && now >= self.next_attempt && self.connect().is_err() {
             self.next_attempt = now + RETRY_PERIOD;
         }
     }
@@ -123,8 +126,9 @@ impl<L: Link> SocketPeer<L> {
         }
         self.usable = false;
         self.outbox.clear();
-        // An interface that is merely down keeps its socket; one that is gone, or a host that is, needs a new one.
-        if error != rustix::io::Errno::NETDOWN {
+        // An interface that is merely down keeps its socket; one that is gone, or a host that is, needs a new one. A host that
+        // takes no more may have delivered something: it is read first, and its end after it.
+        if !matches!(error, rustix::io::Errno::NETDOWN | rustix::io::Errno::PIPE) {
             self.socket = None;
             self.next_attempt = Instant::now() + RETRY_PERIOD;
         }
@@ -162,6 +166,7 @@ impl<L: Link> SocketPeer<L> {
             }
             Some(frame) => {
                 self.counters.received += 1;
+                self.counters.received_by_id.count(&frame);
                 Some(Received::Frame(frame, packet.stamp_ns))
             }
             None => {
@@ -244,7 +249,10 @@ impl<L: Link> Bus for SocketPeer<L> {
         let handed_over_ns = (self.clock)(0);
         let result = if self.joined.is_some() { self.post(&bytes) } else { self.send_packet(&bytes) };
         match result {
-            Ok(()) => self.counters.sent += 1,
+            Ok(()) => {
+                self.counters.sent += 1;
+                self.counters.sent_by_id.count(frame);
+            }
             Err(_) => self.counters.dropped_on_send += 1,
         }
         result.map(|()| handed_over_ns)
@@ -253,6 +261,9 @@ impl<L: Link> Bus for SocketPeer<L> {
     fn receive(&mut self) -> Received {
         loop {
             while let Some(packet) = self.inbox.take() {
+                if packet.len == 0 && self.left {
+                    return Received::Nothing;
+                }
                 if packet.len == 0 {
                     self.went_away(rustix::io::Errno::CONNRESET);
                     return Received::Nothing;
@@ -314,6 +325,15 @@ impl<L: Link> Bus for SocketPeer<L> {
     fn done(&mut self, cycle: u32) {
         // A failure shows as a bus that is down, and as a time-out of the barrier.
         let _ = self.post(&Control::new(Kind::Done, cycle).to_bytes()).and_then(|()| self.flush());
+    }
+
+    fn leave(&mut self) {
+        // The kernel decides on each packet under one lock: it is in our queue, or its sender is told that we have gone.
+        // SocketCAN refuses; its peers go on as before.
+        if let Some(socket) = &self.socket {
+            self.left = rustix::net::shutdown(socket, rustix::net::Shutdown::Read).is_ok();
+            self.drained = false;
+        }
     }
 }
 

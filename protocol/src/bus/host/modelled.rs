@@ -1,6 +1,6 @@
 //! The host over a wire that keeps time: what the model says happened is carried out, in real time and in lockstep.
 
-use super::{ForRig, GONE, Host, RIG_HERE};
+use super::{ForRig, GONE, Host, RIG_HERE, Sent};
 use crate::bus::lockstep::{PeerId, Release};
 use crate::bus::timed::{CYCLE_NS, TimedWire};
 use crate::can::{CanFrame, ERROR_FLAG};
@@ -118,7 +118,7 @@ impl Host {
         let Some(peer) = self.peers.get_mut(&id) else { return };
         if in_barrier {
             peer.post(&frame.to_bytes());
-        } else if !peer.send(&frame.to_bytes()) {
+        } else if matches!(peer.send(&frame.to_bytes()), Sent::Dropped) {
             self.report.peers[peer.report].dropped_at_queue.count(frame);
         }
     }

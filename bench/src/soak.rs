@@ -1,0 +1,345 @@
+//! A soak: emulator and controllers over hours, segment after segment, each accounted for to the last frame.
+//!
+//! ```text
+//!   plan ──► segment: controllers, load, emulator ──► judge: account, gaps, memory, … ──► soak.json, JUnit, soak.hlog, soak.md
+//!    ▲            watched once a second                                                        │ whole after each segment
+//!    └────────────────────────── by the segment's number alone ────────────────────────────────┘
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`plan`] | which segment comes when |
+//! | [`segment`], [`processes`], [`procfs`] | one segment while it runs |
+//! | [`evidence`], [`frame_log`] | what it left, read |
+//! | [`account`], [`memory`] | sent = received + lost, to the frame; whether memory is flat |
+//! | [`judge`] | every check of a segment |
+//! | [`model`], [`keeping`], [`merged`], [`junit`], [`verdict`] | what is known of all, and its files |
+//! | [`rotate`] | big files of older segments go |
+//!
+//! It knows emulator and controller as programs and by their files; it talks to neither.
+
+pub mod account;
+pub mod cli;
+pub mod evidence;
+pub mod frame_log;
+pub mod judge;
+pub mod junit;
+pub mod keeping;
+pub mod memory;
+pub mod merged;
+pub mod model;
+pub mod plan;
+pub mod processes;
+pub mod procfs;
+pub mod rotate;
+pub mod segment;
+pub mod verdict;
+
+use cli::{SoakArguments, YesNo};
+use keeping::{Keeping, unix_s};
+use model::{Segment, Settings};
+use plan::Plan;
+use protocol::bus::BusUrl;
+use protocol::exit::Exit;
+use protocol::run_folder::write_json;
+use realtime::Interrupt;
+use segment::{Common, End, Outcome};
+use serde_json::json;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Time between two lines of progress, s.
+const PROGRESS_S: f64 = 10.0;
+/// Segments in a row that end before their time, after which the soak gives up: the fault is none of a moment.
+const GIVE_UP_AFTER: usize = 3;
+
+/// What keeps a soak from going on.
+#[derive(Debug, thiserror::Error)]
+pub enum SoakError {
+    /// A file that cannot be read, or says what is not allowed.
+    #[error("cannot read {file}: {reason}")]
+    Input {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A file that cannot be written.
+    #[error("cannot write {file}: {reason}; choose another folder with --out")]
+    Output {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// A program that does not start.
+    #[error("cannot start {program}: {reason}; build it, or say where it is with --bin-dir")]
+    Program {
+        /// The program.
+        program: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// The folder is another soak's at this moment.
+    #[error("{0}: another soak is at work in this folder; choose another --out")]
+    Busy(PathBuf),
+    /// The folder holds a soak that was begun otherwise.
+    #[error(
+        "{out} holds a soak with other settings: {differences}; choose another --out, or go on with --anyway"
+    )]
+    OtherSettings {
+        /// The folder.
+        out: PathBuf,
+        /// What differs.
+        differences: String,
+    },
+    /// No handler for Ctrl-C.
+    #[error("cannot watch for Ctrl-C: {0}")]
+    Signals(io::Error),
+}
+
+impl SoakError {
+    pub(crate) fn output(file: &Path, error: &io::Error) -> Self {
+        Self::Output { file: file.into(), reason: error.to_string() }
+    }
+}
+
+/// Soaks as the command line asks.
+///
+/// # Errors
+/// [`SoakError`] when it cannot begin or its results cannot be written; how it went is the exit code.
+pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
+    let common = common(arguments)?;
+    let (load, load_missing_because) = load(arguments);
+    let planned_s = arguments.planned_s();
+    let loss = (arguments.loss_segments == YesNo::Yes && matches!(arguments.bus, BusUrl::Unix { .. }))
+        .then_some(arguments.loss);
+    let settings = Settings {
+        bus: arguments.bus.to_string(),
+        experiments: arguments.experiments.clone(),
+        segment_s: plan::segment_s(arguments.segment_seconds, planned_s),
+        load: (arguments.load != "none").then(|| arguments.load.clone()),
+        loss,
+        emulator_options: arguments.emulator_options.clone(),
+        controller_options: arguments.controller_options.clone(),
+        rig: arguments.rig.display().to_string(),
+    };
+    let mut keeping = Keeping::open(&arguments.out, settings, planned_s, arguments.anyway)?;
+    keeping.soak.load_missing_because = load_missing_because;
+    let soaking = Soaking {
+        plan: Plan { experiments: arguments.experiments.clone(), load: load.is_some(), loss },
+        common: Common { load: load.unwrap_or_default(), ..common },
+        keep: arguments.keep,
+        keep_failed: arguments.keep_failed,
+        interrupt: Interrupt::watch().map_err(SoakError::Signals)?,
+    };
+    let (exit, because) = soaking.run(&mut keeping)?;
+    keeping.soak.ended_because = Some(because.clone());
+    keeping.write()?;
+    eprintln!("soak: {because}");
+    eprintln!("soak: {}", keeping.soak.verdict);
+    eprintln!("soak: results in {}: soak.json, soak-junit.xml, soak.hlog, soak.md", arguments.out.display());
+    Ok(exit)
+}
+
+/// What all segments have in common, looked at before anything is begun.
+fn common(arguments: &SoakArguments) -> Result<Common, SoakError> {
+    let unreadable =
+        |file: &Path, error: &io::Error| SoakError::Input { file: file.into(), reason: error.to_string() };
+    let experiment = |name: &String| arguments.experiment_folder.join(format!("{name}.toml"));
+    for file in arguments.experiments.iter().map(experiment).chain([arguments.rig.clone()]) {
+        std::fs::metadata(&file).map_err(|error| unreadable(&file, &error))?;
+    }
+    let beside_us = || std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned()));
+    let bin_dir = arguments.bin_dir.clone().or_else(beside_us).unwrap_or_default();
+    for program in ["emulator", "controller"] {
+        let path = bin_dir.join(program);
+        std::fs::metadata(&path)
+            .map_err(|error| SoakError::Program { program: path.clone(), reason: error.to_string() })?;
+    }
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect();
+    Ok(Common {
+        bus: arguments.bus.clone(),
+        rig: arguments.rig.clone(),
+        experiment_folder: arguments.experiment_folder.clone(),
+        bin_dir,
+        load: Vec::new(),
+        emulator_options: words(&arguments.emulator_options),
+        controller_options: words(&arguments.controller_options),
+        min_free_bytes: arguments.min_free_mb * 1_000_000,
+    })
+}
+
+/// The load generator's command line with its program's path, or why there is none although one was asked for.
+fn load(arguments: &SoakArguments) -> (Option<Vec<String>>, Option<String>) {
+    let mut words: Vec<_> = arguments.load.split_whitespace().map(str::to_owned).collect();
+    let Some(program) = words.first().filter(|program| *program != "none") else { return (None, None) };
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let here = program.contains('/').then(|| PathBuf::from(program));
+    let found = here.into_iter().chain(std::env::split_paths(&folders).map(|folder| folder.join(program)));
+    match found.into_iter().find(|path| path.is_file()) {
+        Some(path) => {
+            words[0] = path.display().to_string();
+            (Some(words), None)
+        }
+        None => {
+            let why = format!("{program} is not installed; scripts/soak installs it, or say --load none");
+            eprintln!("soak: warning: {why}");
+            (None, Some(why))
+        }
+    }
+}
+
+/// A soak at work.
+struct Soaking {
+    plan: Plan,
+    common: Common,
+    keep: u64,
+    keep_failed: u64,
+    interrupt: Interrupt,
+}
+
+impl Soaking {
+    /// Runs segments until the time is up, and tells why it ended.
+    fn run(&self, keeping: &mut Keeping) -> Result<(Exit, String), SoakError> {
+        let mut early_in_a_row = 0;
+        loop {
+            if self.interrupt.came() {
+                return Ok((
+                    Exit::Interrupted,
+                    "interrupted; everything is saved, the same command goes on".into(),
+                ));
+            }
+            let left_s = keeping.soak.planned_s - keeping.soak.elapsed_s;
+            let Some(rig_s) = plan::rig_s(keeping.soak.settings.segment_s, left_s) else {
+                let exit = if keeping.soak.totals.failed > 0 { Exit::BoundBroken } else { Exit::Good };
+                return Ok((exit, "the time asked for is up".into()));
+            };
+            let (end, codes) = self.segment(keeping, rig_s)?;
+            match end {
+                End::DiskFull(free_bytes) => {
+                    let (free, out) = (free_bytes / 1_000_000, keeping.out().display());
+                    let why = format!(
+                        "the disk of {out} is nearly full, {free} MB are free: make room, or see --min-free-mb"
+                    );
+                    return Ok((Exit::BadInput, why));
+                }
+                End::Early(_) => early_in_a_row += 1,
+                End::TimeUp | End::Interrupted => early_in_a_row = 0,
+            }
+            if early_in_a_row >= GIVE_UP_AFTER {
+                let why = format!(
+                    "{GIVE_UP_AFTER} segments in a row ended before their time; see emulator.txt and controller.txt in their folders"
+                );
+                let refused = codes.contains(&Some(Exit::BadInput as i32));
+                return Ok((if refused { Exit::BadInput } else { Exit::BusFailed }, why));
+            }
+        }
+    }
+
+    /// Runs, judges and records one segment; tells how it ended and the exit codes of its programs.
+    fn segment(&self, keeping: &mut Keeping, rig_s: f64) -> Result<(End, Vec<Option<i32>>), SoakError> {
+        let spec = self.plan.segment(keeping.next_number());
+        let folder = keeping.out().join("segments").join(spec.folder());
+        let (started_unix_s, began) = (unix_s(), Instant::now());
+        let (planned_s, elapsed_s) = (keeping.soak.planned_s, keeping.soak.elapsed_s);
+        let failed = keeping.soak.totals.failed;
+        let mut told_s = -PROGRESS_S;
+        let mut tell = |at_s: f64| {
+            if at_s - told_s >= PROGRESS_S {
+                told_s = at_s;
+                let left_min = (planned_s - elapsed_s - at_s).max(0.0) / 60.0;
+                eprintln!(
+                    "soak: segment {} ({}): {at_s:.0} of {rig_s:.0} s; {failed} failed so far; {left_min:.1} min left",
+                    spec.folder(),
+                    spec.in_words(),
+                );
+            }
+        };
+        let outcome = segment::run(&self.common, &spec, rig_s, &folder, &self.interrupt, &mut tell)?;
+        let load = spec.load.then(|| self.common.load.join(" "));
+        write_conditions(&folder, &spec, load.as_deref())?;
+        let judged = judge::judge(&spec, &folder, &outcome);
+        let unread = keeping.merged.add_segment(&folder);
+        unread.iter().for_each(|line| eprintln!("soak: warning: {line}"));
+        if keeping.soak.machine.is_null() {
+            keeping.soak.machine = judged.machine;
+        }
+        let file_bytes = procfs::folder_bytes(&folder);
+        let segment = Segment {
+            folder: spec.folder(),
+            started_unix_s,
+            length_s: began.elapsed().as_secs_f64(),
+            rig_s,
+            finished: true,
+            ended: in_words(&outcome),
+            load,
+            checks: judged.checks,
+            figures: judged.figures,
+            account: judged.account.rows,
+            memory: judged.memory,
+            file_bytes,
+            file_bytes_per_s: (file_bytes as f64 / rig_s) as u64,
+            rotated: false,
+            spec,
+        };
+        for check in segment.broken() {
+            eprintln!("soak: segment {} failed: {}: {}", segment.folder, check.name, check.detail);
+        }
+        keeping.soak.segments.push(segment);
+        let out = keeping.out().to_owned();
+        rotate::rotate(&out, &mut keeping.soak.segments, self.keep, self.keep_failed)
+            .map_err(|error| SoakError::output(&out, &error))?;
+        keeping.soak.elapsed_s += began.elapsed().as_secs_f64();
+        keeping.write()?;
+        Ok((outcome.end, outcome.exits.values().map(|(_, code, _)| *code).collect()))
+    }
+}
+
+/// What a latency report wants to know of a run.
+fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Result<(), SoakError> {
+    let path = folder.join("conditions.json");
+    let conditions = json!({
+        "schema_version": 1,
+        "load_generator": load,
+        "group": format!("{}, {}", spec.experiment, spec.in_words()),
+        "pair": spec.number,
+        "reference_command": null,
+        "reference_missing_because": "a soak measures no reference",
+        "probe": false,
+    });
+    write_json(&path, &conditions).map_err(|error| SoakError::output(&path, &error))
+}
+
+fn in_words(outcome: &Outcome) -> String {
+    match &outcome.end {
+        End::TimeUp => "its time was up".into(),
+        End::Interrupted => "interrupted".into(),
+        End::DiskFull(free_bytes) => format!("the disk was nearly full: {} MB free", free_bytes / 1_000_000),
+        End::Early(why) => why.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! A segment that tests of the parts share.
+
+    use super::model::{Check, CheckResult, Figures, Segment};
+    use super::plan::Spec;
+
+    /// A finished segment of experiment `e` with these checks.
+    pub(super) fn segment(number: u32, checks: &[(&str, CheckResult)]) -> Segment {
+        let check = |(name, result): &(&str, CheckResult)| Check {
+            name: (*name).into(),
+            result: *result,
+            detail: "because".into(),
+        };
+        let mut segment = Segment::cut_off(number, "e", &format!("{number:04}-e"));
+        segment.finished = true;
+        segment.checks = checks.iter().map(check).collect();
+        segment.figures = Figures { cycles: Some(1000), ..Figures::default() };
+        assert_eq!(segment.spec, Spec { number, ..segment.spec.clone() });
+        segment
+    }
+}

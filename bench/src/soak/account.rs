@@ -1,0 +1,304 @@
+//! The account of a segment's frames, to the last one: for every identifier and every receiver
+//!
+//! ```text
+//!   sent = received + lost on the wire + lost at the receiver's queue + passed before it came + passed after it left
+//!    │        │            └──────────────┴── the host of the embedded bus counts them ──┴──────────────┘
+//!    │        └── the receiver counts them           can://: the kernel's overflow count stands in the queue's place
+//!    └── the sender counts them
+//!
+//!   gaps at the receiver + before its first frame + after its last  =  sent - received
+//! ```
+//!
+//! The second line is the other way to the same number: from the counters that senders put into commands (4 bits) and from the
+//! rig's ticks (how many sensor frames it has sent), without anything that host or kernel say. No tolerance anywhere: a
+//! host counts what passed while a peer was not there, so the ends of a connection are exact too.
+
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Senders count valve commands modulo this.
+const COUNTER_RANGE: u64 = 16;
+
+/// Frames by the name of their identifier.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Counts(BTreeMap<String, u64>);
+
+impl Counts {
+    /// Frames of an identifier.
+    #[must_use]
+    pub fn of(&self, id: &str) -> u64 {
+        self.0.get(id).copied().unwrap_or(0)
+    }
+
+    /// Adds frames of an identifier.
+    pub fn add(&mut self, id: &str, frames: u64) {
+        *self.0.entry(id.to_owned()).or_default() += frames;
+    }
+
+    /// Adds all of another.
+    pub fn add_all(&mut self, other: &Self) {
+        other.0.iter().for_each(|(id, frames)| self.add(id, *frames));
+    }
+
+    /// Frames in all.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.0.values().sum()
+    }
+
+    /// Identifiers that were counted.
+    pub fn ids(&self) -> impl Iterator<Item = &String> {
+        self.0.keys()
+    }
+}
+
+impl<const N: usize> From<[(&str, u64); N]> for Counts {
+    fn from(counts: [(&str, u64); N]) -> Self {
+        Self(counts.into_iter().map(|(id, frames)| (id.to_owned(), frames)).collect())
+    }
+}
+
+/// What the host of the embedded bus saw of a peer.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// Frames that it took from the peer.
+    pub taken: Counts,
+    /// Frames of others before the peer came.
+    pub before: Counts,
+    /// Frames that it put into the peer's queue.
+    pub delivered: Counts,
+    /// Frames that did not fit the queue.
+    pub dropped: Counts,
+    /// Frames of others while the peer was off a modelled bus.
+    pub missed_in_bus_off: Counts,
+    /// Frames of others after the peer had left.
+    pub after: Counts,
+}
+
+/// Gaps that a receiver saw by what frames say of themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gaps {
+    /// The rig, of an axis's commands: gaps between the first and the last one, whose counters these are.
+    Commands {
+        /// Missing in between.
+        lost: u64,
+        /// Counter of the first command that came; a sender's first has 1.
+        first: u8,
+        /// Counter of the last.
+        last: u8,
+    },
+    /// A controller, of its axis's sensors, by the rig's ticks.
+    Sensors {
+        /// Missing between the first and the last tick, which says that no more come.
+        lost: u64,
+        /// Missing before the first tick that came.
+        before: u64,
+    },
+}
+
+impl Gaps {
+    /// All that is missing, when `sent` were sent; sums to the frame.
+    #[must_use]
+    pub fn missing(&self, sent: u64) -> u64 {
+        match *self {
+            Self::Commands { lost, first, last } => {
+                let before = (u64::from(first) + COUNTER_RANGE - 1) % COUNTER_RANGE;
+                let after = (sent % COUNTER_RANGE + COUNTER_RANGE - u64::from(last)) % COUNTER_RANGE;
+                before + lost + after
+            }
+            Self::Sensors { lost, before } => lost + before,
+        }
+    }
+}
+
+/// A process on the bus, as it and the host tell.
+#[derive(Clone, Debug, Default)]
+pub struct Party {
+    /// Its name.
+    pub name: String,
+    /// Frames that it handed to the bus.
+    pub sent: Counts,
+    /// Frames that it took from the bus.
+    pub received: Counts,
+    /// Frames that the kernel dropped at its queue, of whatever identifier; only SocketCAN tells.
+    pub overflow: u64,
+    /// What the host saw of it; `None` without a host.
+    pub seen: Option<Seen>,
+    /// Gaps by identifier, of those that have any to see.
+    pub gaps: BTreeMap<String, Gaps>,
+}
+
+/// What the wire of the embedded bus did.
+#[derive(Clone, Debug, Default)]
+pub struct Wire {
+    /// Frames that it lost on purpose.
+    pub injected: Counts,
+    /// Frames that a modelled wire never sent: at a full transmit queue, or in bus-off.
+    pub never_sent: Counts,
+    /// Frames that passed it.
+    pub passed: Counts,
+    /// Peers that are none of ours, which may have sent.
+    pub others: Vec<Seen>,
+}
+
+/// One identifier at one receiver.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Row {
+    /// Identifier, as candump names it.
+    pub id: String,
+    /// Who sent it.
+    pub sender: String,
+    /// Who should have received it.
+    pub receiver: String,
+    /// Frames sent, by the sender's count.
+    pub sent: u64,
+    /// Frames received, by the receiver's count.
+    pub received: u64,
+    /// Lost on the wire on purpose, or never sent by a modelled one, by the host's count.
+    pub lost_on_wire: u64,
+    /// Lost at the receiver's queue, or missed in bus-off, by the host's count; on can:// the kernel's, when it names one identifier only.
+    pub lost_at_queue: u64,
+    /// Passed before the receiver was on the bus.
+    pub before_it_came: u64,
+    /// Passed after it had left.
+    pub after_it_left: u64,
+    /// Missing by the gaps that the receiver saw and the ends of its series; null where frames carry no count.
+    pub missing_by_gaps: Option<u64>,
+}
+
+/// The account of a segment.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Account {
+    /// Each identifier at each receiver.
+    pub rows: Vec<Row>,
+    /// What does not add up, a sentence each; empty when everything does.
+    pub broken: Vec<String>,
+    /// Where gaps and counts differ, a sentence each.
+    pub gaps_broken: Vec<String>,
+}
+
+impl Row {
+    fn missing(&self) -> i128 {
+        i128::from(self.sent) - i128::from(self.received)
+    }
+
+    fn explained(&self) -> u64 {
+        self.lost_on_wire + self.lost_at_queue + self.before_it_came + self.after_it_left
+    }
+}
+
+/// Adds up who sent and who received what. `wire`: on the embedded bus.
+#[must_use]
+pub fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
+    let mut account = Account::default();
+    let senders = senders(parties, wire);
+    if let Some(wire) = wire {
+        check_host(parties, wire, &senders, &mut account.broken);
+    }
+    for party in parties {
+        let first_row = account.rows.len();
+        for (id, (sender, sent)) in senders.iter().filter(|(id, _)| party.sent.of(id) == 0) {
+            let seen = party.seen.clone().unwrap_or_default();
+            account.rows.push(Row {
+                id: id.clone(),
+                sender: sender.clone(),
+                receiver: party.name.clone(),
+                sent: *sent,
+                received: party.received.of(id),
+                lost_on_wire: wire.map_or(0, |wire| wire.injected.of(id) + wire.never_sent.of(id)),
+                lost_at_queue: seen.dropped.of(id) + seen.missed_in_bus_off.of(id),
+                before_it_came: seen.before.of(id),
+                after_it_left: seen.after.of(id),
+                missing_by_gaps: party.gaps.get(id).map(|gaps| gaps.missing(*sent)),
+            });
+        }
+        let rows = &mut account.rows[first_row..];
+        if wire.is_none() {
+            take_overflow(party, rows, &mut account.broken);
+        }
+        check_rows(rows, &mut account.broken, &mut account.gaps_broken);
+        for id in party.received.ids().filter(|id| !senders.contains_key(*id)) {
+            account.broken.push(format!("{} received {id}, which nobody has sent", party.name));
+        }
+    }
+    account
+}
+
+/// Sender and frames of each identifier.
+fn senders(parties: &[Party], wire: Option<&Wire>) -> BTreeMap<String, (String, u64)> {
+    let mut senders: BTreeMap<String, (String, u64)> = BTreeMap::new();
+    let strangers = wire.map_or(&[][..], |wire| &wire.others).iter().map(|seen| ("another", &seen.taken));
+    for (name, sent) in parties.iter().map(|party| (party.name.as_str(), &party.sent)).chain(strangers) {
+        for id in sent.ids() {
+            let entry = senders.entry(id.clone()).or_insert_with(|| (name.to_owned(), 0));
+            entry.1 += sent.of(id);
+            if entry.0 != name {
+                entry.0 = format!("{} and {name}", entry.0);
+            }
+        }
+    }
+    senders
+}
+
+/// What the host says of itself must be whole before it is held against others.
+fn check_host(
+    parties: &[Party],
+    wire: &Wire,
+    senders: &BTreeMap<String, (String, u64)>,
+    broken: &mut Vec<String>,
+) {
+    for party in parties {
+        let Some(seen) = &party.seen else {
+            broken.push(format!("the host never saw {}", party.name));
+            continue;
+        };
+        let ids: BTreeSet<_> = party.sent.ids().chain(seen.taken.ids()).collect();
+        for id in ids.into_iter().filter(|id| party.sent.of(id) != seen.taken.of(id)) {
+            let (sent, taken) = (party.sent.of(id), seen.taken.of(id));
+            broken.push(format!("{id}: {} sent {sent}, the host took {taken}", party.name));
+        }
+        for id in seen.delivered.ids().filter(|id| seen.delivered.of(id) != party.received.of(id)) {
+            let (delivered, received) = (seen.delivered.of(id), party.received.of(id));
+            broken.push(format!("{id}: {} received {received}, the host delivered {delivered}", party.name));
+        }
+    }
+    for (id, (_, sent)) in senders {
+        let (passed, injected) = (wire.passed.of(id), wire.injected.of(id) + wire.never_sent.of(id));
+        if *sent != passed + injected {
+            broken.push(format!("{id}: {sent} sent, {passed} passed the wire, {injected} lost on it"));
+        }
+    }
+}
+
+/// The kernel counts what it dropped and does not say of which identifier: the sum must be what is missing in all.
+fn take_overflow(party: &Party, rows: &mut [Row], broken: &mut Vec<String>) {
+    let missing: i128 = rows.iter().map(Row::missing).sum();
+    if missing == i128::from(party.overflow) && rows.iter().all(|row| row.missing() >= 0) {
+        rows.iter_mut().for_each(|row| row.lost_at_queue = row.sent - row.received);
+    } else {
+        let (name, overflow) = (&party.name, party.overflow);
+        broken.push(format!("{name} misses {missing} frames in all, its queue dropped {overflow}"));
+    }
+}
+
+fn check_rows(rows: &[Row], broken: &mut Vec<String>, gaps_broken: &mut Vec<String>) {
+    for row in rows {
+        let Row { id, sender, receiver, sent, received, .. } = row;
+        if row.missing() != i128::from(row.explained()) {
+            broken.push(format!(
+                "{id}: {sender} sent {sent}, {receiver} received {received}, {} lost or not there for it",
+                row.explained()
+            ));
+        }
+        if let Some(by_gaps) = row.missing_by_gaps.filter(|by_gaps| i128::from(*by_gaps) != row.missing()) {
+            gaps_broken.push(format!(
+                "{id} at {receiver}: {} missing by the counts, {by_gaps} by the gaps",
+                row.missing()
+            ));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,130 @@
+//! Accounts of made-up segments: whole ones, and each way in which one can be broken.
+
+use super::*;
+
+/// A rig and a controller; two of 1000 sensor frames were lost on the wire, one at the controller's queue, three passed before it
+/// came; of 996 commands one was lost on the wire, and one came when the rig had left.
+fn whole() -> (Vec<Party>, Wire) {
+    let rig = Party {
+        name: "emulator".into(),
+        sent: Counts::from([("120", 1000), ("130", 100)]),
+        received: Counts::from([("110", 994)]),
+        seen: Some(Seen {
+            taken: Counts::from([("120", 1000), ("130", 100)]),
+            delivered: Counts::from([("110", 994)]),
+            after: Counts::from([("110", 1)]),
+            ..Seen::default()
+        }),
+        // 996 = 62 * 16 + 4: the last one sent has counter 4; the last that came 3, so one is missing behind it.
+        gaps: BTreeMap::from([("110".into(), Gaps::Commands { lost: 0, first: 2, last: 3 })]),
+        ..Party::default()
+    };
+    let controller = Party {
+        name: "controller".into(),
+        sent: Counts::from([("110", 996)]),
+        received: Counts::from([("120", 994), ("130", 100)]),
+        seen: Some(Seen {
+            taken: Counts::from([("110", 996)]),
+            before: Counts::from([("120", 3)]),
+            delivered: Counts::from([("120", 994), ("130", 100)]),
+            dropped: Counts::from([("120", 1)]),
+            ..Seen::default()
+        }),
+        gaps: BTreeMap::from([("120".into(), Gaps::Sensors { lost: 2, before: 4 })]),
+        ..Party::default()
+    };
+    let wire = Wire {
+        injected: Counts::from([("120", 2), ("110", 1)]),
+        passed: Counts::from([("110", 995), ("120", 998), ("130", 100)]),
+        ..Wire::default()
+    };
+    (vec![rig, controller], wire)
+}
+
+fn broken(change: impl Fn(&mut Vec<Party>, &mut Wire)) -> Account {
+    let (mut parties, mut wire) = whole();
+    change(&mut parties, &mut wire);
+    close(&parties, Some(&wire))
+}
+
+#[test]
+fn a_whole_account_names_every_missing_frame_both_ways() {
+    let account = broken(|_, _| {});
+    assert_eq!((&account.broken, &account.gaps_broken), (&vec![], &vec![]));
+    let missing: Vec<_> =
+        account.rows.iter().map(|row| (row.id.as_str(), row.explained(), row.missing_by_gaps)).collect();
+    assert_eq!(missing, [("110", 2, Some(2)), ("120", 6, Some(6)), ("130", 0, None)]);
+}
+
+#[test]
+fn one_frame_too_few_at_a_receiver_breaks_it() {
+    let account = broken(|parties, _| parties[1].received = Counts::from([("120", 993), ("130", 100)]));
+    assert_eq!(account.broken.len(), 2, "{account:?}");
+    assert!(account.broken[1].contains("120: emulator sent 1000, controller received 993"), "{account:?}");
+    assert_eq!(account.gaps_broken.len(), 1, "{account:?}");
+}
+
+#[test]
+fn a_frame_that_never_reached_the_host_breaks_it() {
+    let account = broken(|parties, _| parties[1].sent = Counts::from([("110", 997)]));
+    assert!(account.broken[0].contains("110: controller sent 997, the host took 996"), "{account:?}");
+}
+
+#[test]
+fn a_wire_that_lost_more_than_it_says_breaks_it() {
+    let account = broken(|_, wire| wire.injected = Counts::from([("120", 1), ("110", 1)]));
+    assert!(
+        account.broken.iter().any(|line| line.contains("998 passed the wire, 1 lost on it")),
+        "{account:?}"
+    );
+}
+
+#[test]
+fn gaps_that_differ_by_one_break_the_gaps_alone() {
+    let gaps = Gaps::Sensors { lost: 3, before: 4 };
+    let account = broken(|parties, _| {
+        parties[1].gaps.insert("120".into(), gaps);
+    });
+    assert_eq!(account.broken, [""; 0]);
+    assert_eq!(account.gaps_broken, ["120 at controller: 6 missing by the counts, 7 by the gaps"]);
+}
+
+#[test]
+fn a_stranger_that_sends_is_a_sender_and_its_frames_must_arrive() {
+    let stranger = Seen { taken: Counts::from([("108", 5)]), ..Seen::default() };
+    let account = broken(|parties, wire| {
+        wire.others = vec![stranger.clone()];
+        wire.passed.add("108", 5);
+        for party in parties {
+            party.received.add("108", 5);
+            party.seen.as_mut().unwrap().delivered.add("108", 5);
+        }
+    });
+    assert_eq!(account.broken, [""; 0]);
+    assert_eq!(account.rows.iter().filter(|row| row.sender == "another").count(), 2);
+}
+
+#[test]
+fn on_a_kernels_bus_the_overflow_count_must_be_what_is_missing_in_all() {
+    let (mut parties, _) = whole();
+    parties.iter_mut().for_each(|party| party.seen = None);
+    (parties[0].overflow, parties[1].overflow) = (2, 6);
+    let account = close(&parties, None);
+    assert_eq!((account.broken.len(), account.gaps_broken.len()), (0, 0), "{account:?}");
+    parties[1].overflow = 5;
+    let account = close(&parties, None);
+    assert_eq!(account.broken[0], "controller misses 6 frames in all, its queue dropped 5");
+}
+
+#[test]
+fn what_nobody_sent_is_told() {
+    let account = broken(|parties, _| parties[0].received.add("7", 1));
+    assert_eq!(account.broken, ["emulator received 7, which nobody has sent"]);
+}
+
+#[test]
+fn a_series_of_commands_is_missing_what_lies_before_between_and_after() {
+    // 1 to 20 were sent; 1, 2, 7 and 20 did not come.
+    assert_eq!(Gaps::Commands { lost: 1, first: 3, last: 3 }.missing(20), 4);
+    assert_eq!(Gaps::Commands { lost: 0, first: 1, last: 0 }.missing(16), 0);
+}

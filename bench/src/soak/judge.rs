@@ -1,0 +1,195 @@
+//! What a finished segment is worth: its files read, its account closed, every check with its result.
+
+use super::account::{self, Account};
+use super::evidence::{Evidence, counts};
+use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
+use super::model::{Check, CheckResult, Figures};
+use super::plan::Spec;
+use super::segment::{End, Outcome};
+use crate::thresholds;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Standard deviations that the injected loss may be away from its probability.
+const LOSS_DEVIATIONS: f64 = 5.0;
+
+/// What was found.
+pub struct Judged {
+    /// Every check.
+    pub checks: Vec<Check>,
+    /// Figures of the run.
+    pub figures: Figures,
+    /// The account.
+    pub account: Account,
+    /// Memory by process.
+    pub memory: BTreeMap<String, Memory>,
+    /// `machine` of `run.json`.
+    pub machine: Value,
+}
+
+/// Judges what a segment left in its folder.
+#[must_use]
+pub fn judge(spec: &Spec, folder: &Path, outcome: &Outcome) -> Judged {
+    let evidence = Evidence::read(spec, folder);
+    let account = evidence.account(outcome);
+    let memory: BTreeMap<_, _> =
+        outcome.memory.iter().map(|(name, record)| (name.clone(), Memory::of(record))).collect();
+    let mut checks = vec![processes(outcome)];
+    match &account {
+        Ok(account) => checks.extend([
+            result("account", &account.broken, || in_numbers(account)),
+            result("gaps", &account.gaps_broken, || {
+                "missing frames are the same by counts and by gaps".into()
+            }),
+            loss(spec, &evidence, account),
+        ]),
+        Err(why) => {
+            checks.extend(["account", "gaps", "loss"].map(|name| check(name, CheckResult::Failed, why)))
+        }
+    }
+    checks.extend([records(&evidence, outcome), memory_check(&memory), positions(&evidence)]);
+    let account = account.unwrap_or_default();
+    let machine = evidence.run["machine"].clone();
+    Judged { checks, figures: evidence.figures(), account, memory, machine }
+}
+
+fn check(name: &str, result: CheckResult, detail: &str) -> Check {
+    Check { name: name.into(), result, detail: detail.into() }
+}
+
+/// Passed when nothing is broken.
+fn result(name: &str, broken: &[String], good: impl Fn() -> String) -> Check {
+    if broken.is_empty() {
+        check(name, CheckResult::Passed, &good())
+    } else {
+        check(name, CheckResult::Failed, &broken.join("; "))
+    }
+}
+
+fn processes(outcome: &Outcome) -> Check {
+    // Asked to end by a signal, the rig says 130, with everything saved.
+    let asked = matches!(outcome.end, End::Interrupted | End::DiskFull(_));
+    let as_expected =
+        |name: &str, code: Option<i32>| code == Some(0) || (asked && name == "emulator" && code == Some(130));
+    let mut broken: Vec<_> = outcome
+        .exits
+        .iter()
+        .filter(|(name, (_, code, _))| !as_expected(name, *code))
+        .map(|(name, (_, _, words))| format!("{name}: {words}, see {name}.txt"))
+        .collect();
+    if let End::Early(why) = &outcome.end {
+        broken.insert(0, why.clone());
+    }
+    result("processes", &broken, || "all programs ended as they should".into())
+}
+
+fn in_numbers(account: &Account) -> String {
+    let sum = |part: fn(&account::Row) -> u64| account.rows.iter().map(part).sum::<u64>();
+    format!(
+        "{} frames for {} pairs of identifier and receiver: {} received, {} lost on the wire on purpose, {} lost at queues, \
+         {} passed before their receiver came or after it left",
+        sum(|row| row.sent),
+        account.rows.len(),
+        sum(|row| row.received),
+        sum(|row| row.lost_on_wire),
+        sum(|row| row.lost_at_queue),
+        sum(|row| row.before_it_came + row.after_it_left),
+    )
+}
+
+/// The injected loss was as frequent as asked for; that every lost frame was found is the account's and the gaps' affair.
+fn loss(spec: &Spec, evidence: &Evidence, account: &Account) -> Check {
+    let injected = counts(&evidence.summary["bus_host"]["injected_loss"]).total();
+    let Some(loss) = spec.loss else {
+        let detail = format!("no loss asked for, {injected} frames lost on purpose");
+        let result = if injected == 0 { CheckResult::Skipped } else { CheckResult::Failed };
+        return check("loss", result, &detail);
+    };
+    let frames = counts(&evidence.summary["bus_host"]["on_wire"]).total() + injected;
+    let expected = loss * frames as f64;
+    let allowed = LOSS_DEVIATIONS * (expected * (1.0 - loss)).sqrt();
+    let found = account.rows.iter().any(|row| row.missing_by_gaps.is_some_and(|missing| missing > 0));
+    let detail =
+        format!("{injected} of {frames} frames lost on purpose, {expected:.0} ± {allowed:.0} expected");
+    let kept = (injected as f64 - expected).abs() <= allowed && found;
+    check("loss", if kept { CheckResult::Passed } else { CheckResult::Failed }, &detail)
+}
+
+fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
+    let told = |name: &String, memory: &Memory| {
+        let slope = memory.slope_kib_per_h.map_or(String::new(), |slope| format!(", {slope:+.0} KiB/h"));
+        let growth = memory.growth_percent.map_or(String::new(), |growth| format!(", {growth:+.2} %"));
+        format!("{name} {} KiB{slope}{growth}", memory.rss_last_kib)
+    };
+    let all: Vec<_> = memory.iter().map(|(name, memory)| told(name, memory)).collect();
+    let bounds = format!(
+        "(bounds: {SLOPE_LIMIT_KIB_PER_H:.0} KiB/h, {GROWTH_LIMIT_PERCENT} % from the second quarter to the last)"
+    );
+    let detail = format!("{} {bounds}", all.join("; "));
+    let flat: Vec<_> = memory.values().map(Memory::is_flat).collect();
+    let result = match () {
+        () if flat.contains(&Some(false)) => CheckResult::Failed,
+        () if flat.is_empty() || flat.contains(&None) => CheckResult::Skipped,
+        () => CheckResult::Passed,
+    };
+    check("memory", result, &detail)
+}
+
+/// Every record reached the files, and the log holds every frame that the rig counted.
+fn records(evidence: &Evidence, outcome: &Outcome) -> Check {
+    let mut broken = Vec::new();
+    for (name, told) in evidence.controllers.iter().chain([(&"emulator".to_owned(), &evidence.summary)]) {
+        match told["records_dropped"].as_u64() {
+            Some(0) => {}
+            Some(dropped) => broken.push(format!("{name}: {dropped} records did not reach the files")),
+            None => broken.push(format!("{name} left no report")),
+        }
+    }
+    let mut counted = counts(&evidence.summary["bus"]["sent_by_id"]);
+    counted.add_all(&counts(&evidence.summary["bus"]["received_by_id"]));
+    match &evidence.log {
+        Err(error) => broken.push(error.clone()),
+        Ok(log) if broken.is_empty() => {
+            let ids = log.frames.ids().chain(counted.ids()).filter(|id| log.frames.of(id) != counted.of(id));
+            broken.extend(ids.map(|id| {
+                format!("{id}: {} in bus.log, the rig counted {}", log.frames.of(id), counted.of(id))
+            }));
+            broken.dedup();
+        }
+        Ok(_) => {}
+    }
+    let bytes = outcome.memory.values().map(Vec::len).max().unwrap_or(0);
+    result("records", &broken, || {
+        format!("bus.log holds all {} frames of the rig, {bytes} looks at the processes", counted.total())
+    })
+}
+
+/// The position errors against the experiment's bounds on them; what did not come about in the segment's time is not judged.
+fn positions(evidence: &Evidence) -> Check {
+    let drive = evidence.drive();
+    let keys = ["position_error_dynamic_m", "position_error_static_m"];
+    let measured: Map<_, _> = keys
+        .iter()
+        .filter(|key| drive[**key].is_number())
+        .map(|key| ((*key).to_owned(), drive[*key].clone()))
+        .collect();
+    let experiment = evidence.run["experiment_toml"].as_str().unwrap_or_default().parse::<toml::Table>();
+    let passed =
+        experiment.ok().and_then(|table| table.get("passed")?.as_table().cloned()).unwrap_or_default();
+    let bounds: toml::Table = passed.into_iter().filter(|(key, _)| measured.contains_key(key)).collect();
+    if bounds.is_empty() {
+        return check("positions", CheckResult::Skipped, &format!("no bound to judge: {}", json!(measured)));
+    }
+    match thresholds::judge(&bounds, &measured) {
+        Err(error) => check("positions", CheckResult::Failed, &error.to_string()),
+        Ok(judged) => {
+            let words = |key: &String, entry: &Value| {
+                format!("{key} = {}, {}", measured[key], thresholds::in_words(entry))
+            };
+            let told: Vec<_> = judged.iter().map(|(key, entry)| words(key, entry)).collect();
+            let kept = judged.values().all(thresholds::is_kept);
+            check("positions", if kept { CheckResult::Passed } else { CheckResult::Failed }, &told.join("; "))
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! Distributions of all segments together: their `.hlog` files added up by tag, bin by bin, so that a percentile of the soak is
+//! one of its samples and no mean of percentiles.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use hdrhistogram::Histogram;
+use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
+use hdrhistogram::serialization::{Deserializer, Serializer, V2DeflateSerializer};
+use realtime::{Recorder, write_hlog};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
+use std::path::Path;
+use std::time::Duration;
+
+/// Files of a segment that hold distributions.
+const LOGS: &[&str] = &["emulator.hlog", "controller.hlog", "controller-drive.hlog", "controller-load.hlog"];
+
+/// Distributions by tag.
+#[derive(Clone, Default)]
+pub struct Merged(BTreeMap<String, Histogram<u64>>);
+
+/// A distribution as `soak.json` keeps it: figures for people, and the histogram to go on with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    /// Half of the samples were at most this, ns.
+    pub p50_ns: u64,
+    /// 90 %.
+    pub p90_ns: u64,
+    /// 99 %.
+    pub p99_ns: u64,
+    /// 99.9 %.
+    pub p999_ns: u64,
+    /// 99.99 %.
+    pub p9999_ns: u64,
+    /// The largest.
+    pub max_ns: u64,
+    /// Samples.
+    pub count: u64,
+    /// The histogram: HdrHistogram V2, deflated, in base64.
+    pub hdr_v2_base64: String,
+}
+
+impl Merged {
+    /// Adds what a segment left in its folder. Tells what cannot be read.
+    pub fn add_segment(&mut self, folder: &Path) -> Vec<String> {
+        let mut unread = Vec::new();
+        for path in LOGS.iter().map(|name| folder.join(name)).filter(|path| path.exists()) {
+            if let Err(error) = self.add_log(&path) {
+                unread.push(format!("{}: {error}", path.display()));
+            }
+        }
+        unread
+    }
+
+    fn add_log(&mut self, path: &Path) -> io::Result<()> {
+        let mut deserializer = Deserializer::new();
+        let mut reader = BufReader::new(File::open(path)?);
+        let mut line = Vec::new();
+        // A killed process leaves a last line without its end; the others stand.
+        while reader.read_until(b'\n', &mut line)? > 0 && line.ends_with(b"\n") {
+            for entry in IntervalLogIterator::new(&line) {
+                if let Ok(LogEntry::Interval(interval)) = entry {
+                    let tag = interval.tag().map_or("", |tag| tag.as_str());
+                    self.add(tag, &decode(interval.encoded_histogram(), &mut deserializer)?)?;
+                }
+            }
+            line.clear();
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, tag: &str, more: &Histogram<u64>) -> io::Result<()> {
+        if !self.0.contains_key(tag) {
+            self.0.insert(tag.to_owned(), Recorder::new().histogram().clone());
+        }
+        self.0.get_mut(tag).map_or(Ok(()), |histogram| histogram.add(more)).map_err(io::Error::other)
+    }
+
+    /// Takes up what an earlier start kept.
+    ///
+    /// # Errors
+    /// A histogram that is none.
+    pub fn from_kept(kept: &BTreeMap<String, Kept>) -> io::Result<Self> {
+        let mut merged = Self::default();
+        for (tag, kept) in kept {
+            merged.add(tag, &decode(&kept.hdr_v2_base64, &mut Deserializer::new())?)?;
+        }
+        Ok(merged)
+    }
+
+    /// What to keep.
+    ///
+    /// # Errors
+    /// A histogram that cannot be written, which no counts of ours bring about.
+    pub fn keep(&self) -> io::Result<BTreeMap<String, Kept>> {
+        self.0.iter().map(|(tag, histogram)| Ok((tag.clone(), kept(histogram)?))).collect()
+    }
+
+    /// Writes all of it as one interval, under a temporary name first.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write(&self, path: &Path, started_unix_s: f64, length: Duration) -> io::Result<()> {
+        let tagged = self.0.iter().filter(|(tag, _)| !tag.is_empty());
+        let parts: Vec<_> = tagged.map(|(tag, histogram)| (tag.as_str(), histogram)).collect();
+        let temporary = path.with_extension("hlog.part");
+        write_hlog(&temporary, &parts, started_unix_s, length)?;
+        std::fs::rename(&temporary, path)
+    }
+}
+
+fn decode(text: &str, deserializer: &mut Deserializer) -> io::Result<Histogram<u64>> {
+    let bytes = STANDARD.decode(text).map_err(io::Error::other)?;
+    deserializer.deserialize(&mut bytes.as_slice()).map_err(io::Error::other)
+}
+
+fn kept(histogram: &Histogram<u64>) -> io::Result<Kept> {
+    let mut bytes = Vec::new();
+    V2DeflateSerializer::new().serialize(histogram, &mut bytes).map_err(io::Error::other)?;
+    Ok(Kept {
+        p50_ns: histogram.value_at_quantile(0.5),
+        p90_ns: histogram.value_at_quantile(0.9),
+        p99_ns: histogram.value_at_quantile(0.99),
+        p999_ns: histogram.value_at_quantile(0.999),
+        p9999_ns: histogram.value_at_quantile(0.9999),
+        max_ns: histogram.max(),
+        count: histogram.len(),
+        hdr_v2_base64: STANDARD.encode(bytes),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn segment(values_ns: &[u64]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let mut recorder = Recorder::new();
+        values_ns.iter().for_each(|ns| recorder.record(*ns));
+        let parts = [("emulator-wakeup", recorder.histogram())];
+        write_hlog(&folder.path().join("emulator.hlog"), &parts, 1e9, Duration::from_secs(1)).unwrap();
+        folder
+    }
+
+    #[test]
+    fn segments_add_up_also_across_a_restart() {
+        let (one, other) = (segment(&[1000; 98]), segment(&[5000, 70_000_000]));
+        let mut merged = Merged::default();
+        assert!(merged.add_segment(one.path()).is_empty());
+        let mut merged = Merged::from_kept(&merged.keep().unwrap()).unwrap();
+        assert!(merged.add_segment(other.path()).is_empty());
+        let kept = &merged.keep().unwrap()["emulator-wakeup"];
+        assert_eq!((kept.count, kept.p50_ns), (100, 1000));
+        assert!((4995..=5005).contains(&kept.p99_ns) && kept.max_ns >= 70_000_000, "{kept:?}");
+        let path = one.path().join("soak.hlog");
+        merged.write(&path, 1e9, Duration::from_secs(2)).unwrap();
+        let mut read = Merged::default();
+        read.add_log(&path).unwrap();
+        assert_eq!(read.keep().unwrap(), merged.keep().unwrap());
+    }
+
+    #[test]
+    fn a_half_line_is_left_out_and_a_damaged_one_told() {
+        let folder = segment(&[1000]);
+        let path = folder.path().join("emulator.hlog");
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, format!("{text}Tag=half,0.000,1.0")).unwrap();
+        let mut merged = Merged::default();
+        assert!(merged.add_segment(folder.path()).is_empty());
+        assert_eq!(merged.keep().unwrap().len(), 1);
+        std::fs::write(&path, text.replace("HIST", "hist")).unwrap();
+        assert_eq!(merged.add_segment(folder.path()).len(), 1);
+    }
+}

@@ -1,0 +1,256 @@
+//! `soak.json`: everything that a soak knows, whole after each segment. The other result files are made of it.
+
+use super::account::Row;
+use super::memory::Memory;
+use super::merged::Kept;
+use super::plan::Spec;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Version of `soak.json`; goes up when a key changes its meaning or goes.
+pub const SOAK_SCHEMA_VERSION: u32 = 1;
+
+/// A soak, over all its starts.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Soak {
+    /// See [`SOAK_SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Whether its results may be trusted so far.
+    pub trusted: bool,
+    /// The same in one line, with what for or why not.
+    pub verdict: String,
+    /// First start, s since 1970.
+    pub started_unix_s: f64,
+    /// When this was written, s since 1970.
+    pub updated_unix_s: f64,
+    /// Length asked for.
+    pub planned_s: f64,
+    /// Time soaked, of all starts.
+    pub elapsed_s: f64,
+    /// Why the last start ended; null while it runs, or when it was killed.
+    pub ended_because: Option<String>,
+    /// How it was asked for.
+    pub settings: Settings,
+    /// Why there is no load generator although one was asked for; null otherwise.
+    pub load_missing_because: Option<String>,
+    /// The machine, as the emulator's first `run.json` tells it.
+    pub machine: Value,
+    /// Sums over all segments.
+    pub totals: Totals,
+    /// Distributions of all segments together, by tag.
+    pub distributions: BTreeMap<String, Kept>,
+    /// Bytes of the soak's folder.
+    pub folder_bytes: u64,
+    /// Resident memory of the soak itself after the last segment.
+    pub own_rss_kib: u64,
+    /// The segments in their order.
+    pub segments: Vec<Segment>,
+}
+
+/// What must be the same when a soak goes on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// The bus by its URL.
+    pub bus: String,
+    /// Experiments in turn.
+    pub experiments: Vec<String>,
+    /// Length of a segment with all around it.
+    pub segment_s: f64,
+    /// Command line of the load generator; null for none.
+    pub load: Option<String>,
+    /// Probability of loss in the segments that lose; null when none does.
+    pub loss: Option<f64>,
+    /// More options of the emulator.
+    pub emulator_options: String,
+    /// More options of the controllers.
+    pub controller_options: String,
+    /// The rig file.
+    pub rig: String,
+}
+
+impl Settings {
+    /// What differs from another, a few words each.
+    #[must_use]
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let tables = [self, other].map(|settings| serde_json::to_value(settings).unwrap_or_default());
+        let keys = tables[0].as_object().into_iter().flatten().map(|(key, _)| key);
+        keys.filter(|key| tables[0][*key] != tables[1][*key])
+            .map(|key| format!("{key} was {}, is {}", tables[0][key], tables[1][key]))
+            .collect()
+    }
+}
+
+/// Sums over all segments that finished.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Totals {
+    /// Segments that were accounted for.
+    pub segments: usize,
+    /// Those of them with a broken check.
+    pub failed: usize,
+    /// Segments of which nothing is known, because the soak itself was killed.
+    pub unfinished: usize,
+    /// Cycles of the rig.
+    pub cycles: u64,
+    /// Cycles that it computed late and did not send.
+    pub skipped: u64,
+    /// Commands that came too old or grew too old.
+    pub stale_commands: u64,
+    /// Frames sent, one for each sender.
+    pub frames_sent: u64,
+    /// Frames that should have been received, one for each receiver.
+    pub frames_due: u64,
+    /// Frames received, one for each receiver.
+    pub frames_received: u64,
+    /// Frames lost on purpose, one for each receiver.
+    pub lost_on_wire: u64,
+    /// Frames lost at receivers' queues.
+    pub lost_at_queue: u64,
+    /// Frames that passed while a receiver was not there.
+    pub not_there: u64,
+}
+
+/// A segment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Segment {
+    /// As it was planned.
+    pub spec: Spec,
+    /// Its folder below the soak's.
+    pub folder: String,
+    /// Start, s since 1970.
+    pub started_unix_s: f64,
+    /// Length with all around it.
+    pub length_s: f64,
+    /// How long the rig was to run.
+    pub rig_s: f64,
+    /// False when the soak was killed while it ran: then only its folder tells of it.
+    pub finished: bool,
+    /// How it ended, in words.
+    pub ended: String,
+    /// The load generator that ran beside it, by its command line.
+    pub load: Option<String>,
+    /// What was checked.
+    pub checks: Vec<Check>,
+    /// Figures of the run.
+    pub figures: Figures,
+    /// Each identifier at each receiver.
+    pub account: Vec<Row>,
+    /// Memory by process.
+    pub memory: BTreeMap<String, Memory>,
+    /// Bytes of its folder at its end.
+    pub file_bytes: u64,
+    /// The same, a second of the rig.
+    pub file_bytes_per_s: u64,
+    /// Whether its big files are gone.
+    pub rotated: bool,
+}
+
+/// A check of a segment.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Check {
+    /// Its name.
+    pub name: String,
+    /// How it went.
+    pub result: CheckResult,
+    /// What was found, in a line or more.
+    pub detail: String,
+}
+
+/// How a check went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CheckResult {
+    /// Kept.
+    Passed,
+    /// Broken.
+    Failed,
+    /// Nothing to judge.
+    Skipped,
+}
+
+/// Figures of a segment's run; what nobody told is null.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Cycles of the rig.
+    pub cycles: Option<u64>,
+    /// Cycles that it computed late and did not send.
+    pub skipped: Option<u64>,
+    /// Wake-ups that missed at least one.
+    pub overruns: Option<u64>,
+    /// Commands that came too old or grew too old.
+    pub stale_commands: Option<u64>,
+    /// Frames sent, one for each sender.
+    pub frames_sent: u64,
+    /// Largest error while the set-point moved.
+    pub position_error_dynamic_m: Option<f64>,
+    /// Largest mean error at rest.
+    pub position_error_static_m: Option<f64>,
+    /// Repetitions of the experiment that were completed.
+    pub repetitions: Option<u64>,
+}
+
+impl Segment {
+    /// One that was running when the soak was killed.
+    #[must_use]
+    pub fn cut_off(number: u32, experiment: &str, folder: &str) -> Self {
+        let spec =
+            Spec { number, experiment: experiment.into(), two_processes: false, load: false, loss: None };
+        Self {
+            spec,
+            folder: folder.into(),
+            started_unix_s: 0.0,
+            length_s: 0.0,
+            rig_s: 0.0,
+            finished: false,
+            ended: "the soak was killed while it ran; its rows stay in its folder".into(),
+            load: None,
+            checks: Vec::new(),
+            figures: Figures::default(),
+            account: Vec::new(),
+            memory: BTreeMap::new(),
+            file_bytes: 0,
+            file_bytes_per_s: 0,
+            rotated: false,
+        }
+    }
+
+    /// Whether a check was broken.
+    #[must_use]
+    pub fn failed(&self) -> bool {
+        self.checks.iter().any(|check| check.result == CheckResult::Failed)
+    }
+
+    /// Checks that were broken.
+    pub fn broken(&self) -> impl Iterator<Item = &Check> {
+        self.checks.iter().filter(|check| check.result == CheckResult::Failed)
+    }
+}
+
+impl Totals {
+    /// Of these segments.
+    #[must_use]
+    pub fn of(segments: &[Segment]) -> Self {
+        let mut totals = Self::default();
+        for segment in segments {
+            if !segment.finished {
+                totals.unfinished += 1;
+                continue;
+            }
+            totals.segments += 1;
+            totals.failed += usize::from(segment.failed());
+            let figures = &segment.figures;
+            totals.cycles += figures.cycles.unwrap_or(0);
+            totals.skipped += figures.skipped.unwrap_or(0);
+            totals.stale_commands += figures.stale_commands.unwrap_or(0);
+            totals.frames_sent += figures.frames_sent;
+            for row in &segment.account {
+                totals.frames_due += row.sent;
+                totals.frames_received += row.received;
+                totals.lost_on_wire += row.lost_on_wire;
+                totals.lost_at_queue += row.lost_at_queue;
+                totals.not_there += row.before_it_came + row.after_it_left;
+            }
+        }
+        totals
+    }
+}

@@ -1,0 +1,161 @@
+//! Which segment comes when: experiment, processes, load and loss by the segment's number alone, so that a soak that is
+//! taken up again goes on as if it had never stopped.
+//!
+//! ```text
+//!   way   processes   load   loss        the experiments go round at their own pace; when both rounds end together, the ways
+//!    0       one       off     -         shift by one against them, so that every experiment is run every way
+//!    1       two       on      -
+//!    2       two       off    yes        a wire that loses frames needs the embedded bus
+//!    3       one       on      -
+//! ```
+
+use serde::{Deserialize, Serialize};
+
+/// Shortest segment, s: below it there is nothing but its start and its end.
+pub const SHORTEST_SEGMENT_S: f64 = 8.0;
+/// Usual length of a segment, s.
+const USUAL_SEGMENT_S: f64 = 300.0;
+/// Segments that the shortest soak is cut into: one of each way.
+const WAYS: u32 = 4;
+/// What of a segment is no run of the rig, s: starting, ending, reading what was left.
+const AROUND_S: f64 = 2.5;
+
+/// A segment as it is planned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spec {
+    /// Its number, from 1.
+    pub number: u32,
+    /// The experiment's name.
+    pub experiment: String,
+    /// Whether each axis has a controller process of its own.
+    pub two_processes: bool,
+    /// Whether the load generator runs.
+    pub load: bool,
+    /// Probability that a frame is lost on purpose; null without.
+    pub loss: Option<f64>,
+}
+
+/// What segments are made of.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Experiments in turn.
+    pub experiments: Vec<String>,
+    /// Whether there is a load generator.
+    pub load: bool,
+    /// Probability of loss in the segments that lose; null for none.
+    pub loss: Option<f64>,
+}
+
+impl Plan {
+    /// The segment with this number, from 1.
+    #[must_use]
+    pub fn segment(&self, number: u32) -> Spec {
+        let place = number - 1;
+        let count = self.experiments.len() as u32;
+        let way = (place + place / least_common_multiple(count, WAYS)) % WAYS;
+        Spec {
+            number,
+            experiment: self.experiments[(place % count) as usize].clone(),
+            two_processes: matches!(way, 1 | 2),
+            load: self.load && matches!(way, 1 | 3),
+            loss: self.loss.filter(|_| way == 2),
+        }
+    }
+}
+
+impl Spec {
+    /// Name of its folder.
+    #[must_use]
+    pub fn folder(&self) -> String {
+        format!("{:04}-{}", self.number, self.experiment)
+    }
+
+    /// What sets it apart, in words.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let mut words =
+            vec![if self.two_processes { "two controllers" } else { "one controller" }.to_owned()];
+        words.extend(self.load.then(|| "under load".to_owned()));
+        words.extend(self.loss.map(|loss| format!("{} % loss", loss * 100.0)));
+        words.join(", ")
+    }
+}
+
+/// Length of a segment with all around it, for a soak of `planned_s`.
+#[must_use]
+pub fn segment_s(asked_s: Option<f64>, planned_s: f64) -> f64 {
+    asked_s.unwrap_or_else(|| (planned_s / f64::from(WAYS)).clamp(SHORTEST_SEGMENT_S, USUAL_SEGMENT_S))
+}
+
+/// How long the rig runs in the next segment, of `segment_s` with all around it; `None` when too little of the soak is left.
+#[must_use]
+pub fn rig_s(segment_s: f64, left_s: f64) -> Option<f64> {
+    // The last one may be shorter or longer than the others by a part that would be none of its own.
+    let with_rest = if left_s < segment_s + SHORTEST_SEGMENT_S { left_s } else { segment_s };
+    (with_rest >= SHORTEST_SEGMENT_S).then(|| ((with_rest - AROUND_S) * 10.0).round() / 10.0)
+}
+
+fn least_common_multiple(a: u32, b: u32) -> u32 {
+    let (mut greatest, mut rest) = (a, b);
+    while rest > 0 {
+        (greatest, rest) = (rest, greatest % rest);
+    }
+    a / greatest * b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    fn plan(count: usize) -> Plan {
+        let experiments = (0..count).map(|place| format!("e{place}")).collect();
+        Plan { experiments, load: true, loss: Some(0.01) }
+    }
+
+    #[test]
+    fn every_experiment_is_run_every_way() {
+        for count in 1..=13 {
+            let plan = plan(count);
+            let seen: BTreeSet<_> = (1..=count as u32 * 16)
+                .map(|number| plan.segment(number))
+                .map(|spec| (spec.experiment, spec.two_processes, spec.load, spec.loss.is_some()))
+                .collect();
+            assert_eq!(seen.len(), count * 4, "{count} experiments");
+        }
+    }
+
+    #[test]
+    fn the_first_four_segments_are_the_four_ways() {
+        let seen: Vec<_> = (1..=4).map(|number| plan(5).segment(number)).collect();
+        let ways: Vec<_> =
+            seen.iter().map(|spec| (spec.two_processes, spec.load, spec.loss.is_some())).collect();
+        assert_eq!(
+            ways,
+            [(false, false, false), (true, true, false), (true, false, true), (false, true, false)]
+        );
+        assert_eq!(seen[2].folder(), "0003-e2");
+        assert_eq!(seen[2].in_words(), "two controllers, 1 % loss");
+    }
+
+    #[test]
+    fn without_load_and_loss_there_is_none() {
+        let plan = Plan { load: false, loss: None, ..plan(3) };
+        assert!((1..20).map(|number| plan.segment(number)).all(|spec| !spec.load && spec.loss.is_none()));
+    }
+
+    #[test]
+    fn three_minutes_are_four_segments_of_some_forty_seconds() {
+        let length_s = segment_s(None, 180.0);
+        let (mut left_s, mut segments) = (180.0, Vec::new());
+        while let Some(rig_s) = rig_s(length_s, left_s) {
+            segments.push(rig_s);
+            left_s -= rig_s + AROUND_S;
+        }
+        assert_eq!(segments, [42.5; 4]);
+        assert_eq!(segment_s(None, 36_000.0), 300.0);
+        assert_eq!(segment_s(Some(60.0), 36_000.0), 60.0);
+        assert_eq!(rig_s(300.0, 7.0), None);
+        assert_eq!(rig_s(300.0, 306.0), Some(303.5));
+    }
+}

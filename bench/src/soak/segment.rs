@@ -1,0 +1,262 @@
+//! One segment while it runs: emulator, controllers and load started in their order, watched once a second, ended together.
+//!
+//! The controllers come first, so that on can:// everybody listens before the first frame; the rig ends by itself after its time,
+//! and its farewell ends the controllers. When one of them goes before its time, the others are ended too: what they
+//! have recorded stays, and the next segment is another one.
+
+use super::SoakError;
+use super::memory::Sample;
+use super::plan::Spec;
+use super::processes::{Running, end_in_words};
+use super::procfs;
+use protocol::bus::BusUrl;
+use realtime::Interrupt;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Between two looks at the processes.
+const LOOK: Duration = Duration::from_millis(50);
+/// Between two samples of memory and files.
+const SAMPLE: Duration = Duration::from_secs(1);
+/// Samples from one look at the proportional share to the next.
+const PSS_EVERY: usize = 10;
+/// How long controllers may take to listen on can://.
+const LISTEN: Duration = Duration::from_secs(20);
+/// How long programs may take to save and end.
+const SAVE: Duration = Duration::from_secs(20);
+
+/// What all segments of a soak have in common.
+pub struct Common {
+    /// The bus.
+    pub bus: BusUrl,
+    /// The rig file.
+    pub rig: PathBuf,
+    /// Folder of the experiment files.
+    pub experiment_folder: PathBuf,
+    /// Folder of the programs.
+    pub bin_dir: PathBuf,
+    /// Command line of the load generator, its program first; empty for none.
+    pub load: Vec<String>,
+    /// More options of the emulator.
+    pub emulator_options: Vec<String>,
+    /// More options of the controllers.
+    pub controller_options: Vec<String>,
+    /// Ends the segment while so much of the disk is still free.
+    pub min_free_bytes: u64,
+}
+
+/// Why a segment ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Its time was up.
+    TimeUp,
+    /// Somebody asked the soak to end.
+    Interrupted,
+    /// The disk is nearly full: so many bytes are left.
+    DiskFull(u64),
+    /// A program ended before its time, or did not end.
+    Early(String),
+}
+
+/// What a segment leaves besides its files.
+pub struct Outcome {
+    /// Why it ended.
+    pub end: End,
+    /// Each program's process number, and its exit code, `None` when it has none; by name.
+    pub exits: BTreeMap<String, (u32, Option<i32>, String)>,
+    /// Memory of each program.
+    pub memory: BTreeMap<String, Vec<Sample>>,
+    /// Frames that the interface sent meanwhile; `None` on the embedded bus, and where the system does not tell.
+    pub sent_by_interface: Option<u64>,
+}
+
+/// Tells a person how far the segment is: seconds since its start.
+pub type Tell<'a> = dyn FnMut(f64) + 'a;
+
+/// Runs a segment of `rig_s` in `folder`, which is made.
+///
+/// # Errors
+/// [`SoakError`] when it cannot be begun.
+pub fn run(
+    common: &Common,
+    spec: &Spec,
+    rig_s: f64,
+    folder: &Path,
+    interrupt: &Interrupt,
+    tell: &mut Tell<'_>,
+) -> Result<Outcome, SoakError> {
+    std::fs::create_dir_all(folder).map_err(|error| SoakError::output(folder, &error))?;
+    let interface = interface(&common.bus);
+    let sent_before = interface.and_then(procfs::sent_by_interface);
+    let start = Start { common, spec, folder };
+    let mut running = start.controllers()?;
+    let load = if spec.load { start.load()? } else { None };
+    running.insert(0, start.emulator(rig_s)?);
+    let mut watch = Watch { began: Instant::now(), samples: 0, memory: BTreeMap::new() };
+    let end = watch.until_the_end(
+        &mut running,
+        rig_s,
+        |free| free < common.min_free_bytes,
+        interrupt,
+        tell,
+        folder,
+    );
+    if end != End::TimeUp {
+        // The rig's farewell ends the controllers with all that they were sent; so it goes first.
+        running[0].interrupt();
+        running[0].wait_until(Instant::now() + SAVE / 2);
+    }
+    let controllers_end = Instant::now() + Duration::from_secs(2);
+    for program in running.iter_mut().skip(1) {
+        if !program.wait_until(controllers_end) {
+            program.interrupt();
+        }
+    }
+    let exits = running.iter_mut().map(|program| {
+        let status = program.end(SAVE);
+        (program.name.clone(), (program.pid(), status.and_then(|status| status.code()), end_in_words(status)))
+    });
+    let exits = exits.collect();
+    drop(load);
+    let sent_after = interface.and_then(procfs::sent_by_interface);
+    let sent_by_interface = sent_before.zip(sent_after).map(|(before, after)| after.saturating_sub(before));
+    Ok(Outcome { end, exits, memory: watch.memory, sent_by_interface })
+}
+
+fn interface(bus: &BusUrl) -> Option<&str> {
+    match bus {
+        BusUrl::Can { interface } => Some(interface),
+        BusUrl::Unix { .. } => None,
+    }
+}
+
+/// How the programs of a segment are started.
+struct Start<'a> {
+    common: &'a Common,
+    spec: &'a Spec,
+    folder: &'a Path,
+}
+
+impl Start<'_> {
+    /// The bus of this segment; the seed goes with its number, so that each loses others.
+    fn bus(&self) -> BusUrl {
+        let mut bus = self.common.bus.clone();
+        if let (BusUrl::Unix { wire, .. }, Some(loss)) = (&mut bus, self.spec.loss) {
+            (wire.loss, wire.seed) = (loss, u64::from(self.spec.number));
+        }
+        bus
+    }
+
+    fn program(&self, name: &str, program: &str, more: Vec<OsString>) -> Result<Running, SoakError> {
+        let path = self.common.bin_dir.join(program);
+        let experiment = self.common.experiment_folder.join(format!("{}.toml", self.spec.experiment));
+        let mut arguments: Vec<OsString> = vec!["run".into(), "--bus".into(), self.bus().to_string().into()];
+        for (option, value) in [("--rig", &self.common.rig), ("--experiment", &experiment)] {
+            arguments.extend([option.into(), value.into()]);
+        }
+        arguments.extend(["--out".into(), self.folder.into()]);
+        arguments.extend(more);
+        self.start(name, &path, &arguments)
+    }
+
+    fn start(&self, name: &str, path: &Path, arguments: &[OsString]) -> Result<Running, SoakError> {
+        let said = self.folder.join(format!("{name}.txt"));
+        Running::start(name, path, arguments, &said)
+            .map_err(|error| SoakError::Program { program: path.into(), reason: error.to_string() })
+    }
+
+    fn emulator(&self, rig_s: f64) -> Result<Running, SoakError> {
+        let mut more: Vec<OsString> = vec!["--seconds".into(), rig_s.to_string().into()];
+        more.extend(self.common.emulator_options.iter().map(Into::into));
+        self.program("emulator", "emulator", more)
+    }
+
+    fn controllers(&self) -> Result<Vec<Running>, SoakError> {
+        let axes: &[&str] = if self.spec.two_processes { &["drive", "load"] } else { &["both"] };
+        let interface = interface(&self.common.bus);
+        let before = interface.and_then(procfs::listeners);
+        let mut controllers = Vec::new();
+        for axis in axes {
+            let name = if *axis == "both" { "controller".into() } else { format!("controller-{axis}") };
+            let mut more: Vec<OsString> = vec!["--axis".into(), axis.into(), "--repeat".into()];
+            more.extend(self.common.controller_options.iter().map(Into::into));
+            controllers.push(self.program(&name, "controller", more)?);
+        }
+        if let Some((interface, before)) = interface.zip(before) {
+            let until = Instant::now() + LISTEN;
+            let wanted = before + controllers.len();
+            while procfs::listeners(interface).is_some_and(|now| now < wanted) && Instant::now() < until {
+                std::thread::sleep(LOOK);
+            }
+        }
+        Ok(controllers)
+    }
+
+    fn load(&self) -> Result<Option<Running>, SoakError> {
+        let Some((program, arguments)) = self.common.load.split_first() else { return Ok(None) };
+        let arguments: Vec<OsString> = arguments.iter().map(Into::into).collect();
+        self.start("load", Path::new(program), &arguments).map(Some)
+    }
+}
+
+/// What is watched while programs run.
+struct Watch {
+    began: Instant,
+    samples: usize,
+    memory: BTreeMap<String, Vec<Sample>>,
+}
+
+impl Watch {
+    /// Waits until the emulator, the first of `running`, has ended, or something ends the segment before.
+    fn until_the_end(
+        &mut self,
+        running: &mut [Running],
+        rig_s: f64,
+        too_full: impl Fn(u64) -> bool,
+        interrupt: &Interrupt,
+        tell: &mut Tell<'_>,
+        folder: &Path,
+    ) -> End {
+        let latest = self.began + Duration::from_secs_f64(rig_s) + SAVE;
+        loop {
+            if self.began.elapsed() >= SAMPLE * self.samples as u32 {
+                self.sample(running);
+                if let Some(free) = procfs::free_bytes(folder).filter(|free| too_full(*free)) {
+                    return End::DiskFull(free);
+                }
+                tell(self.began.elapsed().as_secs_f64());
+            }
+            if interrupt.came() {
+                return End::Interrupted;
+            }
+            let gone: Vec<_> =
+                running.iter_mut().filter_map(|one| (!one.is_running()).then(|| one.name.clone())).collect();
+            let in_time = self.began.elapsed().as_secs_f64() >= rig_s;
+            if gone.iter().any(|name| name == "emulator") && in_time {
+                return End::TimeUp;
+            }
+            // The farewell is heard a little before the rig's own end.
+            if !gone.is_empty() && !in_time {
+                let after_s = self.began.elapsed().as_secs_f64();
+                return End::Early(format!("{} ended after {after_s:.1} of {rig_s} s", gone.join(" and ")));
+            }
+            if Instant::now() > latest {
+                return End::Early("the emulator did not end in time".into());
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    fn sample(&mut self, running: &mut [Running]) {
+        let at_s = self.began.elapsed().as_secs_f64();
+        let pss = self.samples.is_multiple_of(PSS_EVERY);
+        for program in running.iter_mut() {
+            if let Some(sample) = procfs::memory(program.pid(), at_s, pss) {
+                self.memory.entry(program.name.clone()).or_default().push(sample);
+            }
+        }
+        self.samples += 1;
+    }
+}
