@@ -1,7 +1,7 @@
 # shellcheck shell=bash
-# Sourced, with `root` set: tables that an example of the system tests prints, shown or put between the two marks of a page.
+# Sourced, with `root` set: tables that are shown or put between the two marks of a page.
 
-# tables EXAMPLE PAGE [--write]
+# tables EXAMPLE PAGE [--write]: what an example of the system tests prints.
 # shellcheck disable=SC2154 # root is the sourcing script's
 tables() {
     local text
@@ -13,8 +13,13 @@ tables() {
         cat "$text"
         return
     fi
-    awk -v tables="$text" -v name="$1" '
+    put_table "$1" "$text" "$2"
+}
+
+# put_table NAME FILE PAGE: the file's text between the two marks of that name.
+put_table() {
+    awk -v tables="$2" -v name="$1" '
         $0 == "<!-- " name ": begin -->" { print; while ((getline line < tables) > 0) print line; inside = 1 }
         $0 == "<!-- " name ": end -->" { print ""; inside = 0 }
-        !inside { print }' "$root/$2" >"$root/$2.new" && mv "$root/$2.new" "$root/$2"
+        !inside { print }' "$root/$3" >"$root/$3.new" && mv "$root/$3.new" "$root/$3"
 }

@@ -5,7 +5,7 @@
 tools=${tools:?set by scripts/test}
 
 # PyPI packages by version: clients that the tests hold the product against.
-python_packages=(cantools==45.1.0 crccheck==1.3.1)
+python_packages=(cantools==45.1.0 crccheck==1.3.1 hdrhistogram==0.10.3)
 gungraun_version=0.20.0
 
 install_tools() {
@@ -29,6 +29,31 @@ need_packages() {
         mkdir -p "$tools/debian"
         (cd "$tools/debian" && apt-get download -q "$@" >/dev/null && for package in *.deb; do dpkg -x "$package" .; done)
     fi
+}
+
+# need_program PROGRAM PACKAGE [LIBRARY-PACKAGE…]: as root installed; else unpacked with its libraries, and a wrapper in
+# $tools/bin that finds them there. Fails when the packages cannot be had.
+need_program() {
+    local program=$1 found libraries
+    shift
+    if command -v "$program" >/dev/null || [ -x "$tools/bin/$program" ]; then return 0; fi
+    need_packages "$@" || return 1
+    [ "$(id -u)" != 0 ] || return 0
+    found=$(find "$tools/debian/usr/bin" "$tools/debian/usr/sbin" -name "$program" 2>/dev/null | head -n 1)
+    [ -n "$found" ] || return 1
+    libraries="$tools/debian/usr/lib/$(uname -m)-linux-gnu:$tools/debian/lib/$(uname -m)-linux-gnu"
+    mkdir -p "$tools/bin"
+    printf '#!/bin/sh\nLD_LIBRARY_PATH=%s exec %s "$@"\n' "$libraries" "$found" >"$tools/bin/$program"
+    chmod +x "$tools/bin/$program"
+}
+
+# cyclictest, the reference of scripts/latency.
+install_rt_tests() { need_program cyclictest rt-tests libnuma1; }
+
+# The load generator of scripts/latency and scripts/soak. Its graphic and compression libraries are linked, whatever is used.
+install_stress_ng() {
+    # shellcheck disable=SC2046 # a list of names
+    need_program stress-ng stress-ng $(apt-cache depends stress-ng 2>/dev/null | sed -n 's/^ *Depends: \(lib[a-z0-9.+-]*\)$/\1/p')
 }
 
 # The benchmark's floor is C; a Rust toolchain links with a C compiler anyway.

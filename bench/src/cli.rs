@@ -1,5 +1,8 @@
 //! The bench's command line.
 
+use crate::latency_table::LatencyTableArguments;
+use crate::ping_pong::cli::{PingPongArguments, PongArguments};
+use crate::probe::cli::ProbeArguments;
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
@@ -24,8 +27,21 @@ pub enum Command {
     Spread(SpreadArguments),
     /// List all figures with unit and meaning.
     Figures,
+    /// Report the latencies of runs: percentiles, worst events with their causes, a reference beside them, groups side by side.
+    Report(ReportArguments),
+    /// Name the one cause that a latency report gives for what went wrong in its runs: on stdout its name, or `nothing`.
+    Cause(CauseArguments),
     /// Check the bounds of an experiment file: figures that exist, numbers that make sense.
     CheckExperiment(CheckArguments),
+    /// Watch the machine: a thread on each CPU that reads the clock over and over notes when it could not.
+    Probe(ProbeArguments),
+    /// Measure round trips of 16 bytes between two processes, as a reference for those of rig and controller.
+    PingPong(PingPongArguments),
+    /// Print the table of ratios of a latency report, in Markdown.
+    LatencyTable(LatencyTableArguments),
+    /// The process that answers; ping-pong starts it.
+    #[command(hide = true)]
+    Pong(PongArguments),
 }
 
 /// Which run to sum up.
@@ -67,5 +83,40 @@ pub struct SpreadArguments {
 #[derive(Args, Debug)]
 pub struct CheckArguments {
     /// The experiment file.
+    pub file: PathBuf,
+}
+
+/// What to report on.
+#[derive(Args, Debug)]
+pub struct ReportArguments {
+    /// Folders of runs, or folders that hold some.
+    #[arg(required_unless_present = "group", value_name = "RUN")]
+    pub folders: Vec<PathBuf>,
+    /// Write report.html, report.md, report.json, latency.hlog and jitterdebugger.json here [default: the run's folder, or
+    /// `report` beside several].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Heading of the report.
+    #[arg(long)]
+    pub title: Option<String>,
+    /// Set the runs side by side by the groups that their conditions.json name; the first run's group comes first.
+    #[arg(long)]
+    pub compare: bool,
+    /// Put a run, or the runs in a folder, into a group to be set beside others; may be repeated.
+    #[arg(long, value_name = "NAME=FOLDER")]
+    pub group: Vec<String>,
+    /// Hold the report against the bounds of a threshold file; exit with 1 when one is broken.
+    #[arg(long, value_name = "FILE.toml")]
+    pub bounds: Option<PathBuf>,
+    /// Write report.md only.
+    #[arg(long)]
+    pub markdown_only: bool,
+}
+
+/// Which report to ask.
+#[derive(Args, Debug)]
+pub struct CauseArguments {
+    /// The report.json.
+    #[arg(value_name = "REPORT.json")]
     pub file: PathBuf,
 }

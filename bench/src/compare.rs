@@ -5,7 +5,8 @@
 mod overlay;
 
 use crate::SummaryError;
-use crate::grid::{Grid, escaped};
+use crate::grid::Grid;
+use crate::page_style::{document, escaped};
 use crate::runs::{Run, rows};
 use crate::table::{in_use, without_unit};
 use std::path::{Path, PathBuf};
@@ -61,21 +62,10 @@ pub fn page(runs: &[Run], grid: &Grid) -> Result<String, SummaryError> {
     let title = runs.first().map(Run::title).unwrap_or_default();
     let list: String = runs.iter().map(entry).collect();
     let figures: String = pictures.iter().map(|svg| format!("<figure>{svg}</figure>\n")).collect();
-    Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}: {} \
-            runs</title>\n<style>{STYLE}</style></head>\n\
-         <body>\n<h1>{title}: {} runs side by side</h1>\n<ul>\n{list}</ul>\n{}{figures}</body></html>\n",
-        runs.len(),
-        runs.len(),
-        grid.html(),
-        title = escaped(&title),
-    ))
+    let title = format!("{title}: {} runs side by side", runs.len());
+    let body = format!("<h1>{}</h1>\n<ul>\n{list}</ul>\n{}{figures}", escaped(&title), grid.html());
+    Ok(document(&title, &body))
 }
-
-const STYLE: &str = "body{font:15px sans-serif;max-width:1150px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
-table{border-collapse:collapse;margin:1.5em 0}td,th{padding:.25em .8em;border-bottom:1px solid #ccc;text-align:right;\
-font-variant-numeric:tabular-nums}td:first-child,th:first-child{text-align:left}figure{margin:2em \
-    0}svg{max-width:100%;height:auto}";
 
 /// A run by name, with the programs that its experiment names.
 fn entry(run: &Run) -> String {

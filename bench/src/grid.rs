@@ -1,5 +1,7 @@
 //! A table of words, for a terminal, in Markdown, or in HTML.
 
+use crate::page_style::escaped;
+
 /// Rows of words under a head; the first column is left-aligned, the others right.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
@@ -35,22 +37,25 @@ impl Grid {
         format!("{}{rule}{rows}", line(&self.head))
     }
 
-    /// An HTML table.
+    /// An HTML table in a box that scrolls.
     #[must_use]
     pub fn html(&self) -> String {
-        let row = |tag: &str, row: &[String]| {
-            let cells: String = row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect();
-            format!("<tr>{cells}</tr>\n")
+        let row = |first: &str, other: &str, row: &[String]| {
+            let cells = row.iter().enumerate().map(|(place, cell)| {
+                let tag = if place == 0 { first } else { other };
+                let class = if place == 0 { "" } else { " class=\"n\"" };
+                let scope = if tag == "th" && place == 0 { " scope=\"row\"" } else { "" };
+                format!("<{tag}{scope}{class}>{}</{tag}>", escaped(cell))
+            });
+            format!("<tr>{}</tr>\n", cells.collect::<String>())
         };
-        let rows: String = self.rows.iter().map(|cells| row("td", cells)).collect();
-        format!("<table>\n{}{rows}</table>\n", row("th", &self.head))
+        let rows: String = self.rows.iter().map(|cells| row("th", "td", cells)).collect();
+        format!(
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Figures\">\n<table>\n<thead>{}</thead>\n\
+             <tbody>\n{rows}</tbody>\n</table>\n</div>\n",
+            row("th", "th", &self.head)
+        )
     }
-}
-
-/// Text as HTML shows it.
-#[must_use]
-pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -62,6 +67,6 @@ mod tests {
         let word = |text: &str| text.to_owned();
         let grid = Grid { head: vec![word("figure"), word("run")], rows: vec![vec![word("a"), word("<5>")]] };
         assert_eq!(grid.markdown(), "| figure | run |\n|--------|----:|\n| a      | <5> |\n");
-        assert!(grid.html().contains("<td>&lt;5&gt;</td>"));
+        assert!(grid.html().contains("<td class=\"n\">&lt;5&gt;</td>"));
     }
 }

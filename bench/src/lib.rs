@@ -14,8 +14,12 @@
 //! | [`picture`] | the pictures of a run: all of it, and around its step or its emergency stop |
 //! | [`runs`] | several runs: whether they are of one experiment, their figures |
 //! | [`grid`] | a table of words in Markdown and HTML |
+//! | [`page_style`] | what all pages share: stylesheet, frame, text made safe |
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
 //! | [`spread`] | how much the figures of repetitions spread |
+//! | [`probe`] | gaps that a spinning thread sees: did the machine stand still, or did another thread run |
+//! | [`ping_pong`] | round trips of 16 bytes between two processes, as a reference |
+//! | [`latency_table`] | the table of ratios that `scripts/latency` ends with |
 //! | [`report`] | the latency report |
 //! | [`cli`] | the command line |
 
@@ -25,7 +29,11 @@ pub mod drawing;
 pub mod figures;
 pub mod grid;
 pub mod join;
+pub mod latency_table;
+pub mod page_style;
 pub mod picture;
+pub mod ping_pong;
+pub mod probe;
 pub mod record;
 pub mod report;
 pub mod reports;

@@ -1,31 +1,53 @@
 //! Process beside plant and controller: sums up, judges, draws and compares what they left behind.
 
-use bench::cli::{CheckArguments, Cli, Command, CompareArguments, SpreadArguments};
+use bench::cli::{
+    CauseArguments, CheckArguments, Cli, Command, CompareArguments, ReportArguments, SpreadArguments,
+};
+use bench::ping_pong::{self, PingPongError};
+use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
-use bench::{SummaryError, compare, figures, join, picture, spread, table, thresholds};
+use bench::{SummaryError, compare, figures, join, latency_table, picture, probe, spread, table, thresholds};
 use clap::Parser;
 use protocol::exit::Exit;
 use protocol::run_folder::write_json;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let done = match Cli::parse().command {
-        Command::Summary(arguments) => sum_up(&arguments.folder).map_err(RunsError::from),
-        Command::Compare(arguments) => compare_runs(&arguments),
-        Command::Spread(arguments) => spread_runs(&arguments),
+    let done: Result<Exit, Box<dyn std::error::Error>> = match Cli::parse().command {
+        Command::Summary(arguments) => sum_up(&arguments.folder).map_err(Into::into),
+        Command::Compare(arguments) => compare_runs(&arguments).map_err(Into::into),
+        Command::Spread(arguments) => spread_runs(&arguments).map_err(Into::into),
+        Command::Report(arguments) => report_on(&arguments).map_err(Into::into),
+        Command::Cause(arguments) => name_cause(&arguments).map_err(Into::into),
         Command::Figures => {
             print(&figures::list());
             Ok(Exit::Good)
         }
-        Command::CheckExperiment(arguments) => check(&arguments).map_err(RunsError::from),
+        Command::CheckExperiment(arguments) => check(&arguments).map_err(Into::into),
+        Command::LatencyTable(arguments) => {
+            latency_table::table(&arguments).map(|text| print(&text)).map(|()| Exit::Good).map_err(Into::into)
+        }
+        Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
+        Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
+        Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
     };
     let exit = done.unwrap_or_else(|error| {
         eprintln!("bench: {error}");
         Exit::BadInput
     });
     exit.into()
+}
+
+/// How a command of the bench's own measuring ended.
+fn told<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCode {
+    done.unwrap_or_else(|error| {
+        eprintln!("bench: {error}");
+        exit(&error)
+    })
+    .into()
 }
 
 fn print(text: &str) {
@@ -75,6 +97,27 @@ fn spread_runs(arguments: &SpreadArguments) -> Result<Exit, RunsError> {
         std::fs::write(&table, markdown).map_err(|error| SummaryError::write(&table, error))?;
         write_json(&json, &spread::json(&runs)).map_err(|error| SummaryError::write(&json, error))?;
     }
+    Ok(Exit::Good)
+}
+
+fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
+    let chosen = report::choice::choose(&arguments.folders, &arguments.group)?;
+    let compare = arguments.compare || !arguments.group.is_empty();
+    let mut made = report::make(&chosen, arguments.title.as_deref(), compare);
+    if let Some(file) = &arguments.bounds {
+        made.judge(file)?;
+    }
+    let out = arguments.out.clone().unwrap_or_else(|| report::choice::default_out(&chosen));
+    report::output::write(&made, &out, arguments.markdown_only)?;
+    print(&report::markdown::table(&made.report));
+    print(&format!("\n  report in {}", out.display()));
+    Ok(if made.kept() { Exit::Good } else { Exit::BoundBroken })
+}
+
+fn name_cause(arguments: &CauseArguments) -> Result<Exit, ReportError> {
+    let (name, sentence) = report::cause::name(&report::cause::read(&arguments.file)?);
+    eprintln!("{sentence}");
+    print(&name);
     Ok(Exit::Good)
 }
 

@@ -121,6 +121,16 @@ pub struct RunArguments {
     /// Look for changes of the program files while running, and take over their numbers.
     #[arg(long)]
     pub watch: bool,
+    /// Write the timing of every cycle, not of the worst ones alone: controller-timing.csv, some 200 bytes a cycle; with --pace
+    /// real.
+    #[arg(long)]
+    pub full_timing: bool,
+    /// Freeze the flight recorder when waking or executing takes longer than this, in us; with --pace real.
+    #[arg(long, default_value_t = 500, value_name = "US", value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
+    pub flight_late_us: u64,
+    /// Keep no ring of the last seconds, and write none.
+    #[arg(long)]
+    pub no_flight: bool,
     /// How long bus and sensors may be gone before giving up, in s.
     #[arg(long, default_value_t = 10.0, value_parser = grace)]
     pub bus_grace: f64,

@@ -7,7 +7,8 @@
 //! |---|---|
 //! | [`station`] | frames in, commands out, for the axes of a process |
 //! | [`pace`] | what moves it: the rig's frames, or the barrier |
-//! | [`rig_view`] | cycle numbers, lost frames |
+//! | [`rig_view`] | cycle numbers, lost, late and duplicate frames |
+//! | [`timing`] | when everything of a cycle happened; histograms, timing tables, flight recorder |
 //! | [`axis`] | one axis controller: chains, work, program put together |
 //! | [`chains`] | the sequence chains: main, force, matching, emergency stop |
 //! | [`program`] | tasks of an axis, composed in a file; [`pre_controller`], [`post_controller`], [`linearisation`] |
@@ -46,4 +47,5 @@ pub mod run;
 pub mod set_point;
 pub mod setup;
 pub mod station;
+pub mod timing;
 pub mod watch;

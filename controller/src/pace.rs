@@ -1,14 +1,15 @@
 //! What moves the controllers: the rig's frames as they arrive, or the lockstep barrier.
 //!
 //! In real time the controllers have no clock of their own that could drift against the rig's: the sensors of a cycle wake
-//! them, and their wake-up latency is counted from the arrival of the frame at our queue.
+//! them, and their wake-up latency is counted from the arrival of the frame at our queue (see [`crate::timing`]).
 
+use crate::rig_view::PerAxis;
 use crate::station::{News, Station};
-use plant::Axis;
+use crate::timing::{Stopwatch, StopwatchAccount};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{Bus, BusError, Received};
-use protocol::frames::{DRIVE_SENSORS, LOAD_SENSORS};
-use realtime::{Clock, Interrupt, Recorder as Histogram};
+use protocol::timing::Vitals;
+use realtime::{Clock, Continued, Interrupt, VitalsReader};
 use std::time::{Duration, Instant as WallInstant};
 
 /// Longest wait for a frame before looking at the world again.
@@ -21,8 +22,6 @@ const DONE_SILENCE: Duration = Duration::from_secs(1);
 pub(crate) const STOPPED_CYCLES: u64 = 2000;
 /// Answers that the allocation count leaves out at the start.
 const WARM_UP: u64 = 1000;
-/// Period of the answers, ns.
-const PERIOD_NS: u64 = 1_000_000;
 
 /// Why the controllers ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,84 +54,47 @@ pub struct Ride<'a> {
 pub struct Paced {
     /// Why it ended.
     pub end: End,
-    /// Arrival of the sensors of our first axis to our waking up, ns.
-    pub wakeup_ns: Histogram,
-    /// Waking up to the last frame sent, ns.
-    pub execution_ns: Histogram,
-    /// |time between two answers - period|, ns.
-    pub period_error_ns: Histogram,
     /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
     pub allocations: Option<u64>,
+    /// What the stopwatch counted.
+    pub stopwatch: StopwatchAccount,
 }
 
-impl Paced {
-    fn new() -> Self {
-        Self {
-            end: End::RigEnded,
-            wakeup_ns: Histogram::new(),
-            execution_ns: Histogram::new(),
-            period_error_ns: Histogram::new(),
-            allocations: None,
-        }
-    }
-}
-
-/// Answers frames as they arrive.
-pub fn run_real(ride: Ride<'_>, clock: &impl Clock) -> Paced {
+/// Answers frames as they arrive, under a stopwatch.
+pub fn run_real(ride: Ride<'_>, mut stopwatch: Stopwatch<impl Clock + Send>, continued: Continued) -> Paced {
     let Ride { station, bus, grace, interrupt } = ride;
-    let mut paced = Paced::new();
-    let wakes = if station.has(Axis::Drive) { DRIVE_SENSORS.id } else { LOAD_SENSORS.id };
-    // What others say is no life of the rig: it sends sensors and ticks.
-    let life = |station: &Station| (station.view().received(), station.view().cycle());
-    let mut alive = life(station);
-    let mut last_life = WallInstant::now();
-    let mut last_answer_ns = None;
-    let mut silent = false;
+    let mut vitals = VitalsReader::new(continued);
+    let mut rig = RigLife::new(station);
     // Not being connected yet is no loss; only what was up can be lost.
     let mut was_up = true;
     let mut ever_up = false;
     let mut watch = None;
-    paced.end = loop {
+    stopwatch.begin();
+    let end = loop {
         bus.wait_readable(PATIENCE);
         if watch.is_none() && station.answered() >= WARM_UP {
             watch = Some(realtime::allocations::watch());
         }
-        let woke_ns = clock.now().as_nanos();
+        stopwatch.woke();
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
-            // Every frame's own waiting counts, so that a stall shows with all the frames that waited for its end.
-            if frame.standard_id() == Some(wakes) {
-                paced.wakeup_ns.record(woke_ns.saturating_sub(stamp_ns));
-            }
-            station.take(&frame);
+            let sensors = station.take(&frame);
+            stopwatch.took(&frame, stamp_ns, sensors);
         }
-        if station.answer(bus) {
-            paced.execution_ns.record(clock.now().as_nanos().saturating_sub(woke_ns));
-            if let Some(last_ns) = last_answer_ns.replace(woke_ns) {
-                paced.period_error_ns.record(PERIOD_NS.abs_diff(woke_ns.saturating_sub(last_ns)));
-            }
-        }
+        stopwatch.took_all();
+        let answered = station.answer(&mut stopwatch.bus(bus));
+        stopwatch.answered(answered, || counted(&mut vitals));
         if interrupt.came() {
             break End::Interrupted;
         }
         if station.ending() {
             break End::RigEnded;
         }
-        let alive_before = std::mem::replace(&mut alive, life(station));
-        if alive != alive_before {
-            last_life = WallInstant::now();
-        }
-        let quiet = last_life.elapsed();
         ever_up |= bus.is_up();
         if ever_up && bus.is_up() != was_up {
             was_up = bus.is_up();
             station.tell(if was_up { News::BusBack } else { News::BusLost });
         }
-        if (quiet > SILENCE) != silent {
-            silent = !silent;
-            if silent {
-                station.tell(News::SensorsSilent);
-            }
-        }
+        let quiet = rig.quiet(station);
         if station.stopped_for() > STOPPED_CYCLES {
             break End::Stopped;
         }
@@ -143,11 +105,59 @@ pub fn run_real(ride: Ride<'_>, clock: &impl Clock) -> Paced {
             break End::BusGone;
         }
     };
-    paced.allocations = watch.map(|watch| {
+    let allocations = watch.map(|watch| {
         drop(watch);
         realtime::allocations::counted()
     });
-    paced
+    Paced { end, allocations, stopwatch: stopwatch.finish() }
+}
+
+/// What the kernel counted since it was asked last, in the words of the timing table.
+fn counted(vitals: &mut VitalsReader) -> Vitals {
+    let counts = vitals.read();
+    Vitals {
+        minor_faults: counts.minor_faults,
+        major_faults: counts.major_faults,
+        voluntary_switches: counts.voluntary_switches,
+        involuntary_switches: counts.involuntary_switches,
+        run_delay_ns: counts.run_delay_ns,
+        continued: counts.continued,
+        cpu: counts.cpu,
+    }
+}
+
+/// Whether the rig is heard of.
+struct RigLife {
+    heard: (PerAxis, Option<u64>),
+    last: WallInstant,
+    silent: bool,
+}
+
+impl RigLife {
+    fn new(station: &Station) -> Self {
+        Self { heard: Self::heard(station), last: WallInstant::now(), silent: false }
+    }
+
+    /// What others say is no life of the rig: it sends sensors and ticks.
+    fn heard(station: &Station) -> (PerAxis, Option<u64>) {
+        (station.view().received(), station.view().cycle())
+    }
+
+    /// For how long it has been silent; tells a person when that begins.
+    fn quiet(&mut self, station: &mut Station) -> Duration {
+        let before = std::mem::replace(&mut self.heard, Self::heard(station));
+        if self.heard != before {
+            self.last = WallInstant::now();
+        }
+        let quiet = self.last.elapsed();
+        if (quiet > SILENCE) != self.silent {
+            self.silent = !self.silent;
+            if self.silent {
+                station.tell(News::SensorsSilent);
+            }
+        }
+        quiet
+    }
 }
 
 /// Answers when the barrier says so.
@@ -157,11 +167,12 @@ pub fn run_real(ride: Ride<'_>, clock: &impl Clock) -> Paced {
 pub fn run_lockstep(ride: Ride<'_>, name: &str) -> Result<Paced, BusError> {
     let Ride { station, bus, grace, interrupt } = ride;
     bus.join_lockstep(Role::Member, name)?;
-    let mut paced = Paced::new();
     let mut waiting_since = None;
-    paced.end = loop {
+    let end = loop {
         match bus.receive() {
-            Received::Frame(frame, _) => station.take(&frame),
+            Received::Frame(frame, _) => {
+                station.take(&frame);
+            }
             Received::Barrier(control) => match control.kind {
                 Kind::Go { .. } => {
                     waiting_since = None;
@@ -196,5 +207,5 @@ pub fn run_lockstep(ride: Ride<'_>, name: &str) -> Result<Paced, BusError> {
             }
         }
     };
-    Ok(paced)
+    Ok(Paced { end, allocations: None, stopwatch: StopwatchAccount::default() })
 }

@@ -5,9 +5,11 @@
 use crate::axis::AxisRecord;
 use crate::guard::Stuck;
 use crate::station::News;
+use crate::timing::ledger::{Ledger, TimingFigures};
 use crate::watch::Watcher;
 use crossbeam_channel::{Receiver, TryRecvError};
 use plant::Axis;
+use protocol::frames::MainChainState;
 use protocol::run_folder::LineFile;
 use std::io::{self, Write};
 use std::path::Path;
@@ -97,14 +99,25 @@ pub struct Writer {
     pub news: Receiver<News>,
     /// Who looks at the program files, if anybody does.
     pub watcher: Option<Watcher>,
+    /// Who records what the stopwatch stamped, where time is real.
+    pub ledger: Option<Ledger>,
+}
+
+/// What is left when the queues' senders are gone.
+pub struct Written {
+    /// What a person was told.
+    pub told: Vec<News>,
+    /// Why writing stopped, if it did.
+    pub failure: Option<String>,
+    /// Figures of the timing, where time is real.
+    pub timing: Option<TimingFigures>,
 }
 
 impl Writer {
     /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
     /// which does not return, when an algorithm never does, with everything written.
-    /// Returns the news, and why writing stopped, if it did.
-    pub fn run(self, failed: impl Fn(), stuck: impl Fn()) -> (Vec<News>, Option<String>) {
-        let Self { mut tables, records, news, mut watcher } = self;
+    pub fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
+        let Self { mut tables, records, news, mut watcher, mut ledger } = self;
         let mut told = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
@@ -123,29 +136,45 @@ impl Writer {
             if let Some(watcher) = &mut watcher {
                 watcher.look();
             }
+            for item in news.try_iter() {
+                eprintln!("controller: {}", sentence(item));
+                if let (News::State { state: MainChainState::Fault, cycle, .. }, Some(ledger)) =
+                    (item, &mut ledger)
+                {
+                    ledger.fault(cycle);
+                }
+                told.push(item);
+            }
+            if let Some(ledger) = &mut ledger {
+                note(&mut failure, if finished { ledger.finish() } else { ledger.look() });
+            }
             if watch.look() {
                 // The process ends here; a failure of the last write has nobody left to be told to.
                 let _ = tables.write_out();
+                let _ = ledger.as_mut().map(Ledger::finish);
                 stuck();
             }
-            for item in news.try_iter() {
-                eprintln!("controller: {}", sentence(item));
-                told.push(item);
-            }
-            if failure.is_none() && (finished || last_flush.elapsed() > FLUSH_PERIOD) {
+            if finished || last_flush.elapsed() > FLUSH_PERIOD {
                 last_flush = Instant::now();
-                failure = tables.write_out().err().map(|error| error.to_string());
+                note(&mut failure, tables.write_out());
+                note(&mut failure, ledger.as_mut().map_or(Ok(()), Ledger::write_out));
             }
             if let Some(failure) = &failure {
                 eprintln!("controller: cannot write {failure}; free space or choose another --out");
                 failed();
-                return (told, Some(failure.clone()));
             }
-            if finished {
-                return (told, None);
+            if finished || failure.is_some() {
+                return Written { told, failure, timing: ledger.map(|ledger| ledger.figures()) };
             }
             std::thread::sleep(POLL_PERIOD);
         }
+    }
+}
+
+/// Keeps the first failure.
+fn note(failure: &mut Option<String>, written: io::Result<()>) {
+    if let (None, Err(error)) = (&failure, written) {
+        *failure = Some(error.to_string());
     }
 }
 

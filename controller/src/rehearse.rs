@@ -10,11 +10,13 @@ use crate::report::{self, AxisReport, Report};
 use crate::run::RunError;
 use crate::setup::{Inputs, Mode};
 use crate::station::News;
+use crate::timing::ledger::TimingFigures;
 use plant::scene::Outcome;
 use plant::{Axis, Scene, tables};
 use protocol::bus::BusCounters;
 use protocol::exit::Exit;
-use protocol::run_folder::{LineFile, SCHEMA_VERSION, clear_results, write_json};
+use protocol::flight_dump;
+use protocol::run_folder::{LineFile, SCHEMA_VERSION, clear, clear_results, controller_results, write_json};
 use realtime::{Interrupt, Percentiles, Recorder};
 use serde_json::json;
 use std::path::Path;
@@ -34,6 +36,7 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let out = &arguments.files.out;
     std::fs::create_dir_all(out)
         .and_then(|()| clear_results(out))
+        .and_then(|()| clear_timing(out))
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     end_when_stuck();
     let started = Instant::now();
@@ -53,6 +56,17 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     files.write_out().map_err(RunError::output)?;
     let ended = Ended { rehearsal, interrupted, told, news, took_s: started.elapsed().as_secs_f64() };
     save(arguments, &inputs, &scene, &ended)
+}
+
+/// Removes what runs in real time left; a rehearsal has no timing.
+fn clear_timing(out: &Path) -> std::io::Result<()> {
+    let mut names = vec![report::name(&Axis::ALL)];
+    names.extend(Axis::ALL.map(|axis| report::name(&[axis])));
+    for name in &names {
+        clear(out, &controller_results(name))?;
+        flight_dump::clear(out, name)?;
+    }
+    flight_dump::clear(out, "emulator")
 }
 
 /// Ends the process when an algorithm never returns, which this thread could not.
@@ -162,11 +176,13 @@ fn save(
         rig_cycles_skipped: 0,
         frames_ignored: station.ignored(),
         bus: BusCounters::default(),
-        wakeup_ns: no_times(),
-        execution_ns: no_times(),
-        period_error_ns: no_times(),
+        frames_late: 0,
+        frames_duplicate: 0,
+        timing: TimingFigures::none(),
         allocations_in_cycle: None,
         records_dropped: station.records_dropped(),
+        sensors_before_start: 0,
+        timing_dropped: 0,
         realtime_granted: Vec::new(),
         realtime_refused: Vec::new(),
         axes,

@@ -5,10 +5,10 @@ use crate::axis::AxisController;
 use crate::rig_view::RigView;
 use crate::setup::Inputs;
 use crate::station::{IgnoredFrames, News, Station};
+use crate::timing::ledger::TimingFigures;
 use plant::Axis;
 use protocol::bus::BusCounters;
 use protocol::frames::MainChainState;
-use realtime::Percentiles;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -37,16 +37,22 @@ pub struct Report {
     pub frames_ignored: IgnoredFrames,
     /// What the bus counted.
     pub bus: BusCounters,
-    /// Arrival of the sensors to waking up.
-    pub wakeup_ns: Percentiles,
-    /// Waking up to the last frame sent.
-    pub execution_ns: Percentiles,
-    /// Deviation of the time between two answers from the period.
-    pub period_error_ns: Percentiles,
+    /// Sensor frames of the process's axes that came after newer ones.
+    pub frames_late: u64,
+    /// Sensor frames of the process's axes that came again.
+    pub frames_duplicate: u64,
+    /// Percentiles of the stages, arrivals, what the kernel counted, flight recorder. Wake-up: from the arrival of sensors; one
+    /// sample for each row, and one for each frame of the axis that wakes us that was overtaken.
+    #[serde(flatten)]
+    pub timing: TimingFigures,
     /// Allocations in the 1 ms path; null when the build does not count them.
     pub allocations_in_cycle: Option<u64>,
     /// Rows lost to a full queue.
     pub records_dropped: u64,
+    /// Sensor frames of the axis that wakes us that had arrived before the loop began; they are no wake-ups.
+    pub sensors_before_start: u64,
+    /// Stamps and frames lost to a full queue: histograms, timing table and flight recorder lack them.
+    pub timing_dropped: u64,
     /// What the system granted for real time.
     pub realtime_granted: Vec<String>,
     /// What it refused, with the remedy.
@@ -78,6 +84,10 @@ pub struct AxisReport {
     pub sensors_received: u64,
     /// Sensor frames of the axis that never came.
     pub sensors_lost: u64,
+    /// Sensor frames of the axis that came after newer ones.
+    pub sensors_late: u64,
+    /// Sensor frames of the axis that came again; they are among those received.
+    pub sensors_duplicate: u64,
     /// Offset of its position sensor as it was matched, m.
     pub matched_offset_m: f64,
     /// The program file as it stands; null for an axis that held its valve shut.
@@ -105,6 +115,8 @@ impl AxisReport {
             position_error_static_m: controller.figures().static_m(),
             sensors_received: view.received().get(controller.axis()),
             sensors_lost: view.lost().get(controller.axis()),
+            sensors_late: view.late().get(controller.axis()),
+            sensors_duplicate: view.duplicate().get(controller.axis()),
             matched_offset_m: program.geometry().offset_m,
             program_toml: source.map(|source| source.text.clone()),
             program_file: source.map(|source| source.path.display().to_string()),

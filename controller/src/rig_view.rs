@@ -9,9 +9,15 @@
 //!   sent of each axis up to tick n = n + 1 - skipped      (n - skipped when the tick comes before its cycle's sensors)
 //!   lost between two ticks         = difference of that - sensors received
 //! ```
+//!
+//! A frame of a cycle that its axis has passed already is *late*: it was missing, and comes after the next ones. One with counter
+//! and content of a frame that came is a *duplicate*. Both are counted, and neither is fresh: what is answered is the newest.
+
+mod recent;
 
 use plant::Axis;
 use protocol::frames::{ALIVE_RANGE, RigStatus, Sensors, Tick};
+use recent::{Coming, Recent};
 
 /// Cycles for which a status of the rig holds: ten of its periods.
 const STATUS_HOLDS_CYCLES: u64 = 100;
@@ -60,7 +66,9 @@ pub enum TickNews {
 #[derive(Clone, Copy)]
 struct Account {
     sent: u64,
+    /// Without duplicates.
     received: PerAxis,
+    late: PerAxis,
 }
 
 /// The rig as seen from the bus.
@@ -69,8 +77,11 @@ pub struct RigView {
     cycle: Option<u64>,
     skipped: u64,
     sensors: [Option<Sensors>; 2],
+    recent: [Recent; 2],
     fresh: [bool; 2],
     received: PerAxis,
+    late: PerAxis,
+    duplicate: PerAxis,
     account: Option<Account>,
     lost: PerAxis,
     /// With the cycle in which it came.
@@ -81,6 +92,17 @@ impl RigView {
     /// Takes the sensors of an axis.
     pub fn take_sensors(&mut self, axis: Axis, sensors: Sensors) {
         *self.received.of(axis) += 1;
+        match self.recent[axis.index()].take(&sensors) {
+            Coming::Newer => {}
+            Coming::Late => {
+                *self.late.of(axis) += 1;
+                return;
+            }
+            Coming::Again => {
+                *self.duplicate.of(axis) += 1;
+                return;
+            }
+        }
         if let Some(known) = self.cycle {
             let ahead = (ALIVE_RANGE + u64::from(sensors.alive) - known % ALIVE_RANGE) % ALIVE_RANGE;
             self.cycle = Some(known + ahead);
@@ -97,7 +119,8 @@ impl RigView {
         let restarted = self.account.is_some() && ahead.is_some_and(|ahead| ahead < -(ALIVE_RANGE as i64));
         if restarted {
             // Of the old rig, nothing but the counts holds.
-            *self = Self { received: self.received, lost: self.lost, ..Self::default() };
+            let Self { received, late, duplicate, lost, .. } = *self;
+            *self = Self { received, late, duplicate, lost, ..Self::default() };
         }
         let cycle = match (self.cycle, ahead) {
             (Some(known), Some(ahead)) => known.saturating_add_signed(ahead),
@@ -123,14 +146,21 @@ impl RigView {
         self.skipped += more + passed.saturating_sub(more) / SKIPPED_RANGE * SKIPPED_RANGE;
         let comes_first = tick.catch_up || tick.ending;
         let sent = (cycle + u64::from(!comes_first)).saturating_sub(self.skipped);
+        // A frame that came twice must not hide one that was lost.
+        let once = |axis| self.received.get(axis) - self.duplicate.get(axis);
+        let received = PerAxis { drive: once(Axis::Drive), load: once(Axis::Load) };
         if let Some(last) = self.account {
             for axis in Axis::ALL {
-                let came = *self.received.of(axis) - *last.received.clone().of(axis);
-                // A frame that came twice must not hide one that was lost elsewhere in time.
-                *self.lost.of(axis) += (sent - last.sent.min(sent)).saturating_sub(came);
+                let went = sent - last.sent.min(sent);
+                let came = received.get(axis) - last.received.get(axis);
+                // A late frame may have counted as lost at the tick before; nothing else takes a loss back.
+                let late = self.late.get(axis) - last.late.get(axis);
+                let found = came.saturating_sub(went).min(late);
+                let lost = self.lost.of(axis);
+                *lost = (*lost + went.saturating_sub(came)).saturating_sub(found);
             }
         }
-        self.account = Some(Account { sent, received: self.received });
+        self.account = Some(Account { sent, received, late: self.late });
     }
 
     /// Takes the rig's status.
@@ -177,6 +207,18 @@ impl RigView {
         self.lost
     }
 
+    /// Sensor frames that came after newer ones of their axis.
+    #[must_use]
+    pub fn late(&self) -> PerAxis {
+        self.late
+    }
+
+    /// Sensor frames that came again.
+    #[must_use]
+    pub fn duplicate(&self) -> PerAxis {
+        self.duplicate
+    }
+
     /// Cycles that the rig says it skipped.
     #[must_use]
     pub fn skipped(&self) -> u64 {
@@ -185,146 +227,4 @@ impl RigView {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn tick(cycle: u32, skipped: u16) -> Tick {
-        Tick { cycle, skipped, ..Tick::default() }
-    }
-
-    fn sensors(cycle: u64) -> Sensors {
-        Sensors { alive: (cycle % 16) as u8, ..Sensors::default() }
-    }
-
-    /// Plays the rig's frames of `cycles`, without those that `lost` names.
-    fn play(view: &mut RigView, cycles: std::ops::Range<u64>, lost: &[u64]) {
-        for cycle in cycles {
-            for axis in Axis::ALL {
-                if !lost.contains(&cycle) {
-                    view.take_sensors(axis, sensors(cycle));
-                }
-            }
-            if cycle % 10 == 0 {
-                view.take_tick(&tick(cycle as u32, 0));
-            }
-        }
-    }
-
-    #[test]
-    fn sensors_without_a_tick_have_no_cycle() {
-        let mut view = RigView::default();
-        view.take_sensors(Axis::Drive, sensors(7));
-        assert!(view.fresh_sensors(Axis::Drive).is_none());
-    }
-
-    #[test]
-    fn each_frame_has_its_cycle_and_is_fresh_once() {
-        let mut view = RigView::default();
-        play(&mut view, 5000..5011, &[]);
-        assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 5010);
-        assert!(view.fresh_sensors(Axis::Drive).is_none());
-        view.take_sensors(Axis::Drive, sensors(5013));
-        assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 5013);
-        assert_eq!(view.fresh_sensors(Axis::Load).unwrap().0, 5010, "the load's frame is an older one");
-    }
-
-    #[test]
-    fn lost_frames_are_counted_exactly() {
-        let mut view = RigView::default();
-        play(&mut view, 0..1001, &[3, 15, 16, 17, 500]);
-        assert_eq!(view.lost(), PerAxis { drive: 5, load: 5 });
-    }
-
-    #[test]
-    fn more_lost_frames_than_the_counter_can_tell_are_found_by_the_tick() {
-        let mut view = RigView::default();
-        let lost: Vec<u64> = (101..148).collect();
-        play(&mut view, 0..201, &lost);
-        assert_eq!(view.lost().drive, 47);
-    }
-
-    #[test]
-    fn skipped_cycles_are_not_lost() {
-        let mut view = RigView::default();
-        play(&mut view, 0..101, &[]);
-        view.take_tick(&Tick { catch_up: true, ..tick(151, 50) });
-        play_with_skipped(&mut view, 151..201, 50);
-        assert_eq!((view.lost().drive, view.skipped()), (0, 50));
-        view.take_sensors(Axis::Drive, sensors(201));
-        assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 201);
-    }
-
-    fn play_with_skipped(view: &mut RigView, cycles: std::ops::Range<u64>, skipped: u16) {
-        for cycle in cycles {
-            Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
-            if cycle % 10 == 0 {
-                view.take_tick(&tick(cycle as u32, skipped));
-            }
-        }
-    }
-
-    #[test]
-    fn a_stall_of_more_cycles_than_the_tick_can_count_loses_nothing() {
-        let mut view = RigView::default();
-        play(&mut view, 0..101, &[]);
-        let skipped = (100_000 % SKIPPED_RANGE) as u16;
-        view.take_tick(&Tick { catch_up: true, ..tick(100_101, skipped) });
-        play_with_skipped(&mut view, 100_101..100_201, skipped);
-        assert_eq!((view.lost().drive, view.skipped()), (0, 100_000));
-    }
-
-    #[test]
-    fn the_cycle_goes_on_when_the_ticks_counter_wraps() {
-        let mut view = RigView::default();
-        let last = u64::from(u32::MAX);
-        view.take_tick(&tick(u32::MAX - 5, 0));
-        (last - 4..=last + 5).for_each(|cycle| {
-            Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
-        });
-        assert_eq!(view.take_tick(&tick(4, 0)), TickNews::Usual);
-        assert_eq!((view.fresh_sensors(Axis::Drive).unwrap().0, view.lost().drive), (last + 5, 0));
-    }
-
-    #[test]
-    fn an_emergency_stop_of_the_old_rig_is_not_the_new_ones() {
-        let mut view = RigView::default();
-        play(&mut view, 0..5001, &[]);
-        view.take_status(RigStatus { emergency_stop: true, ..RigStatus::default() });
-        view.take_tick(&tick(0, 0));
-        assert!(view.status().is_none());
-    }
-
-    #[test]
-    fn a_status_holds_for_a_hundred_cycles() {
-        let mut view = RigView::default();
-        view.take_status(RigStatus::default());
-        // The first time that is known: what came before it is as new.
-        view.take_tick(&tick(5000, 0));
-        assert!(view.status().is_some());
-        play(&mut view, 5001..5101, &[]);
-        assert!(view.status().is_some(), "in cycle {:?}", view.cycle());
-        view.take_sensors(Axis::Drive, sensors(5101));
-        assert!(view.status().is_none());
-        view.take_status(RigStatus::default());
-        assert!(view.status().is_some());
-    }
-
-    #[test]
-    fn the_ending_tick_settles_the_last_frames() {
-        let mut view = RigView::default();
-        play(&mut view, 0..98, &[95]);
-        let news = view.take_tick(&Tick { ending: true, ..tick(98, 0) });
-        assert_eq!((news, view.lost().drive), (TickNews::Ending, 1));
-    }
-
-    #[test]
-    fn a_rig_that_starts_anew_is_noticed_and_loses_nothing() {
-        let mut view = RigView::default();
-        play(&mut view, 0..5001, &[]);
-        view.take_sensors(Axis::Drive, sensors(0));
-        assert_eq!(view.take_tick(&tick(0, 0)), TickNews::Restarted);
-        play(&mut view, 1..101, &[]);
-        assert_eq!(view.lost(), PerAxis::default());
-        assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 100);
-    }
-}
+mod tests;

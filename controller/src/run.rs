@@ -4,20 +4,25 @@ use crate::cli::{Axes, Pace, RunArguments};
 use crate::guard::STUCK;
 use crate::pace::{self, End, Paced, Ride};
 use crate::plugin::PluginError;
-use crate::recording::{Tables, Writer};
+use crate::recording::{Tables, Writer, Written};
 use crate::report::{self, AxisReport, Report};
 use crate::setup::{Inputs, Mode};
-use crate::station::{IgnoredFrames, News, Outlets, Station};
+use crate::station::{IgnoredFrames, Outlets, Station};
+use crate::timing::Stopwatch;
+use crate::timing::ledger::TimingFigures;
+use crate::timing::setup::{self, RunStart};
 use crate::watch;
 use crossbeam_channel::bounded;
 use plant::Axis;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
-use protocol::run_folder::{SCHEMA_VERSION, write_json};
-use realtime::{Clock, Grants, Interrupt, MonotonicClock, Request};
+use protocol::flight_dump;
+use protocol::run_folder::{SCHEMA_VERSION, clear, controller_results, write_json};
+use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, Request};
 use std::collections::BTreeMap;
+use std::io;
 use std::path::Path;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 /// Rows that fit the queue: 16 s of both axes.
 const ROW_QUEUE: usize = 32 * 1024;
@@ -79,10 +84,13 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let controllers =
         axes.iter().map(|axis| inputs.controller(*axis, mode)).collect::<Result<Vec<_>, _>>()?;
     let out = &arguments.files.out;
-    std::fs::create_dir_all(out).map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
+    std::fs::create_dir_all(out)
+        .and_then(|()| clear(out, &controller_results(&report::name(axes))))
+        .and_then(|()| flight_dump::clear(out, &report::name(axes)))
+        .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     let tables = Tables::create(out, axes).map_err(RunError::output)?;
-    let interrupt =
-        Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
+    let signals =
+        Signals::watch().map_err(|error| RunError::Input(format!("cannot watch for signals: {error}")))?;
     let mut bus =
         bus::open(&arguments.bus, Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns)))?;
 
@@ -92,24 +100,37 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let outlets = Outlets { records: record_sender, news: news_sender, changes, waits: !real_time };
     let station = Station::new(controllers, outlets);
     let watcher = arguments.watch.then(|| watch::Watcher::new(&inputs, axes, change_sender));
-    let started = Instant::now();
+    let started = RunStart::now();
+    let timing = real_time.then(|| setup::begin(arguments, &started, signals.freeze)).transpose()?;
+    let (stopwatch, ledger) = timing.unzip();
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
-        let asking = &interrupt;
+        let asking = &signals.interrupt;
         let writer = scope.spawn(move || {
-            let writer = Writer { tables, records, news, watcher };
+            let writer = Writer { tables, records, news, watcher, ledger };
             writer.run(|| asking.ask(), || end_stuck(out, axes))
         });
-        let parts = Work { arguments, inputs: &inputs, station, bus: bus.as_mut(), interrupt: &interrupt };
+        let bus = bus.as_mut();
+        let (interrupt, continued) = (&signals.interrupt, signals.continued);
+        let parts = Work { arguments, inputs: &inputs, station, stopwatch, bus, interrupt, continued };
         let work = scope.spawn(|| parts.run());
         let finished = join(work);
-        let (told, failure) = join(writer);
-        save(
-            arguments,
-            &inputs,
-            Ended { started, finished: finished?, told, output_failed: failure.is_some() },
-        )
+        let written = join(writer);
+        save(arguments, &inputs, Ended { started, finished: finished?, written })
     })
+}
+
+/// Signals that a run looks at.
+struct Signals {
+    interrupt: Interrupt,
+    freeze: Freeze,
+    continued: Continued,
+}
+
+impl Signals {
+    fn watch() -> io::Result<Self> {
+        Ok(Self { interrupt: Interrupt::watch()?, freeze: Freeze::watch()?, continued: Continued::watch()? })
+    }
 }
 
 /// Ends the process whose loop is stuck in an algorithm, for good: its thread cannot be asked to.
@@ -137,10 +158,9 @@ struct Finished {
 }
 
 struct Ended {
-    started: Instant,
+    started: RunStart,
     finished: Finished,
-    told: Vec<News>,
-    output_failed: bool,
+    written: Written,
 }
 
 /// What the thread of the controllers works with.
@@ -148,20 +168,23 @@ struct Work<'a> {
     arguments: &'a RunArguments,
     inputs: &'a Inputs,
     station: Station,
+    /// In real time.
+    stopwatch: Option<Stopwatch<MonotonicClock>>,
     bus: &'a mut dyn Bus,
     interrupt: &'a Interrupt,
+    continued: Continued,
 }
 
 impl Work<'_> {
     /// The station goes at the end, and with it the sending ends of the recorder's queues.
     fn run(self) -> Result<Finished, RunError> {
-        let Self { arguments, inputs, mut station, bus, interrupt } = self;
+        let Self { arguments, inputs, mut station, stopwatch, bus, interrupt, continued } = self;
         let grants = acquire_realtime(arguments);
         let grace = Duration::from_secs_f64(arguments.bus_grace);
         let ride = Ride { station: &mut station, bus: &mut *bus, grace, interrupt };
-        let paced = match arguments.pace {
-            Pace::Real => pace::run_real(ride, &MonotonicClock),
-            Pace::Lockstep => pace::run_lockstep(ride, member_name(arguments.axis))?,
+        let paced = match stopwatch {
+            Some(stopwatch) => pace::run_real(ride, stopwatch, continued),
+            None => pace::run_lockstep(ride, member_name(arguments.axis))?,
         };
         Ok(Finished {
             paced,
@@ -203,7 +226,7 @@ fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
         (Exit::BoundBroken, format!("stopped before the end{why}"))
     };
     match paced.end {
-        _ if ended.output_failed => (Exit::BadInput, "the output could not be written".into()),
+        _ if ended.written.failure.is_some() => (Exit::BadInput, "the output could not be written".into()),
         End::Stopped => aborted(),
         End::RigEnded if stopped.is_some() => aborted(),
         End::RigEnded if done => (Exit::Good, "done, and the rig has ended".into()),
@@ -221,51 +244,41 @@ fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
 
 fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit, RunError> {
     let (exit, ended_because) = verdict(arguments, &ended);
-    let Ended { started, finished, told, .. } = ended;
+    let Ended { started, finished, written } = ended;
     let Finished { paced, grants, bus, axes, .. } = finished;
-    let lost: u64 = axes.values().map(|axis| axis.sensors_lost).sum();
+    let sum = |of: fn(&AxisReport) -> u64| axes.values().map(of).sum::<u64>();
     eprintln!(
-        "controller: {ended_because}; {} cycles answered, {lost} sensor frames lost",
-        finished.answered
+        "controller: {ended_because}; {} cycles answered, {} sensor frames lost",
+        finished.answered,
+        sum(|axis| axis.sensors_lost)
     );
-    let name = report::name(arguments.axis.list());
-    let out = &arguments.files.out;
     let real = arguments.pace == Pace::Real;
-    let unix_s =
-        SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(started.elapsed());
-    if real {
-        let parts = [
-            ("controller-wakeup", paced.wakeup_ns.histogram()),
-            ("controller-execution", paced.execution_ns.histogram()),
-            ("controller-period-error", paced.period_error_ns.histogram()),
-        ];
-        let path = out.join(format!("{name}.hlog"));
-        realtime::write_hlog(&path, &parts, unix_s.as_secs_f64(), started.elapsed())
-            .map_err(|error| RunError::Output(format!("{}: {error}", path.display())))?;
-    }
     let report = Report {
         schema_version: SCHEMA_VERSION,
         command_line: std::env::args().collect(),
         version: env!("CARGO_PKG_VERSION"),
         title: inputs.experiment.title.clone(),
-        started_unix_s: real.then_some(unix_s.as_secs_f64()),
+        started_unix_s: real.then_some(started.unix_s),
         ended_well: exit == Exit::Good,
         ended_because,
         cycles_answered: finished.answered,
         rig_cycles_skipped: finished.skipped,
         frames_ignored: finished.ignored,
         bus,
-        wakeup_ns: paced.wakeup_ns.percentiles(),
-        execution_ns: paced.execution_ns.percentiles(),
-        period_error_ns: paced.period_error_ns.percentiles(),
+        frames_late: sum(|axis| axis.sensors_late),
+        frames_duplicate: sum(|axis| axis.sensors_duplicate),
+        timing: written.timing.unwrap_or_else(TimingFigures::none),
         allocations_in_cycle: paced.allocations.filter(|_| cfg!(feature = "count-allocations")),
         records_dropped: finished.records_dropped,
+        sensors_before_start: paced.stopwatch.before_start,
+        timing_dropped: paced.stopwatch.dropped,
         realtime_granted: grants.granted().to_vec(),
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
         axes,
-        news: told,
+        news: written.told,
     };
-    write_json(&out.join(format!("{name}.json")), &report).map_err(RunError::output)?;
+    let path = arguments.files.out.join(format!("{}.json", report::name(arguments.axis.list())));
+    write_json(&path, &report).map_err(RunError::output)?;
     Ok(exit)
 }
 

@@ -17,7 +17,7 @@ use plant::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MainChainState, ValveCommand,
+    ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand,
 };
 use std::collections::VecDeque;
 
@@ -155,11 +155,11 @@ impl Station {
         }
     }
 
-    /// Takes a frame.
-    pub fn take(&mut self, frame: &CanFrame) {
+    /// Takes a frame; tells whose sensors it was.
+    pub fn take(&mut self, frame: &CanFrame) -> Option<Axis> {
         match Frame::decode(frame) {
-            Ok(Frame::DriveSensors(sensors)) => self.view.take_sensors(Axis::Drive, sensors),
-            Ok(Frame::LoadSensors(sensors)) => self.view.take_sensors(Axis::Load, sensors),
+            Ok(Frame::DriveSensors(sensors)) => return Some(self.take_sensors(Axis::Drive, sensors)),
+            Ok(Frame::LoadSensors(sensors)) => return Some(self.take_sensors(Axis::Load, sensors)),
             Ok(Frame::RigStatus(status)) => self.view.take_status(status),
             Ok(Frame::Tick(tick)) => match self.view.take_tick(&tick) {
                 TickNews::Usual => self.seats.iter_mut().for_each(|seat| seat.silent_ticks += 1),
@@ -180,15 +180,21 @@ impl Station {
             }
             Err(_) => self.ignored.malformed += 1,
         }
+        None
     }
 
-    /// Answers what is fresh; true when the first of our axes was answered.
-    pub fn answer(&mut self, bus: &mut dyn Bus) -> bool {
+    fn take_sensors(&mut self, axis: Axis, sensors: Sensors) -> Axis {
+        self.view.take_sensors(axis, sensors);
+        axis
+    }
+
+    /// Answers what is fresh; tells the cycle that was answered for each axis.
+    pub fn answer(&mut self, bus: &mut dyn Bus) -> [Option<u64>; 2] {
+        let mut cycles = [None; 2];
         if self.ending {
-            return false;
+            return cycles;
         }
         self.take_changes();
-        let mut first = false;
         for place in 0..self.seats.len() {
             let axis = self.seats[place].controller.axis();
             if let Some((cycle, sensors)) = self.view.fresh_sensors(axis) {
@@ -205,12 +211,12 @@ impl Station {
                         && !seat.controller.may_restart();
                 seat.stopped_for = if stopped { seat.stopped_for + 1 } else { 0 };
                 self.send(place, cycle, &answer, bus);
-                first |= place == 0;
+                cycles[axis.index()] = Some(cycle);
             } else if self.seats[place].silent_ticks >= SILENT_TICKS {
                 self.speak_without_sensors(place, bus);
             }
         }
-        first
+        cycles
     }
 
     /// The rig goes on, and own sensors do not come: after each tick the axis says what a fault has to say.

@@ -12,6 +12,9 @@ use std::path::PathBuf;
 /// FIFO priority of the rig loop; above most of the system, below the kernel's own threads at 99.
 pub const DEFAULT_FIFO_PRIORITY: u8 = 80;
 
+/// Lateness that freezes the flight recorder: half a cycle.
+const DEFAULT_FLIGHT_LATE_US: u64 = 500;
+
 /// Emulates the servo-pneumatic rig on a CAN bus.
 #[derive(Debug, Parser)]
 #[command(name = "emulator", version, about, after_help = EXIT_CODE_HELP)]
@@ -90,6 +93,15 @@ pub struct RunArguments {
     /// Ask the system for no priority, no locked memory and no latency request.
     #[arg(long)]
     pub no_realtime: bool,
+    /// Write when everything of every cycle happened: emulator-timing.csv.
+    #[arg(long)]
+    pub full_timing: bool,
+    /// Freeze the flight recorder at a wake-up later than this, an execution longer than this, or a missed cycle, in us.
+    #[arg(long, default_value_t = DEFAULT_FLIGHT_LATE_US, value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
+    pub flight_late_us: u64,
+    /// Keep no flight recorder.
+    #[arg(long)]
+    pub no_flight: bool,
     /// Ignore frames of the bench: hand force, link, weights.
     #[arg(long)]
     pub no_bench_frames: bool,

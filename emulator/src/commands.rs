@@ -24,6 +24,10 @@ pub struct CommandCounters {
     pub expired: u64,
     /// Commands that never came, by the gaps in the sender's counter.
     pub lost: u64,
+    /// Accepted commands that came a cycle or more later than the cycle after the one that they answer.
+    pub late: u64,
+    /// Commands equal to the one before, counter and all; accepted all the same, and told apart by the watch for two senders.
+    pub duplicate: u64,
     /// Times that the fault `two-sources` was latched.
     pub two_sources: u64,
 }
@@ -46,6 +50,8 @@ pub enum Change {
 pub struct CommandIntake {
     sources: SourceWatch,
     acting: Option<ValveCommand>,
+    /// The last one accepted, acting or not.
+    last: Option<ValveCommand>,
     /// An accepted command was there, and grew stale.
     expired: bool,
     disputed: bool,
@@ -56,11 +62,13 @@ pub struct CommandIntake {
 impl CommandIntake {
     /// Takes a well-formed command that arrived before the cycle that was sent last acts. True when it was accepted.
     pub fn take(&mut self, command: ValveCommand, live: &LiveCycles) -> bool {
-        if live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES) {
+        let Some(age) = live.age(command.echo).filter(|age| *age <= STALE_AFTER_CYCLES) else {
             self.counters.refused_stale += 1;
             self.refused_since_accepted += 1;
             return false;
-        }
+        };
+        self.counters.late += u64::from(age > 1);
+        self.counters.duplicate += u64::from(self.last.replace(command) == Some(command));
         if let Step::Continues { lost } = self.sources.note(command.alive, live.count()) {
             // A refused frame leaves a gap in the counters of those accepted, but it came.
             self.counters.lost += lost.saturating_sub(self.refused_since_accepted);
@@ -111,6 +119,12 @@ impl CommandIntake {
     #[must_use]
     pub fn age_cycles(&self, live: &LiveCycles) -> Option<u64> {
         self.acting.as_ref().and_then(|command| live.age(command.echo))
+    }
+
+    /// The same when it is obeyed: not while two senders dispute it.
+    #[must_use]
+    pub fn obeyed_age_cycles(&self, live: &LiveCycles) -> Option<u64> {
+        if self.disputed { None } else { self.age_cycles(live) }
     }
 
     /// Whether the valve is shut because no fresh command is there.
@@ -252,6 +266,36 @@ mod tests {
         bench.intake.take(command, &bench.live);
         bench.cycle(None);
         assert_eq!((bench.intake.opening(), bench.intake.stale()), (0.0, false));
+    }
+
+    #[test]
+    fn a_late_command_and_one_that_comes_twice_are_counted_and_obeyed() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        bench.cycle(Some(0.5));
+        bench.cycle(None);
+        let late = bench.command(0.25, 0);
+        assert!(bench.intake.take(late, &bench.live));
+        assert_eq!((bench.intake.counters().late, bench.intake.counters().duplicate), (1, 0));
+        bench.cycle(Some(0.5));
+        let again = ValveCommand { alive: bench.alive, ..bench.intake.acting.unwrap() };
+        assert!(bench.intake.take(again, &bench.live));
+        assert_eq!((bench.intake.counters().late, bench.intake.counters().duplicate), (1, 1));
+        assert_eq!(bench.intake.opening(), 0.5);
+    }
+
+    #[test]
+    fn two_senders_in_step_with_the_same_words_are_two_all_the_same() {
+        let mut bench = Bench::default();
+        bench.cycle(None);
+        for _ in 0..30 {
+            let command = bench.command(0.5, bench.cycle - 1);
+            bench.intake.take(command, &bench.live);
+            bench.intake.take(command, &bench.live);
+            bench.cycle(None);
+        }
+        assert_eq!((bench.intake.opening(), bench.intake.counters().two_sources), (0.0, 1));
+        assert_eq!(bench.intake.counters().duplicate, 30);
     }
 
     #[test]

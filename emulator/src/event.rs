@@ -69,10 +69,27 @@ pub enum EventKind {
         /// Its identifier.
         id: u16,
     },
+    /// The plant's state is no longer finite: the run ends in silence.
+    NotFinite,
     /// The bus went away.
     BusLost,
     /// The bus came back.
     BusBack,
+}
+
+impl EventKind {
+    /// Whether it is a fault, of which one wants to know what was going on before.
+    #[must_use]
+    pub fn is_fault(&self) -> bool {
+        matches!(
+            self,
+            Self::TwoSources(_)
+                | Self::CommandStale(_)
+                | Self::NotFinite
+                | Self::BusLost
+                | Self::EmergencyStop
+        )
+    }
 }
 
 impl From<Outcome> for EventKind {
@@ -150,6 +167,7 @@ impl fmt::Display for Event {
             EventKind::SecondRig { id } => {
                 write!(f, "frame {id:#05x} came from elsewhere: another rig is on this bus; stop one of them")
             }
+            EventKind::NotFinite => write!(f, "fault not-finite: the plant's state is no longer finite"),
             EventKind::BusLost => write!(f, "the bus is gone; trying to come back"),
             EventKind::BusBack => write!(f, "the bus is back"),
         }

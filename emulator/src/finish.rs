@@ -1,4 +1,4 @@
-//! The end of a run: histograms and `summary.json` written, the run told in a few lines, the exit code chosen.
+//! The end of a run: `summary.json` written, the run told in a few lines, the exit code chosen.
 
 use crate::cli::RunArguments;
 use crate::pace::End;
@@ -7,7 +7,7 @@ use crate::run::{LoopOutcome, RunError, RunStart};
 use crate::summary::Summary;
 use protocol::exit::Exit;
 use protocol::run_folder::{SCHEMA_VERSION, write_json};
-use realtime::{Percentiles, Recorder as Histogram};
+use realtime::{Percentiles, Recorder as Histogram, StageFigures};
 use std::path::Path;
 
 /// Saves what is left to save, tells the run in a few lines, and says how it went.
@@ -22,17 +22,6 @@ pub(crate) fn finish(
 ) -> Result<Exit, RunError> {
     let (exit, reason) = verdict(&outcome.paced.end);
     eprintln!("emulator: {reason}");
-    if let Some(statistics) = &outcome.paced.statistics {
-        let path = arguments.out.join("emulator.hlog");
-        let parts = [
-            ("emulator-wakeup", statistics.wakeup_ns.histogram()),
-            ("emulator-execution", statistics.execution_ns.histogram()),
-            ("emulator-period-error", statistics.period_error_ns.histogram()),
-            ("round-trip", outcome.figures.round_trip.histogram()),
-        ];
-        realtime::write_hlog(&path, &parts, started.unix_s.unwrap_or(0.0), started.began.elapsed())
-            .map_err(|error| RunError::output(&path, &error))?;
-    }
     let path = arguments.out.join("summary.json");
     let summary = summarise(outcome, written, started.epoch_offset_ns, reason, exit == Exit::Good);
     tell(&summary, &arguments.out);
@@ -77,6 +66,13 @@ fn summarise(
     let percentiles = |recorder: Option<&Histogram>| {
         recorder.map_or_else(|| Histogram::new().percentiles(), Histogram::percentiles)
     };
+    let WriterReport { evidence, events, event_count, .. } = written;
+    let nothing = || Histogram::new().percentiles();
+    let of_stage =
+        |pick: fn(&StageFigures) -> Percentiles| evidence.stages.as_ref().map_or_else(nothing, pick);
+    let of_axes = |figures: Option<[Percentiles; 2]>| figures.unwrap_or_else(|| [nothing(), nothing()]);
+    let [round_trip_ns, load_round_trip_ns] = of_axes(evidence.round_trip_ns);
+    let [drive_command_age_ns, load_command_age_ns] = of_axes(evidence.command_age_ns);
     let of_loop =
         |pick: fn(&realtime::LoopStatistics) -> &Histogram| -> Percentiles { percentiles(loops.map(pick)) };
     Summary {
@@ -93,11 +89,25 @@ fn summarise(
         frames_lost: lost,
         frames_lost_at_rig: lost,
         frames_malformed: figures.frames.malformed + bus.malformed,
+        frames_late: both.iter().map(|commands| commands.late).sum(),
+        frames_duplicate: both.iter().map(|commands| commands.duplicate).sum(),
         stale_commands: both.iter().map(|commands| commands.refused_stale + commands.expired).sum(),
         wakeup_ns: of_loop(|statistics| &statistics.wakeup_ns),
         execution_ns: of_loop(|statistics| &statistics.execution_ns),
         period_error_ns: of_loop(|statistics| &statistics.period_error_ns),
-        round_trip_ns: figures.round_trip.percentiles(),
+        receive_ns: of_stage(|stages| stages.receive_ns),
+        step_ns: of_stage(|stages| stages.step_ns),
+        send_ns: of_stage(|stages| stages.send_ns),
+        completion_ns: of_stage(|stages| stages.completion_ns),
+        round_trip_ns,
+        load_round_trip_ns,
+        drive_command_age_ns,
+        load_command_age_ns,
+        command_age_cycles: evidence.command_age_cycles,
+        arrivals: evidence.arrivals,
+        flight: evidence.flight,
+        wall_clock_steps: evidence.wall_clock_steps,
+        vitals: evidence.vitals,
         allocations_in_cycle: paced.allocations.filter(|_| cfg!(feature = "count-allocations")),
         records_dropped: figures.records_dropped,
         ended_because,
@@ -108,8 +118,8 @@ fn summarise(
         frames_ignored: figures.frames,
         bus,
         bus_host,
-        event_count: written.event_count,
-        events: written.events,
+        event_count,
+        events,
     }
 }
 

@@ -8,8 +8,9 @@
 //! | [`station`] | one cycle: sensors out, commands in, records, step |
 //! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
 //! | [`commands`], [`sources`], [`live_cycles`] | which command acts, who sends it, how old it is |
+//! | [`exchange`] | when sensors went out and the commands that answer them came |
 //! | [`telegrams`], [`wire_limits`] | the frames that the rig sends, and whether its numbers fit them |
-//! | [`recording`] | the queues out of the 1 ms path, and the files |
+//! | [`recording`] | the queues out of the 1 ms path, the files, and the evidence of real time |
 //! | `finish` | histograms, summary, exit code |
 //! | [`console`] | what a person types |
 //! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
@@ -19,6 +20,7 @@ pub mod cli;
 pub mod commands;
 pub mod console;
 pub mod event;
+pub mod exchange;
 mod finish;
 pub mod host_thread;
 pub mod inputs;

@@ -5,7 +5,7 @@ pub mod real;
 
 use crate::station::Station;
 use protocol::bus::Bus;
-use realtime::{Interrupt, LoopStatistics, Overrun};
+use realtime::{Continued, Freeze, Interrupt, LoopStatistics, Overrun};
 use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -78,6 +78,10 @@ pub enum End {
 pub struct Shared {
     /// Set by a signal.
     pub interrupt: Interrupt,
+    /// Set by the signal that freezes the flight recorder.
+    pub freeze: Freeze,
+    /// How often the process was continued after a stop.
+    pub continued: Continued,
     /// Set by the writer when it cannot write.
     pub output_failed: AtomicBool,
     /// Newest cycle, for the progress line.
@@ -127,12 +131,12 @@ pub struct Paced {
 
 impl Ride<'_> {
     /// Tells the progress after `cycles`, and why the run should end, if it should.
-    fn after_cycle(&self, cycles: u64) -> Option<End> {
+    fn after_cycle(&mut self, cycles: u64) -> Option<End> {
         let Self { station, limits, shared, .. } = self;
         shared.cycle.store(cycles, Ordering::Relaxed);
         shared.skipped.store(station.skipped(), Ordering::Relaxed);
         shared.controller_heard.store(station.controller_heard(), Ordering::Relaxed);
-        if !station.is_finite() {
+        if !station.is_finite(cycles - 1) {
             Some(End::NotFinite)
         } else if shared.interrupt.came() {
             Some(End::Interrupted)

@@ -14,18 +14,22 @@ use crate::finish::finish;
 use crate::host_thread::HostThread;
 use crate::inputs::Inputs;
 use crate::pace::{self, Limits, Pace, Paced, Ride, Shared};
+use crate::recording::evidence::{EvidenceSetup, PROCESS};
 use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::station::{Station, StationFigures, StationParts};
-use crate::summary::{Machine, RunDescription};
+use crate::summary::RunDescription;
 use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock};
 use protocol::exit::Exit;
+use protocol::flight_dump;
 use protocol::run_folder::{SCHEMA_VERSION, clear_results, write_json};
-use realtime::{Clock, Grants, Interrupt, MonotonicClock, PeriodicConfig, Request};
+use realtime::{
+    Clock, Continued, Freeze, Grants, Interrupt, Machine, MonotonicClock, PeriodicConfig, Request,
+};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -86,7 +90,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     // Everything that can be refused is looked at before the folder is touched: it may hold an earlier run.
     let inputs = Inputs::read(&arguments.rig, arguments.experiment.as_deref())?;
     let periodic = loop_config(arguments)?;
-    let shared = Shared { interrupt: watch_interrupt()?, ..Shared::default() };
+    let shared = watch_signals()?;
 
     // Simulated time in lockstep, where the log must not show the machine's clock.
     let simulated_ns = Arc::new(AtomicU64::new(0));
@@ -136,24 +140,36 @@ pub fn watch_interrupt() -> Result<Interrupt, RunError> {
     Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }
 
+/// Watches for all signals that mean something to a run.
+fn watch_signals() -> Result<Shared, RunError> {
+    let refused = |error| RunError::Input(format!("cannot watch for SIGUSR1 and SIGCONT: {error}"));
+    Ok(Shared {
+        interrupt: watch_interrupt()?,
+        freeze: Freeze::watch().map_err(refused)?,
+        continued: Continued::watch().map_err(refused)?,
+        ..Shared::default()
+    })
+}
+
 /// When a run's clock started, in the clocks that its files speak.
 pub(crate) struct RunStart {
     /// Seconds since 1970; `None` in lockstep.
     pub(crate) unix_s: Option<f64>,
     /// What turns the run's clock into the stamps of `bus.log`.
     pub(crate) epoch_offset_ns: u64,
-    pub(crate) began: Instant,
+    /// On the clock of all stamps.
+    pub(crate) monotonic: realtime::Instant,
 }
 
 impl RunStart {
     fn now(lockstep: bool) -> Self {
-        let began = Instant::now();
+        let monotonic = MonotonicClock.now();
         if lockstep {
-            return Self { unix_s: None, epoch_offset_ns: 0, began };
+            return Self { unix_s: None, epoch_offset_ns: 0, monotonic };
         }
         let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let epoch_offset_ns = (unix.as_nanos() as u64).saturating_sub(MonotonicClock.now().as_nanos());
-        Self { unix_s: Some(unix.as_secs_f64()), epoch_offset_ns, began }
+        let epoch_offset_ns = (unix.as_nanos() as u64).saturating_sub(monotonic.as_nanos());
+        Self { unix_s: Some(unix.as_secs_f64()), epoch_offset_ns, monotonic }
     }
 }
 
@@ -263,6 +279,7 @@ fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) ->
     let folder = arguments.out.as_path();
     std::fs::create_dir_all(folder)
         .and_then(|()| clear_results(folder))
+        .and_then(|()| flight_dump::clear(folder, PROCESS))
         .map_err(|error| RunError::output(folder, &error))?;
     let interface = match &arguments.bus {
         BusUrl::Can { interface } => interface.as_str(),
@@ -274,6 +291,12 @@ fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) ->
         epoch_offset_ns: started.epoch_offset_ns,
         linked: inputs.scene.linked,
         added_mass_kg: inputs.scene.added_mass_kg,
+        evidence: started.unix_s.map(|started_unix_s| EvidenceSetup {
+            full_timing: arguments.full_timing,
+            flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
+            started_unix_s,
+            base: started.monotonic,
+        }),
     })
     .map_err(|error| RunError::output(folder, &error))
 }

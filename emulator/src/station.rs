@@ -13,8 +13,9 @@
 use crate::commands::{Change, CommandCounters, CommandIntake};
 use crate::console::Command;
 use crate::event::{Event, EventKind};
+use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
 use crate::live_cycles::LiveCycles;
-use crate::recording::{FrameRecord, Recorder};
+use crate::recording::Recorder;
 use crate::telegrams::{self, CommandState, SaturatedSensors, TickCause};
 use crossbeam_channel::Receiver;
 use plant::scene::{Action, HandForces, Holder};
@@ -22,11 +23,13 @@ use plant::tables::CycleRecord;
 use plant::{Axis, AxisReadings, Inputs, People, Plant, Sensors};
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
+use protocol::candump::FrameRecord;
 use protocol::frames::{
-    ChainStatus, DecodeError, ECHO_RANGE, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
+    ChainStatus, DecodeError, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
 };
 use protocol::periods;
-use realtime::Recorder as Histogram;
+use protocol::timing::CycleTiming;
+use realtime::Overrun;
 use std::time::Duration;
 
 /// Longest wait for room in the recorder's queue after a stall, in ms; a writer that is slower than this has failed.
@@ -72,8 +75,6 @@ pub struct StationFigures {
     pub frames: FrameCounters,
     /// Commands of drive and load by what became of them.
     pub commands: [CommandCounters; 2],
-    /// Time from the drive's sensors sent to the command that answers them received, in ns; empty in lockstep.
-    pub round_trip: Histogram,
     /// Cycles computed without being sent.
     pub skipped: u64,
     /// Records lost to full queues.
@@ -101,9 +102,7 @@ pub struct Station {
     frames: FrameCounters,
     /// Sensors that saturated since the last status.
     saturated: [SaturatedSensors; 2],
-    /// When the drive's sensors of a cycle were sent, by the cycle's low bits; 0 where not.
-    sent_ns: Box<[u64; ECHO_RANGE as usize]>,
-    round_trip: Histogram,
+    exchange: [ExchangeWatch; 2],
     chains_done: [Option<bool>; 2],
 }
 
@@ -133,8 +132,7 @@ impl Station {
             bus_was_up: true,
             frames: FrameCounters::default(),
             saturated: [SaturatedSensors::default(); 2],
-            sent_ns: Box::new([0; ECHO_RANGE as usize]),
-            round_trip: Histogram::new(),
+            exchange: Default::default(),
             chains_done: [None; 2],
         }
     }
@@ -187,10 +185,11 @@ impl Station {
         if let Some(call) = self.people.rig_call(cycle) {
             self.send(&telegrams::emergency_stop(call), bus);
         }
-        let sent_ns = self.send(&drive, bus);
-        self.sent_ns[(cycle % ECHO_RANGE) as usize] = sent_ns.unwrap_or(0);
+        for (axis, sensors) in [drive, load].iter().enumerate() {
+            let stamp_ns = self.send(sensors, bus);
+            self.exchange[axis].begin(cycle, stamp_ns);
+        }
         self.live.sent(cycle);
-        self.send(&load, bus);
         if periods::tick_is_due(cycle) && !after_miss {
             self.send_tick(TickCause::Period, cycle, bus);
         }
@@ -217,14 +216,8 @@ impl Station {
     pub fn take(&mut self, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
         self.recorder.frame(FrameRecord { stamp_ns, frame: *frame });
         match Frame::decode(frame) {
-            Ok(Frame::DriveValveCommand(command)) => {
-                if self.commands[0].take(command, &self.live) {
-                    self.note_round_trip(command, stamp_ns);
-                }
-            }
-            Ok(Frame::LoadValveCommand(command)) => {
-                self.commands[1].take(command, &self.live);
-            }
+            Ok(Frame::DriveValveCommand(command)) => self.take_command(0, command, stamp_ns, cycle),
+            Ok(Frame::LoadValveCommand(command)) => self.take_command(1, command, stamp_ns, cycle),
             Ok(Frame::ConsoleEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Console, stop, cycle),
             Ok(Frame::DriveEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Drive, stop, cycle),
             Ok(Frame::LoadEmergencyStop(stop)) => self.obey_emergency_stop(Holder::Load, stop, cycle),
@@ -269,11 +262,28 @@ impl Station {
     /// Latches the commands for `cycle`, records it, and steps the plant to the start of the next.
     pub fn act(&mut self, cycle: u64) {
         for axis in Axis::ALL {
-            if let Some(change) = self.commands[axis as usize].latch(&self.live) {
+            let change = self.commands[axis as usize].latch(&self.live);
+            let age_cycles = self.commands[axis as usize].obeyed_age_cycles(&self.live);
+            self.exchange[axis as usize].latched(age_cycles);
+            if let Some(change) = change {
                 self.tell(cycle, change_event(change, axis));
             }
         }
         self.advance(cycle);
+    }
+
+    /// Hands over when everything of this cycle happened: `row` without the exchange, which the station knows.
+    pub fn tell_timing(&mut self, row: CycleTiming) {
+        let axes = self.exchange.each_ref().map(ExchangeWatch::cycle);
+        let [AxisCycle { exchange: drive, .. }, AxisCycle { exchange: load, .. }] = axes;
+        self.recorder.timing(TimingRecord::Cycle { row: CycleTiming { drive, load, ..row }, axes });
+    }
+
+    /// Hands over the overrun that ends the run.
+    pub fn tell_overrun(&mut self, overrun: &Overrun, woke_ns: u64) {
+        let Overrun { index: first, skipped, late_by } = *overrun;
+        let late_ns = late_by.as_nanos() as u64;
+        self.recorder.timing(TimingRecord::Stopped { first, skipped, late_ns, woke_ns });
     }
 
     /// Records `cycle` with what acts over it, and steps the plant: for cycles that were sent and for those that were missed.
@@ -305,10 +315,13 @@ impl Station {
         Some(stamp_ns)
     }
 
-    fn note_round_trip(&mut self, command: ValveCommand, stamp_ns: u64) {
-        let sent_ns = self.sent_ns[usize::from(command.echo)];
-        if sent_ns != 0 && !self.lockstep {
-            self.round_trip.record(stamp_ns.saturating_sub(sent_ns));
+    fn take_command(&mut self, axis: usize, command: ValveCommand, stamp_ns: u64, cycle: u64) {
+        if !self.commands[axis].take(command, &self.live) {
+            return;
+        }
+        let round_trip_ns = self.exchange[axis].taken(command.echo, stamp_ns, cycle);
+        if let Some(ns) = round_trip_ns.filter(|_| !self.lockstep) {
+            self.recorder.round_trip(RoundTrip { axis, ns });
         }
     }
 
@@ -363,10 +376,13 @@ impl Station {
         self.chains_done.iter().flatten().count() > 0 && self.chains_done.iter().flatten().all(|done| *done)
     }
 
-    /// Whether the plant's state is finite; when not, the run must end with silence on the bus.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        self.plant.state().is_finite()
+    /// Whether the plant's state is finite; when not, which is told, the run must end with silence on the bus.
+    pub fn is_finite(&mut self, cycle: u64) -> bool {
+        let finite = self.plant.state().is_finite();
+        if !finite {
+            self.tell(cycle, EventKind::NotFinite);
+        }
+        finite
     }
 
     /// Frames by what became of them.
@@ -399,7 +415,6 @@ impl Station {
         StationFigures {
             frames: self.frames,
             commands: self.commands.map(|intake| *intake.counters()),
-            round_trip: self.round_trip,
             skipped: self.skipped,
             records_dropped: self.recorder.dropped(),
         }

@@ -5,11 +5,12 @@
 
 use crate::commands::CommandCounters;
 use crate::event::Event;
+use crate::recording::evidence::{CommandAges, FlightFigures};
 use crate::station::FrameCounters;
 use plant::Scene;
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
-use realtime::Percentiles;
+use realtime::{ArrivalFigures, Machine, Percentiles, VitalTotals, WallClockStep};
 use serde::Serialize;
 
 /// `run.json`: what a run was made with.
@@ -45,39 +46,6 @@ pub struct RunDescription {
     pub machine: Machine,
 }
 
-/// The machine of a run.
-#[derive(Debug, Serialize)]
-pub struct Machine {
-    /// Kernel release and build.
-    pub kernel: String,
-    /// Model name of the processor.
-    pub processor: String,
-    /// Processors that may be used.
-    pub processors: usize,
-    /// Clock source of the kernel.
-    pub clock_source: String,
-}
-
-impl Machine {
-    /// Reads what `/proc` and `/sys` tell; `unknown` where they do not.
-    #[must_use]
-    pub fn read() -> Self {
-        let file = |path: &str| std::fs::read_to_string(path).map(|text| text.trim().to_owned()).ok();
-        let unknown = || "unknown".to_owned();
-        let processor = file("/proc/cpuinfo").and_then(|text| {
-            let line = text.lines().find(|line| line.starts_with("model name"))?;
-            Some(line.split_once(':')?.1.trim().to_owned())
-        });
-        Self {
-            kernel: file("/proc/version").unwrap_or_else(unknown),
-            processor: processor.unwrap_or_else(unknown),
-            processors: std::thread::available_parallelism().map_or(0, usize::from),
-            clock_source: file("/sys/devices/system/clocksource/clocksource0/current_clocksource")
-                .unwrap_or_else(unknown),
-        }
-    }
-}
-
 /// `summary.json` as the emulator knows it.
 #[derive(Debug, Serialize)]
 pub struct Summary {
@@ -107,6 +75,10 @@ pub struct Summary {
     pub frames_lost_at_rig: u64,
     /// Frames that were counted and ignored because they are not as `rig.dbc` says.
     pub frames_malformed: u64,
+    /// Commands accepted a cycle or more later than the cycle after the one that they answer.
+    pub frames_late: u64,
+    /// Commands equal to the one before, counter and all.
+    pub frames_duplicate: u64,
     /// Commands refused as stale, and commands that grew stale while acting.
     pub stale_commands: u64,
     /// Wake-up latency against the scheduled time; empty in lockstep.
@@ -115,8 +87,32 @@ pub struct Summary {
     pub execution_ns: Percentiles,
     /// Period error; empty in lockstep.
     pub period_error_ns: Percentiles,
-    /// Drive sensors sent to command received; empty in lockstep.
+    /// Stage that takes frames; empty in lockstep.
+    pub receive_ns: Percentiles,
+    /// Stage that computes, missed cycles included; empty in lockstep.
+    pub step_ns: Percentiles,
+    /// Stage that samples the sensors and sends; empty in lockstep.
+    pub send_ns: Percentiles,
+    /// From a cycle's scheduled time to everything of it done; empty in lockstep.
+    pub completion_ns: Percentiles,
+    /// Drive sensors handed over to command received; empty in lockstep.
     pub round_trip_ns: Percentiles,
+    /// The same of the load.
+    pub load_round_trip_ns: Percentiles,
+    /// Drive sensors handed over to the start of the first cycle in which the command acts; empty in lockstep.
+    pub drive_command_age_ns: Percentiles,
+    /// The same of the load.
+    pub load_command_age_ns: Percentiles,
+    /// Cycles sent, by the age in cycles of the command that acted; empty in lockstep.
+    pub command_age_cycles: CommandAges,
+    /// How regularly each cyclic frame came that came at all; empty in lockstep.
+    pub arrivals: Vec<ArrivalFigures>,
+    /// Dumps of the flight recorder.
+    pub flight: FlightFigures,
+    /// Steps of the wall clock by more than 1 ms, from which nothing followed; the first hundred.
+    pub wall_clock_steps: Vec<WallClockStep>,
+    /// What the kernel counted of the loop's thread after the first second.
+    pub vitals: VitalTotals,
     /// Allocations in the 1 ms path after the first second; null unless built with `count-allocations`.
     pub allocations_in_cycle: Option<u64>,
     /// Records that did not reach the files because a queue was full.

@@ -3,8 +3,10 @@
 pub mod bus;
 pub mod bus_load;
 pub mod can;
+pub mod candump;
 pub mod checksum;
 pub mod exit;
+pub mod flight_dump;
 pub mod frames;
 pub mod periods;
 pub mod response_time;

@@ -21,9 +21,10 @@ pub fn new_folder() -> PathBuf {
     PathBuf::from(format!("runs/{}-{}", now.as_secs(), std::process::id()))
 }
 
-/// Files that programs write at the end of a run, or at its start in one go: what is left of an earlier run is none of this
-/// one's. The tables are not among them: each is made anew at its writer's start, and a controller may start before the rig.
-/// A controller's table whose axis no report of the run names is therefore of an earlier run.
+/// Files that programs write at the end of a run, or at its start in one go, and the emulator's own that it does not make in
+/// every run: what is left of an earlier run is none of this one's. What grows during a run is not among them, tables,
+/// `*.hlog` and dumps of the flight recorder ([`crate::flight_dump::clear`]): its writer makes it anew at its own start, and a
+/// controller may start before the rig. A controller's file whose axis no report of the run names is therefore of an earlier run.
 pub const RESULTS: &[&str] = &[
     "run.json",
     "summary.json",
@@ -34,23 +35,35 @@ pub const RESULTS: &[&str] = &[
     "step.svg",
     "stop.svg",
     "emulator.hlog",
-    "controller.hlog",
-    "controller-drive.hlog",
-    "controller-load.hlog",
+    "emulator-timing.csv",
 ];
 
-/// Removes what an earlier run left of [`RESULTS`] in `folder`, so that two runs are never taken for one.
+/// Files of a controller, `name` being that of its report, that it does not make in every run: it removes them at its start.
+#[must_use]
+pub fn controller_results(name: &str) -> [String; 2] {
+    [format!("{name}.hlog"), format!("{name}-timing.csv")]
+}
+
+/// Removes these files of an earlier run from `folder`.
 ///
 /// # Errors
-/// What the system says, with the file's name.
-pub fn clear_results(folder: &Path) -> io::Result<()> {
-    for path in RESULTS.iter().map(|name| folder.join(name)) {
+/// As [`clear_results`].
+pub fn clear(folder: &Path, names: &[impl AsRef<str>]) -> io::Result<()> {
+    for path in names.iter().map(|name| folder.join(name.as_ref())) {
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(named(&path, &error)),
             _ => {}
         }
     }
     Ok(())
+}
+
+/// Removes what an earlier run left of [`RESULTS`] in `folder`, so that two runs are never taken for one.
+///
+/// # Errors
+/// What the system says, with the file's name.
+pub fn clear_results(folder: &Path) -> io::Result<()> {
+    clear(folder, RESULTS)
 }
 
 /// A file that grows by whole lines.
@@ -121,7 +134,7 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> io::Result<()> 
     written.map_err(|error| named(path, &error))
 }
 
-fn named(path: &Path, error: &io::Error) -> io::Error {
+pub(crate) fn named(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 

@@ -1,4 +1,4 @@
-//! When everything of a cycle happened: the rows of `emulator-timing.csv`, `controller-timing.csv` and of a flight recorder's dump.
+//! When everything of a cycle happened: rows of `emulator-timing.csv`, `controller-timing.csv` and a flight recorder's dump.
 //!
 //! Both processes write the same columns on the same clock (CLOCK_MONOTONIC, one for all processes of a host), so that a row of
 //! the rig and a row of a controller of one cycle tell how long a frame was on its way between them:
@@ -63,7 +63,7 @@ pub struct CycleTiming {
     pub step_ns: u64,
     /// Length of the stage that sends frames.
     pub send_ns: u64,
-    /// When everything of the cycle was done.
+    /// When everything of the cycle was done; of a controller, without a wait in between for the other axis's sensors.
     pub done_ns: u64,
     /// Exchange of the drive axis.
     pub drive: Exchange,

@@ -120,6 +120,8 @@ pub struct Percentiles {
     pub p99: Option<u64>,
     /// 99.9 % of the samples were at most this.
     pub p999: Option<u64>,
+    /// 99.99 % of the samples were at most this; below 10 000 samples it is the largest one, as `count` tells.
+    pub p9999: Option<u64>,
     /// No sample was above this (rounded up by at most 0.1 %, like the others).
     pub max: Option<u64>,
     /// Number of samples.
@@ -135,6 +137,7 @@ impl Percentiles {
             p90: quantile(0.9),
             p99: quantile(0.99),
             p999: quantile(0.999),
+            p9999: quantile(0.9999),
             max: (!histogram.is_empty()).then(|| histogram.max()),
             count: histogram.len(),
         }
@@ -144,8 +147,10 @@ impl Percentiles {
 /// One line: `p50 13.1 us, …`, for a terminal.
 impl fmt::Display for Percentiles {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { p50, p90, p99, p999, max, count } = self;
-        for (name, value_ns) in [("p50", p50), ("p90", p90), ("p99", p99), ("p99.9", p999), ("max", max)] {
+        let Self { p50, p90, p99, p999, p9999, max, count } = self;
+        let named =
+            [("p50", p50), ("p90", p90), ("p99", p99), ("p99.9", p999), ("p99.99", p9999), ("max", max)];
+        for (name, value_ns) in named {
             match value_ns {
                 Some(ns) => write!(f, "{name} {:.1} us, ", *ns as f64 * 1e-3)?,
                 None => write!(f, "{name} -, ")?,
@@ -170,31 +175,55 @@ pub fn write_hlog(
     started_unix_s: f64,
     duration: Duration,
 ) -> io::Result<()> {
-    let started = Duration::try_from_secs_f64(started_unix_s)
-        .map_err(|error| invalid(format!("start of the log, {started_unix_s} s since 1970: {error}")))?;
+    let started = start_of_log(started_unix_s)?;
     let tagged = parts.iter().map(|&(name, histogram)| Ok((tag(name)?, histogram)));
     let tagged = tagged.collect::<io::Result<Vec<_>>>()?;
 
     let mut file = BufWriter::new(File::create(path)?);
     let mut serializer = V2DeflateSerializer::new();
-    let started = SystemTime::UNIX_EPOCH + started;
-    let mut log = IntervalLogWriterBuilder::new()
-        .add_comment("[Histogram log format version 1.3]")
-        .add_comment("[Values are nanoseconds]")
-        .with_start_time(started)
-        .with_base_time(started)
-        .begin_log_with(&mut file, &mut serializer)?;
+    write_head(&mut file, started)?;
     for (tag, histogram) in tagged {
-        // With a base time, the interval's start counts from it.
-        log.write_histogram(histogram, Duration::ZERO, duration, Some(tag)).map_err(|error| match error {
-            IntervalLogWriterError::IoError(error) => error,
-            IntervalLogWriterError::SerializeError(error) => io::Error::other(error),
-        })?;
+        write_interval(&mut file, &mut serializer, tag, histogram, (Duration::ZERO, duration))?;
     }
     file.flush()
 }
 
-fn tag(name: &str) -> io::Result<Tag<'_>> {
+/// The start of a log as a length of time since 1970.
+pub(crate) fn start_of_log(started_unix_s: f64) -> io::Result<Duration> {
+    Duration::try_from_secs_f64(started_unix_s)
+        .map_err(|error| invalid(format!("start of the log, {started_unix_s} s since 1970: {error}")))
+}
+
+/// The comments, the start and the base time of a log.
+pub(crate) fn write_head(out: &mut impl Write, started: Duration) -> io::Result<()> {
+    let mut serializer = V2DeflateSerializer::new();
+    let started = SystemTime::UNIX_EPOCH + started;
+    IntervalLogWriterBuilder::new()
+        .add_comment("[Histogram log format version 1.3]")
+        .add_comment("[Values are nanoseconds]")
+        .with_start_time(started)
+        .with_base_time(started)
+        .begin_log_with(out, &mut serializer)?;
+    Ok(())
+}
+
+/// One line: a histogram of the interval that begins `from` after the base time and lasts `length`.
+pub(crate) fn write_interval(
+    out: &mut impl Write,
+    serializer: &mut V2DeflateSerializer,
+    tag: Tag<'_>,
+    histogram: &Histogram<u64>,
+    (from, length): (Duration, Duration),
+) -> io::Result<()> {
+    // Without comments and times the builder writes no head of its own.
+    let mut log = IntervalLogWriterBuilder::new().begin_log_with(out, serializer)?;
+    log.write_histogram(histogram, from, length, Some(tag)).map_err(|error| match error {
+        IntervalLogWriterError::IoError(error) => error,
+        IntervalLogWriterError::SerializeError(error) => io::Error::other(error),
+    })
+}
+
+pub(crate) fn tag(name: &str) -> io::Result<Tag<'_>> {
     Tag::new(name)
         .filter(|tag| !tag.is_empty())
         .ok_or_else(|| invalid(format!("tag {name:?}: not empty, no comma, no space, no line end")))
@@ -211,7 +240,10 @@ mod tests {
     #[test]
     fn percentiles_of_an_empty_recorder_are_null() {
         let json = serde_json::to_string(&Recorder::new()).expect("serialises");
-        assert_eq!(json, r#"{"p50":null,"p90":null,"p99":null,"p999":null,"max":null,"count":0}"#);
+        assert_eq!(
+            json,
+            r#"{"p50":null,"p90":null,"p99":null,"p999":null,"p9999":null,"max":null,"count":0}"#
+        );
     }
 
     #[test]
@@ -224,6 +256,7 @@ mod tests {
             (got.p90, 900_000),
             (got.p99, 990_000),
             (got.p999, 999_000),
+            (got.p9999, 1_000_000),
             (got.max, 1_000_000),
         ] {
             let value = value.expect("not empty");

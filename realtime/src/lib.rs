@@ -6,7 +6,10 @@
 //! ```text
 //!  Clock ──────────► PeriodicLoop ──────────► LoopStatistics ──► percentiles (summary.json)
 //!  real or virtual   deadline n = start + n T  three Recorders     write_hlog  (*.hlog)
-//!                         ▲
+//!                         │ rows, by a queue
+//!                         ▼
+//!  a thread of normal priority: StageAccount ──► *.hlog, second by second;  FlightRecorder ──► what happened around an event
+//!
 //!  acquire(Request): FIFO, one CPU, locked memory, no deep sleep; each refusal is a warning with a remedy
 //! ```
 //!
@@ -15,8 +18,15 @@
 //! | [`clock`] | [`Instant`], the trait [`Clock`], the system's monotonic clock, a virtual one for tests |
 //! | [`periodic`] | the loop, its re-arm rule, what happens on an overrun |
 //! | [`histogram`] | recorders that never allocate, percentiles, HdrHistogram logs |
+//! | [`stages`] | when the stages of a cycle happened, and their histograms |
+//! | [`interval_log`] | an HdrHistogram log that grows by a second at a time |
+//! | [`arrivals`] | intervals, gaps and bursts of a cyclic frame |
+//! | [`flight`] | the ring of the last seconds, and what is taken out of it |
+//! | [`vitals`] | page faults, switches, run delay and CPU of the real-time thread |
+//! | [`wall_clock`] | whether somebody set the time of day |
 //! | [`privileges`] | what the thread asks of the system, what it got, what was refused and how to get it |
-//! | [`signals`] | Ctrl-C and SIGTERM as a flag |
+//! | [`machine`] | facts of the machine: kernel, processors, interrupts, memory, limits, build |
+//! | [`signals`] | Ctrl-C, SIGTERM, SIGUSR1 and SIGCONT as values |
 //! | [`allocations`] | an allocator that counts, for the proof that a cycle allocates nothing |
 //!
 //! ```
@@ -36,17 +46,31 @@
 //! ```
 
 pub mod allocations;
+pub mod arrivals;
 pub mod clock;
+pub mod flight;
 pub mod histogram;
+pub mod interval_log;
+pub mod machine;
 pub mod periodic;
 pub mod privileges;
 pub mod signals;
+pub mod stages;
 mod virtual_clock;
+pub mod vitals;
+pub mod wall_clock;
 
+pub use arrivals::{ArrivalFigures, Arrivals};
 pub use clock::{Clock, Instant, MonotonicClock, VirtualClock};
+pub use flight::{FlightRecorder, Lateness, Severity, Stamped, Trigger};
 pub use histogram::{Percentiles, Recorder, write_hlog};
+pub use interval_log::IntervalLog;
+pub use machine::Machine;
 pub use periodic::{
     ConfigError, Cycle, LoopStatistics, Overrun, OverrunPolicy, PeriodicConfig, PeriodicLoop, UnknownPolicy,
 };
 pub use privileges::{Grants, Refusal, Request, acquire};
-pub use signals::Interrupt;
+pub use signals::{Continued, Freeze, Interrupt};
+pub use stages::{CycleStages, StageAccount, StageFigures};
+pub use vitals::{VitalCounts, VitalTotals, VitalsReader};
+pub use wall_clock::{WallClockStep, WallClockWatch};

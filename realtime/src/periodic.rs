@@ -231,7 +231,7 @@ impl<C: Clock> PeriodicLoop<C> {
         let late_by = woke.saturating_duration_since(self.deadline(first));
         let skipped = late_by.as_nanos() as u64 / self.period_ns;
 
-        self.record_missed(late_by, skipped);
+        record_missed(&mut self.statistics.wakeup_ns, late_by.as_nanos() as u64, skipped, self.period_ns);
         if skipped > 0 {
             self.statistics.overruns += 1;
             self.statistics.skipped += skipped;
@@ -251,14 +251,16 @@ impl<C: Clock> PeriodicLoop<C> {
         Ok(cycle)
     }
 
-    /// Records the execution time of the cycle since its wake-up. Without a cycle, or told twice, it does nothing.
-    pub fn end_of_work(&mut self) {
-        let Some(cycle) = self.working.take() else { return };
+    /// Records the execution time of the cycle since its wake-up, and tells when that was. Without a cycle, or told twice, it
+    /// does nothing.
+    pub fn end_of_work(&mut self) -> Option<Instant> {
+        let cycle = self.working.take()?;
         let now = self.clock.now();
         self.statistics.execution_ns.record(now.saturating_duration_since(cycle.woke).as_nanos() as u64);
         if now > self.deadline(cycle.index + 1) {
             self.statistics.late_completions += 1;
         }
+        Some(now)
     }
 
     /// The account so far.
@@ -295,20 +297,6 @@ impl<C: Clock> PeriodicLoop<C> {
         }
     }
 
-    /// Records each of the `skipped` missed cycles, the first of which came `late_by` too late.
-    fn record_missed(&mut self, late_by: Duration, skipped: u64) {
-        let late_ns = late_by.as_nanos() as u64;
-        // Cycles beyond the recorder's bound all land in one bin: recorded at one go, so that hours of stall (a debugger,
-        // a clock step) cost no more than the 60 s that the recorder tells apart.
-        let clipped = (late_ns.saturating_sub(BOUND_NS).div_ceil(self.period_ns)).min(skipped);
-        if clipped > 0 {
-            self.statistics.wakeup_ns.record_n(late_ns, clipped);
-        }
-        for missed in clipped..skipped {
-            self.statistics.wakeup_ns.record(late_ns - missed * self.period_ns);
-        }
-    }
-
     fn record_handed_out(&mut self, cycle: &Cycle) {
         let latency = cycle.wakeup_latency();
         self.statistics.cycles += 1;
@@ -317,6 +305,20 @@ impl<C: Clock> PeriodicLoop<C> {
         if let Some(previous) = self.previous_latency.replace(latency) {
             self.statistics.period_error_ns.record(latency.abs_diff(previous).as_nanos() as u64);
         }
+    }
+}
+
+/// Records each of the `skipped` missed cycles against its own scheduled time; the first of them came `late_ns` too late. The
+/// only place where coordinated omission is undone.
+pub(crate) fn record_missed(wakeup_ns: &mut Recorder, late_ns: u64, skipped: u64, period_ns: u64) {
+    // Cycles beyond the recorder's bound all land in one bin: recorded at one go, so that hours of stall (a debugger,
+    // a clock step) cost no more than the 60 s that the recorder tells apart.
+    let clipped = (late_ns.saturating_sub(BOUND_NS).div_ceil(period_ns)).min(skipped);
+    if clipped > 0 {
+        wakeup_ns.record_n(late_ns, clipped);
+    }
+    for missed in clipped..skipped {
+        wakeup_ns.record(late_ns - missed * period_ns);
     }
 }
 

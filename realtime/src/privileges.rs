@@ -225,8 +225,9 @@ fn online_cpus() -> Vec<usize> {
     )
 }
 
-/// Reads the kernel's list format, as in `0-3,8`.
-fn parse_cpu_list(text: &str) -> Option<Vec<usize>> {
+/// Reads the kernel's list format, as in `0-3,8`; `None` when it is something else.
+#[must_use]
+pub fn parse_cpu_list(text: &str) -> Option<Vec<usize>> {
     let mut cpus = Vec::new();
     for part in text.trim().split(',') {
         let (first, last) = part.split_once('-').unwrap_or((part, part));

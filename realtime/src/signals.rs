@@ -1,13 +1,19 @@
-//! Ctrl-C and SIGTERM as a flag that a loop looks at.
+//! Signals as values that a loop or a thread looks at.
+//!
+//! | signal | value | means |
+//! |---|---|---|
+//! | SIGINT, SIGTERM | [`Interrupt`] | end, with everything saved |
+//! | SIGUSR1 | [`Freeze`] | write down the last seconds |
+//! | SIGCONT | [`Continued`] | the process had been stopped, which explains a late cycle |
 //!
 //! The loop ends at its next cycle and everything is saved, however many signals follow: Ctrl-C reaches a process through its
 //! terminal and again through whoever started it. There is no forced end here; Ctrl-\ is for a process that hangs.
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGCONT, SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Set once somebody asked the process to end.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +44,58 @@ impl Interrupt {
     }
 }
 
+/// Somebody asked for the last seconds to be written down.
+#[derive(Clone, Debug, Default)]
+pub struct Freeze(Arc<AtomicBool>);
+
+impl Freeze {
+    /// Starts watching; from then on SIGUSR1 does not end the process.
+    ///
+    /// # Errors
+    /// What the system says when it takes no handler.
+    pub fn watch() -> io::Result<Self> {
+        let freeze = Self::default();
+        flag::register(SIGUSR1, Arc::clone(&freeze.0))?;
+        Ok(freeze)
+    }
+
+    /// Whether a signal came since the last look.
+    #[must_use]
+    pub fn take(&self) -> bool {
+        self.0.swap(false, Ordering::Relaxed)
+    }
+}
+
+/// How often the process was continued after a stop.
+#[derive(Clone, Debug, Default)]
+pub struct Continued(Arc<AtomicU64>);
+
+impl Continued {
+    /// Starts counting.
+    ///
+    /// # Errors
+    /// What the system says when it takes no handler.
+    pub fn watch() -> io::Result<Self> {
+        let continued = Self::default();
+        let count = Arc::clone(&continued.0);
+        let raise = move || {
+            count.fetch_add(1, Ordering::Relaxed);
+        };
+        #[allow(unsafe_code, reason = "signal-hook counts no signals without a handler of one's own")]
+        // SAFETY: the handler does nothing but raise an atomic, which is async-signal-safe and cannot panic.
+        unsafe {
+            signal_hook::low_level::register(SIGCONT, raise)?;
+        }
+        Ok(continued)
+    }
+
+    /// Signals so far.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -51,5 +109,23 @@ mod tests {
             signal_hook::low_level::raise(signal).unwrap();
             assert!(interrupt.came());
         }
+    }
+
+    #[test]
+    fn each_continuation_is_counted() {
+        let continued = Continued::watch().unwrap();
+        for count in 1..=3 {
+            signal_hook::low_level::raise(SIGCONT).unwrap();
+            assert_eq!(continued.count(), count);
+        }
+    }
+
+    #[test]
+    fn a_freeze_is_taken_once_and_ends_nothing() {
+        let freeze = Freeze::watch().unwrap();
+        assert!(!freeze.take());
+        signal_hook::low_level::raise(SIGUSR1).unwrap();
+        assert!(freeze.take());
+        assert!(!freeze.take());
     }
 }

@@ -4,27 +4,10 @@ use std::fs;
 use std::io::ErrorKind;
 use std::time::Duration;
 
-use hdrhistogram::Histogram;
-use hdrhistogram::serialization::Deserializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 use realtime::{Recorder, write_hlog};
 
-/// Standard base64 with padding, RFC 4648: the one step between the log's reader and the histogram's.
-fn from_base64(text: &str) -> Vec<u8> {
-    const ALPHABET: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut bytes = Vec::new();
-    let (mut bits, mut filled) = (0_u32, 0);
-    for letter in text.trim_end_matches('=').bytes() {
-        let six = ALPHABET.iter().position(|&known| known == letter).expect("a base64 letter");
-        bits = bits << 6 | six as u32;
-        filled += 6;
-        if filled >= 8 {
-            filled -= 8;
-            bytes.push((bits >> filled) as u8);
-        }
-    }
-    bytes
-}
+mod common;
 
 fn recorder_of(values: impl IntoIterator<Item = u64>) -> Recorder {
     let mut recorder = Recorder::new();
@@ -60,8 +43,7 @@ fn a_log_is_read_back_equal_with_its_tags_and_times() {
         assert_eq!(interval.tag().expect("a tag").as_str(), tag);
         assert_eq!(interval.start_timestamp(), Duration::ZERO);
         assert_eq!(interval.duration(), Duration::from_millis(12_345));
-        let bytes = from_base64(interval.encoded_histogram());
-        let read: Histogram<u64> = Deserializer::new().deserialize(&mut &bytes[..]).expect("a histogram");
+        let read = common::histogram(interval.encoded_histogram());
         assert_eq!(&read, histogram, "{tag}");
     }
 }

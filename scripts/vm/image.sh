@@ -3,14 +3,15 @@
 # Builds the guest's initramfs; sourced by vcan-vm.
 #
 # Two cpio archives one after the other, which the kernel unpacks in turn: the base (busybox, dash, ip, can-utils,
-# modules, init) is cached on the sum of its contents; the payload (the job and /airbench) is made afresh for each call.
+# cyclictest, modules, init) is cached on the sum of its contents; the payload (the job and /airbench) is made afresh for each call.
 #
 # Expects $cache, $root, $scripts, $out, the options, say, fail and packages.sh.
 
-# First line: what init loads. Second line: there for a job to modprobe.
+# First line: what init loads; second: with --cards; third: there for a job to modprobe.
 kernel_modules=(
     virtio_pci virtio_blk can can_raw can_dev vcan
-    vxcan can_isotp can_gw slcan sja1000 kvaser_pci
+    sja1000 kvaser_pci
+    vxcan can_isotp can_gw slcan
 )
 
 # pack FOLDER: a cpio archive of it on standard output, as root's files, whoever packs them.
@@ -52,6 +53,9 @@ gather_base() {
         find_program can-utils "$program"
         add_program "$tree" "$found_program" "$program"
     done
+    # The reference beside our own figures.
+    find_program rt-tests cyclictest
+    add_program "$tree" "$found_program" cyclictest
     cp -r "$cache/kernel-$kernel/lib/modules" "$tree/lib/"
     install "$scripts/vm/init" "$tree/init"
 }
@@ -86,12 +90,13 @@ the_only() {
 # in the usual one would make cargo rebuild everything at each change of sides.
 build_binaries() {
     local target=x86_64-unknown-linux-gnu
-    type -P cargo >/dev/null || fail "$exit_usage" "no cargo to build emulator and controller with"
-    say "building emulator and controller, static"
+    type -P cargo >/dev/null || fail "$exit_usage" "no cargo to build emulator, controller and bench with"
+    say "building emulator, controller and bench, static"
     (cd "$root" && RUSTFLAGS="-C target-feature=+crt-static" cargo build --release --quiet --target "$target" \
-        --target-dir target/vm -p emulator -p controller) 8>&- ||
-        fail "$exit_usage" "emulator or controller cannot be built"
-    install -D -t "$1" "$root/target/vm/$target/release/emulator" "$root/target/vm/$target/release/controller"
+        --target-dir target/vm -p emulator -p controller -p bench) 8>&- ||
+        fail "$exit_usage" "emulator, controller or bench cannot be built"
+    static_bench=$root/target/vm/$target/release/bench
+    install -D -t "$1" "$root/target/vm/$target/release/"{emulator,controller} "$static_bench"
 }
 
 # Adds what belongs to this call to $out/vm/initramfs.cpio.
@@ -104,13 +109,16 @@ add_payload() {
         [[ -f $rig && -f $experiment ]] || fail "$exit_usage" "no such file: $rig or $experiment"
         cp "$rig" "$tree/airbench/rig.toml"
         cp "$experiment" "$tree/airbench/point-to-point.toml"
-        # The experiment names its programs by their names, which stand in the folder beside its own.
-        mkdir -p "$tree/programs"
+        cp -r "$root/controller/experiments" "$tree/airbench/experiments"
+        # An experiment names its programs by their names, which stand in the folder beside its own.
+        mkdir -p "$tree/programs" "$tree/airbench/programs"
         local programs
         programs=$(dirname "$experiment")/../programs
         if [[ -d $programs ]]; then cp "$programs"/*.toml "$tree/programs/"; fi
+        cp "$root"/controller/programs/*.toml "$tree/airbench/programs/"
         build_binaries "$tree/airbench"
     fi
+    cp "$scripts"/vm/job-* "$tree/airbench/"
     if [[ -n $payload ]]; then cp -rL "$payload/." "$tree/airbench/"; fi
     if [[ -n $job_command ]]; then
         printf '%s\n' "$job_command" >"$tree/job"

@@ -8,7 +8,9 @@ Nothing of airbench takes part: candump.log was written by can-utils and is deco
 - every DriveSensors and LoadSensors frame with the row of its cycle in measurement.csv, signal by signal;
 - every row without a frame with the skipped cycles that ticks and summary.json tell;
 - the valve columns with the commands of bus.log by their stamps, under the rules of the contract: the last command that
-  arrived before cycle k was due acts in it, and one that answers a cycle more than 20 sent cycles back does not;
+  arrived before cycle k was due acts in it, and one that answers a cycle more than 20 sent cycles back does not. Between the
+  kernel's stamp and a socket a frame may be held up, when real-time threads leave the kernel's own no time: candump, which
+  stood in the same queue, then shows it behind frames with later stamps, and the rig cannot have had it before;
 - the counters of summary.json and controller.json with the number of frames in candump.log, and with the gaps in it.
 
 The values of measurement.csv are counts times a step, and so are cantools': they may differ by the rounding of the two products,
@@ -33,6 +35,8 @@ CYCLE_NS = 1_000_000
 # The log truncates stamps to 1 us, and summary.json tells cycle 0 as a double of seconds since 1970, 0.24 us apart: a command
 # this close to the moment when a cycle was due may have come before or after it.
 UNDECIDED_NS = 3000
+# How long after that a frame that was held up may have reached the rig.
+DELIVERY_NS = 5_000_000
 ULPS = 4 * sys.float_info.epsilon
 
 
@@ -55,6 +59,8 @@ class Frame:
         self.stamp_ns = int(seconds) * 1_000_000_000 + int(fraction) * 1000
         self.id = int(match[3], 16)
         self.hex = match[4]
+        # When it must have reached the rig at the latest; later than its stamp for one that was held up.
+        self.delivered_ns = self.stamp_ns
         message = database.get_message_by_frame_id(self.id)
         self.name = message.name
         self.sender = message.senders[0]
@@ -78,6 +84,11 @@ def read_rows(path):
 def compare_logs(recorded, own):
     """candump.log and bus.log hold the same frames. What the controllers said after the emulator had left is only in the
     first."""
+    newest_ns = 0
+    for frame in recorded:
+        newest_ns = max(newest_ns, frame.stamp_ns)
+        if newest_ns > frame.stamp_ns:
+            frame.delivered_ns = newest_ns + DELIVERY_NS
     by_id = [defaultdict(list), defaultdict(list)]
     for table, log in zip(by_id, (recorded, own)):
         for frame in log:
@@ -89,6 +100,7 @@ def compare_logs(recorded, own):
         heard, logged = by_id[0][identifier], by_id[1][identifier]
         for ours, theirs in zip(logged, heard):
             check(ours.hex == theirs.hex, f"{ours.place} has {ours.id:03X}#{ours.hex}, {theirs.place} has {theirs.hex}")
+            ours.delivered_ns = ours.stamp_ns + theirs.delivered_ns - theirs.stamp_ns
         check(len(logged) <= len(heard), f"bus.log has {len(logged)} frames {identifier:03X}, candump.log {len(heard)}")
         for frame in heard[len(logged) :]:
             check(frame.sender != "Rig", f"{frame.place}: a frame of the rig that is not in bus.log")
@@ -197,7 +209,7 @@ def counts_of_axis(commands, axis, sent, rows, cycle_zero_ns):
         sent_before["count"] += 1
         sent_before[cycle % 4096] = sent_before["count"]
         due_ns = cycle_zero_ns + cycle * CYCLE_NS
-        while taken < len(commands) and commands[taken].stamp_ns < due_ns - UNDECIDED_NS:
+        while taken < len(commands) and commands[taken].delivered_ns < due_ns - UNDECIDED_NS:
             latch.take(commands[taken].values, sent_before)
             taken += 1
         # What acts in this cycle is held over the skipped ones that follow.

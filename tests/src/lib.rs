@@ -6,7 +6,9 @@
 //!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
+//!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   own ───── algorithms in C, built as a user builds them
+//!   disturb ─ disturbances whose cause a report has to name
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
@@ -18,7 +20,9 @@ pub mod account;
 pub mod axis_table;
 pub mod binaries;
 pub mod bus_cycles;
+pub mod disturb;
 pub mod events;
+pub mod guest;
 pub mod launch;
 pub mod load;
 pub mod own;

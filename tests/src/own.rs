@@ -56,6 +56,11 @@ pub fn failing(scene: &Scene, when: &str, options: &[&str]) {
     build(scene, &source, &[options, &[when.as_str()]].concat());
 }
 
+/// Builds the library that faults pages as `own_algorithm.so` in the scene.
+pub fn page_faulting(scene: &Scene) {
+    build(scene, &workspace().join("tests/c/page_faults.c"), &["-O2", "-Wall", "-Wextra", "-Werror"]);
+}
+
 fn build(scene: &Scene, source: &Path, options: &[&str]) {
     let mut compiler = Command::new("gcc");
     compiler.args(["-std=c11", "-fPIC", "-shared"]).args(options).arg("-I");

@@ -17,10 +17,14 @@ use system_tests::turn;
 fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let emulator =
-        scene.emulator(Pace::Real).build(Build::CountingAllocations).with("--seconds 11.5").start();
+    let emulator = scene
+        .emulator(Pace::Real)
+        .build(Build::CountingAllocations)
+        .with("--seconds 11.5 --full-timing")
+        .start();
     let stranger = scene.peer();
-    let controller = scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat").start();
+    let controller =
+        scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat --full-timing").start();
     // Frames to be refused come along: the paths that refuse are part of the 1 ms path too.
     for row in (1000..11_000).step_by(500) {
         scene.wait_for_rows("emulator", row);
@@ -44,7 +48,11 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
 fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
     let _machine = turn::take();
     let scene = Scene::new(LINKED);
-    let emulator = scene.emulator(Pace::Real).build(Build::CountingAllocations).with("--seconds 14").start();
+    let emulator = scene
+        .emulator(Pace::Real)
+        .build(Build::CountingAllocations)
+        .with("--seconds 14 --full-timing")
+        .start();
     let controller = scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat").start();
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait().expect_code(0);

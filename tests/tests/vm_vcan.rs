@@ -1,85 +1,31 @@
 //! On real SocketCAN: Debian's kernel in a virtual machine runs emulator and controller on `vcan0`, and can-utils record,
 //! send and disturb.
 //!
-//! `scripts/vcan-vm` builds static binaries, boots the guest and brings the files back. The guest is emulated and uneven:
-//! cycles are skipped in it, and what is tested is that each of them is accounted for, never how fast anything was. Nothing
+//! The guest is emulated and uneven: cycles are skipped in it, and what is tested is that each of them is accounted for. Nothing
 //! here is ever skipped; without network for the first download the test fails.
 
-use protocol::can::CanFrame;
 use protocol::frames::{Frame, MainChainState};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::{Mutex, MutexGuard};
-use std::time::Duration;
-use system_tests::process::{Ended, Running};
-
-/// Limit for one machine, static build and first download of QEMU and kernel included.
-const LIMIT: Duration = Duration::from_secs(20 * 60);
-
-/// One machine at a time: two would stall one another.
-fn only_one() -> MutexGuard<'static, ()> {
-    static MACHINE: Mutex<()> = Mutex::new(());
-    // A test that failed leaves no machine behind.
-    MACHINE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate stands in the workspace")
-}
-
-fn python() -> PathBuf {
-    let python = std::env::var_os("AIRBENCH_PYTHON")
-        .map_or_else(|| root().join("target/tools/venv/bin/python"), PathBuf::from);
-    assert!(
-        python.exists(),
-        "{} is missing: run scripts/test, which makes the Python environment with cantools",
-        python.display()
-    );
-    python
-}
-
-/// Runs a job in a machine of its own.
-fn in_machine(out: &Path, arguments: &[&str]) -> Ended {
-    let mut command = Command::new(root().join("scripts/vcan-vm"));
-    // The guest's programs are built by vcan-vm as it wants them, whatever this test was built with.
-    command.env_remove("CARGO_TARGET_DIR").arg("--out").arg(out).args(arguments);
-    let ended = Running::start("scripts/vcan-vm", &mut command).wait_within(LIMIT);
-    eprintln!("{}", ended.stderr);
-    ended
-}
-
-fn json(path: &Path) -> Value {
-    let text = fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-fn count(value: &Value, pointer: &str) -> u64 {
-    value
-        .pointer(pointer)
-        .and_then(Value::as_u64)
-        .unwrap_or_else(|| panic!("no count at {pointer} in {value:#}"))
-}
+use std::path::Path;
+use system_tests::guest::{Guest, compare_candump, data_frames, python};
+use system_tests::records::{count, json};
 
 #[test]
 fn candump_recorded_what_the_runs_files_say() {
-    let _machine = only_one();
-    let folder = tempfile::tempdir().unwrap();
     python(); // tells at once what is missing
-    in_machine(folder.path(), &[]).expect_code(0);
+    let guest = Guest::run(&[]);
 
-    let run = folder.path().join("run");
+    let run = guest.out();
     let summary = json(&run.join("summary.json"));
     assert_eq!(summary["ended_because"], "the controllers are done");
     assert!(count(&summary, "/cycles") > 5000 && count(&summary, "/frames_received") > 0);
     assert_eq!(count(&summary, "/frames_malformed"), 0);
     assert_eq!(json(&run.join("controller.json"))["axes"]["drive"]["chain_state"], "done");
 
-    let log = folder.path().join("candump.log");
-    let told = compare(&log, &run).unwrap_or_else(|complaint| panic!("{complaint}"));
+    let log = guest.file("candump.log");
+    let told = compare_candump(&log, &run).unwrap_or_else(|complaint| panic!("{complaint}"));
     eprintln!("compared: {told}");
     let told: Value = serde_json::from_str(&told).unwrap();
     // On a machine that is busy otherwise most cycles may be skipped; what was sent is compared all the same.
@@ -94,17 +40,6 @@ fn candump_recorded_what_the_runs_files_say() {
     assert_eq!(told["last_main_chain"], "done");
 
     comparison_notices_every_alteration(&log, &run);
-}
-
-/// What `compare_candump.py` says of candump's log and a run's folder; its complaint when they do not agree.
-fn compare(log: &Path, run: &Path) -> Result<String, String> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/compare_candump.py");
-    let mut command = Command::new(python());
-    command.args(["-W", "error"]).arg(script).arg(root().join("protocol/rig.dbc")).arg(log).arg(run);
-    let output = command.output().unwrap();
-    let [told, complaint] =
-        [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-    if output.status.success() { Ok(told) } else { Err(complaint) }
 }
 
 /// Alters one thing at a time in the files that agree: one count of one signal, one frame, one cell, one counter.
@@ -162,50 +97,24 @@ fn comparison_notices_every_alteration(log: &Path, run: &Path) {
         }
         lines.retain(|line| !line.is_empty());
         fs::write(path, lines.join("\n") + "\n").unwrap();
-        let complaint = compare(log, run).expect_err(&format!("{hint}: the alteration was not noticed"));
+        let complaint =
+            compare_candump(log, run).expect_err(&format!("{hint}: the alteration was not noticed"));
         assert!(complaint.contains(hint), "{} {range:?}: {complaint}", path.display());
         fs::write(path, good).unwrap();
     }
-    compare(log, run).expect("the files are as they were");
-}
-
-/// Exit codes by name, from the job's file.
-fn codes(run: &Path) -> BTreeMap<String, i32> {
-    let text = fs::read_to_string(run.join("codes")).unwrap();
-    text.lines()
-        .map(|line| {
-            let (name, code) = line.split_once(' ').unwrap();
-            (name.to_owned(), code.parse().unwrap())
-        })
-        .collect()
+    compare_candump(log, run).expect("the files are as they were");
 }
 
 /// The frames of a candump log that `rig.dbc` knows.
 fn known_frames(log: &Path) -> Vec<Frame> {
     let text = fs::read_to_string(log).unwrap();
-    text.lines()
-        .filter_map(|line| {
-            let (id, hex) = line.rsplit_once(' ').unwrap().1.split_once('#').unwrap();
-            let id = u16::from_str_radix(id, 16).ok().filter(|_| id.len() == 3)?;
-            let data: Option<Vec<_>> = (0..hex.len())
-                .step_by(2)
-                .map(|at| u8::from_str_radix(hex.get(at..at + 2)?, 16).ok())
-                .collect();
-            Frame::decode(&CanFrame::new(id, &data?)).ok()
-        })
-        .collect()
+    data_frames(&text).iter().filter_map(|frame| Frame::decode(frame).ok()).collect()
 }
 
 #[test]
 fn foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
-    let _machine = only_one();
-    let folder = tempfile::tempdir().unwrap();
-    let payload = tempfile::tempdir().unwrap();
-    fs::copy(root().join("scripts/vm/job-foreign"), payload.path().join("job-foreign")).unwrap();
-    let payload = payload.path().to_str().unwrap();
-    in_machine(folder.path(), &["--binaries", "--payload", payload, "--", "sh", "/airbench/job-foreign"])
-        .expect_code(0);
-    let run = folder.path().join("run");
+    let guest = Guest::run(&["--", "sh /airbench/job-foreign"]);
+    let run = guest.out();
 
     let expected = [
         ("controller-lockstep", 2), // a barrier is asked for on a bus that has none
@@ -218,9 +127,9 @@ fn foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
         ("foreign-controller", 1), // aborted by the emergency stop
         ("foreign-emulator", 0),
     ];
-    assert_eq!(codes(&run), expected.map(|(name, code)| (name.to_owned(), code)).into());
+    assert_eq!(guest.codes(), expected.map(|(name, code)| (name.to_owned(), code)).into());
     foreign_frames_are_counted(&run);
-    the_emergency_stop_of_cansend_trips_the_rig(&run, &folder.path().join("candump.log"));
+    the_emergency_stop_of_cansend_trips_the_rig(&run, &guest.file("candump.log"));
     the_bus_that_went_down_was_counted(&run);
 }
 

@@ -287,6 +287,9 @@ pub struct RunPart {
     pub arrivals: Vec<ArrivalRow>,
     /// Whether the emulator's verdict was good.
     pub passed: bool,
+    /// What this run's folder does not hold, or holds damaged, and what the report therefore does not say.
+    #[serde(default)]
+    pub lacks: Vec<String>,
 }
 
 /// How regularly a cyclic frame came.

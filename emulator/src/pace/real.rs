@@ -4,7 +4,8 @@ use super::{CYCLE, End, Paced, Ride};
 use crate::commands::STALE_AFTER_CYCLES;
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
-use realtime::{Clock, PeriodicConfig, PeriodicLoop};
+use protocol::timing::{CycleTiming, Vitals};
+use realtime::{Clock, PeriodicConfig, PeriodicLoop, VitalCounts, VitalsReader};
 use std::time::{Duration, Instant};
 
 /// How long after the farewell the answers to the last cycles may still come in.
@@ -21,7 +22,8 @@ const NEWCOMER_CYCLES: u64 = 10 * STALE_AFTER_CYCLES;
 /// Runs the rig on `clock`.
 pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Paced {
     let start = clock.now() + CYCLE;
-    let mut periodic = PeriodicLoop::new(clock, config, start);
+    let mut periodic = PeriodicLoop::new(&clock, config, start);
+    let mut vitals = VitalsReader::new(ride.shared.continued.clone());
     let mut inbox = Inbox::new();
     let mut bus_lost_at: Option<u64> = None;
     let mut cycles = 0;
@@ -30,7 +32,10 @@ pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Pa
     let end = loop {
         let cycle = match periodic.next_cycle() {
             Ok(cycle) => cycle,
-            Err(overrun) => break End::Overrun(overrun),
+            Err(overrun) => {
+                ride.station.tell_overrun(&overrun, clock.now().as_nanos());
+                break End::Overrun(overrun);
+            }
         };
         let index = cycle.index;
         if watch.is_none() && index >= WARM_UP_CYCLES {
@@ -38,23 +43,42 @@ pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Pa
         }
         let Ride { station, bus, .. } = &mut ride;
         station.miss(index - cycle.skipped, cycle.skipped);
+        let caught_up = clock.now();
         station.publish(index, cycle.skipped > 0, *bus);
+        let sent = clock.now();
         inbox.take_before(cycle.scheduled.as_nanos(), *bus, |frame, stamp_ns| {
             station.take(frame, stamp_ns, index);
         });
+        let taken = clock.now();
         station.act(index);
+        let stepped = clock.now();
         cycles = index + 1;
         bus_lost_at = if bus.is_up() { None } else { bus_lost_at.or(Some(index)) };
-        if bus_lost_at.is_some_and(|lost| index - lost > grace_cycles) {
-            break End::BusGone;
-        }
-        if index < NEWCOMER_CYCLES && station.frame_counters().second_rig > 0 {
-            break End::SecondRig;
-        }
-        if let Some(end) = ride.after_cycle(cycles) {
+        let end = if bus_lost_at.is_some_and(|lost| index - lost > grace_cycles) {
+            Some(End::BusGone)
+        } else if index < NEWCOMER_CYCLES && station.frame_counters().second_rig > 0 {
+            Some(End::SecondRig)
+        } else {
+            ride.after_cycle(cycles)
+        };
+        // Measuring is part of the cycle's work, save for handing over what was measured.
+        let vitals = row_vitals(vitals.read());
+        let done = periodic.end_of_work().unwrap_or(stepped);
+        ride.station.tell_timing(CycleTiming {
+            cycle: index,
+            skipped: cycle.skipped,
+            due_ns: cycle.scheduled.as_nanos(),
+            woke_ns: cycle.woke.as_nanos(),
+            receive_ns: length_ns(sent, taken),
+            step_ns: length_ns(cycle.woke, caught_up) + length_ns(taken, stepped),
+            send_ns: length_ns(caught_up, sent),
+            done_ns: done.as_nanos(),
+            vitals,
+            ..CycleTiming::default()
+        });
+        if let Some(end) = end {
             break end;
         }
-        periodic.end_of_work();
     };
     let allocations = watch.map(|watch| {
         drop(watch);
@@ -66,6 +90,23 @@ pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Pa
     }
     let cycle_zero_ns = start.as_nanos();
     Paced { end, cycles, cycle_zero_ns, statistics: Some(periodic.into_statistics()), allocations }
+}
+
+fn length_ns(from: realtime::Instant, to: realtime::Instant) -> u64 {
+    to.saturating_duration_since(from).as_nanos() as u64
+}
+
+/// The counts under the names of the timing table.
+fn row_vitals(counts: VitalCounts) -> Vitals {
+    Vitals {
+        minor_faults: counts.minor_faults,
+        major_faults: counts.major_faults,
+        voluntary_switches: counts.voluntary_switches,
+        involuntary_switches: counts.involuntary_switches,
+        run_delay_ns: counts.run_delay_ns,
+        continued: counts.continued,
+        cpu: counts.cpu,
+    }
 }
 
 fn say_farewell(ride: &mut Ride<'_>, inbox: &mut Inbox, cycles: u64) {

@@ -4,11 +4,15 @@
 //! process that is killed leaves files that read to their last line. When a write fails (a full disk, a folder that
 //! went away), the run is asked to end, and what was written stays.
 
-use super::{FrameRecord, Records, candump};
+use super::Records;
+use super::evidence::{Evidence, EvidenceReport, EvidenceSetup};
 use crate::event::{Event, EventKind};
 use crate::pace::Shared;
 use plant::tables;
+use protocol::candump::{self, FrameRecord};
+use protocol::flight_dump::Log;
 use protocol::run_folder::LineFile;
+use realtime::{Clock, MonotonicClock};
 use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -39,6 +43,8 @@ pub struct WriterSetup {
     pub linked: bool,
     /// Weights on the carriage, for the same line.
     pub added_mass_kg: f64,
+    /// What to keep of time; `None` in lockstep.
+    pub evidence: Option<EvidenceSetup>,
 }
 
 /// What the writer leaves behind.
@@ -52,6 +58,8 @@ pub struct WriterReport {
     pub events: Vec<Event>,
     /// Events in all.
     pub event_count: u64,
+    /// What was measured of time.
+    pub evidence: EvidenceReport,
     /// Why writing stopped, if it did.
     pub failure: Option<String>,
 }
@@ -62,6 +70,7 @@ pub struct Writer {
     bus_log: LineFile,
     measurement: LineFile,
     truth: LineFile,
+    evidence: Option<Evidence>,
     pending: Vec<FrameRecord>,
     events_told: usize,
     skips_told: usize,
@@ -79,9 +88,23 @@ impl Writer {
             (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
         tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
         tables::write_truth_head(truth.lines())?;
+        let log = Log { interface: setup.interface.clone(), epoch_offset_ns: setup.epoch_offset_ns };
+        let evidence = setup.evidence.as_ref();
+        let evidence =
+            evidence.map(|evidence| Evidence::create(setup.folder.clone(), log, evidence)).transpose()?;
         let pending = Vec::new();
         let report = WriterReport::default();
-        Ok(Self { setup, bus_log, measurement, truth, pending, events_told: 0, skips_told: 0, report })
+        Ok(Self {
+            setup,
+            bus_log,
+            measurement,
+            truth,
+            evidence,
+            pending,
+            events_told: 0,
+            skips_told: 0,
+            report,
+        })
     }
 
     /// Writes until the sending ends are gone and the queues are empty.
@@ -91,7 +114,7 @@ impl Writer {
         loop {
             // Asked before draining: what was sent before the ends went is drained below.
             let finished = records.senders_gone();
-            let mut drained = self.drain(records);
+            let mut drained = self.drain(records).and_then(|()| self.judge(records, shared));
             if finished {
                 drained = drained.and_then(|()| self.write_frames(0));
             }
@@ -101,7 +124,11 @@ impl Writer {
             } else {
                 Ok(())
             };
-            if let Err(error) = drained.and(flushed) {
+            let mut written = drained.and(flushed);
+            if finished || written.is_err() {
+                written = written.and(self.finish_evidence());
+            }
+            if let Err(error) = written {
                 self.fail(&error, shared);
                 return self.report;
             }
@@ -120,12 +147,35 @@ impl Writer {
             self.measurement.write_when_full()?;
             self.truth.write_when_full()?;
         }
-        self.pending.extend(records.frames.try_iter());
+        for record in records.frames.try_iter() {
+            if let Some(evidence) = &mut self.evidence {
+                evidence.frame(&record);
+            }
+            self.pending.push(record);
+        }
         self.write_frames(FRAME_DELAY_NS)?;
         for event in records.events.try_iter() {
             self.tell(event);
         }
         Ok(())
+    }
+
+    /// Takes what the loop measured, and does what follows from it.
+    fn judge(&mut self, records: &Records, shared: &Shared) -> io::Result<()> {
+        let asked = shared.freeze.take();
+        let Some(evidence) = &mut self.evidence else { return Ok(()) };
+        for record in records.timings.try_iter() {
+            evidence.timing(&record)?;
+        }
+        records.round_trips.try_iter().for_each(|round_trip| evidence.round_trip(round_trip));
+        evidence.poll(MonotonicClock.now(), asked)
+    }
+
+    fn finish_evidence(&mut self) -> io::Result<()> {
+        let Some(evidence) = self.evidence.take() else { return Ok(()) };
+        let (report, written) = evidence.finish(MonotonicClock.now());
+        self.report.evidence = report;
+        written
     }
 
     /// Writes the frames that are older than the newest by `delay_ns`, in the order of their stamps. A command is read a
@@ -148,6 +198,9 @@ impl Writer {
     /// Tells and keeps the event. Late wake-ups have a quota of their own, so that they hide nothing else.
     fn tell(&mut self, event: Event) {
         self.report.event_count += 1;
+        if let Some(evidence) = &mut self.evidence {
+            evidence.event(&event);
+        }
         let late = matches!(event.kind, EventKind::Skipped { .. });
         let (told, most_told, most_kept) = if late {
             (&mut self.skips_told, SKIPS_TOLD, SKIPS_KEPT)
@@ -168,7 +221,8 @@ impl Writer {
     fn flush(&mut self) -> io::Result<()> {
         self.bus_log.write_out()?;
         self.measurement.write_out()?;
-        self.truth.write_out()
+        self.truth.write_out()?;
+        self.evidence.as_mut().map_or(Ok(()), Evidence::flush)
     }
 
     fn fail(&mut self, error: &io::Error, shared: &Shared) {

@@ -191,6 +191,9 @@ const DIMENSIONLESS: &[&str] = &[
     "velocity_feed_forward", // share
     "loss",                  // probability
     "error_rate",            // the same
+    "median",                // of ratios
+    "interval",              // of their median
+    "confidence",            // probability
     "factor",                // of a DBC signal, whose unit is a field beside it
     "offset",                // the same
     "min",                   // the same, and of a key of the parameter table

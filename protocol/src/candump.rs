@@ -2,8 +2,17 @@
 //!
 //! `(SSSSSSSSSS.UUUUUU) IFACE ID#HEX`, six decimals, upper case, no comments: python-can, cantools and SavvyCAN read it.
 
-use crate::recording::FrameRecord;
+use crate::can::CanFrame;
 use std::io::{self, Write};
+
+/// A frame and its time.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameRecord {
+    /// When it was sent or arrived, in ns of the run's clock.
+    pub stamp_ns: u64,
+    /// The frame.
+    pub frame: CanFrame,
+}
 
 /// Writes one frame; `epoch_offset_ns` turns the run's clock into the log's.
 ///
@@ -23,7 +32,6 @@ pub fn write_line(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::can::CanFrame;
 
     #[test]
     fn a_line_is_what_candump_writes() {

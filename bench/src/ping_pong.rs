@@ -1,0 +1,284 @@
+//! Ping-pong: round trips of 16 bytes between two processes, against which those of rig and controller are held.
+//!
+//! ```text
+//!   ping (this process)                    pong (a child of the same program)
+//!     at t_n = t_0 + n · interval   16 bytes ──────►  answers at once
+//!     reads the answer  ◄────────── 16 bytes
+//! ```
+//! Both have the same FIFO priority and lock their memory; each may be pinned. On a bus they are peers as emulator and
+//! controller are, and wait as the controller does (poll, then a batch); on a bare pair of sockets they read plainly, which is
+//! the least that this kernel asks for two switches between processes. The 16 bytes are a `struct can_frame`.
+//!
+//! # Terms
+//! - *Round trip*: from before sending to the answer having been read, both switches included.
+//! - *To arrival*: to the answer's arrival at our queue, by the kernel's stamp. That is what the rig's round trip ends with,
+//!   which does not wait for the answer but finds it at its next cycle.
+
+pub mod cli;
+mod line;
+mod rally;
+
+use cli::{PingPongArguments, PongArguments};
+use line::{Line, OnBus, OnSocket};
+use protocol::bus::{self, BusError, BusUrl, StampClock};
+use protocol::exit::Exit;
+use protocol::run_folder::{SCHEMA_VERSION, write_json};
+use rally::{Rally, Rhythm};
+use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request, write_hlog};
+use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use std::io::{self, Write};
+use std::os::fd::{AsFd, OwnedFd};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Silence after which the answering process takes the other one for gone.
+const SILENCE: Duration = Duration::from_secs(10);
+
+/// What keeps a ping-pong from being played.
+#[derive(Debug, thiserror::Error)]
+pub enum PingPongError {
+    /// The system gave no sockets, no process, no handler.
+    #[error("{what}: {reason}")]
+    System {
+        /// What was asked for.
+        what: &'static str,
+        /// What the system said.
+        reason: String,
+    },
+    /// The bus cannot be opened.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The other process does not answer.
+    #[error("no answer {0}; an embedded bus needs a host: 'emulator bus --bus URL'")]
+    Silent(String),
+    /// A file cannot be written, or is something else.
+    #[error("cannot write {file}: {reason}")]
+    Write {
+        /// The file.
+        file: String,
+        /// Why not.
+        reason: String,
+    },
+}
+
+impl PingPongError {
+    /// The exit code that the error leads to.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Bus(_) | Self::Silent(_) => Exit::BusFailed,
+            Self::System { .. } | Self::Write { .. } => Exit::BadInput,
+        }
+    }
+
+    fn system(what: &'static str, reason: impl ToString) -> Self {
+        Self::System { what, reason: reason.to_string() }
+    }
+
+    fn write(file: &Path, reason: impl ToString) -> Self {
+        Self::Write { file: file.display().to_string(), reason: reason.to_string() }
+    }
+}
+
+/// What stands in the JSON file under the name of a ping-pong; percentiles first, in ns.
+#[derive(Debug, Serialize)]
+struct Figures {
+    #[serde(flatten)]
+    round_trip_ns: Percentiles,
+    /// Null on a bare pair of sockets.
+    to_arrival_ns: Option<Percentiles>,
+    sent: u64,
+    answered: u64,
+    lost: u64,
+    /// Pings left out since the one before was not back in time.
+    skipped: u64,
+    interval_us: u64,
+    priority: u8,
+    cpu: Option<usize>,
+    peer_cpu: Option<usize>,
+    bus: Option<String>,
+    granted: Vec<String>,
+    refused: Vec<String>,
+}
+
+/// Plays as asked, prints the figures, and writes them where asked.
+///
+/// # Errors
+/// [`PingPongError`]
+pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
+    let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let interrupt = Interrupt::watch().map_err(|error| PingPongError::system("no signal handler", error))?;
+    // Before anything is asked of the system for this process: the child would inherit it.
+    let (mut line, mut other) = open(arguments)?;
+    let played = play(arguments, &mut *line, &interrupt);
+    // On a bare socket it ends by itself when we are gone; on a bus it would wait for more.
+    drop(line);
+    let _ = other.kill();
+    let _ = other.wait();
+    let (rally, grants) = played?;
+    let figures = figures(arguments, &rally, &grants);
+    tell(&name(arguments), &figures);
+    if let Some(path) = &arguments.json {
+        add(path, &name(arguments), &figures)?;
+    }
+    if let Some(path) = &arguments.out {
+        let tag = format!("ping-pong-{}", name(arguments));
+        let length = Duration::from_secs_f64(arguments.seconds);
+        write_hlog(path, &[(&tag, rally.round_trip_ns.histogram())], started.as_secs_f64(), length)
+            .map_err(|error| PingPongError::write(path, error))?;
+    }
+    Ok(if interrupt.came() { Exit::Interrupted } else { Exit::Good })
+}
+
+/// Answers; the process that [`run`] starts.
+///
+/// # Errors
+/// [`PingPongError`]
+pub fn pong(arguments: &PongArguments) -> Result<Exit, PingPongError> {
+    // Whoever asks may be killed; nobody would end this process then.
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
+        .map_err(|errno| PingPongError::system("no signal when the parent ends", errno))?;
+    let mut line = match &arguments.bus {
+        Some(url) => on_bus(url)?,
+        None => on_socket(io::stdin().as_fd().try_clone_to_owned())?,
+    };
+    let _grants = grants(arguments.priority, arguments.cpu);
+    rally::answer(&mut *line, &MonotonicClock, SILENCE);
+    Ok(Exit::Good)
+}
+
+fn play(
+    arguments: &PingPongArguments,
+    line: &mut dyn Line,
+    interrupt: &Interrupt,
+) -> Result<(Rally, Grants), PingPongError> {
+    let grants = grants((!arguments.no_realtime).then_some(arguments.priority), arguments.cpu);
+    let interval = Duration::from_micros(arguments.interval_us);
+    let pings = (arguments.seconds * 1e6 / arguments.interval_us as f64).round().max(1.0) as u64;
+    let gone = |_| PingPongError::Silent("any more: the process that answers has ended".into());
+    if !rally::serve(line, &MonotonicClock, interrupt).map_err(gone)? && !interrupt.came() {
+        let bus = arguments.bus.as_ref().map_or_else(String::new, |bus| format!(" on {bus}"));
+        let up = if line.is_up() { "" } else { ", which is down" };
+        return Err(PingPongError::Silent(format!("within 5 s{bus}{up}")));
+    }
+    let rally = rally::ask(line, &MonotonicClock, Rhythm { interval, pings }, interrupt).map_err(gone)?;
+    Ok((rally, grants))
+}
+
+/// Our end, and the process at the other.
+fn open(arguments: &PingPongArguments) -> Result<(Box<dyn Line>, Child), PingPongError> {
+    let program = std::env::current_exe();
+    let program = program.map_err(|error| PingPongError::system("this program's own path", error))?;
+    let mut command = Command::new(program);
+    command.arg("pong").stdin(Stdio::null());
+    if !arguments.no_realtime {
+        command.args(["--priority", &arguments.priority.to_string()]);
+    }
+    if let Some(cpu) = arguments.peer_cpu {
+        command.args(["--cpu", &cpu.to_string()]);
+    }
+    let line = match &arguments.bus {
+        Some(url) => {
+            command.args(["--bus", &url.to_string()]);
+            on_bus(url)?
+        }
+        None => {
+            let pair = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None);
+            let (ours, theirs) = pair.map_err(|errno| PingPongError::system("no pair of sockets", errno))?;
+            command.stdin(Stdio::from(theirs));
+            on_socket(Ok(ours))?
+        }
+    };
+    let other = command.spawn().map_err(|error| PingPongError::system("no second process", error))?;
+    Ok((line, other))
+}
+
+fn on_bus(url: &BusUrl) -> Result<Box<dyn Line>, PingPongError> {
+    let clock: StampClock = Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns));
+    Ok(Box::new(OnBus(bus::open(url, clock)?)))
+}
+
+fn on_socket(socket: io::Result<OwnedFd>) -> Result<Box<dyn Line>, PingPongError> {
+    let refused = |reason: String| PingPongError::System { what: "no socket to read from", reason };
+    let socket = socket.map_err(|error| refused(error.to_string()))?;
+    Ok(Box::new(OnSocket::new(socket).map_err(|errno| refused(errno.to_string()))?))
+}
+
+fn grants(priority: Option<u8>, cpu: Option<usize>) -> Grants {
+    let request = match priority {
+        Some(priority) => Request::for_a_loop(priority, cpu),
+        None => Request { cpu, ..Request::default() },
+    };
+    let grants = realtime::acquire(&request);
+    grants.refusals().iter().for_each(|refusal| eprintln!("bench: warning: {refusal}"));
+    grants
+}
+
+fn name(arguments: &PingPongArguments) -> String {
+    let usual = if arguments.socketpair { "socketpair" } else { "bus" };
+    arguments.name.clone().unwrap_or_else(|| usual.to_owned())
+}
+
+fn figures(arguments: &PingPongArguments, rally: &Rally, grants: &Grants) -> Figures {
+    Figures {
+        round_trip_ns: rally.round_trip_ns.percentiles(),
+        to_arrival_ns: arguments.bus.as_ref().map(|_| rally.to_arrival_ns.percentiles()),
+        sent: rally.sent,
+        answered: rally.answered,
+        lost: rally.sent - rally.answered,
+        skipped: rally.skipped,
+        interval_us: arguments.interval_us,
+        priority: arguments.priority,
+        cpu: arguments.cpu,
+        peer_cpu: arguments.peer_cpu,
+        bus: arguments.bus.as_ref().map(ToString::to_string),
+        granted: grants.granted().to_vec(),
+        refused: grants.refusals().iter().map(ToString::to_string).collect(),
+    }
+}
+
+fn tell(name: &str, figures: &Figures) {
+    let us = |ns: Option<u64>| ns.map_or_else(|| "-".to_owned(), |ns| format!("{:.1}", ns as f64 / 1e3));
+    let line = |what: &str, of: &Percentiles| {
+        format!(
+            "{name} {what}: p50 {} p90 {} p99 {} p99.9 {} max {} us, {} samples",
+            us(of.p50),
+            us(of.p90),
+            us(of.p99),
+            us(of.p999),
+            us(of.max),
+            of.count
+        )
+    };
+    let mut out = io::stdout();
+    // A reader that has gone has seen enough.
+    let _ = writeln!(out, "{}", line("round trip", &figures.round_trip_ns));
+    if let Some(to_arrival_ns) = &figures.to_arrival_ns {
+        let _ = writeln!(out, "{}", line("to arrival", to_arrival_ns));
+    }
+    if figures.lost + figures.skipped > 0 {
+        let _ = writeln!(out, "{name}: {} pings lost, {} left out", figures.lost, figures.skipped);
+    }
+}
+
+/// Adds the figures to a file that other ping-pongs may have begun.
+fn add(path: &Path, name: &str, figures: &Figures) -> Result<(), PingPongError> {
+    let refused = |reason: String| PingPongError::write(path, reason);
+    let mut file: Map<String, Value> = match std::fs::read_to_string(path) {
+        Ok(text) => serde_json::from_str(&text).map_err(|error| refused(format!("not ours: {error}")))?,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Map::new(),
+        Err(error) => return Err(refused(error.to_string())),
+    };
+    file.insert("schema_version".into(), SCHEMA_VERSION.into());
+    let value = serde_json::to_value(figures).map_err(|error| refused(error.to_string()))?;
+    file.insert(name.into(), value);
+    let commands = file.entry("commands").or_insert_with(|| json!({}));
+    let command: Vec<String> = std::env::args().collect();
+    let commands =
+        commands.as_object_mut().ok_or_else(|| refused("not ours: 'commands' is no table".into()))?;
+    commands.insert(name.into(), command.join(" ").into());
+    write_json(path, &file).map_err(|error| refused(error.to_string()))
+}

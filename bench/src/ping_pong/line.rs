@@ -1,0 +1,83 @@
+//! What ping and pong travel on: a bus, waited for as the controller waits, or a bare pair of sockets, read plainly.
+
+use protocol::bus::{Bus, Received};
+use protocol::can::{CAN_FRAME_BYTES, CanFrame};
+use rustix::io::Errno;
+use rustix::net::sockopt::{Timeout, set_socket_timeout};
+use rustix::net::{RecvFlags, SendFlags, recv, send};
+use std::os::fd::OwnedFd;
+use std::time::Duration;
+
+/// The other end is gone for good.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Gone;
+
+/// A way between two processes for 16 bytes.
+pub(super) trait Line {
+    /// Hands a frame over; false when it was dropped.
+    fn send(&mut self, frame: &CanFrame) -> bool;
+
+    /// Waits for frames for a while and hands each on, with its arrival in ns of CLOCK_MONOTONIC where that is known.
+    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Gone>;
+
+    /// Whether it can carry anything yet.
+    fn is_up(&self) -> bool;
+}
+
+/// Longest wait, that of the controller.
+pub(super) const PATIENCE: Duration = Duration::from_millis(20);
+
+/// A bus: poll, then a batch with `recvmmsg`, as the controller does it.
+pub(super) struct OnBus(pub(super) Box<dyn Bus>);
+
+impl Line for OnBus {
+    fn send(&mut self, frame: &CanFrame) -> bool {
+        self.0.send(frame).is_ok()
+    }
+
+    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Gone> {
+        self.0.wait_readable(PATIENCE);
+        while let Received::Frame(frame, stamp_ns) = self.0.receive() {
+            take(&frame, Some(stamp_ns));
+        }
+        Ok(())
+    }
+
+    fn is_up(&self) -> bool {
+        self.0.is_up()
+    }
+}
+
+/// One end of a pair of SEQPACKET sockets: a blocking read, the least that two processes can do.
+pub(super) struct OnSocket(OwnedFd);
+
+impl OnSocket {
+    pub(super) fn new(socket: OwnedFd) -> rustix::io::Result<Self> {
+        set_socket_timeout(&socket, Timeout::Recv, Some(PATIENCE))?;
+        Ok(Self(socket))
+    }
+}
+
+impl Line for OnSocket {
+    fn send(&mut self, frame: &CanFrame) -> bool {
+        send(&self.0, &frame.to_bytes(), SendFlags::NOSIGNAL).is_ok()
+    }
+
+    fn wait(&mut self, take: &mut dyn FnMut(&CanFrame, Option<u64>)) -> Result<(), Gone> {
+        let mut bytes = [0; CAN_FRAME_BYTES];
+        match recv(&self.0, &mut bytes, RecvFlags::empty()) {
+            Ok((CAN_FRAME_BYTES, _)) => {
+                if let Some(frame) = CanFrame::from_bytes(&bytes) {
+                    take(&frame, None);
+                }
+                Ok(())
+            }
+            Ok((0, _)) | Err(Errno::CONNRESET | Errno::PIPE) => Err(Gone),
+            _ => Ok(()),
+        }
+    }
+
+    fn is_up(&self) -> bool {
+        true
+    }
+}

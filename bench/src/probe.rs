@@ -1,0 +1,262 @@
+//! The spin-gap probe: a thread on each CPU that reads the clock over and over, and notes when it could not.
+//!
+//! A process that wakes late cannot say whether the machine stood still or something else had the CPU. A thread that never
+//! sleeps can: `CLOCK_MONOTONIC` is the clock of all processes, so its gaps lie beside the late cycles of the same run.
+//!
+//! ```text
+//!   a thread for each CPU (SCHED_IDLE, pinned)          main
+//!     read clock … gap! ── bounded queue, try_send ──►  polls, writes probe.csv, ends on a signal
+//! ```
+//! # What it changes
+//! The CPUs never idle, so they leave no sleep state and the hypervisor need not bring them back: wake-ups get *faster*. A
+//! hyperthread beside it loses up to half its speed, and a shared power budget gets tighter. SCHED_IDLE gives way to every
+//! other thread at once. So the probe explains runs; figures that are claimed are measured without it.
+//!
+//! # What a gap does not say
+//! While the thread that is watched for has the CPU, the probe of that CPU has not: a standstill that hits just then shows as
+//! a gap in which another ran. The probes of the other CPUs tell, if all stood still.
+//!
+//! # Source
+//! The idea is that of `hwlat_detector` (kernel's tree, `Documentation/trace/hwlat_detector.rst`) and of `sysjitter`, from user space and
+//! without switching interrupts off.
+
+pub mod cli;
+mod gaps;
+
+pub use gaps::{Counts, Gap, GapWatch, Total};
+
+use cli::ProbeArguments;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use protocol::exit::Exit;
+use protocol::run_folder::LineFile;
+use realtime::privileges::parse_cpu_list;
+use realtime::signals::Continued;
+use realtime::vitals::VitalsReader;
+use realtime::{Clock, Interrupt, MonotonicClock, Request};
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+use thread_priority::{
+    NormalThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
+    thread_native_id,
+};
+
+/// Head line of the table.
+pub const HEAD: &str = "cpu,from_ns,to_ns,another_ran";
+/// Gaps that wait for the writer: what all CPUs can see in several of its turns.
+const QUEUE: usize = 65_536;
+/// Turn of the writer.
+const TURN: Duration = Duration::from_millis(50);
+/// Gaps that reach the table; a probe that was forgotten must not fill the disk.
+const MOST_ROWS: u64 = 2_000_000;
+
+/// What keeps the probe from watching.
+#[derive(Debug, thiserror::Error)]
+pub enum ProbeError {
+    /// `--cpus` is no list of CPUs.
+    #[error("--cpus {0}: not a list of CPUs such as 0-3,8")]
+    Cpus(String),
+    /// A thread does not get its CPU, or no idle priority: its gaps would say nothing.
+    #[error("CPU {cpu}: {reason}")]
+    Thread {
+        /// The CPU.
+        cpu: usize,
+        /// What was refused, and what to do.
+        reason: String,
+    },
+    /// The table cannot be written.
+    #[error("cannot write the gaps: {0}; choose another file with --out")]
+    Write(io::Error),
+    /// No handler for signals.
+    #[error("cannot watch for signals: {0}")]
+    Signals(io::Error),
+}
+
+/// What one CPU showed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    stood_still: Total,
+    another_ran: Total,
+}
+
+/// What the watching threads share with the writer.
+struct Watched {
+    stop: Interrupt,
+    dropped: AtomicU64,
+}
+
+/// Watches as asked; see the module.
+///
+/// # Errors
+/// [`ProbeError`]
+pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
+    let cpus = cpus(arguments.cpus.as_deref())?;
+    let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;
+    let continued = Continued::watch().map_err(ProbeError::Signals)?;
+    let mut file = LineFile::create(&arguments.out).map_err(ProbeError::Write)?;
+    file.lines().extend_from_slice(format!("{HEAD}\n").as_bytes());
+    file.write_out().map_err(ProbeError::Write)?;
+    // A page that is not there would be a gap of the probe's own making.
+    realtime::acquire(&Request { lock_memory: true, ..Request::default() });
+
+    let watched = Watched { stop: Interrupt::default(), dropped: AtomicU64::new(0) };
+    let (sender, gaps) = bounded(QUEUE);
+    let began_ns = MonotonicClock.now().as_nanos();
+    let mut table = Table { file, rows: 0, seen: cpus.iter().map(|&cpu| (cpu, Seen::default())).collect() };
+    std::thread::scope(|scope| {
+        let (ready, all_ready) = bounded(cpus.len());
+        for &cpu in &cpus {
+            let (sender, ready, continued, watched) =
+                (sender.clone(), ready.clone(), continued.clone(), &watched);
+            let gap_ns = arguments.gap_us * 1000;
+            scope.spawn(move || {
+                let begun = begin(cpu);
+                let good = begun.is_ok();
+                // Before it is told: what comes between the telling and a first look would be nobody's gap.
+                let looking = Looking::begin(gap_ns, continued);
+                // Whoever waits for it takes what comes.
+                let _ = ready.send(begun);
+                if good {
+                    looking.go_on(cpu, &sender, watched);
+                }
+            });
+        }
+        drop((sender, ready));
+        let begun = all_ready.iter().take(cpus.len()).collect::<Result<(), _>>();
+        let told = begun.and_then(|()| {
+            eprintln!("bench: probe watches {}, gaps over {} us", named(&cpus), arguments.gap_us);
+            let until_ns = arguments.seconds.map(|seconds| began_ns + (seconds * 1e9) as u64);
+            let time_up = || until_ns.is_some_and(|until_ns| MonotonicClock.now().as_nanos() >= until_ns);
+            while !time_up() && !interrupt.came() {
+                std::thread::sleep(TURN);
+                table.take(&gaps)?;
+            }
+            Ok(())
+        });
+        watched.stop.ask();
+        told
+    })?;
+    // A gap that was going on at the end was told when its thread ran again.
+    table.take(&gaps)?;
+    let Table { rows, seen, .. } = table;
+    tell(&seen, MonotonicClock.now().as_nanos() - began_ns);
+    let dropped = watched.dropped.load(Ordering::Relaxed);
+    if dropped > 0 {
+        eprintln!("bench: warning: {dropped} gaps were seen and not kept: the queue to the writer was full");
+    }
+    if rows > MOST_ROWS {
+        eprintln!(
+            "bench: warning: the table ends after {MOST_ROWS} of {rows} gaps; ask for longer ones with --gap-us"
+        );
+    }
+    Ok(if interrupt.came() { Exit::Interrupted } else { Exit::Good })
+}
+
+fn cpus(list: Option<&str>) -> Result<Vec<usize>, ProbeError> {
+    let Some(list) = list else {
+        let allowed = rustix::thread::sched_getaffinity(None).map_err(|errno| ProbeError::Thread {
+            cpu: 0,
+            reason: format!("the allowed CPUs are not told ({errno}); name them with --cpus"),
+        })?;
+        return Ok((0..rustix::thread::CpuSet::MAX_CPU).filter(|&cpu| allowed.is_set(cpu)).collect());
+    };
+    parse_cpu_list(list).filter(|cpus| !cpus.is_empty()).ok_or_else(|| ProbeError::Cpus(list.into()))
+}
+
+/// Puts the calling thread on its CPU, below everything else.
+fn begin(cpu: usize) -> Result<(), ProbeError> {
+    let grants = realtime::acquire(&Request { cpu: Some(cpu), ..Request::default() });
+    if let Some(refusal) = grants.refusals().first() {
+        return Err(ProbeError::Thread { cpu, reason: refusal.to_string() });
+    }
+    let idle = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Idle);
+    set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, idle).map_err(|error| {
+        ProbeError::Thread {
+            cpu,
+            reason: format!("SCHED_IDLE was refused: {error:?}; without it the probe disturbs"),
+        }
+    })
+}
+
+/// A thread that looks at the clock over and over.
+struct Looking {
+    vitals: VitalsReader,
+    watch: GapWatch,
+}
+
+impl Looking {
+    fn begin(gap_ns: u64, continued: Continued) -> Self {
+        let vitals = VitalsReader::new(continued);
+        Self { vitals, watch: GapWatch::new(gap_ns, MonotonicClock.now().as_nanos()) }
+    }
+
+    fn go_on(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, watched: &Watched) {
+        let mut going_on = true;
+        while going_on {
+            // Looked at before the clock, so that a gap that outlasts the run is told too.
+            going_on = !watched.stop.came();
+            let counts = || {
+                let read = self.vitals.read();
+                Counts {
+                    voluntary_switches: read.voluntary_switches,
+                    involuntary_switches: read.involuntary_switches,
+                    run_delay_ns: read.run_delay_ns,
+                }
+            };
+            if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), counts)
+                && gaps.try_send((cpu, gap)).is_err()
+            {
+                watched.dropped.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+/// The table on the disk, and what it adds up to.
+struct Table {
+    file: LineFile,
+    rows: u64,
+    seen: BTreeMap<usize, Seen>,
+}
+
+impl Table {
+    /// Writes what waits.
+    fn take(&mut self, gaps: &Receiver<(usize, Gap)>) -> Result<(), ProbeError> {
+        for (cpu, gap) in gaps.try_iter() {
+            self.rows += 1;
+            let of_cpu = self.seen.entry(cpu).or_default();
+            if gap.another_ran {
+                of_cpu.another_ran += &gap
+            } else {
+                of_cpu.stood_still += &gap
+            }
+            if self.rows <= MOST_ROWS {
+                let Gap { from_ns, to_ns, another_ran } = gap;
+                let line = format!("{cpu},{from_ns},{to_ns},{}\n", u8::from(another_ran));
+                self.file.lines().extend_from_slice(line.as_bytes());
+                self.file.write_when_full().map_err(ProbeError::Write)?;
+            }
+        }
+        self.file.write_out().map_err(ProbeError::Write)
+    }
+}
+
+fn tell(seen: &BTreeMap<usize, Seen>, length_ns: u64) {
+    let part = |total: &Total| {
+        let share_percent = 100.0 * total.together_ns as f64 / length_ns.max(1) as f64;
+        format!("{:>7}  {:>10.1}  {share_percent:>7.3}", total.count, total.longest_ns as f64 / 1e3)
+    };
+    // A reader that has gone has seen enough.
+    let mut out = io::stdout();
+    let _ = writeln!(out, "       the CPU stood still             another thread ran");
+    let _ = writeln!(out, "  CPU     gaps  longest us   time %       gaps  longest us   time %");
+    for (cpu, Seen { stood_still, another_ran }) in seen {
+        let _ = writeln!(out, "{cpu:>5}  {}    {}", part(stood_still), part(another_ran));
+    }
+}
+
+fn named(cpus: &[usize]) -> String {
+    let list = cpus.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    if cpus.len() == 1 { format!("CPU {list}") } else { format!("CPUs {list}") }
+}

@@ -1,0 +1,160 @@
+//! A gap: what a thread that does nothing but read the clock sees when it is not running, and whose fault it was.
+//!
+//! ```text
+//!   looks at the clock   | | | | | |              | | | |        gap: from the last look before to the first one after
+//!                                  └── length ────┘
+//! ```
+//! Somebody else had the CPU if the kernel counted a switch away from the thread meanwhile, and had it wait for most of the
+//! gap. A switch alone does not say so: the counts reach back up to a millisecond, in which a short one may have come before.
+//! Without a switch the thread *was* running, and the CPU under it stood still: a hypervisor, the firmware (SMI), or the
+//! kernel's own interrupt work.
+
+use std::ops::AddAssign;
+
+/// How often the counts are read when nothing happens, so that they tell of a gap and of little before it.
+const REFRESH_NS: u64 = 1_000_000;
+
+/// What the kernel counted of the watching thread since it was last asked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Times the thread gave the CPU away. It never does by itself: somebody stopped the process.
+    pub voluntary_switches: u64,
+    /// Times another thread took it.
+    pub involuntary_switches: u64,
+    /// Time that the thread waited for the CPU, ns; 0 where the kernel does not tell.
+    pub run_delay_ns: u64,
+}
+
+impl Counts {
+    /// Whether something other than the thread had the CPU for most of `length_ns`.
+    fn explain(&self, length_ns: u64) -> bool {
+        let untold = self.run_delay_ns == 0;
+        self.voluntary_switches > 0
+            || (self.involuntary_switches > 0 && (untold || self.run_delay_ns >= length_ns / 2))
+    }
+}
+
+/// A gap on one CPU, on CLOCK_MONOTONIC.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// Last look before it, ns.
+    pub from_ns: u64,
+    /// First look after it, ns.
+    pub to_ns: u64,
+    /// Whether another thread had the CPU, or somebody stopped the probe.
+    pub another_ran: bool,
+}
+
+/// Finds gaps in looks at the clock.
+#[derive(Debug)]
+pub struct GapWatch {
+    gap_ns: u64,
+    last_ns: u64,
+    refreshed_ns: u64,
+}
+
+impl GapWatch {
+    /// A watch whose first look is at `now_ns`.
+    #[must_use]
+    pub fn new(gap_ns: u64, now_ns: u64) -> Self {
+        Self { gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
+    }
+
+    /// The next look. `counts` tells what was counted since it was last called.
+    pub fn look(&mut self, now_ns: u64, counts: impl FnOnce() -> Counts) -> Option<Gap> {
+        let from_ns = std::mem::replace(&mut self.last_ns, now_ns);
+        let length_ns = now_ns - from_ns;
+        let is_gap = length_ns > self.gap_ns;
+        if !is_gap && now_ns - self.refreshed_ns < REFRESH_NS {
+            return None;
+        }
+        self.refreshed_ns = now_ns;
+        let another_ran = counts().explain(length_ns);
+        is_gap.then_some(Gap { from_ns, to_ns: now_ns, another_ran })
+    }
+}
+
+/// Gaps of one kind, added up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Total {
+    /// How many.
+    pub count: u64,
+    /// The longest, ns.
+    pub longest_ns: u64,
+    /// All of them together, ns.
+    pub together_ns: u64,
+}
+
+impl AddAssign<&Gap> for Total {
+    fn add_assign(&mut self, gap: &Gap) {
+        let length_ns = gap.to_ns - gap.from_ns;
+        self.count += 1;
+        self.longest_ns = self.longest_ns.max(length_ns);
+        self.together_ns += length_ns;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GAP_NS: u64 = 100_000;
+
+    fn counts(voluntary_switches: u64, involuntary_switches: u64, run_delay_ns: u64) -> Counts {
+        Counts { voluntary_switches, involuntary_switches, run_delay_ns }
+    }
+
+    #[test]
+    fn only_a_pause_longer_than_asked_is_a_gap_and_it_goes_from_look_to_look() {
+        let mut watch = GapWatch::new(GAP_NS, 1_000);
+        assert_eq!(watch.look(1_000 + GAP_NS, Counts::default), None);
+        let gap = watch.look(1_001 + 2 * GAP_NS, Counts::default).expect("a nanosecond too long");
+        assert_eq!(gap, Gap { from_ns: 1_000 + GAP_NS, to_ns: 1_001 + 2 * GAP_NS, another_ran: false });
+        assert_eq!(watch.look(gap.to_ns + 50, Counts::default), None, "a gap is told once");
+    }
+
+    #[test]
+    fn another_ran_if_it_took_the_cpu_for_most_of_the_gap() {
+        for (counted, another_ran) in [
+            (counts(0, 0, 0), false),
+            (counts(0, 1, 500_000), true),
+            (counts(0, 3, 1_000_000), true),
+            // A short switch before the machine stood still.
+            (counts(0, 1, 20_000), false),
+            // A kernel that counts switches and no delays.
+            (counts(0, 1, 0), true),
+            // Stopped by a signal: the machine has nothing to do with it.
+            (counts(1, 0, 2_000), true),
+        ] {
+            let mut watch = GapWatch::new(GAP_NS, 0);
+            let gap = watch.look(1_000_000, || counted).expect("1 ms is a gap");
+            assert_eq!(gap.another_ran, another_ran, "{counted:?}");
+        }
+    }
+
+    #[test]
+    fn counts_from_before_the_last_millisecond_are_forgotten() {
+        let mut watch = GapWatch::new(GAP_NS, 0);
+        let mut pending = counts(0, 1, 60_000);
+        let mut asked = 0;
+        for now_ns in (50_000..=1_000_000).step_by(50_000) {
+            let told = watch.look(now_ns, || {
+                asked += 1;
+                std::mem::take(&mut pending)
+            });
+            assert_eq!(told, None);
+        }
+        assert_eq!(asked, 1, "read once a millisecond");
+        let gap = watch.look(1_200_000, || pending).expect("200 us are a gap");
+        assert!(!gap.another_ran, "the switch was long before");
+    }
+
+    #[test]
+    fn totals_add_up() {
+        let mut total = Total::default();
+        for (from_ns, to_ns) in [(0, 200_000), (500_000, 1_000_000)] {
+            total += &Gap { from_ns, to_ns, another_ran: false };
+        }
+        assert_eq!(total, Total { count: 2, longest_ns: 500_000, together_ns: 700_000 });
+    }
+}

@@ -1,0 +1,222 @@
+//! What a run left in its folder, read as far as it is there: what is missing or damaged is told, and the rest is used.
+
+use super::hlog::{self, Passing};
+use super::joined::Series;
+use super::probe::{self, Gap};
+use super::reference::{self, Reference};
+use protocol::timing::{self, CycleTiming};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+/// Processes of a run that leave files, by the first part of their files' names.
+pub const PROCESSES: [&str; 4] = ["emulator", "controller", "controller-drive", "controller-load"];
+
+/// Longest interval of a log whose maximum is one of a second; older logs hold the run in one interval.
+const LONGEST_SECOND_S: f64 = 1.5;
+
+/// One run as it was read.
+#[derive(Clone, Debug, Default)]
+pub struct RunFiles {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// `summary.json`; null when missing.
+    pub summary: Value,
+    /// `run.json`; null when missing.
+    pub run: Value,
+    /// `conditions.json`; null when missing.
+    pub conditions: Value,
+    /// `controller*.json` by process.
+    pub controllers: BTreeMap<String, Value>,
+    /// Distributions of all logs by tag, with the maximum of each second.
+    pub logged: BTreeMap<String, Series>,
+    /// End of the last interval of a log, s from its base time.
+    pub logged_until_s: f64,
+    /// Rows of each process, rising by cycle: of the whole run, or those of the flight recorder.
+    pub rows: BTreeMap<String, Vec<CycleTiming>>,
+    /// Whether the rows are those of the whole run.
+    pub whole: bool,
+    /// The flight recorder's word for how late a process was in a cycle, ns: it knows sensors that waited and were overtaken.
+    pub told_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
+    /// Gaps that the probe saw; nothing when it did not run.
+    pub gaps: Option<Vec<Gap>>,
+    /// The reference beside this run.
+    pub reference: Option<Reference>,
+    /// What is missing or damaged, a sentence each.
+    pub lacks: Vec<String>,
+}
+
+/// Whether a folder holds anything of a run.
+#[must_use]
+pub fn is_run(folder: &Path) -> bool {
+    let names = ["summary.json", "run.json", "emulator.hlog", "emulator-timing.csv"];
+    names.iter().any(|name| folder.join(name).is_file())
+}
+
+impl RunFiles {
+    /// Reads what is in `folder`.
+    #[must_use]
+    pub fn read(folder: &Path) -> Self {
+        let mut run = Self { folder: folder.into(), ..Self::default() };
+        run.summary = run.json("summary.json");
+        run.run = run.json("run.json");
+        run.conditions = run.json("conditions.json");
+        for process in PROCESSES {
+            if process != "emulator" {
+                let told = run.json(&format!("{process}.json"));
+                if !told.is_null() {
+                    run.controllers.insert(process.into(), told);
+                }
+            }
+            run.take_log(&format!("{process}.hlog"));
+            if let Some(rows) = run.parse(&format!("{process}-timing.csv"), timing::read) {
+                run.whole = true;
+                run.rows.insert(process.into(), rows);
+            }
+        }
+        run.take_flights();
+        run.gaps = run.parse("probe.csv", probe::read);
+        run.reference = run.parse("cyclictest.json", reference::read);
+        run.tell_what_is_missing();
+        run
+    }
+
+    /// The text of a file, nothing when it is not there.
+    fn text(&mut self, name: &str) -> Option<String> {
+        let path = self.folder.join(name);
+        match std::fs::read_to_string(&path) {
+            Ok(text) => Some(text),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+            Err(error) => {
+                self.lacks.push(format!("{name} cannot be read and was left out: {error}"));
+                None
+            }
+        }
+    }
+
+    fn parse<T, E: Display>(&mut self, name: &str, read: impl Fn(&str) -> Result<T, E>) -> Option<T> {
+        let text = self.text(name)?;
+        match read(&text) {
+            Ok(parsed) => Some(parsed),
+            Err(error) => {
+                self.lacks.push(format!("{name} is damaged and was left out: {error}"));
+                None
+            }
+        }
+    }
+
+    fn json(&mut self, name: &str) -> Value {
+        self.parse(name, |text| serde_json::from_str(text)).unwrap_or_default()
+    }
+
+    /// A log, up to where it is damaged.
+    fn take_log(&mut self, name: &str) {
+        let Some(text) = self.text(name) else { return };
+        let read = hlog::each(&text, |passing| self.take_interval(passing));
+        if let Err(error) = read {
+            self.lacks.push(format!("{name} is damaged and was read up to there: {error}"));
+        }
+    }
+
+    /// An interval of a log.
+    pub fn take_interval(&mut self, passing: Passing<'_>) {
+        let Passing { tag, start_s, duration_s, histogram } = passing;
+        // Logs from before the load axis had a round trip of its own name the drive's without its axis.
+        let tag = if tag == "round-trip" { "drive-round-trip" } else { tag };
+        if !self.logged.contains_key(tag) {
+            self.logged.insert(tag.to_owned(), Series::default());
+        }
+        let Some(series) = self.logged.get_mut(tag) else { return };
+        series.samples.add_histogram(histogram);
+        if !histogram.is_empty() && duration_s <= LONGEST_SECOND_S {
+            let largest = series.maxima_ns.entry(start_s as u64).or_default();
+            *largest = histogram.max().max(*largest);
+        }
+        self.logged_until_s = self.logged_until_s.max(start_s + duration_s);
+    }
+
+    /// What the flight recorder's dumps tell, and their rows for processes that did not write all of theirs.
+    fn take_flights(&mut self) {
+        let Ok(entries) = std::fs::read_dir(self.folder.join("flight")) else { return };
+        let mut names: Vec<_> =
+            entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
+        names.sort();
+        let mut taken: BTreeMap<String, BTreeMap<u64, CycleTiming>> = BTreeMap::new();
+        for name in names {
+            // PROCESS-CYCLE-TRIGGER, and a process may have a dash in its name.
+            let Some(process) = name.rsplitn(3, '-').nth(2) else { continue };
+            if !PROCESSES.contains(&process) {
+                continue;
+            }
+            let process = process.to_owned();
+            let event = self.json(&format!("flight/{name}/event.json"));
+            if let (Some(cycle), Some(late_ns)) = (event["cycle"].as_u64(), event["late_ns"].as_u64()) {
+                self.told_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
+            }
+            if self.rows.contains_key(&process) {
+                continue;
+            }
+            let rows = self.parse(&format!("flight/{name}/timing.csv"), timing::read).unwrap_or_default();
+            taken.entry(process).or_default().extend(rows.into_iter().map(|row| (row.cycle, row)));
+        }
+        for (process, rows) in taken {
+            self.rows.insert(process, rows.into_values().collect());
+        }
+    }
+
+    fn tell_what_is_missing(&mut self) {
+        let mut lack = |what: &str| self.lacks.push(what.to_owned());
+        if self.summary.is_null() {
+            lack(
+                "no readable summary.json: the emulator was killed or still runs; what it counted is not known",
+            );
+        }
+        if self.run.is_null() {
+            lack("no readable run.json: machine and command line are not known");
+        }
+        if self.controllers.is_empty() {
+            lack("no readable controller*.json: what the controllers counted is not known");
+        }
+        if self.logged.is_empty() {
+            lack("no readable *.hlog: percentiles are those of the summaries, without histogram and maxima");
+        }
+        if !self.whole {
+            lack(
+                "no *-timing.csv (run with --full-timing): no one-way latencies, and late cycles are known \
+                 only from the flight recorder",
+            );
+        }
+    }
+
+    /// When the run began, s since 1970; nothing when it is not told.
+    #[must_use]
+    pub fn started_unix_s(&self) -> Option<f64> {
+        self.run["started_unix_s"].as_f64()
+    }
+
+    /// How long it was, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        let told = self.summary["cycles"].as_u64().map(|cycles| cycles as f64 * 1e-3);
+        told.unwrap_or(self.logged_until_s)
+    }
+
+    /// `summary.json` and each `controller*.json`, by process.
+    pub fn reports(&self) -> impl Iterator<Item = (&str, &Value)> {
+        let emulator = std::iter::once(("emulator", &self.summary));
+        emulator.chain(self.controllers.iter().map(|(process, told)| (process.as_str(), told)))
+    }
+
+    /// What each process was granted for real time.
+    pub fn granted(&self) -> impl Iterator<Item = (&str, Vec<&str>)> {
+        let emulator = (!self.run.is_null()).then(|| ("emulator", words_of(&self.run)));
+        emulator
+            .into_iter()
+            .chain(self.controllers.iter().map(|(process, told)| (process.as_str(), words_of(told))))
+    }
+}
+
+fn words_of(told: &Value) -> Vec<&str> {
+    told["realtime_granted"].as_array().into_iter().flatten().filter_map(Value::as_str).collect()
+}

@@ -1,0 +1,181 @@
+//! HdrHistogram interval logs: read with their tags and times, and written for other tools.
+//!
+//! A log names its base time once and then holds a line for each interval: tag, start, length, largest value, histogram.
+//! A killed process leaves a last line without its end; it is left out, the others stand.
+//!
+//! # Source
+//! HdrHistogram, <https://hdrhistogram.org>: interval log, format version 1.3 with tags; histograms in encoding V2, deflated,
+//! in base64.
+
+use super::samples::Samples;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use hdrhistogram::Histogram;
+use hdrhistogram::serialization::interval_log::{
+    IntervalLogHistogram, IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry,
+    Tag,
+};
+use hdrhistogram::serialization::{Deserializer, V2DeflateSerializer};
+use std::io::{self, Write};
+use std::time::{Duration, SystemTime};
+
+/// A histogram of a stretch of time.
+#[derive(Clone, Debug)]
+pub struct Interval {
+    /// Name of the distribution.
+    pub tag: String,
+    /// Start, s from the log's base time.
+    pub start_s: f64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// The samples.
+    pub samples: Samples,
+}
+
+/// An interval log that is damaged at a line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {reason}")]
+pub struct LogError {
+    /// Line, from 1.
+    pub line: usize,
+    /// What is wrong.
+    pub reason: String,
+}
+
+/// A histogram of a stretch of time, as it is read: gone when the next one comes, since an hour of them would fill the memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Passing<'a> {
+    /// Name of the distribution.
+    pub tag: &'a str,
+    /// Start, s from the log's base time.
+    pub start_s: f64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// The samples.
+    pub histogram: &'a Histogram<u64>,
+}
+
+/// Hands each interval of a log to `take`.
+///
+/// # Errors
+/// [`LogError`] at the first line that is no interval; those before it were handed out.
+pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogError> {
+    let mut deserializer = Deserializer::new();
+    let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+    for (place, line) in whole.split_inclusive('\n').enumerate() {
+        let failed = |reason: String| LogError { line: place + 1, reason };
+        for entry in IntervalLogIterator::new(line.as_bytes()) {
+            match entry {
+                Ok(LogEntry::Interval(told)) => {
+                    let histogram = decode(&told, &mut deserializer).map_err(failed)?;
+                    take(Passing {
+                        tag: told.tag().map_or("", |tag| tag.as_str()),
+                        start_s: told.start_timestamp().as_secs_f64(),
+                        duration_s: told.duration().as_secs_f64(),
+                        histogram: &histogram,
+                    });
+                }
+                Ok(_) => {}
+                Err(_) => return Err(failed("neither an interval nor a comment".into())),
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Reads a log of few intervals.
+///
+/// # Errors
+/// As [`each`].
+pub fn read(text: &str) -> Result<Vec<Interval>, LogError> {
+    let mut intervals = Vec::new();
+    each(text, |Passing { tag, start_s, duration_s, histogram }| {
+        let samples = Samples::from_histogram(histogram);
+        intervals.push(Interval { tag: tag.to_owned(), start_s, duration_s, samples });
+    })?;
+    Ok(intervals)
+}
+
+fn decode(
+    told: &IntervalLogHistogram<'_>,
+    deserializer: &mut Deserializer,
+) -> Result<Histogram<u64>, String> {
+    let bytes = STANDARD.decode(told.encoded_histogram()).map_err(|error| error.to_string())?;
+    deserializer.deserialize(&mut bytes.as_slice()).map_err(|error| error.to_string())
+}
+
+/// Writes intervals, in the order given, as a log with this base time in s since 1970.
+///
+/// # Errors
+/// What `out` says; [`io::ErrorKind::InvalidInput`] for a tag or a time that a log cannot hold.
+pub fn write<'a>(
+    out: &mut impl Write,
+    base_unix_s: f64,
+    intervals: impl IntoIterator<Item = &'a Interval>,
+) -> io::Result<()> {
+    let base = SystemTime::UNIX_EPOCH + seconds(base_unix_s)?;
+    let mut serializer = V2DeflateSerializer::new();
+    let mut log = IntervalLogWriterBuilder::new()
+        .add_comment("[Histogram log format version 1.3]")
+        .add_comment("[Values are nanoseconds]")
+        .with_start_time(base)
+        .with_base_time(base)
+        .begin_log_with(out, &mut serializer)?;
+    for Interval { tag, start_s, duration_s, samples } in intervals {
+        let named =
+            Tag::new(tag).filter(|tag| !tag.is_empty()).ok_or_else(|| invalid(format!("tag {tag:?}")))?;
+        let (start, length) = (seconds(*start_s)?, seconds(*duration_s)?);
+        log.write_histogram(samples.histogram(), start, length, Some(named)).map_err(
+            |error| match error {
+                IntervalLogWriterError::IoError(error) => error,
+                IntervalLogWriterError::SerializeError(error) => io::Error::other(error),
+            },
+        )?;
+    }
+    Ok(())
+}
+
+fn seconds(seconds: f64) -> io::Result<Duration> {
+    Duration::try_from_secs_f64(seconds).map_err(|error| invalid(format!("{seconds} s: {error}")))
+}
+
+fn invalid(message: String) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn interval(tag: &str, start_s: f64, values_ns: &[u64]) -> Interval {
+        Interval { tag: tag.into(), start_s, duration_s: 1.0, samples: values_ns.iter().copied().collect() }
+    }
+
+    fn log() -> String {
+        let mut out = Vec::new();
+        let parts = [interval("a", 0.0, &[5, 5, 90_000]), interval("b", 1.5, &[1_000_000_000])];
+        write(&mut out, 1e9, &parts).unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn a_log_reads_back_with_equal_counts_and_times() {
+        let read = read(&log()).unwrap();
+        let counts: Vec<_> =
+            read.iter().map(|part| (part.tag.as_str(), part.start_s, part.samples.count())).collect();
+        assert_eq!(counts, [("a", 0.0, 3), ("b", 1.5, 1)]);
+        assert_eq!(read[0].samples.histogram().count_at(5), 2);
+        assert_eq!(read[0].samples.histogram().count_at(90_000), 1);
+    }
+
+    #[test]
+    fn a_half_line_is_left_out_and_a_damaged_one_is_named() {
+        let text = log();
+        assert_eq!(read(&text[..text.len() - 9]).unwrap().len(), 1);
+        let lines: Vec<_> = text.lines().collect();
+        let place = lines.iter().position(|line| line.starts_with("Tag=a")).unwrap() + 1;
+        for damaged in [text.replace("Tag=a,0.000", "Tag=a,zero"), text.replacen("HISTF", "HIST*", 1)] {
+            assert_eq!(read(&damaged).unwrap_err().line, place, "{damaged}");
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Groups of runs side by side, and the bounds of a threshold file.
+
+use super::markup::{Cell, Table, none, number, paragraph, words as text};
+use super::words::{self, NOTHING};
+use crate::report::model::{BoundResult, Comparison, ComparisonCell};
+
+/// The groups with their changes against the first.
+pub(super) fn comparison(comparison: Option<&Comparison>) -> String {
+    let Some((comparison, (first, others))) =
+        comparison.and_then(|comparison| Some((comparison, comparison.groups.split_first()?)))
+    else {
+        return none("Nothing was compared: the runs are of one group.");
+    };
+    let mut head = vec!["median of the runs, µs".to_owned(), first.clone()];
+    for group in others {
+        head.extend([group.clone(), "change".to_owned(), "beyond the noise?".to_owned()]);
+    }
+    let mut table = Table::new("Comparison", head);
+    for row in &comparison.rows {
+        let mut cells = vec![text(&row.figure)];
+        for (place, cell) in row.cells.iter().enumerate() {
+            cells.push(number(median(cell)));
+            if place > 0 {
+                cells.push(number(cell.change_percent.map_or_else(|| NOTHING.into(), words::change)));
+                cells.push(text(noise(cell.beyond_noise)));
+            }
+        }
+        table.row(cells);
+    }
+    let said = format!(
+        "In brackets the least and the largest of the group's runs. Changes are against {first}. A change is beyond the noise \
+         when repeated runs of one group do not differ that much among themselves."
+    );
+    format!("{}{}", paragraph(&said), table.html_or("No figure was measured in these groups."))
+}
+
+fn median(cell: &ComparisonCell) -> String {
+    let (least, largest) = cell.range_ns;
+    format!("{} ({} – {})", words::in_us(cell.median_ns), words::in_us(least), words::in_us(largest))
+}
+
+fn noise(beyond: Option<bool>) -> &'static str {
+    match beyond {
+        Some(true) => "beyond",
+        Some(false) => "within",
+        None => "too few runs to tell",
+    }
+}
+
+/// The bounds, kept or broken.
+pub(super) fn bounds(bounds: &[BoundResult]) -> String {
+    let mut table = Table::new("Bounds", ["figure", "value", "at least", "at most", "verdict"]);
+    let told = |value: Option<f64>| value.map_or_else(|| NOTHING.into(), words::short);
+    for bound in bounds {
+        let value = if bound.value.is_some() { told(bound.value) } else { "not measured".into() };
+        let verdict = if bound.kept { "kept" } else { "broken" };
+        table.row([
+            text(&bound.figure),
+            number(value),
+            number(told(bound.min)),
+            number(told(bound.max)),
+            Cell::Judged(bound.kept, verdict.into()),
+        ]);
+    }
+    table.html_or("No threshold file was given.")
+}

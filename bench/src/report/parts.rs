@@ -1,0 +1,116 @@
+//! The runs one by one: counts, arrivals, and where each came from.
+
+use super::distributions::percentiles;
+use super::files::RunFiles;
+use super::findings;
+use super::model::{ArrivalRow, PercentilesNs, RunPart};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Group of a run that says none.
+const NO_GROUP: &str = "all";
+
+/// A run's part of the report.
+#[must_use]
+pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String, PercentilesNs>) -> RunPart {
+    let told_group = run.conditions["group"].as_str();
+    RunPart {
+        folder: run.folder.display().to_string(),
+        group: group.or(told_group).unwrap_or(NO_GROUP).to_owned(),
+        started_unix_s: run.started_unix_s().unwrap_or_default(),
+        duration_s: run.duration_s(),
+        counts: counts(run),
+        percentiles_ns,
+        arrivals: arrivals(run),
+        passed: run.summary["passed"].as_bool().unwrap_or_default(),
+        lacks: run.lacks.clone(),
+    }
+}
+
+/// Counts of the summary by their keys, nested ones joined by points; those of a controller begin with its name.
+fn counts(run: &RunFiles) -> BTreeMap<String, u64> {
+    const NO_COUNTS: [&str; 3] = ["schema_version", "thresholds", "figures"];
+    let mut counts = BTreeMap::new();
+    for (process, told) in run.reports() {
+        let prefix = if process == "emulator" { String::new() } else { format!("{process}.") };
+        for (key, value) in told.as_object().into_iter().flatten() {
+            // Percentiles are no counts, and what joining copied from the controllers' own files stands there.
+            let copied =
+                process == "emulator" && ["axes", "controller", "controllers"].contains(&key.as_str());
+            if !key.ends_with("_ns") && !NO_COUNTS.contains(&key.as_str()) && !copied {
+                add(&mut counts, &format!("{prefix}{key}"), value);
+            }
+        }
+    }
+    if !run.summary.is_null() || !run.controllers.is_empty() {
+        counts.insert("frames_lost_by_gaps".into(), findings::lost_by_gaps(run));
+    }
+    counts
+}
+
+fn add(counts: &mut BTreeMap<String, u64>, name: &str, value: &Value) {
+    match value {
+        Value::Number(number) => counts.extend(number.as_u64().map(|count| (name.to_owned(), count))),
+        Value::Object(parts) => parts
+            .iter()
+            .filter(|(key, _)| !key.ends_with("_ns"))
+            .for_each(|(key, value)| add(counts, &format!("{name}.{key}"), value)),
+        _ => {}
+    }
+}
+
+fn arrivals(run: &RunFiles) -> Vec<ArrivalRow> {
+    let mut rows = Vec::new();
+    for (receiver, told) in run.reports() {
+        for row in told["arrivals"].as_array().into_iter().flatten() {
+            let count = |key: &str| row[key].as_u64().unwrap_or_default();
+            rows.push(ArrivalRow {
+                receiver: receiver.to_owned(),
+                frame: row["frame"].as_str().unwrap_or("?").to_owned(),
+                period_ms: count("period_ms"),
+                count: count("count"),
+                gaps: count("gaps"),
+                bursts: count("bursts"),
+                interval_ns: percentiles(&row["interval_ns"]).unwrap_or_default(),
+            });
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::made_up;
+    use serde_json::json;
+
+    #[test]
+    fn counts_keep_their_keys_and_percentiles_are_none() {
+        let mut run = made_up::run(50);
+        run.summary["wakeup_ns"] = json!({ "p50": 3, "count": 50 });
+        run.summary["vitals"] = json!({ "minor_faults": 4, "run_delay_ns": 5 });
+        let told = part(&run, None, BTreeMap::new());
+        assert_eq!(told.counts["cycles"], 50);
+        assert_eq!(told.counts["vitals.minor_faults"], 4);
+        assert_eq!(told.counts["controller.axes.drive.sensors_lost"], 0);
+        assert!(!told.counts.keys().any(|key| key.ends_with("_ns")));
+        assert_eq!((told.group.as_str(), told.passed), ("a", true));
+        assert_eq!(part(&run, Some("b"), BTreeMap::new()).group, "b");
+    }
+
+    #[test]
+    fn arrivals_of_all_receivers_are_listed() {
+        let mut run = made_up::run(50);
+        let row = |frame: &str| {
+            json!([{ "frame": frame, "period_ms": 1, "count": 49, "gaps": 2, "bursts": 1,
+            "interval_ns": { "p50": 1_000_000, "max": 2_000_000, "count": 49 } }])
+        };
+        run.summary["arrivals"] = row("DriveValveCommand");
+        run.controllers.get_mut("controller").unwrap()["arrivals"] = row("DriveSensors");
+        let told = arrivals(&run);
+        let names: Vec<_> =
+            told.iter().map(|row| (row.receiver.as_str(), row.frame.as_str(), row.gaps)).collect();
+        assert_eq!(names, [("emulator", "DriveValveCommand", 2), ("controller", "DriveSensors", 2)]);
+        assert_eq!(told[0].interval_ns.p50, Some(1_000_000));
+    }
+}

@@ -1,0 +1,122 @@
+//! cyclictest's `--json`: the reference that was measured on the same machine, in the same session.
+//!
+//! Without `-N` cyclictest counts whole us and leaves out the fraction: what it calls 13 lies between 13.0 and 13.999 us. It is
+//! taken as 13.0 us here, which flatters the reference and never us. Samples beyond its histogram (`-h`) are only counted:
+//! they are taken as its largest sample, which none of them exceeds.
+//!
+//! # Source
+//! rt-tests 2.4 as Debian 12 ships it: keys `cmdline:` and `thread`, with `histogram`, `cycles`, `max` in each; read from a
+//! file it wrote. `resolution_in_ns` is 1 with `-N`, else 0.
+
+use super::samples::Samples;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// The tag of the reference's wake-up latency.
+pub const TAG: &str = "cyclictest";
+
+/// A run of cyclictest.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// How it was started.
+    pub command_line: String,
+    /// Whether its samples are whole us.
+    pub whole_us: bool,
+    /// Wake-up latencies of all its threads.
+    pub samples: Samples,
+    /// Samples that its histogram did not hold.
+    pub beyond_histogram: u64,
+}
+
+#[derive(Deserialize)]
+struct File {
+    #[serde(rename = "cmdline:", alias = "cmdline", default)]
+    command_line: String,
+    #[serde(default)]
+    resolution_in_ns: u64,
+    thread: BTreeMap<String, Thread>,
+}
+
+#[derive(Deserialize)]
+struct Thread {
+    #[serde(default)]
+    histogram: BTreeMap<String, u64>,
+    cycles: u64,
+    max: u64,
+}
+
+/// What keeps a reference from being read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReferenceError {
+    /// No such JSON.
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    /// A bin that is no number.
+    #[error("histogram: bin \"{0}\" is no whole number")]
+    Bin(String),
+    /// Started without `-h`.
+    #[error("it holds no histogram: start cyclictest with -h")]
+    NoHistogram,
+}
+
+/// Reads what cyclictest wrote.
+///
+/// # Errors
+/// [`ReferenceError`].
+pub fn read(text: &str) -> Result<Reference, ReferenceError> {
+    let file: File = serde_json::from_str(text)?;
+    let whole_us = file.resolution_in_ns != 1;
+    let to_ns = if whole_us { 1000 } else { 1 };
+    let mut samples = Samples::default();
+    let mut beyond_histogram = 0;
+    for thread in file.thread.values() {
+        let mut held = 0;
+        for (bin, count) in &thread.histogram {
+            let value: u64 = bin.parse().map_err(|_| ReferenceError::Bin(bin.clone()))?;
+            samples.record(value.saturating_mul(to_ns), *count);
+            held += count;
+        }
+        if held == 0 {
+            return Err(ReferenceError::NoHistogram);
+        }
+        let beyond = thread.cycles.saturating_sub(held);
+        samples.record(thread.max.saturating_mul(to_ns), beyond);
+        beyond_histogram += beyond;
+    }
+    if samples.count() == 0 {
+        return Err(ReferenceError::NoHistogram);
+    }
+    Ok(Reference { command_line: file.command_line, whole_us, samples, beyond_histogram })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(resolution: u64, thread: &str) -> String {
+        format!(
+            r#"{{"cmdline:": "cyclictest -p 80", "resolution_in_ns": {resolution}, "thread": {{"0": {thread}}}}}"#
+        )
+    }
+
+    #[test]
+    fn both_resolutions_are_ns_here() {
+        let thread =
+            r#"{"histogram": {"12": 3, "13": 222}, "cycles": 226, "min": 12, "max": 7939, "avg": 13.1}"#;
+        let told = read(&text(0, thread)).unwrap();
+        assert!(told.whole_us);
+        assert_eq!((told.samples.count(), told.beyond_histogram), (226, 1));
+        assert_eq!(told.samples.percentiles_ns().p50.unwrap() / 1000, 13);
+        assert!(told.samples.max_ns().unwrap() >= 7_939_000);
+        let fine = read(&text(1, &thread.replace("7939", "13"))).unwrap();
+        assert!(!fine.whole_us);
+        assert_eq!(fine.samples.percentiles_ns().p50, Some(13));
+    }
+
+    #[test]
+    fn a_reference_without_histogram_says_what_to_do() {
+        let told = read(&text(0, r#"{"cycles": 5, "min": 1, "max": 2, "avg": 1.0}"#)).unwrap_err();
+        assert!(told.to_string().contains("-h"), "{told}");
+        assert!(read("{").unwrap_err().to_string().contains("line 1"));
+    }
+}

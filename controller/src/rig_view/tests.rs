@@ -1,0 +1,191 @@
+//! Cycles, losses, late frames and duplicates, as a rig would send them.
+
+use super::*;
+
+fn tick(cycle: u32, skipped: u16) -> Tick {
+    Tick { cycle, skipped, ..Tick::default() }
+}
+
+fn sensors(cycle: u64) -> Sensors {
+    // Their noise tells the frames of two cycles apart.
+    Sensors { alive: (cycle % 16) as u8, position_m: cycle as f64, ..Sensors::default() }
+}
+
+/// Plays the rig's frames of `cycles`, without those that `lost` names.
+fn play(view: &mut RigView, cycles: std::ops::Range<u64>, lost: &[u64]) {
+    for cycle in cycles {
+        for axis in Axis::ALL {
+            if !lost.contains(&cycle) {
+                view.take_sensors(axis, sensors(cycle));
+            }
+        }
+        if cycle % 10 == 0 {
+            view.take_tick(&tick(cycle as u32, 0));
+        }
+    }
+}
+
+#[test]
+fn sensors_without_a_tick_have_no_cycle() {
+    let mut view = RigView::default();
+    view.take_sensors(Axis::Drive, sensors(7));
+    assert!(view.fresh_sensors(Axis::Drive).is_none());
+}
+
+#[test]
+fn each_frame_has_its_cycle_and_is_fresh_once() {
+    let mut view = RigView::default();
+    play(&mut view, 5000..5011, &[]);
+    assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 5010);
+    assert!(view.fresh_sensors(Axis::Drive).is_none());
+    view.take_sensors(Axis::Drive, sensors(5013));
+    assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 5013);
+    assert_eq!(view.fresh_sensors(Axis::Load).unwrap().0, 5010, "the load's frame is an older one");
+}
+
+#[test]
+fn lost_frames_are_counted_exactly() {
+    let mut view = RigView::default();
+    play(&mut view, 0..1001, &[3, 15, 16, 17, 500]);
+    assert_eq!(view.lost(), PerAxis { drive: 5, load: 5 });
+}
+
+#[test]
+fn a_late_frame_is_counted_and_answered_by_nobody() {
+    let mut view = RigView::default();
+    play(&mut view, 0..98, &[95]);
+    let _ = view.fresh_sensors(Axis::Drive);
+    view.take_sensors(Axis::Drive, sensors(95));
+    assert!(view.fresh_sensors(Axis::Drive).is_none());
+    assert_eq!((view.cycle(), view.late()), (Some(97), PerAxis { drive: 1, load: 0 }));
+    play(&mut view, 98..201, &[]);
+    assert_eq!(view.lost(), PerAxis { drive: 0, load: 1 }, "what came late did come");
+}
+
+#[test]
+fn a_frame_later_than_the_tick_that_missed_it_is_not_lost_in_the_end() {
+    let mut view = RigView::default();
+    play(&mut view, 0..101, &[99]);
+    assert_eq!(view.lost().drive, 1);
+    view.take_sensors(Axis::Drive, sensors(99));
+    play(&mut view, 101..151, &[]);
+    assert_eq!((view.lost(), view.late().drive), (PerAxis { drive: 0, load: 1 }, 1));
+}
+
+#[test]
+fn a_duplicate_is_counted_and_hides_no_loss() {
+    let mut view = RigView::default();
+    play(&mut view, 0..98, &[93]);
+    let _ = view.fresh_sensors(Axis::Load);
+    for again in [97, 96, 97] {
+        view.take_sensors(Axis::Load, sensors(again));
+    }
+    assert!(view.fresh_sensors(Axis::Load).is_none());
+    play(&mut view, 98..201, &[]);
+    assert_eq!((view.duplicate(), view.late()), (PerAxis { drive: 0, load: 3 }, PerAxis::default()));
+    assert_eq!(view.lost(), PerAxis { drive: 1, load: 1 });
+}
+
+#[test]
+fn a_gap_after_which_the_counter_is_behind_is_no_late_frame() {
+    for gap in 13..=17 {
+        let mut view = RigView::default();
+        play(&mut view, 0..100, &[]);
+        view.take_sensors(Axis::Drive, sensors(99 + gap));
+        assert_eq!((view.late(), view.duplicate()), (PerAxis::default(), PerAxis::default()), "{gap}");
+        assert!(view.fresh_sensors(Axis::Drive).is_some());
+    }
+}
+
+#[test]
+fn more_lost_frames_than_the_counter_can_tell_are_found_by_the_tick() {
+    let mut view = RigView::default();
+    let lost: Vec<u64> = (101..148).collect();
+    play(&mut view, 0..201, &lost);
+    assert_eq!(view.lost().drive, 47);
+}
+
+#[test]
+fn skipped_cycles_are_not_lost() {
+    let mut view = RigView::default();
+    play(&mut view, 0..101, &[]);
+    view.take_tick(&Tick { catch_up: true, ..tick(151, 50) });
+    play_with_skipped(&mut view, 151..201, 50);
+    assert_eq!((view.lost().drive, view.skipped()), (0, 50));
+    view.take_sensors(Axis::Drive, sensors(201));
+    assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 201);
+}
+
+fn play_with_skipped(view: &mut RigView, cycles: std::ops::Range<u64>, skipped: u16) {
+    for cycle in cycles {
+        Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
+        if cycle % 10 == 0 {
+            view.take_tick(&tick(cycle as u32, skipped));
+        }
+    }
+}
+
+#[test]
+fn a_stall_of_more_cycles_than_the_tick_can_count_loses_nothing() {
+    let mut view = RigView::default();
+    play(&mut view, 0..101, &[]);
+    let skipped = (100_000 % SKIPPED_RANGE) as u16;
+    view.take_tick(&Tick { catch_up: true, ..tick(100_101, skipped) });
+    play_with_skipped(&mut view, 100_101..100_201, skipped);
+    assert_eq!((view.lost().drive, view.skipped()), (0, 100_000));
+}
+
+#[test]
+fn the_cycle_goes_on_when_the_ticks_counter_wraps() {
+    let mut view = RigView::default();
+    let last = u64::from(u32::MAX);
+    view.take_tick(&tick(u32::MAX - 5, 0));
+    (last - 4..=last + 5).for_each(|cycle| {
+        Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
+    });
+    assert_eq!(view.take_tick(&tick(4, 0)), TickNews::Usual);
+    assert_eq!((view.fresh_sensors(Axis::Drive).unwrap().0, view.lost().drive), (last + 5, 0));
+}
+
+#[test]
+fn an_emergency_stop_of_the_old_rig_is_not_the_new_ones() {
+    let mut view = RigView::default();
+    play(&mut view, 0..5001, &[]);
+    view.take_status(RigStatus { emergency_stop: true, ..RigStatus::default() });
+    view.take_tick(&tick(0, 0));
+    assert!(view.status().is_none());
+}
+
+#[test]
+fn a_status_holds_for_a_hundred_cycles() {
+    let mut view = RigView::default();
+    view.take_status(RigStatus::default());
+    // The first time that is known: what came before it is as new.
+    view.take_tick(&tick(5000, 0));
+    assert!(view.status().is_some());
+    play(&mut view, 5001..5101, &[]);
+    assert!(view.status().is_some(), "in cycle {:?}", view.cycle());
+    view.take_sensors(Axis::Drive, sensors(5101));
+    assert!(view.status().is_none());
+    view.take_status(RigStatus::default());
+    assert!(view.status().is_some());
+}
+
+#[test]
+fn the_ending_tick_settles_the_last_frames() {
+    let mut view = RigView::default();
+    play(&mut view, 0..98, &[95]);
+    let news = view.take_tick(&Tick { ending: true, ..tick(98, 0) });
+    assert_eq!((news, view.lost().drive), (TickNews::Ending, 1));
+}
+
+#[test]
+fn a_rig_that_starts_anew_is_noticed_and_loses_nothing() {
+    let mut view = RigView::default();
+    play(&mut view, 0..5001, &[]);
+    view.take_sensors(Axis::Drive, sensors(0));
+    assert_eq!(view.take_tick(&tick(0, 0)), TickNews::Restarted);
+    play(&mut view, 1..101, &[]);
+    assert_eq!(view.lost(), PerAxis::default());
+    assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 100);
+}

@@ -1,0 +1,259 @@
+//! When everything of a cycle happened, as the 1 ms path stamps it; nothing of it runs in lockstep or in a rehearsal.
+//!
+//! ```text
+//!   sensors arrive ── woke ── take(frame)* ── step ── send* ── done        one wake-up
+//!        due                    receive      the rest  in bus.send
+//! ```
+//!
+//! A row is a cycle that was answered. One process for both axes may wake twice for it, since the load's sensors follow the
+//! drive's. Then the lengths of both wake-ups add up in one row, and `done` stands where it would be without the wait in between,
+//! which is the rig's and no work of ours; `command_ns` of the load tells when it was really answered. So receive, step and send
+//! are the whole of `done - woke`.
+//!
+//! Sensors that were overtaken by newer ones before anybody woke are in no row, save as its `skipped`. So that a stall shows
+//! with everything that waited, the waiting of each such frame of the axis that wakes us is handed over by itself.
+//!
+//! What arrived before the loop began to wait was not late: a cycle is due then at the earliest, and sensors from before are
+//! counted apart.
+//!
+//! This side stamps and hands over; the recorder's thread ([`ledger`]) does the rest. Nothing here allocates, locks, prints or
+//! blocks.
+
+pub mod ledger;
+pub mod setup;
+mod timed_bus;
+
+use crossbeam_channel::Sender;
+use plant::Axis;
+use protocol::bus::Bus;
+use protocol::can::CanFrame;
+use protocol::timing::{CycleTiming, Exchange, Vitals};
+use realtime::Clock;
+pub use timed_bus::TimedBus;
+
+/// Cycles that an answer may be older than the newest one and still belong to the same rig; below, the rig began anew.
+const SAME_RIG: u64 = 16;
+
+/// What was measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measured {
+    /// Sensors of the axis that wakes us that begin no row.
+    Waited {
+        /// When they arrived at our queue, ns.
+        arrived_ns: u64,
+        /// When we woke, ns.
+        woke_ns: u64,
+    },
+    /// A cycle that was answered.
+    Cycle(CycleTiming),
+}
+
+/// A frame that came or went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Passed {
+    /// When it arrived or was handed over, ns.
+    pub stamp_ns: u64,
+    /// The frame.
+    pub frame: CanFrame,
+    /// Whether it is one of ours.
+    pub sent: bool,
+}
+
+/// The queues to the recorder's thread.
+pub struct Outlets {
+    /// Rows and waits.
+    pub measured: Sender<Measured>,
+    /// Frames.
+    pub frames: Sender<Passed>,
+}
+
+/// What a stopwatch counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StopwatchAccount {
+    /// Stamps and frames that found no room in a queue.
+    pub dropped: u64,
+    /// Sensors of the axis that wakes us that had arrived before the loop began.
+    pub before_start: u64,
+}
+
+/// What of a wake-up is not in a row yet.
+#[derive(Clone, Copy, Default)]
+struct WakeUp {
+    woke_ns: u64,
+    received_ns: u64,
+    /// Summed over the frames sent.
+    send_ns: u64,
+    /// When the command of each axis was handed over; 0: not.
+    handed_ns: [u64; 2],
+}
+
+/// Stamps wake-ups and puts the rows together.
+pub struct Stopwatch<C> {
+    clock: C,
+    own: [bool; 2],
+    wakes: Axis,
+    outlets: Outlets,
+    account: StopwatchAccount,
+    /// When the loop began to wait.
+    began_ns: u64,
+    wake_up: WakeUp,
+    /// Arrival of the newest sensors of each own axis; 0: they are answered.
+    arrived_ns: [u64; 2],
+    /// The newest sensors of the axis that wakes us, until they are in a row.
+    waiting: Option<Measured>,
+    pending: Option<CycleTiming>,
+    newest: Option<u64>,
+}
+
+impl<C: Clock + Send> Stopwatch<C> {
+    /// A stopwatch for a process with these axes, the first of which wakes it.
+    ///
+    /// # Panics
+    /// Without axes: no process has none.
+    #[must_use]
+    pub fn new(clock: C, axes: &[Axis], outlets: Outlets) -> Self {
+        let wakes = *axes.first().expect("a process controls an axis");
+        let own = Axis::ALL.map(|axis| axes.contains(&axis));
+        Self {
+            clock,
+            own,
+            wakes,
+            outlets,
+            account: StopwatchAccount::default(),
+            began_ns: 0,
+            wake_up: WakeUp::default(),
+            arrived_ns: [0; 2],
+            waiting: None,
+            pending: None,
+            newest: None,
+        }
+    }
+
+    /// The loop begins to wait for frames.
+    pub fn begin(&mut self) {
+        self.began_ns = self.now_ns();
+    }
+
+    /// The thread woke.
+    pub fn woke(&mut self) {
+        self.wake_up = WakeUp { woke_ns: self.now_ns(), ..WakeUp::default() };
+    }
+
+    /// A frame was taken that had arrived at `stamp_ns`; `sensors` tells whose sensors it was.
+    pub fn took(&mut self, frame: &CanFrame, stamp_ns: u64, sensors: Option<Axis>) {
+        self.hand_over_frame(Passed { stamp_ns, frame: *frame, sent: false });
+        let Some(axis) = sensors.filter(|axis| self.own[axis.index()]) else { return };
+        self.arrived_ns[axis.index()] = stamp_ns;
+        if axis == self.wakes && stamp_ns < self.began_ns {
+            self.account.before_start += 1;
+        } else if axis == self.wakes {
+            let waited = Measured::Waited { arrived_ns: stamp_ns, woke_ns: self.wake_up.woke_ns };
+            if let Some(overtaken) = self.waiting.replace(waited) {
+                self.hand_over(overtaken);
+            }
+        }
+    }
+
+    /// All frames were taken.
+    pub fn took_all(&mut self) {
+        self.wake_up.received_ns = self.now_ns();
+    }
+
+    /// The bus to answer on.
+    pub fn bus<'a>(&'a mut self, bus: &'a mut dyn Bus) -> TimedBus<'a, C> {
+        TimedBus::new(self, bus)
+    }
+
+    /// The axes answered these cycles. When that made a row whole, `vitals` is asked what the kernel counted since it was asked
+    /// last.
+    pub fn answered(&mut self, cycles: [Option<u64>; 2], vitals: impl FnOnce() -> Vitals) {
+        if cycles == [None; 2] {
+            return;
+        }
+        let done_ns = self.now_ns();
+        // After a stall the drive may be a cycle ahead of the load.
+        let ahead = matches!(cycles, [Some(drive), Some(load)] if load < drive);
+        for axis in if ahead { [Axis::Load, Axis::Drive] } else { Axis::ALL } {
+            if let Some(cycle) = cycles[axis.index()] {
+                self.put_into_row(axis, cycle);
+            }
+        }
+        let WakeUp { woke_ns, received_ns, send_ns, .. } = self.wake_up;
+        if let Some(row) = &mut self.pending {
+            row.receive_ns += received_ns.saturating_sub(woke_ns);
+            row.send_ns += send_ns;
+            row.step_ns += done_ns.saturating_sub(received_ns).saturating_sub(send_ns);
+            row.done_ns = row.woke_ns + row.receive_ns + row.step_ns + row.send_ns;
+            let missing = [row.drive, row.load].map(|exchange| exchange.sensors_ns == 0);
+            if self.own.iter().zip(missing).all(|(own, missing)| !own || !missing) {
+                row.vitals = vitals();
+                self.flush();
+            }
+        }
+    }
+
+    fn put_into_row(&mut self, axis: Axis, cycle: u64) {
+        let waited = if axis == self.wakes { self.waiting.take() } else { None };
+        let begins = self.pending.is_none_or(|row| row.cycle != cycle);
+        let arrived_ns = std::mem::take(&mut self.arrived_ns[axis.index()]);
+        let handed_ns = self.wake_up.handed_ns[axis.index()];
+        let older = self.newest.is_some_and(|newest| cycle <= newest && newest - cycle < SAME_RIG);
+        if let Some(waited) = waited.filter(|_| !begins || older) {
+            self.hand_over(waited);
+        }
+        if begins {
+            if older {
+                // Its row has gone: the other axis was a cycle ahead.
+                return;
+            }
+            self.flush();
+            let skipped = self.newest.map_or(0, |newest| cycle.saturating_sub(newest + 1));
+            self.newest = Some(cycle);
+            let due_ns = arrived_ns.max(self.began_ns);
+            // Sensors that arrive while others are being taken wait for nobody.
+            let woke_ns = self.wake_up.woke_ns.max(due_ns);
+            self.wake_up.woke_ns = woke_ns;
+            self.pending = Some(CycleTiming { cycle, skipped, due_ns, woke_ns, ..CycleTiming::default() });
+        }
+        if let Some(row) = &mut self.pending {
+            *exchange(row, axis) = Exchange { sensors_ns: arrived_ns, command_ns: handed_ns, answers: cycle };
+        }
+    }
+
+    /// Hands what is left over; nothing is measured any more.
+    pub fn finish(mut self) -> StopwatchAccount {
+        self.flush();
+        if let Some(waited) = self.waiting.take() {
+            self.hand_over(waited);
+        }
+        self.account
+    }
+
+    fn flush(&mut self) {
+        if let Some(row) = self.pending.take() {
+            self.hand_over(Measured::Cycle(row));
+        }
+    }
+
+    fn hand_over(&mut self, measured: Measured) {
+        self.account.dropped += u64::from(self.outlets.measured.try_send(measured).is_err());
+    }
+
+    fn hand_over_frame(&mut self, passed: Passed) {
+        self.account.dropped += u64::from(self.outlets.frames.try_send(passed).is_err());
+    }
+
+    fn now_ns(&self) -> u64 {
+        self.clock.now().as_nanos()
+    }
+}
+
+fn exchange(row: &mut CycleTiming, axis: Axis) -> &mut Exchange {
+    match axis {
+        Axis::Drive => &mut row.drive,
+        Axis::Load => &mut row.load,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,363 @@
+//! What was stamped, recorded: histograms second by second, the timing table, arrivals, the flight recorder.
+//!
+//! ```text
+//!   [measured] ──► StageAccount ──► controller.hlog        [frames] ──► arrivals of each cyclic frame
+//!              ──► controller-timing.csv, if asked for               ──► flight recorder's frames
+//!              ──► flight recorder's rows ── late, slow, overrun; a fault; SIGUSR1 ──► flight/controller-…/
+//! ```
+//!
+//! It belongs to the recorder's thread, which may wait for the disk. *Late* is the longest wait of sensors that ended with a
+//! wake-up, *slow* the work of a cycle. *Overrun* is a cycle that has no answer, be its sensors overtaken, lost, or
+//! never sent: how late we were ourselves says `late_ns` of the event.
+
+use super::{Measured, Passed};
+use crossbeam_channel::Receiver;
+use protocol::flight_dump::{self, Event, Log};
+use protocol::frames::{Frame, MessageSpec};
+use protocol::run_folder::LineFile;
+use protocol::timing::{CycleTiming, write_head, write_row};
+use realtime::flight::Dump;
+use realtime::{
+    ArrivalFigures, Arrivals, Clock, CycleStages, FlightRecorder, Freeze, Instant, IntervalLog,
+    MonotonicClock, Severity, StageAccount, StageFigures, Stamped, Trigger, VitalCounts, VitalTotals,
+};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Time from one cycle to the next.
+const PERIOD: Duration = Duration::from_millis(1);
+/// Start of a run that the totals of the vitals leave out: memory is touched for the first time.
+const WARM_UP_NS: u64 = 1_000_000_000;
+
+/// What a ledger is made of.
+pub struct LedgerSetup {
+    /// The run's folder.
+    pub folder: PathBuf,
+    /// Name of the process in files and tags.
+    pub process: String,
+    /// Whether every cycle is written.
+    pub full_timing: bool,
+    /// Longest wait and longest work that freeze no flight recorder; `None` without one.
+    pub flight_late: Option<Duration>,
+    /// How the frames of a dump are written.
+    pub log: Log,
+    /// Start of the run, s since 1970.
+    pub started_unix_s: f64,
+    /// The same on the clock of the stamps.
+    pub started: Instant,
+    /// Set by SIGUSR1.
+    pub freeze: Freeze,
+    /// Rows and waits.
+    pub measured: Receiver<Measured>,
+    /// Frames.
+    pub frames: Receiver<Passed>,
+}
+
+/// What a run's timing was, for its report.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimingFigures {
+    /// Percentiles of the stages.
+    #[serde(flatten)]
+    pub stages: StageFigures,
+    /// How regularly each cyclic frame came.
+    pub arrivals: Vec<ArrivalFigures>,
+    /// What the kernel counted after the first second.
+    pub vitals: VitalTotals,
+    /// What the flight recorder wrote.
+    pub flight: FlightFigures,
+}
+
+/// Account of a flight recorder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct FlightFigures {
+    /// Dumps in the folder.
+    pub dumps: u64,
+    /// Dumps that gave way to more severe ones, or were not written.
+    pub dropped: u64,
+}
+
+impl TimingFigures {
+    /// Of a run whose time is not real.
+    #[must_use]
+    pub fn none() -> Self {
+        Self {
+            stages: StageAccount::new("none", PERIOD).figures(),
+            arrivals: Vec::new(),
+            vitals: VitalTotals::default(),
+            flight: FlightFigures::default(),
+        }
+    }
+}
+
+/// A row in the ring, by the time at which the thread woke for it.
+struct Row(CycleTiming);
+
+impl Stamped for Row {
+    fn at_ns(&self) -> u64 {
+        self.0.woke_ns
+    }
+}
+
+impl Stamped for Passed {
+    fn at_ns(&self) -> u64 {
+        self.stamp_ns
+    }
+}
+
+/// A flight recorder and where its dumps go.
+struct Flight {
+    ring: FlightRecorder<Row, Passed>,
+    late_ns: u64,
+    newest_cycle: u64,
+    freeze: Freeze,
+    folder: PathBuf,
+    process: String,
+    log: Log,
+}
+
+/// Records what was measured.
+pub struct Ledger {
+    measured: Receiver<Measured>,
+    frames: Receiver<Passed>,
+    account: StageAccount,
+    table: Option<LineFile>,
+    arrivals: BTreeMap<u16, Arrivals>,
+    flight: Option<Flight>,
+    vitals: VitalTotals,
+    first_ns: Option<u64>,
+    /// Longest wait since the last row.
+    waited_ns: u64,
+}
+
+impl Ledger {
+    /// Makes the files.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn create(setup: LedgerSetup) -> io::Result<Self> {
+        let LedgerSetup { folder, process, log, freeze, .. } = setup;
+        let mut account = StageAccount::new(&process, PERIOD);
+        let hlog = folder.join(format!("{process}.hlog"));
+        account.log_to(IntervalLog::create(&hlog, setup.started_unix_s, setup.started)?);
+        let table = setup.full_timing.then(|| {
+            let mut table = LineFile::create(&folder.join(format!("{process}-timing.csv")))?;
+            write_head(table.lines())?;
+            Ok::<_, io::Error>(table)
+        });
+        let flight = setup.flight_late.map(|late| Flight {
+            ring: FlightRecorder::new(),
+            late_ns: late.as_nanos() as u64,
+            newest_cycle: 0,
+            freeze,
+            folder,
+            process,
+            log,
+        });
+        Ok(Self {
+            measured: setup.measured,
+            frames: setup.frames,
+            account,
+            table: table.transpose()?,
+            arrivals: BTreeMap::new(),
+            flight,
+            vitals: VitalTotals::default(),
+            first_ns: None,
+            waited_ns: 0,
+        })
+    }
+
+    /// Empties the queues, and writes what is over.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn look(&mut self) -> io::Result<()> {
+        self.empty_queues()?;
+        let now = MonotonicClock.now();
+        self.account.advance(now)?;
+        let Some(flight) = &mut self.flight else { return Ok(()) };
+        if flight.freeze.take() {
+            let cycle = flight.newest_cycle;
+            flight.ring.trigger(Trigger::other(Severity::Signal, cycle, now));
+            let folder = flight.folder.join(flight_dump::FOLDER);
+            eprintln!("controller: asked for the last seconds; they go to {}", folder.display());
+        }
+        flight.advance(now)
+    }
+
+    fn empty_queues(&mut self) -> io::Result<()> {
+        while let Ok(passed) = self.frames.try_recv() {
+            self.take_frame(passed);
+        }
+        while let Ok(measured) = self.measured.try_recv() {
+            match measured {
+                Measured::Waited { arrived_ns, woke_ns } => {
+                    let ns = woke_ns.saturating_sub(arrived_ns);
+                    self.waited_ns = self.waited_ns.max(ns);
+                    self.account.record_waited(ns);
+                }
+                Measured::Cycle(row) => self.take_row(row)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn take_frame(&mut self, passed: Passed) {
+        let spec = passed.frame.standard_id().and_then(MessageSpec::by_id);
+        let spec = spec.filter(|_| !passed.sent && Frame::decode(&passed.frame).is_ok());
+        if let Some((spec, period)) = spec.and_then(cyclic) {
+            let arrivals = self.arrivals.entry(spec.id).or_insert_with(|| Arrivals::new(spec.name, period));
+            arrivals.note(Instant::from_nanos(passed.stamp_ns));
+        }
+        if let Some(flight) = &mut self.flight {
+            flight.ring.frame(passed);
+        }
+    }
+
+    fn take_row(&mut self, row: CycleTiming) -> io::Result<()> {
+        let work_ns = row.done_ns.saturating_sub(row.woke_ns);
+        self.account.record(&CycleStages {
+            cycle: row.cycle,
+            // Sensors that were overtaken tell themselves how long they waited.
+            skipped: 0,
+            due_ns: row.due_ns,
+            woke_ns: row.woke_ns,
+            receive_ns: row.receive_ns,
+            step_ns: row.step_ns,
+            send_ns: row.send_ns,
+            done_ns: row.done_ns,
+        })?;
+        let first_ns = *self.first_ns.get_or_insert(row.woke_ns);
+        if row.woke_ns.saturating_sub(first_ns) > WARM_UP_NS {
+            self.vitals.add(&counts(&row));
+        }
+        if let Some(table) = &mut self.table {
+            write_row(table.lines(), &row)?;
+            table.write_when_full()?;
+        }
+        let waited_ns = std::mem::take(&mut self.waited_ns).max(row.woke_ns.saturating_sub(row.due_ns));
+        let Some(flight) = &mut self.flight else { return Ok(()) };
+        flight.take(row, waited_ns, work_ns)
+    }
+
+    /// An axis is in fault since `cycle`.
+    pub fn fault(&mut self, cycle: u64) {
+        if let Some(flight) = &mut self.flight {
+            flight.ring.trigger(Trigger::other(Severity::Fault, cycle, MonotonicClock.now()));
+        }
+    }
+
+    /// Writes the rows of the table out.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn write_out(&mut self) -> io::Result<()> {
+        self.table.as_mut().map_or(Ok(()), LineFile::write_out)
+    }
+
+    /// Writes all that is left.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn finish(&mut self) -> io::Result<()> {
+        self.empty_queues()?;
+        self.account.finish(MonotonicClock.now())?;
+        self.write_out()?;
+        self.flight.as_mut().map_or(Ok(()), Flight::finish)
+    }
+
+    /// The figures so far.
+    #[must_use]
+    pub fn figures(&self) -> TimingFigures {
+        let ring = self.flight.as_ref().map(|flight| &flight.ring);
+        TimingFigures {
+            stages: self.account.figures(),
+            arrivals: self.arrivals.values().map(Arrivals::figures).collect(),
+            vitals: self.vitals,
+            flight: ring.map_or(FlightFigures::default(), |ring| FlightFigures {
+                dumps: ring.dumps(),
+                dropped: ring.dropped(),
+            }),
+        }
+    }
+}
+
+/// A message that comes at a period, whatever happens, and that period.
+fn cyclic(spec: &'static MessageSpec) -> Option<(&'static MessageSpec, Duration)> {
+    spec.cycle_time().filter(|_| spec.send_type.starts_with("Cyclic")).map(|period| (spec, period))
+}
+
+fn counts(row: &CycleTiming) -> VitalCounts {
+    let vitals = &row.vitals;
+    VitalCounts {
+        minor_faults: vitals.minor_faults,
+        major_faults: vitals.major_faults,
+        voluntary_switches: vitals.voluntary_switches,
+        involuntary_switches: vitals.involuntary_switches,
+        run_delay_ns: vitals.run_delay_ns,
+        continued: vitals.continued,
+        cpu: vitals.cpu,
+    }
+}
+
+impl Flight {
+    /// Takes a row, and freezes when it is worth it.
+    fn take(&mut self, row: CycleTiming, waited_ns: u64, work_ns: u64) -> io::Result<()> {
+        let at = Instant::from_nanos(row.woke_ns);
+        let (cycle, skipped) = (row.cycle, row.skipped);
+        self.newest_cycle = cycle;
+        self.ring.row(Row(row));
+        let severity = if skipped > 0 {
+            Severity::Overrun { ns: waited_ns }
+        } else if work_ns > self.late_ns && work_ns >= waited_ns {
+            Severity::Slow { ns: work_ns }
+        } else if waited_ns > self.late_ns {
+            Severity::Late { ns: waited_ns }
+        } else {
+            return Ok(());
+        };
+        // Rows of a backlog may lie behind the window of an earlier event.
+        self.advance(at)?;
+        self.ring.trigger(Trigger { severity, cycle, at, late_ns: waited_ns, slow_ns: work_ns });
+        Ok(())
+    }
+
+    fn advance(&mut self, now: Instant) -> io::Result<()> {
+        let Self { ring, folder, process, log, .. } = self;
+        let mut written = Ok(());
+        ring.advance(now, |dump| written = write(&dump, folder, process, log));
+        written
+    }
+
+    fn finish(&mut self) -> io::Result<()> {
+        let Self { ring, folder, process, log, .. } = self;
+        let mut written = Ok(());
+        ring.finish(|dump| written = write(&dump, folder, process, log));
+        written
+    }
+}
+
+fn write(dump: &Dump<'_, Row, Passed>, folder: &Path, process: &str, log: &Log) -> io::Result<()> {
+    if let Some(gone) = dump.replaces {
+        flight_dump::remove(folder, &flight_dump::name(process, gone.cycle, &gone.severity.to_string()))?;
+    }
+    let trigger = &dump.trigger;
+    let event = Event {
+        process: process.into(),
+        trigger: trigger.severity.to_string(),
+        cycle: trigger.cycle,
+        at_monotonic_ns: trigger.at.as_nanos(),
+        late_ns: trigger.late_ns,
+        slow_ns: trigger.slow_ns,
+        window_from_ns: dump.from.as_nanos(),
+        window_to_ns: dump.to.as_nanos(),
+        ..Event::default()
+    };
+    let frames = dump.frames.iter().map(|passed| (passed.stamp_ns, &passed.frame));
+    flight_dump::write(folder, &event, dump.rows.iter().map(|row| &row.0), frames, log)
+}
+
+#[cfg(test)]
+mod tests;

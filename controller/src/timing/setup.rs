@@ -1,0 +1,73 @@
+//! Both sides of the timing of a run, made before its threads start.
+
+use super::ledger::{Ledger, LedgerSetup};
+use super::{Outlets, Stopwatch};
+use crate::cli::RunArguments;
+use crate::report;
+use crate::run::RunError;
+use crossbeam_channel::bounded;
+use protocol::bus::BusUrl;
+use protocol::flight_dump::Log;
+use realtime::{Clock, Freeze, Instant, MonotonicClock};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Rows and waits that fit the queue: 16 s of cycles, and as many sensors that were overtaken.
+const MEASURED_QUEUE: usize = 32 * 1024;
+/// Frames that fit the queue, some eight for each of those cycles.
+const FRAME_QUEUE: usize = 128 * 1024;
+/// Interface name in the log of the embedded bus.
+const EMBEDDED_INTERFACE: &str = "bus0";
+
+/// When a run started, on the clocks that its files speak.
+#[derive(Clone, Copy, Debug)]
+pub struct RunStart {
+    /// Seconds since 1970.
+    pub unix_s: f64,
+    /// The same on the monotonic clock.
+    pub at: Instant,
+    /// What turns stamps of the monotonic clock into ns since 1970.
+    pub epoch_offset_ns: u64,
+}
+
+impl RunStart {
+    /// Now.
+    #[must_use]
+    pub fn now() -> Self {
+        let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let at = MonotonicClock.now();
+        let epoch_offset_ns = (unix.as_nanos() as u64).saturating_sub(at.as_nanos());
+        Self { unix_s: unix.as_secs_f64(), at, epoch_offset_ns }
+    }
+}
+
+/// What the controllers' thread stamps with, and what the recorder's thread records with.
+///
+/// # Errors
+/// [`RunError::Output`] when a file cannot be made.
+pub fn begin(
+    arguments: &RunArguments,
+    started: &RunStart,
+    freeze: Freeze,
+) -> Result<(Stopwatch<MonotonicClock>, Ledger), RunError> {
+    let (measured_sender, measured) = bounded(MEASURED_QUEUE);
+    let (frame_sender, frames) = bounded(FRAME_QUEUE);
+    let outlets = Outlets { measured: measured_sender, frames: frame_sender };
+    let interface = match &arguments.bus {
+        BusUrl::Can { interface } => interface.as_str(),
+        BusUrl::Unix { .. } => EMBEDDED_INTERFACE,
+    };
+    let ledger = Ledger::create(LedgerSetup {
+        folder: arguments.files.out.clone(),
+        process: report::name(arguments.axis.list()),
+        full_timing: arguments.full_timing,
+        flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
+        log: Log { interface: interface.into(), epoch_offset_ns: started.epoch_offset_ns },
+        started_unix_s: started.unix_s,
+        started: started.at,
+        freeze,
+        measured,
+        frames,
+    });
+    let ledger = ledger.map_err(RunError::output)?;
+    Ok((Stopwatch::new(MonotonicClock, arguments.axis.list(), outlets), ledger))
+}

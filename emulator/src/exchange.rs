@@ -1,0 +1,173 @@
+//! When the sensors of an axis went out, when the commands that answer them came, and from which cycle on they act.
+//!
+//! ```text
+//!   t_7 ─ sensors 7 ──────────► t_8 ───────────► t_9          (rig's cycles)
+//!          │   round trip   ▲    │
+//!          │                └ command that answers 7 arrives, is taken and acts from t_8 on
+//!          └─── command age ────┘
+//! ```
+//! The echo of a command holds 12 bits of the cycle's number; the whole number is the newest cycle with these bits.
+
+use protocol::frames::ECHO_RANGE;
+use protocol::timing::{CycleTiming, Exchange};
+
+/// What a cycle's exchange was, and how old the command is that acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AxisCycle {
+    /// Stamps of the timing table.
+    pub exchange: Exchange,
+    /// When the sensors that the newly acting command answers were handed over; meaningless without such a command.
+    pub answered_sensors_ns: u64,
+    /// Age of the command that acts, in cycles that were sent; 0 when none does.
+    pub age_cycles: u64,
+}
+
+/// What the real-time thread tells of time.
+#[derive(Clone, Copy, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "nearly all are the large one, and a box would allocate in the 1 ms path"
+)]
+pub enum TimingRecord {
+    /// A cycle that was sent.
+    Cycle {
+        /// Its row of the timing table.
+        row: CycleTiming,
+        /// Its exchange, drive and load.
+        axes: [AxisCycle; 2],
+    },
+    /// The overrun that ended the run: cycles that were missed and that no cycle follows.
+    Stopped {
+        /// The first of them.
+        first: u64,
+        /// How many.
+        skipped: u64,
+        /// How late the thread woke for the first.
+        late_ns: u64,
+        /// When it woke.
+        woke_ns: u64,
+    },
+}
+
+/// A command that came.
+#[derive(Clone, Copy, Debug)]
+pub struct RoundTrip {
+    /// 0 for drive, 1 for load.
+    pub axis: usize,
+    /// From its sensors handed over to its arrival.
+    pub ns: u64,
+}
+
+/// Exchange of one axis. Allocates nothing after the start.
+pub struct ExchangeWatch {
+    /// When the sensors of a cycle were handed over, by the cycle's low bits; 0 where they were not.
+    sent_ns: Box<[u64; ECHO_RANGE as usize]>,
+    /// The last command taken in this cycle: arrival, and the cycle that it answers.
+    taken: Option<(u64, u64)>,
+    now: AxisCycle,
+}
+
+impl ExchangeWatch {
+    /// Nothing was sent yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { sent_ns: Box::new([0; ECHO_RANGE as usize]), taken: None, now: AxisCycle::default() }
+    }
+
+    /// Begins `cycle`, whose sensors were handed over at `stamp_ns`, or not.
+    pub fn begin(&mut self, cycle: u64, stamp_ns: Option<u64>) {
+        let sensors_ns = stamp_ns.unwrap_or(0);
+        self.sent_ns[slot(cycle)] = sensors_ns;
+        self.taken = None;
+        self.now =
+            AxisCycle { exchange: Exchange { sensors_ns, ..Exchange::default() }, ..AxisCycle::default() };
+    }
+
+    /// Takes note of an accepted command that arrived at `stamp_ns`, `cycle` being the newest one; tells its round trip, if its
+    /// sensors were handed over.
+    pub fn taken(&mut self, echo: u16, stamp_ns: u64, cycle: u64) -> Option<u64> {
+        let behind = cycle.wrapping_sub(u64::from(echo)) % ECHO_RANGE;
+        self.taken = Some((stamp_ns, cycle.saturating_sub(behind)));
+        let sent_ns = self.sent_ns[usize::from(echo)];
+        (sent_ns != 0).then(|| stamp_ns.saturating_sub(sent_ns))
+    }
+
+    /// The command that acts over this cycle has this age, if one acts; a command taken in this cycle is the one.
+    pub fn latched(&mut self, age_cycles: Option<u64>) {
+        let Some(age_cycles) = age_cycles else { return };
+        self.now.age_cycles = age_cycles;
+        if let Some((stamp_ns, answers)) = self.taken.take() {
+            self.now.exchange.command_ns = stamp_ns;
+            self.now.exchange.answers = answers;
+            self.now.answered_sensors_ns = self.sent_ns[slot(answers)];
+        }
+    }
+
+    /// The exchange of this cycle.
+    #[must_use]
+    pub fn cycle(&self) -> AxisCycle {
+        self.now
+    }
+}
+
+impl Default for ExchangeWatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl AxisCycle {
+    /// Age in ns at the start of the first cycle in which the command acts, `due_ns`; `None` when none newly acts.
+    #[must_use]
+    pub fn age_ns(&self, due_ns: u64) -> Option<u64> {
+        let known = self.exchange.command_ns != 0 && self.answered_sensors_ns != 0;
+        known.then(|| due_ns.saturating_sub(self.answered_sensors_ns))
+    }
+}
+
+fn slot(cycle: u64) -> usize {
+    (cycle % ECHO_RANGE) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_joined_to_its_sensors_across_the_end_of_the_echo() {
+        let mut watch = ExchangeWatch::new();
+        watch.begin(4095, Some(4_095_000_050));
+        watch.begin(4096, Some(4_096_000_060));
+        assert_eq!(watch.taken(4095, 4_095_000_400, 4096), Some(350));
+        watch.latched(Some(1));
+        let AxisCycle { exchange, age_cycles, .. } = watch.cycle();
+        assert_eq!(
+            exchange,
+            Exchange { sensors_ns: 4_096_000_060, command_ns: 4_095_000_400, answers: 4095 }
+        );
+        assert_eq!((age_cycles, watch.cycle().age_ns(4_096_000_000)), (1, Some(999_950)));
+    }
+
+    #[test]
+    fn a_held_command_has_an_age_and_is_not_new() {
+        let mut watch = ExchangeWatch::new();
+        watch.begin(7, Some(7));
+        watch.begin(8, Some(8));
+        watch.latched(Some(2));
+        assert_eq!((watch.cycle().age_cycles, watch.cycle().exchange.command_ns), (2, 0));
+        assert_eq!(watch.cycle().age_ns(9), None);
+    }
+
+    #[test]
+    fn a_command_that_does_not_act_is_none_and_sensors_that_did_not_leave_have_no_round_trip() {
+        let mut watch = ExchangeWatch::new();
+        watch.begin(7, None);
+        watch.begin(8, Some(8));
+        assert_eq!(watch.taken(7, 20, 8), None);
+        watch.latched(None);
+        assert_eq!(
+            watch.cycle(),
+            AxisCycle { exchange: Exchange { sensors_ns: 8, ..Exchange::default() }, ..AxisCycle::default() }
+        );
+    }
+}

@@ -1,0 +1,123 @@
+//! What is kept of rows, frames and events that never ran.
+
+use super::*;
+use crate::event::EventKind;
+use plant::Axis;
+use protocol::can::CanFrame;
+use protocol::frames::ValveCommand;
+use protocol::timing::Exchange;
+use std::path::Path;
+
+const MS: u64 = 1_000_000;
+
+fn evidence(folder: &Path, full_timing: bool) -> Evidence {
+    let log = Log { interface: "bus0".into(), epoch_offset_ns: 0 };
+    let setup = EvidenceSetup {
+        full_timing,
+        flight_late: Some(Duration::from_micros(500)),
+        started_unix_s: 0.0,
+        base: realtime::Instant::from_nanos(0),
+    };
+    Evidence::create(folder.into(), log, &setup).unwrap()
+}
+
+/// A cycle that woke after `late_ns`, acting on a command that answers the one before.
+fn record(cycle: u64, late_ns: u64) -> TimingRecord {
+    let (due_ns, woke_ns) = (cycle * MS, cycle * MS + late_ns);
+    let exchange = Exchange { sensors_ns: woke_ns, command_ns: due_ns - MS / 2, answers: cycle - 1 };
+    let drive = AxisCycle { exchange, answered_sensors_ns: due_ns - MS + 10_000, age_cycles: 1 };
+    let held = AxisCycle { age_cycles: 2, ..AxisCycle::default() };
+    let row = CycleTiming { cycle, due_ns, woke_ns, done_ns: woke_ns + 50_000, ..CycleTiming::default() };
+    TimingRecord::Cycle { row, axes: [drive, held] }
+}
+
+fn at(ms: u64) -> realtime::Instant {
+    realtime::Instant::from_nanos(ms * MS)
+}
+
+fn dumped(folder: &Path) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(folder.join(flight_dump::FOLDER)) else { return Vec::new() };
+    let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn ages_and_round_trips_are_counted_by_axis() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut evidence = evidence(folder.path(), true);
+    (1..=10).for_each(|cycle| evidence.timing(&record(cycle, 1000)).unwrap());
+    evidence.round_trip(RoundTrip { axis: 1, ns: 70_000 });
+    let (report, written) = evidence.finish(at(11));
+    written.unwrap();
+    assert_eq!(report.command_age_cycles.drive, BTreeMap::from([(1, 10)]));
+    assert_eq!(report.command_age_cycles.load, BTreeMap::from([(2, 10)]));
+    let [drive_age, load_age] = report.command_age_ns.unwrap();
+    assert_eq!((drive_age.count, drive_age.max.map(|ns| ns / 10_000), load_age.count), (10, Some(99), 0));
+    assert_eq!(report.round_trip_ns.unwrap().map(|figures| figures.count), [0, 1]);
+    let table = std::fs::read_to_string(folder.path().join("emulator-timing.csv")).unwrap();
+    assert_eq!(timing::read(&table).unwrap().len(), 10);
+    assert_eq!((report.flight, dumped(folder.path())), (FlightFigures::default(), Vec::new()));
+}
+
+#[test]
+fn a_late_cycle_a_fault_and_a_signal_leave_a_dump_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut evidence = evidence(folder.path(), false);
+    let mut cycle = 0;
+    let mut run_until = |evidence: &mut Evidence, end, late| {
+        while cycle < end {
+            cycle += 1;
+            evidence.timing(&record(cycle, if cycle == late { 600_000 } else { 1000 })).unwrap();
+            evidence.poll(at(cycle), false).unwrap();
+        }
+    };
+    run_until(&mut evidence, 2000, 1500);
+    evidence.event(&Event { cycle: 2000, kind: EventKind::Linked });
+    evidence.event(&Event { cycle: 2000, kind: EventKind::TwoSources(Axis::Drive) });
+    run_until(&mut evidence, 3000, 0);
+    evidence.poll(at(3000), true).unwrap();
+    // The last window is not over: the end of the run hands it out.
+    let (report, written) = evidence.finish(at(3001));
+    written.unwrap();
+    let expected = ["emulator-0000001500-late", "emulator-0000002000-fault", "emulator-0000003000-signal"];
+    assert_eq!(dumped(folder.path()), expected);
+    assert_eq!(report.flight, FlightFigures { dumps: 3, dropped: 0 });
+    let rows =
+        std::fs::read_to_string(folder.path().join("flight").join(expected[0]).join("timing.csv")).unwrap();
+    // From 1 s before it was due to 0.3 s after it woke.
+    let rows = timing::read(&rows).unwrap();
+    assert_eq!((rows[0].cycle, rows[rows.len() - 1].cycle), (500, 1800));
+}
+
+#[test]
+fn an_overrun_that_ends_the_run_is_counted_and_dumped() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut evidence = evidence(folder.path(), false);
+    evidence.timing(&record(1, 0)).unwrap();
+    let stopped =
+        TimingRecord::Stopped { first: 2, skipped: 5, late_ns: 5 * MS + 7000, woke_ns: 7 * MS + 7000 };
+    evidence.timing(&stopped).unwrap();
+    let (report, _) = evidence.finish(at(8));
+    assert_eq!(report.stages.unwrap().wakeup_ns.count, 6);
+    assert_eq!(dumped(folder.path()), ["emulator-0000000002-overrun"]);
+}
+
+#[test]
+fn only_good_cyclic_frames_of_others_are_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut evidence = evidence(folder.path(), false);
+    let command = ValveCommand { opening: 0.0, alive: 0, echo: 0, enable: true };
+    let good = Frame::DriveValveCommand(command).encode().unwrap();
+    let frames =
+        [good, CanFrame::new(0x110, &[1, 2, 3]), CanFrame::new(0x120, &[0; 8]), CanFrame::new(0x7FF, &[])];
+    for ms in 1..=10 {
+        frames.iter().for_each(|frame| evidence.frame(&FrameRecord { stamp_ns: ms * MS, frame: *frame }));
+    }
+    let (report, _) = evidence.finish(at(11));
+    let [arrivals] = &report.arrivals[..] else { panic!("{:?}", report.arrivals) };
+    assert_eq!(
+        (arrivals.frame, arrivals.period_ms, arrivals.count, arrivals.gaps),
+        ("DriveValveCommand", 1, 10, 0)
+    );
+}

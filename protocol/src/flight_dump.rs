@@ -1,0 +1,204 @@
+//! What a flight recorder leaves of an event: a folder with the cycles, the frames and what happened.
+//!
+//! ```text
+//!   flight/controller-0000012345-late/
+//!     timing.csv    cycles around the event, as in the timing tables
+//!     bus.log       frames that the process took and sent meanwhile, in candump's form
+//!     event.json    what happened; written last, so that a folder with it is whole
+//! ```
+
+use crate::can::CanFrame;
+use crate::candump::{self, FrameRecord};
+use crate::run_folder::{SCHEMA_VERSION, write_json};
+use crate::timing::{CycleTiming, write_head, write_row};
+use serde::Serialize;
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Folder of the dumps in a run's folder.
+pub const FOLDER: &str = "flight";
+
+/// What happened, and when; as it stands in `event.json`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Event {
+    /// See [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Whose recorder: `emulator`, `controller`, `controller-drive`, `controller-load`.
+    pub process: String,
+    /// What froze it: `overrun`, `late`, `slow`, `fault`, `signal`.
+    pub trigger: String,
+    /// The rig's cycle in which it was noticed.
+    pub cycle: u64,
+    /// When, on CLOCK_MONOTONIC, ns.
+    pub at_monotonic_ns: u64,
+    /// Lateness of the wake-up, ns.
+    pub late_ns: u64,
+    /// Length of the work, ns.
+    pub slow_ns: u64,
+    /// Start of the window, CLOCK_MONOTONIC, ns.
+    pub window_from_ns: u64,
+    /// Its end.
+    pub window_to_ns: u64,
+}
+
+impl Event {
+    /// Name of its folder.
+    #[must_use]
+    pub fn name(&self) -> String {
+        name(&self.process, self.cycle, &self.trigger)
+    }
+}
+
+/// Name of the folder of an event.
+#[must_use]
+pub fn name(process: &str, cycle: u64, trigger: &str) -> String {
+    format!("{process}-{cycle:010}-{trigger}")
+}
+
+/// How frames are written down.
+#[derive(Clone, Debug)]
+pub struct Log {
+    /// Name of the interface in each line.
+    pub interface: String,
+    /// What turns stamps of CLOCK_MONOTONIC into those of the log, ns.
+    pub epoch_offset_ns: u64,
+}
+
+/// Writes a dump into the run's folder.
+///
+/// # Errors
+/// What the system says, with the file's name.
+pub fn write<'a>(
+    run: &Path,
+    event: &Event,
+    rows: impl IntoIterator<Item = &'a CycleTiming>,
+    frames: impl IntoIterator<Item = (u64, &'a CanFrame)>,
+    log: &Log,
+) -> io::Result<()> {
+    let folder = run.join(FOLDER).join(event.name());
+    fs::create_dir_all(&folder).map_err(|error| named(&folder, &error))?;
+    write_file(&folder.join("timing.csv"), |out| {
+        write_head(out)?;
+        rows.into_iter().try_for_each(|row| write_row(out, row))
+    })?;
+    write_file(&folder.join("bus.log"), |out| {
+        frames.into_iter().try_for_each(|(stamp_ns, frame)| {
+            let record = FrameRecord { stamp_ns, frame: *frame };
+            candump::write_line(out, &log.interface, log.epoch_offset_ns, &record)
+        })
+    })?;
+    write_json(&folder.join("event.json"), event)
+}
+
+/// Removes a dump, that one more severe may take its place.
+///
+/// # Errors
+/// What the system says, with the folder's name.
+pub fn remove(run: &Path, name: &str) -> io::Result<()> {
+    let folder = run.join(FOLDER).join(name);
+    match fs::remove_dir_all(&folder) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(named(&folder, &error)),
+        _ => Ok(()),
+    }
+}
+
+/// Removes the dumps that an earlier run of `process` left.
+///
+/// # Errors
+/// What the system says, with the folder's name.
+pub fn clear(run: &Path, process: &str) -> io::Result<()> {
+    let folder = run.join(FOLDER);
+    let entries = match fs::read_dir(&folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(named(&folder, &error)),
+    };
+    for entry in entries {
+        let name = entry.map_err(|error| named(&folder, &error))?.file_name();
+        let Some(name) = name.to_str() else { continue };
+        // One process's name may begin another's; the cycle that follows tells.
+        let own = name.strip_prefix(process).and_then(|rest| rest.strip_prefix('-'));
+        if own.is_some_and(|rest| rest.starts_with(|first: char| first.is_ascii_digit())) {
+            remove(run, name)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_file(
+    path: &PathBuf,
+    write: impl FnOnce(&mut BufWriter<fs::File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let written = fs::File::create(path).map(BufWriter::new).and_then(|mut out| {
+        write(&mut out)?;
+        out.flush()
+    });
+    written.map_err(|error| named(path, &error))
+}
+
+fn named(path: &Path, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
+}
+
+/// An event with the version of the files that describe it.
+impl Default for Event {
+    fn default() -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            process: String::new(),
+            trigger: String::new(),
+            cycle: 0,
+            at_monotonic_ns: 0,
+            late_ns: 0,
+            slow_ns: 0,
+            window_from_ns: 0,
+            window_to_ns: 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::timing;
+
+    fn event(process: &str, cycle: u64) -> Event {
+        Event { process: process.into(), trigger: "late".into(), cycle, ..Event::default() }
+    }
+
+    #[test]
+    fn a_dump_holds_cycles_frames_and_what_happened() {
+        let run = tempfile::tempdir().unwrap();
+        let rows = [CycleTiming { cycle: 41, ..CycleTiming::default() }, CycleTiming::default()];
+        let frame = CanFrame::new(0x120, &[0xAB, 0, 1]);
+        let log = Log { interface: "vcan0".into(), epoch_offset_ns: 1_700_000_000_000_000_000 };
+        write(run.path(), &event("controller", 42), &rows, [(1_234_567_890, &frame)], &log).unwrap();
+        let read = |name: &str| {
+            fs::read_to_string(run.path().join("flight/controller-0000000042-late").join(name)).unwrap()
+        };
+        assert_eq!(timing::read(&read("timing.csv")).unwrap(), rows);
+        assert_eq!(read("bus.log"), "(1700000001.234567) vcan0 120#AB0001\n");
+        let told: serde_json::Value = serde_json::from_str(&read("event.json")).unwrap();
+        assert_eq!((&told["trigger"], &told["cycle"]), (&"late".into(), &42.into()));
+    }
+
+    #[test]
+    fn a_process_clears_its_own_dumps_alone() {
+        let run = tempfile::tempdir().unwrap();
+        clear(run.path(), "controller").unwrap();
+        let log = Log { interface: "bus0".into(), epoch_offset_ns: 0 };
+        for process in ["controller", "controller-drive", "emulator"] {
+            write(run.path(), &event(process, 7), &[], [], &log).unwrap();
+        }
+        clear(run.path(), "controller").unwrap();
+        let mut left: Vec<_> = fs::read_dir(run.path().join(FOLDER))
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["controller-drive-0000000007-late", "emulator-0000000007-late"]);
+        remove(run.path(), "emulator-0000000007-late").unwrap();
+        remove(run.path(), "emulator-0000000007-late").unwrap();
+    }
+}

@@ -1,0 +1,129 @@
+//! Facts of the machine without which a latency figure means nothing: kernel, processors, interrupts, memory, limits, build.
+//!
+//! Two figures can be compared when the machines under them are known; a reader who doubts a figure asks first for the
+//! preemption model, the governor, the hypervisor and the throttle. So all of it is read once, at the start of a run, and
+//! stands in its record. What cannot be read says so, with the reason: absence must not look like a good answer.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `files` | reading below a root, so that tests bring their own `/proc` and `/sys` |
+//! | `kernel` | release, preemption model, clock source, hypervisor, throttling |
+//! | `processors` | model, SMT, frequency, idle states, which CPU takes which interrupt |
+//! | `memory` | memory, swap, huge pages, limits of the process, load |
+//! | `build` | what this program was built with and from |
+//!
+//! # Source
+//! In the kernel's `Documentation`: `admin-guide/{kernel-parameters,sysctl/kernel}`, `admin-guide/pm/{cpufreq,cpuidle}`,
+//! `core-api/irq/irq-affinity`, `ABI/testing/sysfs-devices-system-cpu`; `man 5 proc`.
+
+mod build;
+mod files;
+mod kernel;
+mod memory;
+mod processors;
+
+pub use build::Build;
+pub use kernel::{Preemption, Throttling};
+pub use memory::{Limits, Memory};
+
+use files::Root;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The machine as a run found it. Lists of CPUs and interrupts are in the kernel's form: `0-3,8`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Machine {
+    /// The kernel: release, build, compiler.
+    pub kernel: String,
+    /// Its release.
+    pub kernel_release: String,
+    /// How the kernel lets an urgent thread take the CPU.
+    pub preemption: Preemption,
+    /// What the kernel was started with.
+    pub kernel_command_line: String,
+    /// Model of the processor.
+    pub processor: String,
+    /// Number of CPUs that run.
+    pub processors: usize,
+    /// CPUs that run.
+    pub processors_online: String,
+    /// CPUs that this process may use.
+    pub processors_allowed: String,
+    /// Simultaneous multithreading: whether, and which CPUs share a core.
+    pub smt: String,
+    /// Frequency of each group of CPUs: driver, governor, range; or that nobody here sets it.
+    pub frequency_governors: Vec<String>,
+    /// Driver and governor of the idle states.
+    pub idle_driver: String,
+    /// Idle states of the first CPU, with the time to leave each.
+    pub idle_states: Vec<String>,
+    /// Clock source in use.
+    pub clock_source: String,
+    /// Clock sources that there are.
+    pub clock_sources_available: String,
+    /// Signs of a hypervisor below this kernel, or `none`. It can stop all CPUs, and no counter in here tells.
+    pub hypervisor: String,
+    /// How much of each period real-time threads may have.
+    pub rt_throttling: Throttling,
+    /// CPUs that the scheduler leaves alone.
+    pub isolated: String,
+    /// CPUs without a periodic tick.
+    pub nohz_full: String,
+    /// CPUs that an interrupt without a wish of its own may go to.
+    pub interrupts_default: String,
+    /// Which interrupts may and do go where, by CPU.
+    pub interrupts: BTreeMap<String, String>,
+    /// Memory, swap, huge pages.
+    pub memory: Memory,
+    /// What this process may ask of the system.
+    pub limits: Limits,
+    /// Load averages of 1, 5 and 15 minutes when the machine was read.
+    pub load_average: String,
+    /// What this program was built with and from.
+    pub build: Build,
+}
+
+impl Machine {
+    /// Reads the machine that this process runs on.
+    #[must_use]
+    pub fn read() -> Self {
+        Self::below(Path::new("/"))
+    }
+
+    /// Reads a machine whose `proc`, `sys` and `boot` lie in `root`.
+    #[must_use]
+    pub fn below(root: &Path) -> Self {
+        let root = Root::new(root);
+        Self {
+            kernel: root.fact("proc/version"),
+            kernel_release: root.fact("proc/sys/kernel/osrelease"),
+            preemption: Preemption::read(&root),
+            kernel_command_line: root.fact("proc/cmdline"),
+            processor: processors::model(&root),
+            processors: processors::count(&root),
+            processors_online: root.fact("sys/devices/system/cpu/online"),
+            processors_allowed: root.field("proc/self/status", "Cpus_allowed_list"),
+            smt: processors::smt(&root),
+            frequency_governors: processors::frequency(&root),
+            idle_driver: processors::idle_driver(&root),
+            idle_states: processors::idle_states(&root),
+            clock_source: root.fact("sys/devices/system/clocksource/clocksource0/current_clocksource"),
+            clock_sources_available: root
+                .fact("sys/devices/system/clocksource/clocksource0/available_clocksource"),
+            hypervisor: kernel::hypervisor(&root),
+            rt_throttling: Throttling::read(&root),
+            isolated: root.list("sys/devices/system/cpu/isolated"),
+            nohz_full: root.list("sys/devices/system/cpu/nohz_full"),
+            interrupts_default: processors::default_affinity(&root),
+            interrupts: processors::interrupts(&root),
+            memory: Memory::read(&root),
+            limits: Limits::read(&root),
+            load_average: memory::load_average(&root),
+            build: Build::of_this_program(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,187 @@
+//! Disturbances injected into a run in real time, whose causes `bench report` has to name from what the run left behind.
+//!
+//! Each is done from outside, as it happens to people: a debugger stops a process, another real-time program takes the CPU, a
+//! customer's algorithm faults pages, a logger does not read, the wire loses frames, somebody sets the clock. The report is made
+//! of the run's folder alone; `bench cause` sees the report alone.
+
+use crate::binaries::{Build, Program, executable};
+use crate::launch::Pace;
+use crate::own;
+use crate::process::Running;
+use crate::scene::{RESTLESS, Scene};
+use realtime::Request;
+use rustix::process::Signal;
+use rustix::time::{ClockId, Timespec, clock_gettime, clock_settime};
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// Length of each run, s of the rig's time.
+const RUN_S: u64 = 6;
+/// A process stands still for so long.
+const STOP: Duration = Duration::from_millis(5);
+/// Another program takes the CPU for so long, and so often.
+const HOG: Duration = Duration::from_millis(8);
+const HOGS: u32 = 3;
+/// The wall clock is ahead by so much, for so long.
+const STEP_S: i64 = 3;
+const STEP_HOLDS: Duration = Duration::from_millis(700);
+/// Where the rig's loop is pinned, and so where the hog goes.
+const RIG_CPU: usize = 0;
+
+/// What is done to a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Disturbance {
+    /// Nothing.
+    Nothing,
+    /// SIGSTOP of the rig's process for 5 ms.
+    EmulatorStopped,
+    /// SIGSTOP of the controllers' process for 5 ms.
+    ControllerStopped,
+    /// A thread of FIFO priority 99 on the rig's CPU, three times 8 ms.
+    CpuContention,
+    /// An own algorithm that touches fresh memory, 300 pages a cycle for 1.5 s.
+    PageFaults,
+    /// A peer that connects and never reads.
+    SlowListener,
+    /// A wire that loses 1 % of the frames.
+    FrameLoss,
+    /// The wall clock is set ahead by 3 s and back.
+    ClockStep,
+}
+
+impl Disturbance {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Nothing,
+        Self::EmulatorStopped,
+        Self::ControllerStopped,
+        Self::CpuContention,
+        Self::PageFaults,
+        Self::SlowListener,
+        Self::FrameLoss,
+        Self::ClockStep,
+    ];
+
+    /// What `bench cause` has to say.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "nothing",
+            Self::EmulatorStopped => "emulator-stopped",
+            Self::ControllerStopped => "controller-stopped",
+            Self::CpuContention => "cpu-contention",
+            Self::PageFaults => "page-faults",
+            Self::SlowListener => "slow-listener",
+            Self::FrameLoss => "frame-loss",
+            Self::ClockStep => "clock-step",
+        }
+    }
+
+    /// Whether only root can do it.
+    #[must_use]
+    pub fn needs_root(self) -> bool {
+        matches!(self, Self::CpuContention | Self::ClockStep)
+    }
+}
+
+/// What became of a disturbed run.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// The cause that `bench cause` named.
+    pub cause: String,
+    /// Its sentence.
+    pub sentence: String,
+}
+
+/// Runs emulator and controller for some seconds with a disturbance after `after`, reports, and has the cause named.
+///
+/// # Panics
+/// When a program fails that should not.
+#[must_use]
+pub fn run(disturbance: Disturbance, after: Duration) -> Named {
+    let scene = Scene::new(RESTLESS);
+    if disturbance == Disturbance::PageFaults {
+        own::page_faulting(&scene);
+        scene.write("program.toml", own::PROGRAM);
+    }
+    let out = scene.path("run");
+    let wire = if disturbance == Disturbance::FrameLoss { "?loss=0.01&seed=1" } else { "" };
+    let emulator = scene
+        .emulator(Pace::Real)
+        .bus(scene.url() + wire)
+        .out(&out)
+        .with(&format!("--full-timing --cpu {RIG_CPU} --seconds {RUN_S}"))
+        .start();
+    let controller = scene.controller(Pace::Real).out(&out).with("--full-timing --repeat").start();
+    scene.wait_for_rows("run", 1000);
+    std::thread::sleep(after);
+    inject(disturbance, &scene, &emulator, &controller);
+    // At the end of the time the rig says farewell, which the lossy wire may lose: then the controllers end by its silence.
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait();
+    name_cause(&out)
+}
+
+fn inject(disturbance: Disturbance, scene: &Scene, emulator: &Running, controller: &Running) {
+    match disturbance {
+        // The last two were there from the start.
+        Disturbance::Nothing | Disturbance::PageFaults | Disturbance::FrameLoss => {}
+        Disturbance::EmulatorStopped => stop(emulator),
+        Disturbance::ControllerStopped => stop(controller),
+        Disturbance::CpuContention => hog(),
+        Disturbance::SlowListener => {
+            let listener = scene.peer();
+            std::thread::sleep(Duration::from_secs(3));
+            drop(listener);
+        }
+        Disturbance::ClockStep => step_the_clock(),
+    }
+}
+
+fn stop(process: &Running) {
+    process.signal(Signal::STOP);
+    std::thread::sleep(STOP);
+    process.signal(Signal::CONT);
+}
+
+fn hog() {
+    let hog = std::thread::spawn(|| {
+        let grants =
+            realtime::acquire(&Request { fifo_priority: Some(99), cpu: Some(RIG_CPU), ..Request::default() });
+        assert!(grants.refusals().is_empty(), "the hog needs root: {:?}", grants.refusals());
+        for _ in 0..HOGS {
+            let began = Instant::now();
+            while began.elapsed() < HOG {
+                std::hint::spin_loop();
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    });
+    hog.join().expect("the hog does not panic");
+}
+
+/// Sets the wall clock ahead and back again, by the monotonic clock, so that it shows the right time afterwards.
+fn step_the_clock() {
+    let ahead = |seconds: i64| {
+        let now = clock_gettime(ClockId::Realtime);
+        let then = Timespec { tv_sec: now.tv_sec + seconds, tv_nsec: now.tv_nsec };
+        clock_settime(ClockId::Realtime, then).expect("root may set the clock");
+    };
+    ahead(STEP_S);
+    std::thread::sleep(STEP_HOLDS);
+    ahead(-STEP_S);
+}
+
+/// Has the run reported, and the cause named from the report.
+fn name_cause(out: &Path) -> Named {
+    let bench = executable(Program::Bench, Build::Shipped);
+    let report = out.join("report");
+    let mut command = Command::new(&bench);
+    let reported = Running::start("bench report", command.arg("report").arg(out).arg("--out").arg(&report));
+    let _ = reported.wait().expect_code(0);
+    let mut command = Command::new(&bench);
+    let named = Running::start("bench cause", command.arg("cause").arg(report.join("report.json")));
+    let named = named.wait().expect_code(0);
+    Named { cause: named.stdout.trim().to_owned(), sentence: named.stderr.trim().to_owned() }
+}

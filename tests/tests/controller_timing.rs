@@ -1,0 +1,175 @@
+//! The timing of both processes on one clock: tables that join by cycle, histograms that hold every frame, and a stop of the
+//! controller that its own rows explain.
+
+#[path = "../../realtime/tests/common/mod.rs"]
+mod hlog;
+
+use protocol::timing::{self, CycleTiming, Exchange};
+use rustix::process::Signal;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+use system_tests::launch::Pace;
+use system_tests::records::{count, json};
+use system_tests::scene::{RESTLESS, Scene};
+use system_tests::turn;
+
+fn table(path: &Path) -> Vec<CycleTiming> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    timing::read(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Samples of each tag of a log, all its seconds together.
+fn samples(path: &Path) -> BTreeMap<String, u64> {
+    let mut samples = BTreeMap::new();
+    for (tag, _, _, histogram) in hlog::intervals(path) {
+        *samples.entry(tag).or_default() += histogram.len();
+    }
+    samples
+}
+
+/// Holds table, histograms and report of a controller against each other.
+fn expect_one_account(scene: &Scene, name: &str, waking_axis: &str) -> Vec<CycleTiming> {
+    let at = |file: String| scene.path("controller").join(file);
+    let report = json(&at(format!("{name}.json")));
+    let rows = table(&at(format!("{name}-timing.csv")));
+    assert_eq!(
+        rows.len() as u64,
+        count(&report, "/cycles_answered"),
+        "{name}: a row for each cycle answered"
+    );
+    assert!(rows.windows(2).all(|pair| pair[1].cycle == pair[0].cycle + 1 + pair[1].skipped), "{name}");
+    assert_eq!(count(&report, "/timing_dropped"), 0, "{name}");
+    let of_axis = |key| count(&report, &format!("/axes/{waking_axis}/{key}"));
+    assert_eq!(of_axis("sensors_lost"), 0, "{name}: nothing was lost on the way");
+    let waited = of_axis("sensors_received") - count(&report, "/sensors_before_start");
+    let samples = samples(&at(format!("{name}.hlog")));
+    assert_eq!(samples[&format!("{name}-wakeup")], waited, "{name}: every frame that waited is a sample");
+    for stage in ["receive", "step", "send", "execution", "completion"] {
+        assert_eq!(samples[&format!("{name}-{stage}")], rows.len() as u64, "{name}-{stage}");
+        let key = format!("/{}_ns/count", stage);
+        assert_eq!(count(&report, &key), rows.len() as u64, "{name}: {key}");
+    }
+    for row in &rows {
+        assert!(row.due_ns <= row.woke_ns && row.woke_ns <= row.done_ns, "{name}: {row:?}");
+        let work_ns = row.receive_ns + row.step_ns + row.send_ns;
+        assert_eq!(work_ns, row.done_ns - row.woke_ns, "{name}: the stages are the whole of it: {row:?}");
+    }
+    rows
+}
+
+/// One-way latencies, ns, by cycle answered: rig to controller, controller to rig.
+fn one_way(
+    rig: &[CycleTiming],
+    controller: &[CycleTiming],
+    of: impl Fn(&CycleTiming) -> Exchange,
+) -> [Vec<i64>; 2] {
+    let sent: BTreeMap<u64, u64> = rig.iter().map(|row| (row.cycle, of(row).sensors_ns)).collect();
+    let acted = rig.iter().map(&of).filter(|exchange| exchange.command_ns != 0);
+    let came: BTreeMap<u64, u64> = acted.map(|exchange| (exchange.answers, exchange.command_ns)).collect();
+    let way = |from: u64, to: u64| (from != 0 && to != 0).then(|| to.cast_signed() - from.cast_signed());
+    let there = controller.iter().filter_map(|row| way(*sent.get(&row.cycle)?, of(row).sensors_ns));
+    let back = controller.iter().filter_map(|row| way(of(row).command_ns, *came.get(&row.cycle)?));
+    [there.collect(), back.collect()]
+}
+
+#[test]
+fn rows_of_both_processes_join_to_the_time_on_the_way_each_way() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let emulator = scene.emulator(Pace::Real).with("--seconds 4 --full-timing").start();
+    let controller = scene.controller(Pace::Real).with("--repeat --full-timing").start();
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    let answered = expect_one_account(&scene, "controller", "drive");
+    let rig = table(&scene.path("emulator/emulator-timing.csv"));
+    let summary = json(&scene.path("emulator/summary.json"));
+    assert_eq!(rig.len() as u64, count(&summary, "/cycles") - count(&summary, "/skipped"));
+    let report = json(&scene.path("controller/controller.json"));
+    let arrivals = report["arrivals"].as_array().expect("a list");
+    let sensors = arrivals.iter().find(|arrivals| arrivals["frame"] == "DriveSensors").expect("they came");
+    assert_eq!(count(sensors, "/count"), count(&report, "/axes/drive/sensors_received"));
+    let least = answered.len() * 95 / 100;
+    for (axis, ways) in [
+        ("drive", one_way(&rig, &answered, |row| row.drive)),
+        ("load", one_way(&rig, &answered, |row| row.load)),
+    ] {
+        for (way, latencies_ns) in ["rig to controller", "controller to rig"].into_iter().zip(ways) {
+            // The load of this experiment holds its valve shut: its commands do not act.
+            if (axis, way) == ("load", "controller to rig") {
+                continue;
+            }
+            let positive = latencies_ns.iter().filter(|ns| **ns > 0).count();
+            assert!(positive > least, "{axis}, {way}: {positive} of {} cycles answered", answered.len());
+        }
+    }
+}
+
+fn events(scene: &Scene) -> Vec<(String, Value)> {
+    let dumps = std::fs::read_dir(scene.path("controller/flight")).expect("a folder of dumps");
+    dumps
+        .map(|dump| {
+            let dump = dump.expect("a dump").path();
+            let name = dump.file_name().expect("a name").to_string_lossy().into_owned();
+            assert!(!table(&dump.join("timing.csv")).is_empty(), "{name}: the cycles around it");
+            let log = std::fs::read_to_string(dump.join("bus.log")).expect("the frames around it");
+            for id in [" 120#", " 110#"] {
+                assert!(log.contains(id), "{name}: frames {id} of both ways");
+            }
+            (name, json(&dump.join("event.json")))
+        })
+        .collect()
+}
+
+#[test]
+fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
+    let mut controller = scene.controller(Pace::Real).with("--repeat --full-timing").start();
+    scene.wait_for_rows("emulator", 1200);
+    controller.signal(Signal::STOP);
+    std::thread::sleep(Duration::from_millis(30));
+    controller.signal(Signal::CONT);
+    // Past the window of the first dump.
+    scene.wait_for_more_rows("emulator", 600);
+    controller.signal(Signal::USR1);
+    controller.wait_for("asked for the last seconds");
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    let rows = expect_one_account(&scene, "controller", "drive");
+    let stopped =
+        rows.iter().position(|row| row.skipped >= 25).expect("a row that skips the cycles of the stop");
+    // The signal's handler may run on another thread, a moment later.
+    let continued: u64 = rows[stopped..].iter().take(20).map(|row| row.vitals.continued).sum();
+    assert_eq!(continued, 1, "{:?}", rows[stopped]);
+    let report = json(&scene.path("controller/controller.json"));
+    assert_eq!(count(&report, "/vitals/continued"), 1);
+    let max_ns = count(&report, "/wakeup_ns/max");
+    assert!(max_ns >= 25_000_000, "{max_ns} ns, the wait of the oldest sensors");
+    let events = events(&scene);
+    assert_eq!(events.len() as u64, count(&report, "/flight/dumps"), "{events:?}");
+    let long = |event: &Value| event["trigger"] == "overrun" && count(event, "/late_ns") >= 25_000_000;
+    assert!(events.iter().any(|(_, event)| long(event)), "{events:?}");
+    assert!(events.iter().any(|(name, _)| name.ends_with("-signal")), "{events:?}");
+}
+
+#[test]
+fn a_process_for_each_axis_has_files_and_tags_of_its_own() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let emulator = scene.emulator(Pace::Real).with("--seconds 2").start();
+    let controllers = ["drive", "load"].map(|axis| {
+        let controller = scene.axis_controller(Pace::Real, axis);
+        (axis, controller.with("--repeat --full-timing --no-flight").start())
+    });
+    let _ = emulator.wait().expect_code(0);
+    for (axis, controller) in controllers {
+        let _ = controller.wait().expect_code(0);
+        let rows = expect_one_account(&scene, &format!("controller-{axis}"), axis);
+        let other = |row: &CycleTiming| if axis == "drive" { row.load } else { row.drive };
+        assert!(rows.iter().all(|row| other(row) == Exchange::default()), "{axis} times itself alone");
+    }
+    assert!(!scene.path("controller/flight").exists(), "nobody keeps a ring");
+}

@@ -1,0 +1,98 @@
+//! What `bench report` writes is read by others: HdrHistogram's Python package, and whoever expects jitterdebugger's JSON.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::launch::Pace;
+use system_tests::process::{Ended, Running};
+use system_tests::records::{count, json};
+use system_tests::scene::{SHORT, Scene};
+use system_tests::turn;
+
+/// A short run in real time.
+fn run(scene: &Scene) -> PathBuf {
+    let _machine = turn::take();
+    let out = scene.path("run");
+    let emulator = scene.emulator(Pace::Real).out(&out).start();
+    let controller = scene.controller(Pace::Real).out(&out).start();
+    let _ = controller.wait().expect_code(0);
+    let _ = emulator.wait().expect_code(0);
+    out
+}
+
+fn report(folder: &Path, options: &[&str]) -> Ended {
+    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    Running::start("bench report", bench.arg("report").arg(folder).args(options)).wait()
+}
+
+fn python() -> PathBuf {
+    let python = std::env::var_os("AIRBENCH_PYTHON")
+        .map_or_else(|| workspace().join("target/tools/venv/bin/python"), PathBuf::from);
+    assert!(
+        python.exists(),
+        "{} is missing: run scripts/test, which makes the Python environment with hdrhistogram",
+        python.display()
+    );
+    python
+}
+
+/// What the Python package makes of a log: count and maximum of each tag.
+fn read_by_python(log: &Path) -> Value {
+    let mut python = Command::new(python());
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/read_hlog.py");
+    let ended = Running::start("read_hlog.py", python.arg(script).arg(log)).wait().expect_code(0);
+    serde_json::from_str(&ended.stdout).unwrap_or_else(|error| panic!("{error}: {}", ended.stdout))
+}
+
+#[test]
+fn others_read_what_a_report_writes() {
+    let scene = Scene::new(SHORT);
+    let out = run(&scene);
+    let told = report(&out, &[]).expect_code(0).stdout;
+    assert!(told.contains("emulator-wakeup"), "{told}");
+
+    let report_json = json(&out.join("report.json"));
+    assert_eq!(report_json["schema"], "airbench-latency-report");
+    let distributions = report_json["distributions"].as_array().expect("a list");
+    assert!(!distributions.is_empty());
+    let read = read_by_python(&out.join("latency.hlog"));
+    assert_eq!(read.as_object().expect("tags").len(), distributions.len());
+    for distribution in distributions {
+        let name = distribution["name"].as_str().expect("a name");
+        let own = &distribution["percentiles_ns"];
+        assert_eq!(count(&read[name], "/count"), count(own, "/count"), "{name}");
+        let (theirs_ns, ours_ns) = (count(&read[name], "/max"), count(own, "/max"));
+        // Either end of a bin of three significant digits.
+        assert!(theirs_ns.abs_diff(ours_ns) <= ours_ns / 500 + 1, "{name}: {theirs_ns} and {ours_ns}");
+    }
+
+    let jitter = json(&out.join("jitterdebugger.json"));
+    assert_eq!(jitter["version"], 2);
+    assert!(jitter["sysinfo"]["release"].as_str().is_some_and(|release| !release.is_empty()), "{jitter:#}");
+    let rig = &jitter["cpu"]["0"];
+    let bins = rig["histogram"].as_object().expect("bins");
+    let counted: u64 = bins.values().map(|samples| samples.as_u64().expect("a count")).sum();
+    assert_eq!(counted, count(rig, "/count"));
+    assert!(bins.keys().all(|us| us.parse::<u64>().is_ok()));
+    assert!(count(rig, "/min") <= count(rig, "/max"));
+    let page = std::fs::read_to_string(out.join("report.html")).expect("the page");
+    assert!(page.starts_with("<!") && page.contains("emulator-wakeup"), "no page of this run");
+}
+
+#[test]
+fn bounds_and_bad_input_have_their_exit_codes() {
+    let scene = Scene::new(SHORT);
+    let out = run(&scene);
+    let bounds = |name: &str, text: &str| {
+        let file = scene.write(name, &format!("[bounds]\n{text}\n"));
+        report(&out, &["--bounds", file.to_str().expect("a path"), "--markdown-only"])
+    };
+    let _ = bounds("kept.toml", "\"counts.cycles\" = { min = 1 }").expect_code(0);
+    let broken = bounds("broken.toml", "\"emulator-wakeup.p50_ns\" = { max = 1 }").expect_code(1);
+    assert!(broken.stdout.contains("BROKEN"), "{}", broken.stdout);
+    let unknown = bounds("unknown.toml", "\"emulator-wakup.p50_ns\" = { max = 1 }").expect_code(2);
+    assert!(unknown.stderr.contains("there are emulator-wakeup."), "{}", unknown.stderr);
+    let nothing = report(&scene.path("nothing"), &[]).expect_code(2);
+    assert!(nothing.stderr.contains("nothing"), "{}", nothing.stderr);
+}
