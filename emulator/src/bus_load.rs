@@ -5,8 +5,8 @@ use crate::run::RunError;
 use protocol::bus_load::BusLoad;
 use protocol::exit::Exit;
 use protocol::frames::BIT_RATE_PER_S;
-use protocol::response_time::critical;
 use protocol::response_time::rig::{RigAnalysis, arrivals_text, in_us};
+use protocol::response_time::{Response, critical};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
@@ -40,25 +40,33 @@ fn wire_time(summary: &Path) -> Result<Value, RunError> {
 
 fn markdown(analysis: &RigAnalysis, run: &Value) -> String {
     let mut text = String::from(
-        "| frame | id | bits, worst case | comes at most | bound, us | in a run, us | bits in it | critical instant, us | \
-         bound of these frames, us |\n|---|---|---:|---|---:|---:|---:|---:|---:|\n",
+        "| frame | id | bits, worst case | comes at most | bound, us | in a run, us | bound as it came there, us | bits there | \
+         critical instant, us | bound of these frames, us |\n|---|---|---:|---|---:|---:|---:|---:|---:|---:|\n",
     );
-    for (place, (frame, bound)) in analysis.frames().iter().zip(analysis.responses()).enumerate() {
+    let as_it_came = analysis.clone().with(|frame| {
+        let arrivals = &run["identifiers"][format!("{:03X}", frame.message.id)]["arrivals"];
+        frame.allow_for(arrivals["least_distance_ns"].as_u64(), arrivals["release_jitter_ns"].as_u64());
+        true
+    });
+    let bounds = analysis.responses().into_iter().zip(as_it_came.responses());
+    for (place, (frame, (bound, as_it_came))) in analysis.frames().iter().zip(bounds).enumerate() {
         let (message, seen) = (frame.message, &run["identifiers"][format!("{:03X}", frame.message.id)]);
         let critical = critical::play(analysis, place, 1);
         let bits = |which: usize| seen["bits"][which].as_u64();
         let bits =
             bits(0).zip(bits(1)).map_or_else(String::new, |(least, most)| format!("{least} to {most}"));
+        let in_ns = |bound: Option<Response>| in_us(bound.map(|found| found.response_ns));
         let measured =
             seen["response_ns"]["max"].as_u64().map_or_else(|| "not sent".into(), |ns| in_us(Some(ns)));
         let _infallible = writeln!(
             text,
-            "| {} | 0x{:03X} | {} | {} | {} | {measured} | {bits} | {} | {} |",
+            "| {} | 0x{:03X} | {} | {} | {} | {measured} | {} | {bits} | {} | {} |",
             message.name,
             message.id,
             frame.bits,
             arrivals_text(&frame.arrivals),
-            in_us(bound.map(|found| found.response_ns)),
+            in_ns(bound),
+            in_ns(as_it_came),
             in_us(critical.map(|played| played.measured_ns)),
             in_us(critical.map(|played| played.bound_ns)),
         );

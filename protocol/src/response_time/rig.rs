@@ -73,6 +73,18 @@ impl RigFrame {
         Self { message, bits: worst_case_bits(message.length), arrivals, reason }
     }
 
+    /// Allows for frames that came closer than they may: a late machine makes them. What was seen is told by the model's report.
+    pub fn allow_for(&mut self, least_distance_ns: Option<u64>, release_jitter_ns: Option<u64>) {
+        let Arrivals { jitter_ns, distance_ns, .. } = &mut self.arrivals;
+        if let Some(seen_ns) = least_distance_ns {
+            *distance_ns = (*distance_ns).min(seen_ns);
+        }
+        // Where a frame comes on a change too, early ones are no jitter.
+        if let Some(seen_ns) = release_jitter_ns.filter(|_| self.reason.is_empty()) {
+            *jitter_ns = (*jitter_ns).max(seen_ns);
+        }
+    }
+
     /// Time by which it must be through, counted from its queue: its period less what it may be queued late. `None` for events.
     #[must_use]
     pub fn deadline_ns(&self) -> Option<u64> {
