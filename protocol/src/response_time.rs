@@ -9,14 +9,14 @@
 //!   errors         E(t) = (31 bits + max C_k of hep(m)) F(t)
 //! ```
 //!
-//! T is the period, or the least time between two frames in the long run; J lets frames come early against it; d is the least time
-//! between two of them in a burst. With d = 0 these are the equations of the paper. All instances of the busy period are looked at:
-//! the first one alone, which older analyses took for the worst, may be better than a later one, since its own successor is
-//! delayed by a frame that was pushed through meanwhile. A response counts from the queue (the paper adds J, which counts from the
-//! event behind it), and to the end of the intermission.
+//! T is the period, or the least time between two frames in the long run; J lets frames come early against it; d is the least
+//! time between two of them in a burst. With d = 0 these are the equations of the paper. All instances of the busy period are
+//! looked at: the first one alone, which older analyses took for the worst, may be better than a later one, since its own
+//! successor is delayed by a frame that was pushed through meanwhile. A response counts from the queue (the paper adds J,
+//! which counts from the event behind it), and to the end of the intermission.
 //!
-//! `rig` knows the frames of `rig.dbc`, `critical` plays their worst case. What a wire does is modelled apart, in [`crate::wire_time`], and tests hold both against
-//! each other.
+//! `rig` knows the frames of `rig.dbc`, `critical` plays their worst case. What a wire does is modelled apart, in
+//! [`crate::wire_time`], and tests hold both against each other.
 //!
 //! Source: Davis, Burns, Bril, Lukkien, "Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised",
 //! Real-Time Systems 35 (2007), section 3.2, and 3.4 for errors.
@@ -120,8 +120,8 @@ pub struct Response {
 /// Busy periods are not followed beyond this: whatever is so close to a full wire counts as one.
 const LONGEST_BUSY_PERIOD_NS: u64 = 100_000_000_000;
 
-/// The worst case of the stream at `place` of `streams`, which are in the order of their priority. `None` when there is none: what
-/// has its priority or a higher one fills the wire.
+/// The worst case of the stream at `place` of `streams`, which are in the order of their priority. `None` when there is none:
+/// what has its priority or a higher one fills the wire.
 #[must_use]
 pub fn response(streams: &[Stream], place: usize, line: &Line) -> Option<Response> {
     let level = Level::of(streams, place, line);

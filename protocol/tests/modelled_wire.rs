@@ -1,7 +1,7 @@
 //! The modelled wire against the response-time analysis: all frames of `rig.dbc`, on the model's own clock.
 //!
-//! No phasing exceeds the bound with worst-case stuffing, and errors stay below the bound that allows for them. How close the model
-//! comes at the critical instant is held in `response_time/critical.rs`.
+//! No phasing exceeds the bound with worst-case stuffing, and errors stay below the bound that allows for them. How close the
+//! model comes at the critical instant is held in `response_time/critical.rs`.
 
 use proptest::prelude::*;
 use protocol::can::CanFrame;

@@ -52,8 +52,8 @@ fn every_frame_of_a_run_is_through_within_its_worst_case() {
     assert_eq!(handed_on, count(wire, "/frames"), "what was sent to its end was handed on");
 }
 
-/// All attempts at the drive's commands fail from 1 s on for 20 ms: the controllers' node goes off the bus and is back 100 ms later.
-/// Meanwhile the rig has no fresh command, shuts the valves, and says so.
+/// All attempts at the drive's commands fail from 1 s on for 20 ms: the controllers' node goes off the bus and is back 100 ms
+/// later. Meanwhile the rig has no fresh command, shuts the valves, and says so.
 #[test]
 fn a_node_that_goes_off_the_bus_recovers_and_the_valve_is_shut_meanwhile() {
     let scene = Scene::new(SHORT);

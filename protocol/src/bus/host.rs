@@ -3,7 +3,8 @@
 //! One thread, one epoll. A peer that does not read fills its socket's queue; what does not fit is dropped there
 //! and counted by peer and identifier, so that it can be held against the gaps that the peer sees. A frame that the
 //! wire loses (`wire`) is lost for all and counted by identifier. In lockstep, [`super::lockstep`]
-//! decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's file and its lock are in `socket_file`.
+//! decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's file and its lock are in
+//! `socket_file`.
 
 mod closing;
 mod modelled;
@@ -324,7 +325,8 @@ impl Host {
         }
     }
 
-    /// Puts one frame on the wire: to everyone but its sender and the `deaf`. What a member of the barrier gets leaves with its Go.
+    /// Puts one frame on the wire: to everyone but its sender and the `deaf`. What a member of the barrier gets leaves with
+    /// its Go.
     fn deliver(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
         self.report.frames += 1;
         if self.wire.loses_next() {

@@ -4,9 +4,9 @@
 //! small `recvmmsg` keeps them. The arrival stamp matters: a command is latched by when it *arrived*, not by when a
 //! late loop came round to read it. Batches matter too: one system call empties a queue and knows that it is empty.
 //!
-//! The kernel stamps by the wall clock, which somebody may set at any time. Arrivals are told by the monotonic clock instead, with
-//! the distance of both as it is now or as it was at the last batch: whichever puts the arrival into the time in which it must
-//! have happened, between the moment in which the queue was last seen empty and now ([`arrival_ns`]).
+//! The kernel stamps by the wall clock, which somebody may set at any time. Arrivals are told by the monotonic clock instead,
+//! with the distance of both as it is now or as it was at the last batch: whichever puts the arrival into the time in which
+//! it must have happened, between the moment in which the queue was last seen empty and now ([`arrival_ns`]).
 //!
 //! Source: `socket(7)` (SO_TIMESTAMPNS, SO_RXQ_OVFL), `recvmmsg(2)`, Linux Documentation/networking/can.rst (MSG_CONFIRM).
 
@@ -227,12 +227,13 @@ fn ns_of(clock: ClockId) -> u64 {
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }
 
-/// When a packet arrived by the monotonic clock, which stands at `now_ns`: its `stamp_ns` of the wall clock less the `offsets_ns` of
-/// that clock, the newest first, whichever puts it between the time in which the queue was last seen empty and now. A queue never
-/// seen empty may hold a packet for a second. When none does, it is taken as if it had not been stamped: it arrived now.
+/// When a packet arrived by the monotonic clock, which stands at `now_ns`: its `stamp_ns` of the wall clock less the
+/// `offsets_ns` of that clock, the newest first, whichever puts it between the time in which the queue was last seen empty
+/// and now. A queue never seen empty may hold a packet for a second. When none does, it is taken as if it had not been
+/// stamped: it arrived now.
 ///
-/// Of a step that is shorter than the time since the queue was empty both offsets may be plausible; then the stamp is wrong by the step
-/// at most, and still within that time.
+/// Of a step that is shorter than the time since the queue was empty both offsets may be plausible; then the stamp is wrong
+/// by the step at most, and still within that time.
 fn arrival_ns(stamp_ns: i64, offsets_ns: [i64; 2], empty_ns: Option<u64>, now_ns: u64) -> u64 {
     const LONGEST_CREDIBLE_NS: u64 = 1_000_000_000;
     let since_ns = empty_ns.unwrap_or(now_ns.saturating_sub(LONGEST_CREDIBLE_NS));
@@ -243,8 +244,8 @@ fn arrival_ns(stamp_ns: i64, offsets_ns: [i64; 2], empty_ns: Option<u64>, now_ns
     arrived.map_or(now_ns, |arrived_ns| (arrived_ns.max(0) as u64).clamp(since_ns, now_ns))
 }
 
-/// A time of the monotonic clock by `clock`; now for what has none. A thread that is held up between reading the one and the other
-/// would stamp the packet too late, so a reading that took long is made again.
+/// A time of the monotonic clock by `clock`; now for what has none. A thread that is held up between reading the one and the
+/// other would stamp the packet too late, so a reading that took long is made again.
 fn stamp_of(arrived_ns: Option<u64>, clock: &dyn Fn(u64) -> u64) -> u64 {
     let Some(arrived_ns) = arrived_ns else { return clock(0) };
     let mut stamp_ns = 0;

@@ -8,9 +8,9 @@
 //! ```
 //!
 //! The model's time never depends on when the host came round: a frame enters when it arrived in the host's queue, and a late
-//! turn of the host makes deliveries late, which is counted apart, and nothing else. Before time goes on, all queues are read up to
-//! it (`Host::turn`), so that no frame is told of too late, save one whose sender was interrupted between stamp and queue: it
-//! enters a little late, and is counted.
+//! turn of the host makes deliveries late, which is counted apart, and nothing else. Before time goes on, all queues are read
+//! up to it (`Host::turn`), so that no frame is told of too late, save one whose sender was interrupted between stamp and
+//! queue: it enters a little late, and is counted.
 //!
 //! A timer descriptor wakes the host, since epoll by itself knows whole milliseconds.
 

@@ -1,8 +1,9 @@
 //! The critical instant of a frame, played on the modelled wire: the worst that the analysis knows, and what comes of it.
 //!
-//! The longest frame that it outranks has just begun when it and all that outrank it come at once, and then as early as they may. Each
-//! identifier has one content for all its frames, so that the stuffing of the frames that were sent is one number: with contents that
-//! differ, a bound made of the longest of each can reach beyond a period that the frames themselves end before.
+//! The longest frame that it outranks has just begun when it and all that outrank it come at once, and then as early as they
+//! may. Each identifier has one content for all its frames, so that the stuffing of the frames that were sent is one number:
+//! with contents that differ, a bound made of the longest of each can reach beyond a period that the frames themselves end
+//! before.
 
 use super::rig::{RigAnalysis, RigFrame};
 use crate::bus::host::FramesById;

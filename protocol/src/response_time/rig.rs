@@ -1,8 +1,8 @@
 //! The frames of `rig.dbc` in the analysis: how often each comes at most, and whether a bit rate carries them all in time.
 //!
 //! A period stands in `rig.dbc`. What has none, or comes on a change too, has a least distance in the table here, each with its
-//! reason: what is honest for the programs of this project, and an assumption for those of others, who may send as they like. The bound
-//! holds for senders that keep to it.
+//! reason: what is honest for the programs of this project, and an assumption for those of others, who may send as they like.
+//! The bound holds for senders that keep to it.
 
 use super::{Arrivals, ErrorBound, Line, Response, Stream, response};
 use crate::bus_load::{LOAD_LIMIT_PPM, RESERVE_BITS, load_ppm_at, share_ppm_at, worst_case_bits};
@@ -12,8 +12,8 @@ use std::fmt;
 
 const MS: u64 = 1_000_000;
 
-/// How much later than its period a cyclic frame may be queued, so that the next comes early against it. A guess: what a loop of FIFO
-/// priority keeps, save in its worst moments, on a machine that is not a computer of its own.
+/// How much later than its period a cyclic frame may be queued, so that the next comes early against it. A guess: what a loop
+/// of FIFO priority keeps, save in its worst moments, on a machine that is not a computer of its own.
 pub const RELEASE_JITTER_NS: u64 = 50_000;
 
 /// Names beginning so, how they come, and why.

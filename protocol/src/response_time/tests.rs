@@ -83,8 +83,8 @@ fn simulated(streams: &[(u64, u64)], offsets: &[u64], horizon: u64) -> Vec<u64> 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Small wires, all phasings that matter: the bound is never exceeded, and the worst phasing comes within the one bit by which
-    /// a blocking frame must have begun before.
+    /// Small wires, all phasings that matter: the bound is never exceeded, and the worst phasing comes within the one bit by
+    /// which a blocking frame must have begun before.
     #[test]
     fn the_bound_is_the_worst_of_all_phasings(
         streams in proptest::collection::vec((2..6_u64, 12..30_u64), 2..5),

@@ -1,6 +1,7 @@
 //! Errors of the wire: which attempts at sending are hit, and after how many bits.
 //!
-//! Drawn from a seeded generator of its own, so that the same frames at the same times meet the same errors, whatever else is drawn.
+//! Drawn from a seeded generator of its own, so that the same frames at the same times meet the same errors, whatever else is
+//! drawn.
 
 use super::WireTiming;
 use super::bits::INTERMISSION_BITS;
@@ -13,8 +14,8 @@ pub(super) const ERROR_BITS: u32 = 12 + 8 + INTERMISSION_BITS;
 /// Bits that an error-passive sender waits after its transmission; others may begin meanwhile.
 pub(super) const SUSPEND_BITS: u32 = 8;
 
-/// The longest time that one error can cost besides sending the frame again, in bits. What was sent of the frame up to the error is less
-/// than the frame.
+/// The longest time that one error can cost besides sending the frame again, in bits. What was sent of the frame up to the
+/// error is less than the frame.
 pub const WORST_ERROR_BITS: u32 = ERROR_BITS + SUSPEND_BITS;
 
 /// Makes the draws differ from those of injected loss, which begin with the same seed.
@@ -43,7 +44,8 @@ impl Errors {
         }
     }
 
-    /// The bit of a frame of `bits` bits that is hit when it is sent at `now_ns`; counted from 1, none of them in the intermission.
+    /// The bit of a frame of `bits` bits that is hit when it is sent at `now_ns`; counted from 1, none of them in the
+    /// intermission.
     pub(super) fn hit(&mut self, frame: &CanFrame, bits: u32, now_ns: u64) -> Option<u32> {
         let threshold = self.threshold?;
         let meant = self.id.is_none_or(|id| id == frame.raw_id());

@@ -8,8 +8,8 @@
 //!        └────────────────────────────────────────────────────────┘ both 0
 //! ```
 //!
-//! A sender's TEC goes up by 8 with an error and down by 1 with a frame; the REC of everyone else by 1 and 1. What a node is told is
-//! an error frame as a SocketCAN interface gives it to its listeners.
+//! A sender's TEC goes up by 8 with an error and down by 1 with a frame; the REC of everyone else by 1 and 1. What a node is
+//! told is an error frame as a SocketCAN interface gives it to its listeners.
 //!
 //! Source: ISO 11898-1, fault confinement; Linux `include/uapi/linux/can/error.h`.
 

@@ -1,4 +1,5 @@
-//! What a modelled wire counted: response times by identifier on the model's own clock, load, errors, and what became of each node.
+//! What a modelled wire counted: response times by identifier on the model's own clock, load, errors, and what became of each
+//! node.
 
 use crate::bus::host::FramesById;
 use crate::can::CanFrame;
