@@ -19,8 +19,8 @@ pub fn document(title: &str, body: &str) -> String {
     )
 }
 
-/// Text as a page shows it, between tags and in attributes. Control characters, which a command line or a file's name may hold and no
-/// page may, are shown as the sign for what cannot be shown.
+/// Text as a page shows it, between tags and in attributes. Control characters, which a command line or a file's name may
+/// hold and no page may, are shown as the sign for what cannot be shown.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());

@@ -107,8 +107,8 @@ fn verdict(claim: &Claim) -> String {
 
 fn foot(report: &Report) -> String {
     format!(
-        "<footer class=\"page-foot\">\n<p>Schema {}, version {}. The same data for programs is in report.json beside this page.</p>\n\
-         </footer>\n",
+        "<footer class=\"page-foot\">\n<p>Schema {}, version {}. The same data for programs is in report.json beside this \
+         page.</p>\n</footer>\n",
         escaped(&report.schema),
         report.schema_version
     )

@@ -85,8 +85,8 @@ const HOW_TO_READ: [(&str, &str); 9] = [
     ),
     (
         "Gap of the probe",
-        "A thread that does nothing but read the clock saw no time pass as it should. If no other thread had its CPU, the machine \
-         stood still (a hypervisor, firmware, an interrupt); no program on it can help that.",
+        "A thread that does nothing but read the clock saw no time pass as it should. If no other thread had its CPU, the \
+         machine stood still (a hypervisor, firmware, an interrupt); no program on it can help that.",
     ),
     (
         "Cause",

@@ -49,7 +49,7 @@ pub(super) fn histograms(families: &[Family<'_>]) -> String {
     format!("<div class=\"charts\">\n{charts}</div>\n")
 }
 
-/// A figure: heading, drawing, and its legend if it needs one. The legend stands below, so that drawings side by side stand level.
+/// A figure: heading, drawing, and its legend if it needs one. The legend stands below: drawings side by side stand level.
 pub(super) fn figure(size: &Size, heading: (&str, &str), legend: &str, drawing: &str) -> String {
     let wide = if size.class == FULL.class { " class=\"wide\"" } else { "" };
     let legend =

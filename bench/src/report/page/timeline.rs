@@ -58,8 +58,8 @@ fn gap_ends(gaps: &[ProbeGap]) -> impl Iterator<Item = f64> {
     gaps.iter().map(|gap| gap.from_us + gap.length_us)
 }
 
-/// Lateness of the event's own cycles, each at its due time: the rig writes no row for a cycle that it missed, only for the one that
-/// it woke in. Nothing when the first of them has its row.
+/// Lateness of the event's own cycles, each at its due time: the rig writes no row for a cycle that it missed, only for the
+/// one that it woke in. Nothing when the first of them has its row.
 fn missed(event: &Event) -> Vec<(f64, f64)> {
     let rows = event.around.get(&event.process).map_or(&[][..], Vec::as_slice);
     if event.late_ns == 0 || rows.iter().any(|row| row.cycle == event.cycle) {
