@@ -5,6 +5,8 @@ use std::fmt::Write;
 
 /// Broken checks that the one line names.
 const NAMED: usize = 4;
+/// Characters of each that it quotes; soak.md has all of them.
+const QUOTED: usize = 120;
 
 /// Whether the soak may be trusted, and the line that says so.
 #[must_use]
@@ -17,7 +19,8 @@ pub fn of(soak: &Soak) -> (bool, String) {
     if !broken.is_empty() {
         let more = broken.len().saturating_sub(NAMED);
         let more = if more > 0 { format!("; and {more} more, see soak.md") } else { String::new() };
-        let first = broken[..broken.len().min(NAMED)].join("; ");
+        let first: Vec<_> = broken.iter().take(NAMED).map(|line| quoted(line)).collect();
+        let first = first.join("; ");
         let of = format!("{} of {} segments failed", totals.failed, totals.segments);
         return (false, format!("may not be trusted: {of}: {first}{more}"));
     }
@@ -51,6 +54,13 @@ pub fn of(soak: &Soak) -> (bool, String) {
             write!(line, "; so far {:.0} % of the time asked for", 100.0 * soak.elapsed_s / soak.planned_s);
     }
     (true, line)
+}
+
+fn quoted(line: &str) -> String {
+    match line.char_indices().nth(QUOTED) {
+        Some((end, _)) => format!("{}…", &line[..end]),
+        None => line.to_owned(),
+    }
 }
 
 fn named_broken(segment: &Segment) -> Vec<String> {
@@ -128,6 +138,9 @@ mod tests {
         assert!(trusted && line.starts_with("may be trusted: 1 segments in 1.0 min"), "{line}");
         let (trusted, line) = of(&soak(vec![good, segment(2, &[("account", CheckResult::Failed)])]));
         assert!(!trusted && line.contains("1 of 2 segments failed: 0002-e account: because"), "{line}");
+        let mut long = segment(1, &[("account", CheckResult::Failed)]);
+        long.checks[0].detail = "±".repeat(1000);
+        assert!(of(&soak(vec![long])).1.chars().count() < 250);
     }
 
     #[test]
