@@ -41,7 +41,11 @@ fn run_all(kernel: &str, pairs: &Pairs) -> Guest {
     let (vcan_runs, card_runs) = (runs("vcan0", pairs.vcan0), runs("cards", pairs.cards));
     let disturbed = out.join("cards");
 
-    assert!(guest.codes().values().all(|code| *code == 0), "{:?}", guest.codes());
+    for (name, code) in guest.codes() {
+        // These two jobs end the rig, as Ctrl-C does, when they have done what they are for.
+        let expected = if ["cards-emulator", "errors-emulator"].contains(&name.as_str()) { 130 } else { 0 };
+        assert_eq!(code, expected, "{name}");
+    }
     the_cards_are_set_up_as_asked(&json(&guest.file("guest.json")));
     the_system_granted_real_time(&out.join("cards"));
     for run in &vcan_runs {
