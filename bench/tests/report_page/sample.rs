@@ -326,7 +326,10 @@ fn conditions() -> Conditions {
             ("processor", "AMD EPYC 7763 64-Core Processor, 2 CPUs online"),
             ("kernel", "6.1.0-41-amd64 #1 SMP PREEMPT_DYNAMIC Debian 6.1.158-1"),
             ("preemption model", "voluntary (PREEMPT_DYNAMIC)"),
-            ("kernel command line", "BOOT_IMAGE=/boot/vmlinuz root=/dev/vda1 ro quiet mitigations=auto console=ttyS0"),
+            (
+                "kernel command line",
+                "BOOT_IMAGE=/boot/vmlinuz root=/dev/vda1 ro quiet mitigations=auto console=ttyS0",
+            ),
             ("governor", "not told by the kernel"),
             ("clock source", "kvm-clock"),
             ("hypervisor", "KVM"),
@@ -336,12 +339,24 @@ fn conditions() -> Conditions {
             ("build", "airbench 0.1.0, release, rustc 1.95.0"),
         ]),
         command_lines: facts(&[
-            ("emulator", "emulator run --bus unix:///tmp/airbench/bus0 --experiment experiments/hold.toml --pin 1 --full-timing"),
-            ("controller", "controller run --bus unix:///tmp/airbench/bus0 --experiment experiments/hold.toml --pin 0"),
+            (
+                "emulator",
+                "emulator run --bus unix:///tmp/airbench/bus0 --experiment experiments/hold.toml --pin 1 --full-timing",
+            ),
+            (
+                "controller",
+                "controller run --bus unix:///tmp/airbench/bus0 --experiment experiments/hold.toml --pin 0",
+            ),
         ]),
-        privileges: facts(&[("priority", "FIFO 80 granted"), ("memory", "locked"), ("/dev/cpu_dma_latency", "held at 0")]),
+        privileges: facts(&[
+            ("priority", "FIFO 80 granted"),
+            ("memory", "locked"),
+            ("/dev/cpu_dma_latency", "held at 0"),
+        ]),
         load_generator: None,
-        reference: Some("cyclictest --mlockall --priority=80 --interval=1000 --affinity=1 --duration=60 --json=cyclictest.json".into()),
+        reference: Some(
+            "cyclictest --mlockall --priority=80 --interval=1000 --affinity=1 --json=c.json".into(),
+        ),
         reference_missing_because: None,
         probe: true,
     }
@@ -357,7 +372,7 @@ pub(crate) fn rich() -> Report {
         made_unix_s: 1_795_171_400.0,
         claim: Claim {
             supported: false,
-            sentence: "The medians and p99 may be compared with the reference's; the maxima are the hypervisor's, not ours.".into(),
+            sentence: "Medians and p99 compare with the reference's; the maxima are the hypervisor's.".into(),
             reasons: vec![
                 sentence("The machine is virtual (KVM): it stood still twice, for 3.5 ms at the longest."),
                 sentence("The preemption model is voluntary, not PREEMPT_RT."),
@@ -374,19 +389,41 @@ pub(crate) fn rich() -> Report {
             ratio("emulator-wakeup p50 / cyclictest p50", 1.04, 13_200.0),
             ratio("emulator-wakeup p99 / cyclictest p99", 0.97, 31_000.0),
             ratio("drive-round-trip p50 / ping-pong-bus p50", 1.31, 92_000.0),
-            Ratio { name: "too few".into(), pairs_ns: vec![(5, 0), (4, 3)], median: f64::NAN, interval: None, confidence: None },
+            Ratio {
+                name: "too few".into(),
+                pairs_ns: vec![(5, 0), (4, 3)],
+                median: f64::NAN,
+                interval: None,
+                confidence: None,
+            },
         ],
         worst: worst(),
         findings: vec![
-            Finding { cause: Cause::MachineStoodStill, count: 2, sentence: "The machine stood still twice.".into() },
+            Finding {
+                cause: Cause::MachineStoodStill,
+                count: 2,
+                sentence: "The machine stood still twice.".into(),
+            },
             Finding { cause: Cause::EmulatorStopped, count: 1, sentence: "The rig was stopped once.".into() },
         ],
         runs: (0..RUNS).map(run).collect(),
         comparison: Some(comparison()),
         bounds: vec![
-            BoundResult { figure: "emulator-wakeup.p99_us".into(), value: Some(48.3), min: None, max: Some(100.0), kept: true },
+            BoundResult {
+                figure: "emulator-wakeup.p99_us".into(),
+                value: Some(48.3),
+                min: None,
+                max: Some(100.0),
+                kept: true,
+            },
             BoundResult { figure: "frames_lost".into(), value: None, min: None, max: Some(0.0), kept: false },
-            BoundResult { figure: "cycles".into(), value: Some(f64::INFINITY), min: Some(59_000.0), max: None, kept: true },
+            BoundResult {
+                figure: "cycles".into(),
+                value: Some(f64::INFINITY),
+                min: Some(59_000.0),
+                max: None,
+                kept: true,
+            },
         ],
     }
 }
