@@ -124,6 +124,7 @@ pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
         emulator_options: arguments.emulator_options.clone(),
         controller_options: arguments.controller_options.clone(),
         rig: arguments.rig.display().to_string(),
+        positions_judged: arguments.judge_positions == YesNo::Yes,
     };
     let mut keeping = Keeping::open(&arguments.out, settings, planned_s, arguments.anyway)?;
     keeping.soak.load_missing_because = load_missing_because;
@@ -230,7 +231,7 @@ impl Soaking {
             }
             if early_in_a_row >= GIVE_UP_AFTER {
                 let why = format!(
-                    "{GIVE_UP_AFTER} segments in a row ended before their time; see emulator.txt and controller.txt in their folders"
+                    "{GIVE_UP_AFTER} segments in a row ended before their time; see emulator.txt and controller.txt in them"
                 );
                 let refused = codes.contains(&Some(Exit::BadInput as i32));
                 return Ok((if refused { Exit::BadInput } else { Exit::BusFailed }, why));
@@ -260,7 +261,7 @@ impl Soaking {
         let outcome = segment::run(&self.common, &spec, rig_s, &folder, &self.interrupt, &mut tell)?;
         let load = spec.load.then(|| self.common.load.join(" "));
         write_conditions(&folder, &spec, load.as_deref())?;
-        let judged = judge::judge(&spec, &folder, &outcome);
+        let judged = judge::judge(&spec, &folder, &outcome, keeping.soak.settings.positions_judged);
         let unread = keeping.merged.add_segment(&folder);
         unread.iter().for_each(|line| eprintln!("soak: warning: {line}"));
         if keeping.soak.machine.is_null() {

@@ -122,6 +122,8 @@ pub struct BusCounters {
     pub reconnects: u64,
     /// Frames handed to the bus, by identifier.
     pub sent_by_id: FrameTally,
+    /// Frames that it did not take, by identifier.
+    pub dropped_on_send_by_id: FrameTally,
     /// Well-formed frames taken from the bus, by identifier.
     pub received_by_id: FrameTally,
 }

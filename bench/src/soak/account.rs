@@ -6,12 +6,13 @@
 //!    │        └── the receiver counts them           can://: the kernel's overflow count stands in the queue's place
 //!    └── the sender counts them
 //!
-//!   gaps at the receiver + before its first frame + after its last  =  sent - received
+//!   gaps at the receiver + before its first frame + after its last  =  sent + refused at the sender - received
 //! ```
 //!
-//! The second line is the other way to the same number: from the counters that senders put into commands (4 bits) and from the
-//! rig's ticks (how many sensor frames it has sent), without anything that host or kernel say. No tolerance anywhere: a
-//! host counts what passed while a peer was not there, so the ends of a connection are exact too.
+//! Counters and ticks count what a sender wanted to send, so what its own transmit queue refused is missing in the second line
+//! too, and stands there beside `sent`. That line is the other way to the same number: from the counters that senders put into
+//! commands (4 bits) and from the rig's ticks (how many sensor frames it has sent), without anything that host or kernel say.
+//! No tolerance anywhere: a host counts what passed while a peer was not there, so the ends of a connection are exact too.
 
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -119,6 +120,8 @@ pub struct Party {
     pub name: String,
     /// Frames that it handed to the bus.
     pub sent: Counts,
+    /// Frames that its transmit queue, or a bus that was down, did not take.
+    pub refused: Counts,
     /// Frames that it took from the bus.
     pub received: Counts,
     /// Frames that the kernel dropped at its queue, of whatever identifier; only SocketCAN tells.
@@ -153,11 +156,13 @@ pub struct Row {
     pub receiver: String,
     /// Frames sent, by the sender's count.
     pub sent: u64,
+    /// Frames that the sender's transmit queue did not take: never sent, and missing all the same.
+    pub refused_at_sender: u64,
     /// Frames received, by the receiver's count.
     pub received: u64,
     /// Lost on the wire on purpose, or never sent by a modelled one, by the host's count.
     pub lost_on_wire: u64,
-    /// Lost at the receiver's queue, or missed in bus-off, by the host's count; on can:// the kernel's, when it names one identifier only.
+    /// Lost at the receiver's queue, or missed in bus-off, by the host's count; on can:// the kernel's.
     pub lost_at_queue: u64,
     /// Passed before the receiver was on the bus.
     pub before_it_came: u64,
@@ -200,17 +205,19 @@ pub fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
         let first_row = account.rows.len();
         for (id, (sender, sent)) in senders.iter().filter(|(id, _)| party.sent.of(id) == 0) {
             let seen = party.seen.clone().unwrap_or_default();
+            let refused = parties.iter().map(|party| party.refused.of(id)).sum::<u64>();
             account.rows.push(Row {
                 id: id.clone(),
                 sender: sender.clone(),
                 receiver: party.name.clone(),
                 sent: *sent,
+                refused_at_sender: refused,
                 received: party.received.of(id),
                 lost_on_wire: wire.map_or(0, |wire| wire.injected.of(id) + wire.never_sent.of(id)),
                 lost_at_queue: seen.dropped.of(id) + seen.missed_in_bus_off.of(id),
                 before_it_came: seen.before.of(id),
                 after_it_left: seen.after.of(id),
-                missing_by_gaps: party.gaps.get(id).map(|gaps| gaps.missing(*sent)),
+                missing_by_gaps: party.gaps.get(id).map(|gaps| gaps.missing(*sent + refused)),
             });
         }
         let rows = &mut account.rows[first_row..];
@@ -291,10 +298,10 @@ fn check_rows(rows: &[Row], broken: &mut Vec<String>, gaps_broken: &mut Vec<Stri
                 row.explained()
             ));
         }
-        if let Some(by_gaps) = row.missing_by_gaps.filter(|by_gaps| i128::from(*by_gaps) != row.missing()) {
+        let by_counts = row.missing() + i128::from(row.refused_at_sender);
+        if let Some(by_gaps) = row.missing_by_gaps.filter(|by_gaps| i128::from(*by_gaps) != by_counts) {
             gaps_broken.push(format!(
-                "{id} at {receiver}: {} missing by the counts, {by_gaps} by the gaps",
-                row.missing()
+                "{id} at {receiver}: {by_counts} missing by the counts, {by_gaps} by the gaps"
             ));
         }
     }

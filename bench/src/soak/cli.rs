@@ -44,6 +44,10 @@ pub struct SoakArguments {
     /// Probability that a frame is lost in these segments.
     #[arg(long, default_value_t = 0.01, value_parser = probability)]
     pub loss: f64,
+    /// Whether a broken bound on a position error breaks the segment: 'no' where the machine itself loses cycles by the thousand,
+    /// as an emulated one does.
+    #[arg(long, value_enum, default_value_t = YesNo::Yes)]
+    pub judge_positions: YesNo,
     /// Newest segments that keep their big files (logs and tables).
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
     pub keep: u64,

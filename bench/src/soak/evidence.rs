@@ -162,6 +162,7 @@ fn party(name: &str, told: &Value) -> Party {
     Party {
         name: name.into(),
         sent: counts(&told["bus"]["sent_by_id"]),
+        refused: counts(&told["bus"]["dropped_on_send_by_id"]),
         received: counts(&told["bus"]["received_by_id"]),
         overflow: number(told, "/bus/dropped_on_receive").unwrap_or(0),
         ..Party::default()

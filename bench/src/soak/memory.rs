@@ -7,8 +7,8 @@
 //!   quarters median of the last quarter / median of the second - 1: finds a staircase whose slope is 0 at most times
 //! ```
 //!
-//! A leak of 64 KiB a minute is 90 MiB a day, of a process of some 20 MB. Shorter records than two minutes judge the quarters only: the
-//! kernel counts resident pages in batches, and a batch on a minute is more than the bound.
+//! A leak of 64 KiB a minute is 90 MiB a day, of a process of some 20 MB. Shorter records than two minutes judge the quarters
+//! only: the kernel counts resident pages in batches, and a batch on a minute is more than the bound.
 
 use serde::{Deserialize, Serialize};
 

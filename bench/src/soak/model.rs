@@ -67,6 +67,8 @@ pub struct Settings {
     pub controller_options: String,
     /// The rig file.
     pub rig: String,
+    /// Whether bounds on position errors are judged.
+    pub positions_judged: bool,
 }
 
 impl Settings {

@@ -1,4 +1,4 @@
-//! Big files of older segments go, so that a soak of any length needs a known room: the newest ones and the failed ones keep theirs.
+//! Big files of older segments go, so that a soak of any length needs a known room: the newest and the failed ones keep theirs.
 
 use super::model::Segment;
 use std::io;

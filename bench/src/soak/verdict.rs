@@ -79,7 +79,8 @@ pub fn page(soak: &Soak) -> String {
     let ended = soak.ended_because.as_deref().unwrap_or("it goes on, or was killed");
     let _ = writeln!(page, "- ended because: {ended}");
     let _ = writeln!(page, "- files: {:.0} MB\n", soak.folder_bytes as f64 * 1e-6);
-    page.push_str("| distribution | p50 us | p99 us | p99.9 us | p99.99 us | max us | samples |\n|---|--:|--:|--:|--:|--:|--:|\n");
+    page.push_str("| distribution | p50 us | p99 us | p99.9 us | p99.99 us | max us | samples |\n");
+    page.push_str("|---|--:|--:|--:|--:|--:|--:|\n");
     for (tag, kept) in &soak.distributions {
         let [p50, p99, p999, p9999, max] =
             [kept.p50_ns, kept.p99_ns, kept.p999_ns, kept.p9999_ns, kept.max_ns]

@@ -253,7 +253,10 @@ impl<L: Link> Bus for SocketPeer<L> {
                 self.counters.sent += 1;
                 self.counters.sent_by_id.count(frame);
             }
-            Err(_) => self.counters.dropped_on_send += 1,
+            Err(_) => {
+                self.counters.dropped_on_send += 1;
+                self.counters.dropped_on_send_by_id.count(frame);
+            }
         }
         result.map(|()| handed_over_ns)
     }

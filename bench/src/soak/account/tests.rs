@@ -128,3 +128,14 @@ fn a_series_of_commands_is_missing_what_lies_before_between_and_after() {
     assert_eq!(Gaps::Commands { lost: 1, first: 3, last: 3 }.missing(20), 4);
     assert_eq!(Gaps::Commands { lost: 0, first: 1, last: 0 }.missing(16), 0);
 }
+
+#[test]
+fn what_the_senders_own_queue_refused_is_missing_by_the_gaps_and_not_by_the_counts() {
+    // The first line does not change; three frames that were never sent leave gaps like any others.
+    let gaps = Gaps::Sensors { lost: 5, before: 4 };
+    let account = broken(|parties, _| {
+        parties[0].refused = Counts::from([("120", 3)]);
+        parties[1].gaps.insert("120".into(), gaps);
+    });
+    assert_eq!((account.broken.len(), account.gaps_broken.len()), (0, 0), "{account:?}");
+}
