@@ -177,7 +177,7 @@ fn excuse(evidence: &Evidence, judge: bool) -> Option<String> {
     let late = |told: &Value| told["wakeup_ns"]["max"].as_u64().unwrap_or(0);
     let stall_ns = evidence.controllers.values().map(late).fold(late(&evidence.summary), u64::max);
     if !judge {
-        Some("not judged, as asked".into())
+        Some("told, not judged: bounds of an experiment driven once".into())
     } else if stall_ns >= STALL_NS {
         Some(format!("not judged: a process stood still for {:.1} ms", stall_ns as f64 * 1e-6))
     } else {
