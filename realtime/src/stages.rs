@@ -13,7 +13,7 @@
 //! | `-wakeup` | woke − due of each cycle that was due, missed ones too (coordinated omission, [`crate::periodic`]) |
 //! | `-receive`, `-step`, `-send` | length of the stage |
 //! | `-execution` | done − woke |
-//! | `-completion` | done − due |
+//! | `-completion` | done − due of each cycle that was due, missed ones too: the cycle that followed them did their work |
 //! | `-period-error` | change of the wake-up latency from one cycle to the next, as [`crate::periodic`] defines it |
 //! | further ones | whatever the process adds by [`StageAccount::add`] |
 //!
@@ -33,7 +33,9 @@
 //! # Ok(()) }
 //! ```
 //! A controller has no schedule of its own: it is due when the sensors that wake it arrive. It says `skipped: 0`, and tells the
-//! sensors that waited meanwhile one by one with [`StageAccount::record_waited`].
+//! sensors that waited meanwhile one by one with [`StageAccount::record_waited`], as late as the row that answered after them.
+//!
+//! So wake-up and completion count the same cycles, and the longest completion is never shorter than the longest wake-up.
 //!
 //! Without dropped rows the totals equal those of the loop ([`crate::LoopStatistics`]); a test holds them together.
 
@@ -95,7 +97,7 @@ pub struct StageFigures {
     pub send_ns: Percentiles,
     /// From waking to done.
     pub execution_ns: Percentiles,
-    /// From due to done.
+    /// From due to done, of each cycle that was due.
     pub completion_ns: Percentiles,
     /// Period error.
     pub period_error_ns: Percentiles,
@@ -155,14 +157,17 @@ impl StageAccount {
         let done = Instant::from_nanos(row.done_ns);
         self.turn_if(done, IntervalLog::is_over)?;
         let late_ns = row.late_ns();
-        self.record_missed(late_ns + row.skipped * self.period_ns, row.skipped);
+        let completion_ns = row.done_ns.saturating_sub(row.due_ns);
+        let missed_ns = row.skipped * self.period_ns;
+        self.record_missed_in(Stage::Wakeup, late_ns + missed_ns, row.skipped);
+        self.record_missed_in(Stage::Completion, completion_ns + missed_ns, row.skipped);
         for (stage, ns) in [
             (Stage::Wakeup, late_ns),
             (Stage::Receive, row.receive_ns),
             (Stage::Step, row.step_ns),
             (Stage::Send, row.send_ns),
             (Stage::Execution, row.execution_ns()),
-            (Stage::Completion, row.done_ns.saturating_sub(row.due_ns)),
+            (Stage::Completion, completion_ns),
         ] {
             self.recorders[stage as usize].record(ns);
         }
@@ -172,16 +177,23 @@ impl StageAccount {
         Ok(())
     }
 
-    /// Records `count` cycles in a row that were missed, the first of which was due `late_ns` ago.
+    /// Records `count` cycles in a row that were missed and that no cycle follows, the first of which was due `late_ns` ago.
+    /// They were never completed: they count with the lateness that they had when the run ended.
     pub fn record_missed(&mut self, late_ns: u64, count: u64) {
-        let period_ns = self.period_ns;
-        self.recorders[Stage::Wakeup as usize]
-            .each(|recorder| record_missed(recorder, late_ns, count, period_ns));
+        self.record_missed_in(Stage::Wakeup, late_ns, count);
+        self.record_missed_in(Stage::Completion, late_ns, count);
     }
 
-    /// Records that something that should have woken the thread waited `ns` until it did.
-    pub fn record_waited(&mut self, ns: u64) {
+    fn record_missed_in(&mut self, stage: Stage, late_ns: u64, count: u64) {
+        let period_ns = self.period_ns;
+        self.recorders[stage as usize].each(|recorder| record_missed(recorder, late_ns, count, period_ns));
+    }
+
+    /// Records that something that should have woken the thread waited `ns` until it did, and `completion_ns` until the row that
+    /// answered after it was done.
+    pub fn record_waited(&mut self, ns: u64, completion_ns: u64) {
         self.recorders[Stage::Wakeup as usize].record(ns);
+        self.recorders[Stage::Completion as usize].record(completion_ns.max(ns));
     }
 
     /// Records a sample of a histogram that was added.

@@ -93,6 +93,7 @@ fn without_dropped_rows_the_log_adds_up_to_what_the_loop_counted() {
     let of_account = [figures.wakeup_ns, figures.execution_ns, figures.period_error_ns];
     assert_eq!(of_loop.map(|recorder| recorder.percentiles()), of_account);
     assert_eq!(sum(&lines, "emulator-receive").len(), statistics.cycles);
+    assert_eq!(figures.completion_ns.count, figures.wakeup_ns.count, "missed cycles are completed late too");
     assert_eq!(figures.send_ns.max.map(|ns| ns / 10), Some(300));
 }
 
@@ -102,11 +103,31 @@ fn a_stall_of_fifty_milliseconds_leaves_fifty_samples_a_millisecond_apart() {
     let work = |cycle| Duration::from_micros(if cycle == 100 { 51_000 } else { 10 });
     let (periodic, mut account) = run(folder.path(), 200, work);
     account.finish(periodic.clock().now()).expect("written");
-    let wakeup = sum(&lines(&folder.path().join("emulator.hlog")), "emulator-wakeup");
-    for late_ms in 1..=50_u64 {
-        let near = wakeup.count_between(late_ms * 1_000_000 - 2000, late_ms * 1_000_000 + 2000);
-        assert_eq!(near, 1, "{late_ms} ms late");
+    let lines = lines(&folder.path().join("emulator.hlog"));
+    // The cycle that follows the stall is done 10 us after it woke, and with it those that it made good.
+    for (tag, after_ns) in [("emulator-wakeup", 0), ("emulator-completion", 10_000)] {
+        let samples = sum(&lines, tag);
+        for late_ms in 1..=50_u64 {
+            let expected_ns = late_ms * 1_000_000 + after_ns;
+            // Three digits: a bin is at most a thousandth wide.
+            let near_ns = 2000 + expected_ns / 1000;
+            let near = samples.count_between(expected_ns - near_ns, expected_ns + near_ns);
+            assert_eq!(near, 1, "{tag}: {late_ms} ms late");
+        }
     }
+    assert!(sum(&lines, "emulator-completion").max() >= sum(&lines, "emulator-wakeup").max());
+}
+
+#[test]
+fn what_waited_and_what_nothing_followed_is_in_the_completion_too() {
+    let mut account = StageAccount::new("controller", PERIOD);
+    account.record_waited(5_000_000, 5_040_000);
+    account.record_missed(3_000_000, 3);
+    let figures = account.finish(Instant::from_nanos(0)).expect("no log");
+    assert_eq!((figures.wakeup_ns.count, figures.completion_ns.count), (4, 4));
+    let about = |value: Option<u64>, ns: u64| value.is_some_and(|value| value.abs_diff(ns) < ns / 500);
+    assert!(about(figures.wakeup_ns.max, 5_000_000), "{figures:?}");
+    assert!(about(figures.completion_ns.max, 5_040_000), "{figures:?}");
 }
 
 #[test]
@@ -143,11 +164,14 @@ fn a_second_is_written_though_nothing_newer_comes() {
     let mut account = StageAccount::new("controller", PERIOD);
     let further = account.add("controller-answer");
     account.log_to(IntervalLog::create(&path, 0.0, Instant::from_nanos(0)).expect("made"));
-    account.record_waited(5_000_000);
+    account.record_waited(5_000_000, 5_010_000);
     account.record_further(further, 7);
     account.advance(Instant::from_nanos(1_100_000_000)).expect("written");
     assert!(lines(&path).is_empty(), "rows may still be in the queue");
     account.advance(Instant::from_nanos(1_300_000_000)).expect("written");
-    assert_eq!(lines(&path).keys().collect::<Vec<_>>(), ["controller-answer", "controller-wakeup"]);
+    assert_eq!(
+        lines(&path).keys().collect::<Vec<_>>(),
+        ["controller-answer", "controller-completion", "controller-wakeup"]
+    );
     assert_eq!(account.further(further).max, Some(7));
 }

@@ -46,7 +46,9 @@ fn expect_one_account(scene: &Scene, name: &str, waking_axis: &str) -> Vec<Cycle
     let waited = of_axis("sensors_received") - count(&report, "/sensors_before_start");
     let samples = samples(&at(format!("{name}.hlog")));
     assert_eq!(samples[&format!("{name}-wakeup")], waited, "{name}: every frame that waited is a sample");
-    for stage in ["receive", "step", "send", "execution", "completion"] {
+    assert_eq!(samples[&format!("{name}-completion")], waited, "{name}: and is late until it is answered");
+    assert_eq!(count(&report, "/completion_ns/count"), waited, "{name}");
+    for stage in ["receive", "step", "send", "execution"] {
         assert_eq!(samples[&format!("{name}-{stage}")], rows.len() as u64, "{name}-{stage}");
         let key = format!("/{}_ns/count", stage);
         assert_eq!(count(&report, &key), rows.len() as u64, "{name}: {key}");

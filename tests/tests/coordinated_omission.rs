@@ -77,12 +77,21 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     assert_eq!(wakeup.len(), cycles, "each cycle that was due stands in the histogram once");
     assert_eq!(wakeup.len(), count(&summary, "/wakeup_ns/count"));
     assert_eq!(wakeup.max(), count(&summary, "/wakeup_ns/max"));
+    let completion = sum(&scene.path("emulator/emulator.hlog"), "emulator-completion");
+    assert_eq!(completion.len(), cycles, "a missed cycle is completed late too");
+    assert!(completion.max() >= wakeup.max(), "{} and {}", completion.max(), wakeup.max());
     // One for each missed cycle, a millisecond apart. Three digits: a bin is at most a thousandth wide.
     let late_ns = stall.woke_ns - stall.due_ns + stall.skipped * MS;
     for missed in 0..stall.skipped {
         let expected_ns = late_ns - missed * MS;
         let (from_ns, to_ns) = (expected_ns - expected_ns / 1000, expected_ns + expected_ns / 1000);
         assert!(wakeup.count_between(from_ns, to_ns) >= 1, "no sample at {expected_ns} ns");
+    }
+    let done_ns = stall.done_ns - stall.due_ns;
+    for missed in 0..=stall.skipped {
+        let expected_ns = done_ns + missed * MS;
+        let (from_ns, to_ns) = (expected_ns - expected_ns / 1000, expected_ns + expected_ns / 1000);
+        assert!(completion.count_between(from_ns, to_ns) >= 1, "no completion at {expected_ns} ns");
     }
     let at_least_a_cycle = wakeup.count_between(MS, wakeup.high());
     assert!(at_least_a_cycle >= skipped, "{at_least_a_cycle} late samples for {skipped} skipped cycles");

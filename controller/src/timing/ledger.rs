@@ -32,6 +32,9 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// Start of a run that the totals of the vitals leave out: memory is touched for the first time.
 const WARM_UP_NS: u64 = 1_000_000_000;
 
+/// Sensors that wait for a row at most: with none in that time nobody answers, such as before the first tick.
+const MOST_WAITING: usize = 16 * 1024;
+
 /// What a ledger is made of.
 pub struct LedgerSetup {
     /// The run's folder.
@@ -128,8 +131,21 @@ pub struct Ledger {
     flight: Option<Flight>,
     vitals: VitalTotals,
     first_ns: Option<u64>,
-    /// Longest wait since the last row.
-    waited_ns: u64,
+    /// Sensors that begin no row and wait for the row that answers after them.
+    waiting: Vec<Wait>,
+}
+
+/// Sensors that waited for a wake-up.
+#[derive(Clone, Copy)]
+struct Wait {
+    arrived_ns: u64,
+    woke_ns: u64,
+}
+
+impl Wait {
+    fn ns(self) -> u64 {
+        self.woke_ns.saturating_sub(self.arrived_ns)
+    }
 }
 
 impl Ledger {
@@ -165,7 +181,7 @@ impl Ledger {
             flight,
             vitals: VitalTotals::default(),
             first_ns: None,
-            waited_ns: 0,
+            waiting: Vec::with_capacity(MOST_WAITING),
         })
     }
 
@@ -194,14 +210,22 @@ impl Ledger {
         while let Ok(measured) = self.measured.try_recv() {
             match measured {
                 Measured::Waited { arrived_ns, woke_ns } => {
-                    let ns = woke_ns.saturating_sub(arrived_ns);
-                    self.waited_ns = self.waited_ns.max(ns);
-                    self.account.record_waited(ns);
+                    if self.waiting.len() == MOST_WAITING {
+                        self.give_up_waiting();
+                    }
+                    self.waiting.push(Wait { arrived_ns, woke_ns });
                 }
                 Measured::Cycle(row) => self.take_row(row)?,
             }
         }
         Ok(())
+    }
+
+    /// Nobody answered after these sensors: they count with what they had waited when they were taken.
+    fn give_up_waiting(&mut self) {
+        for wait in self.waiting.drain(..) {
+            self.account.record_waited(wait.ns(), wait.ns());
+        }
     }
 
     fn take_frame(&mut self, passed: Passed) {
@@ -229,6 +253,11 @@ impl Ledger {
             send_ns: row.send_ns,
             done_ns: row.done_ns,
         })?;
+        let mut waited_ns = row.woke_ns.saturating_sub(row.due_ns);
+        for wait in self.waiting.drain(..) {
+            waited_ns = waited_ns.max(wait.ns());
+            self.account.record_waited(wait.ns(), row.done_ns.saturating_sub(wait.arrived_ns));
+        }
         let first_ns = *self.first_ns.get_or_insert(row.woke_ns);
         if row.woke_ns.saturating_sub(first_ns) > WARM_UP_NS {
             self.vitals.add(&counts(&row));
@@ -237,7 +266,6 @@ impl Ledger {
             write_row(table.lines(), &row)?;
             table.write_when_full()?;
         }
-        let waited_ns = std::mem::take(&mut self.waited_ns).max(row.woke_ns.saturating_sub(row.due_ns));
         let Some(flight) = &mut self.flight else { return Ok(()) };
         flight.take(row, waited_ns, work_ns)
     }
@@ -263,6 +291,7 @@ impl Ledger {
     /// What the system says, with the file's name.
     pub fn finish(&mut self) -> io::Result<()> {
         self.empty_queues()?;
+        self.give_up_waiting();
         self.account.finish(MonotonicClock.now())?;
         self.write_out()?;
         self.flight.as_mut().map_or(Ok(()), Flight::finish)

@@ -67,10 +67,11 @@ fn each_row_and_each_wait_is_a_sample() {
     let mut bench = Bench::new(true);
     let rows = [bench.row(7, 20_000, 50_000), bench.row(8, 30_000, 100_000)];
     rows.iter().for_each(|row| bench.tell(*row));
+    // Nobody answers after these.
     bench.measured.send(Measured::Waited { arrived_ns: 1000, woke_ns: 91_000 }).unwrap();
     bench.ledger.finish().unwrap();
     let TimingFigures { stages, flight, .. } = bench.ledger.figures();
-    assert_eq!((stages.wakeup_ns.count, stages.execution_ns.count), (3, 2));
+    assert_eq!((stages.wakeup_ns.count, stages.execution_ns.count, stages.completion_ns.count), (3, 2, 3));
     let about = |value: Option<u64>, exact: u64| value.is_some_and(|ns| ns.abs_diff(exact) <= exact / 500);
     assert!(about(stages.wakeup_ns.max, 90_000), "{stages:?}");
     assert!(
@@ -85,6 +86,23 @@ fn each_row_and_each_wait_is_a_sample() {
     for stage in ["wakeup", "receive", "step", "send", "execution", "completion", "period-error"] {
         assert!(hlog.contains(&format!("Tag=controller-{stage},")), "{stage} is not in\n{hlog}");
     }
+}
+
+#[test]
+fn sensors_that_were_overtaken_are_answered_when_the_row_after_them_is_done() {
+    let mut bench = Bench::new(false);
+    let row = CycleTiming { skipped: 49, ..bench.row(57, 1_000_000, 60_000) };
+    for n in (1..50).rev() {
+        let arrived_ns = row.due_ns - n * MS;
+        bench.measured.send(Measured::Waited { arrived_ns, woke_ns: row.woke_ns }).unwrap();
+    }
+    bench.tell(row);
+    bench.ledger.finish().unwrap();
+    let TimingFigures { stages, .. } = bench.ledger.figures();
+    assert_eq!((stages.wakeup_ns.count, stages.completion_ns.count), (50, 50));
+    assert!(stages.completion_ns.max >= stages.wakeup_ns.max, "{stages:?}");
+    let completion_ns = 50 * MS + 60_000;
+    assert!(stages.completion_ns.max.unwrap().abs_diff(completion_ns) <= completion_ns / 500, "{stages:?}");
 }
 
 #[test]

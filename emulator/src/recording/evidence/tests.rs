@@ -99,7 +99,9 @@ fn an_overrun_that_ends_the_run_is_counted_and_dumped() {
         TimingRecord::Stopped { first: 2, skipped: 5, late_ns: 5 * MS + 7000, woke_ns: 7 * MS + 7000 };
     evidence.timing(&stopped).unwrap();
     let (report, _) = evidence.finish(at(8));
-    assert_eq!(report.stages.unwrap().wakeup_ns.count, 6);
+    let stages = report.stages.unwrap();
+    assert_eq!((stages.wakeup_ns.count, stages.completion_ns.count), (6, 6));
+    assert!(stages.completion_ns.max >= stages.wakeup_ns.max, "{stages:?}");
     assert_eq!(dumped(folder.path()), ["emulator-0000000002-overrun"]);
 }
 
