@@ -1,4 +1,5 @@
-//! Everything around the plant and its controller that is neither: here, what a run's folder adds up to.
+//! Everything around the plant and its controller that is neither: what runs' folders add up to, latency reports, soaks, and
+//! references to measure beside.
 //!
 //! | file | holds |
 //! |---|---|

@@ -17,8 +17,8 @@
 //! a gap in which another ran. The probes of the other CPUs tell, if all stood still.
 //!
 //! # Source
-//! The idea is that of `hwlat_detector` (kernel's tree, `Documentation/trace/hwlat_detector.rst`) and of `sysjitter`, from user space and
-//! without switching interrupts off.
+//! The idea is that of `hwlat_detector` (kernel's tree, `Documentation/trace/hwlat_detector.rst`) and of `sysjitter`, from
+//! user space and without switching interrupts off.
 
 pub mod cli;
 mod gaps;

@@ -17,7 +17,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Length of each run, s of the rig's time.
-const RUN_S: u64 = 6;
+const RUN_S: u64 = 5;
 /// A process stands still for so long.
 const STOP: Duration = Duration::from_millis(5);
 /// Another program takes the CPU for so long, and so often.

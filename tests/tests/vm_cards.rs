@@ -381,7 +381,7 @@ fn cyclictest_stands_beside_our_figures(run: &Path, kernel: &str) {
     );
 }
 
-/// The reports that CI keeps; they say themselves that they support no claim.
+/// The reports that `.github/workflows/ci.yml` keeps, in `target/vm-reports`; they say themselves that they support no claim.
 fn reports_are_kept(kernel: &str) {
     for bus in ["vcan0", "cards"] {
         let folder = root().join(format!("target/vm-reports/{kernel}-{bus}"));

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! Figures: a distribution of all runs with `p50_ns`, `p90_ns`, `p99_ns`, `p999_ns`, `p9999_ns`, `max_ns` or `count`; a ratio's
-//! median; a count summed over the runs; how often a cause was found. A figure that exists and was not measured breaks its bound; one
-//! that does not exist is an error, which names those that do.
+//! median; a count summed over the runs; how often a cause was found. A figure that exists and was not measured breaks its
+//! bound; one that does not exist is an error, which names those that do.
 
 use super::kinds;
 use super::model::{BoundResult, Cause, PercentilesNs, Report};

@@ -14,8 +14,8 @@ const STORM_FAULTS: u64 = 1000;
 /// Share of cycles with faults that is one.
 const STORM_SHARE: f64 = 0.05;
 /// Contention is a finding from one event of the first length on, or from so many of the second. Less is what interrupts and
-/// kernel threads do now and then, and what a virtual CPU that its host takes away between two threads looks like: it stays with its
-/// events. A guess, held against ten undisturbed runs by `scripts/disturb`.
+/// kernel threads do now and then, and what a virtual CPU that its host takes away between two threads looks like: it stays
+/// with its events. A guess, held against ten undisturbed runs by `scripts/disturb`.
 const CONTENTION_LATE_NS: u64 = 4_000_000;
 const CONTENTION_EVENTS: usize = 10;
 const CONTENTION_OFTEN_NS: u64 = 1_000_000;

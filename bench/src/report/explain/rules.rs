@@ -15,8 +15,8 @@
 //! | none of these | machine-stood-still, as what is left |
 //!
 //! A late timer interrupt leaves no trace in the scheduler: the thread was not yet ready, so it did not wait, and nobody was
-//! ahead of it. On a virtual machine that is how its host's doings look from inside. What another CPU wakes is ready at once: there
-//! a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
+//! ahead of it. On a virtual machine that is how its host's doings look from inside. What another CPU wakes is ready at
+//! once: there a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
 
 use crate::report::model::Cause;
 use protocol::timing::Vitals;
