@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 pub const SLOPE_LIMIT_KIB_PER_H: f64 = 64.0 * 60.0;
 /// Largest growth from the second quarter to the last that counts as flat.
 pub const GROWTH_LIMIT_PERCENT: f64 = 1.0;
+/// Growth that a record without a slope may have all the same, KiB: lists that grow to their bound, and the kernel's batches.
+const SHORT_GROWTH_KIB: f64 = 512.0;
 /// What is left out at most, s.
 const START_S: f64 = 60.0;
 /// Shortest record, start left out, whose slope is judged, s.
@@ -87,7 +89,11 @@ impl Memory {
     #[must_use]
     pub fn is_flat(&self) -> Option<bool> {
         let slope_kept = self.slope_kib_per_h.is_none_or(|slope| slope < SLOPE_LIMIT_KIB_PER_H);
-        self.growth_percent.map(|growth| slope_kept && growth < GROWTH_LIMIT_PERCENT)
+        let small = |growth_percent: f64| {
+            self.slope_kib_per_h.is_none()
+                && growth_percent / 100.0 * (self.rss_last_kib as f64) < SHORT_GROWTH_KIB
+        };
+        self.growth_percent.map(|growth| slope_kept && (growth < GROWTH_LIMIT_PERCENT || small(growth)))
     }
 }
 
@@ -151,6 +157,7 @@ mod tests {
         let short = record(40, |at_s| 20_000.0 + 3.0 * at_s);
         assert_eq!((short.slope_kib_per_h, short.is_flat()), (None, Some(true)));
         assert_eq!(record(40, |at_s| 20_000.0 + 60.0 * at_s).is_flat(), Some(false));
+        assert_eq!(record(40, |at_s| 20_000.0 + 20.0 * at_s).is_flat(), Some(true), "2 %, but 400 KiB");
         assert_eq!(record(10, |_| 20_000.0).is_flat(), None);
         assert_eq!(Memory::of(&[]), Memory::default());
     }
