@@ -230,7 +230,10 @@ impl Ledger {
         let spec = passed.frame.standard_id().and_then(MessageSpec::by_id);
         let spec = spec.filter(|_| !passed.sent && Frame::decode(&passed.frame).is_ok());
         if let Some((spec, period)) = spec.and_then(cyclic) {
-            let arrivals = self.arrivals.entry(spec.id).or_insert_with(|| Arrivals::new(spec.name, period));
+            let arrivals = self.arrivals.entry(spec.id).or_insert_with(|| {
+                let arrivals = Arrivals::new(spec.name, period);
+                if spec.send_type == "Cyclic" { arrivals } else { arrivals.on_change_too() }
+            });
             arrivals.note(Instant::from_nanos(passed.stamp_ns));
         }
         if let Some(flight) = &mut self.flight {

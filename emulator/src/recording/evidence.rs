@@ -350,7 +350,8 @@ fn is_heard_cyclically(message: &MessageSpec) -> bool {
 }
 
 fn arrivals_of(message: &MessageSpec) -> Arrivals {
-    Arrivals::new(message.name, Duration::from_millis(message.cycle_time_ms.into()))
+    let arrivals = Arrivals::new(message.name, Duration::from_millis(message.cycle_time_ms.into()));
+    if message.send_type == "Cyclic" { arrivals } else { arrivals.on_change_too() }
 }
 
 /// The row as the account takes it.

@@ -192,6 +192,11 @@ fn cyclic_frames_that_came_have_an_account_and_sent_and_broken_ones_have_none() 
     let arrivals = bench.ledger.figures().arrivals;
     let of = |name: &str| arrivals.iter().find(|arrivals| arrivals.frame == name).unwrap();
     assert_eq!((of("DriveSensors").count, of("DriveSensors").gaps), (3, 1));
+    assert_eq!(
+        (of("DriveSensors").bursts, of("Tick").bursts),
+        (Some(0), None),
+        "a tick is sent on change too"
+    );
     assert_eq!((of("Tick").count, of("Tick").period_ms, arrivals.len()), (1, 10, 2));
 }
 

@@ -138,8 +138,19 @@ fn only_good_cyclic_frames_of_others_are_looked_at() {
     }
     let (report, _) = evidence.finish(at(11));
     let [arrivals] = &report.arrivals[..] else { panic!("{:?}", report.arrivals) };
+    assert_eq!(arrivals.bursts, Some(0));
     assert_eq!(
         (arrivals.frame, arrivals.period_ms, arrivals.count, arrivals.gaps),
         ("DriveValveCommand", 1, 10, 0)
     );
+}
+
+#[test]
+fn a_frame_that_is_sent_on_change_too_has_no_account_of_bursts() {
+    let message = |name: &str| MESSAGES.iter().find(|message| message.name == name).unwrap();
+    let bursts = |name: &str| arrivals_of(message(name)).figures().bursts;
+    let on_change = MESSAGES.iter().filter(|message| message.send_type == "CyclicAndOnChange");
+    assert!(on_change.clone().count() > 0);
+    on_change.for_each(|message| assert_eq!(bursts(message.name), None, "{}", message.name));
+    assert_eq!(bursts("DriveValveCommand"), Some(0));
 }
