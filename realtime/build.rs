@@ -1,8 +1,7 @@
-//! Tells the crate what it is built with and from, so that a run's record can say it: compiler, target, profile, commit.
+//! Tells the crate what it is built with, so that a run's record can say it: compiler, target, profile.
 //!
-//! Nothing here can fail a build: outside git, or without git, the commit is unknown.
+//! Not from which commit: all crates would be built anew after each one. That is told by the program that writes the record.
 
-use std::path::Path;
 use std::process::Command;
 
 fn main() {
@@ -12,27 +11,10 @@ fn main() {
     for (name, variable) in [("TARGET", "TARGET"), ("PROFILE", "PROFILE"), ("OPT_LEVEL", "OPT_LEVEL")] {
         tell(name, std::env::var(variable).ok());
     }
-    tell("COMMIT", commit());
 }
 
 fn tell(name: &str, value: Option<String>) {
     println!("cargo::rustc-env=AIRBENCH_BUILD_{name}={}", value.as_deref().unwrap_or("unknown"));
-}
-
-/// The commit that is checked out, if this checkout is a git repository of its own and not a copy within somebody else's.
-fn commit() -> Option<String> {
-    let top = answer("git", &["rev-parse", "--show-toplevel"])?;
-    let ours = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?.canonicalize().ok()?;
-    if Path::new(&top).canonicalize().ok()? != ours {
-        return None;
-    }
-    // The log of HEAD grows with each commit and each checkout. A path that is not there would run this script every time.
-    if let Some(log) = answer("git", &["rev-parse", "--path-format=absolute", "--git-path", "logs/HEAD"])
-        && Path::new(&log).exists()
-    {
-        println!("cargo::rerun-if-changed={log}");
-    }
-    answer("git", &["rev-parse", "--short=12", "HEAD"])
 }
 
 fn answer(program: &str, arguments: &[&str]) -> Option<String> {

@@ -8,7 +8,8 @@ use protocol::frames::BIT_RATE_PER_S;
 use protocol::response_time::rig::{RigAnalysis, arrivals_text, in_us};
 use protocol::response_time::{Response, critical};
 use serde_json::Value;
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 
 /// Prints what was asked for.
@@ -21,10 +22,8 @@ pub fn print(arguments: &BusLoadArguments) -> Result<Exit, RunError> {
         None => format!("{}\n\n{analysis}", BusLoad::of_rig()),
         Some(summary) => markdown(&analysis, &wire_time(summary)?),
     };
-    #[allow(clippy::print_stdout)] // the table is the command's result
-    {
-        println!("{text}");
-    }
+    // Whoever closed the pipe, such as `head`, has read enough.
+    let _ = writeln!(std::io::stdout(), "{text}");
     Ok(Exit::Good)
 }
 

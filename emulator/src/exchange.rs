@@ -54,6 +54,8 @@ pub enum TimingRecord {
 pub struct RoundTrip {
     /// 0 for drive, 1 for load.
     pub axis: usize,
+    /// The cycle in which it was taken.
+    pub cycle: u64,
     /// From its sensors handed over to its arrival.
     pub ns: u64,
 }

@@ -7,6 +7,7 @@ use emulator::run::{self, RunError};
 use protocol::bus::BusUrl;
 use protocol::bus::host::Host;
 use protocol::exit::Exit;
+use std::io::Write;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -43,9 +44,7 @@ fn host_bus(arguments: &BusArguments) -> Result<Exit, RunError> {
         std::thread::sleep(Duration::from_millis(20));
     }
     let Some(report) = host.stop() else { return Ok(Exit::BusFailed) };
-    #[allow(clippy::print_stdout)] // the report is the command's result
-    {
-        println!("{}", serde_json::to_string_pretty(&report).unwrap_or_default());
-    }
+    // Whoever closed the pipe has read enough.
+    let _ = writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&report).unwrap_or_default());
     Ok(if time_up() { Exit::Good } else { Exit::Interrupted })
 }

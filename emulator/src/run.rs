@@ -321,7 +321,7 @@ fn describe(
         rig_setup: inputs.scene.clone(),
         realtime_granted: grants.granted().to_vec(),
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
-        machine: Machine::read(),
+        machine: Machine::read(env!("AIRBENCH_BUILD_COMMIT")),
     };
     let path = arguments.out.join("run.json");
     write_json(&path, &description).map_err(|error| RunError::output(&path, &error))

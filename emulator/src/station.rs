@@ -321,7 +321,7 @@ impl Station {
         }
         let round_trip_ns = self.exchange[axis].taken(command.echo, stamp_ns, cycle);
         if let Some(ns) = round_trip_ns.filter(|_| !self.lockstep) {
-            self.recorder.round_trip(RoundTrip { axis, ns });
+            self.recorder.round_trip(RoundTrip { axis, cycle, ns });
         }
     }
 

@@ -6,7 +6,8 @@
 //!                           burst   gap
 //! ```
 //! - *Gap*: an interval longer than 1.5 periods. A cycle that the sender skipped is one, and so is a frame that was lost.
-//! - *Burst*: an interval shorter than half a period, as after a delay that held frames back.
+//! - *Burst*: an interval shorter than half a period, as after a delay that held frames back. A frame that is sent on change too
+//!   comes early whenever something changes: its bursts are not counted.
 //!
 //! Fed by a thread of normal priority from frames and their arrival stamps, in the order in which they arrived.
 
@@ -25,7 +26,8 @@ pub struct Arrivals {
     last: Option<Instant>,
     count: u64,
     gaps: u64,
-    bursts: u64,
+    /// `None` for a frame that is sent on change too.
+    bursts: Option<u64>,
     interval_ns: Recorder,
 }
 
@@ -40,8 +42,8 @@ pub struct ArrivalFigures {
     pub count: u64,
     /// Intervals longer than 1.5 periods.
     pub gaps: u64,
-    /// Intervals shorter than half a period.
-    pub bursts: u64,
+    /// Intervals shorter than half a period; `None` for a frame that is sent on change too.
+    pub bursts: Option<u64>,
     /// Intervals between one frame and the next, ns.
     pub interval_ns: Percentiles,
 }
@@ -50,7 +52,13 @@ impl Arrivals {
     /// An account of `frame`, which should come every `period`.
     #[must_use]
     pub fn new(frame: &'static str, period: Duration) -> Self {
-        Self { frame, period, last: None, count: 0, gaps: 0, bursts: 0, interval_ns: Recorder::new() }
+        Self { frame, period, last: None, count: 0, gaps: 0, bursts: Some(0), interval_ns: Recorder::new() }
+    }
+
+    /// The same of a frame that is sent on change too.
+    #[must_use]
+    pub fn on_change_too(self) -> Self {
+        Self { bursts: None, ..self }
     }
 
     /// A frame arrived.
@@ -60,7 +68,9 @@ impl Arrivals {
         let interval = at.saturating_duration_since(last);
         self.interval_ns.record(interval.as_nanos() as u64);
         self.gaps += u64::from(interval > self.period * 3 / 2);
-        self.bursts += u64::from(interval < self.period / 2);
+        if let Some(bursts) = &mut self.bursts {
+            *bursts += u64::from(interval < self.period / 2);
+        }
     }
 
     /// The figures so far.
@@ -85,17 +95,26 @@ mod tests {
     #[test]
     fn a_regular_frame_has_neither_gap_nor_burst() {
         let got = figures(&[1000, 2400, 3000, 3900]);
-        assert_eq!((got.count, got.gaps, got.bursts, got.interval_ns.count), (4, 0, 0, 3));
+        assert_eq!((got.count, got.gaps, got.bursts, got.interval_ns.count), (4, 0, Some(0), 3));
         assert_eq!(got.period_ms, 1);
     }
 
     #[test]
     fn a_lost_frame_is_a_gap_and_a_queue_let_go_is_a_burst() {
         let got = figures(&[1000, 3000, 4000, 8000, 8010, 8020, 9000]);
-        assert_eq!((got.gaps, got.bursts), (2, 2));
+        assert_eq!((got.gaps, got.bursts), (2, Some(2)));
         // Exactly one and a half and exactly half a period are neither.
         let got = figures(&[1000, 2500, 3000]);
-        assert_eq!((got.gaps, got.bursts), (0, 0));
+        assert_eq!((got.gaps, got.bursts), (0, Some(0)));
+    }
+
+    #[test]
+    fn a_frame_that_is_sent_on_change_too_has_gaps_and_no_account_of_bursts() {
+        let mut arrivals = Arrivals::new("Tick", Duration::from_millis(10)).on_change_too();
+        [10, 11, 20, 50].iter().for_each(|ms| arrivals.note(Instant::from_nanos(ms * 1_000_000)));
+        let got = arrivals.figures();
+        assert_eq!((got.count, got.gaps, got.bursts), (4, 1, None));
+        assert!(serde_json::to_string(&got).unwrap().contains(r#""bursts":null"#));
     }
 
     #[test]

@@ -41,6 +41,7 @@
 use std::cmp::Ordering;
 use std::collections::VecDeque;
 use std::fmt;
+use std::io;
 use std::time::Duration;
 
 use crate::clock::Instant;
@@ -267,6 +268,14 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
         }
     }
 
+    /// Whether what was triggered last, this severe, will be handed out: not if [`MOST_DUMPS`] no less severe ones come first.
+    #[must_use]
+    pub fn will_keep(&self, severity: Severity) -> bool {
+        let kept = self.kept.iter().map(|trigger| trigger.severity);
+        let pending = self.pending.iter().map(|pending| pending.trigger.severity);
+        kept.chain(pending).filter(|other| *other >= severity).count() <= MOST_DUMPS
+    }
+
     /// Hands out each window that is over at `now`. Asked at each poll, after rows and frames were taken.
     pub fn advance(&mut self, now: Instant, mut write: impl FnMut(Dump<'_, R, F>)) {
         while let Some(pending) = self.pending.pop_front_if(|pending| now >= pending.to) {
@@ -328,6 +337,13 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
 impl<R: Stamped, F: Stamped> Default for FlightRecorder<R, F> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// Keeps the first failure of several dumps: it says why, and what follows may follow from it.
+pub fn keep_first(written: &mut io::Result<()>, next: io::Result<()>) {
+    if written.is_ok() {
+        *written = next;
     }
 }
 
@@ -431,6 +447,36 @@ mod tests {
             assert_eq!(dump.from, at(2000));
             assert_eq!(dump.rows.len(), 1002);
         });
+    }
+
+    #[test]
+    fn a_signal_too_many_is_known_before_anything_is_promised() {
+        let mut flight = Recorder::new();
+        let mut written = 0;
+        for n in 0..=MOST_DUMPS as u64 {
+            flight.trigger(Trigger::other(Severity::Signal, n, at(10_000 * n)));
+            // The last ones wait for their ends together.
+            assert_eq!(flight.will_keep(Severity::Signal), n < MOST_DUMPS as u64, "{n}");
+            if n < 15 {
+                flight.finish(|_| written += 1);
+            }
+        }
+        flight.finish(|_| written += 1);
+        assert_eq!((written, flight.dropped()), (MOST_DUMPS, 1));
+    }
+
+    #[test]
+    fn a_signal_takes_the_place_of_less_severe_dumps() {
+        let mut flight = Recorder::new();
+        for n in 0..MOST_DUMPS as u64 {
+            flight.trigger(overrun(10_000 * (n + 1), 1));
+            flight.finish(|_| ());
+        }
+        flight.trigger(Trigger::other(Severity::Signal, 1, at(900_000)));
+        assert!(flight.will_keep(Severity::Signal));
+        let mut replaced = false;
+        flight.finish(|dump| replaced = dump.replaces.is_some());
+        assert!(replaced);
     }
 
     #[test]

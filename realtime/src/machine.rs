@@ -85,15 +85,15 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Reads the machine that this process runs on.
+    /// Reads the machine that this process runs on, a program that was built from `commit`.
     #[must_use]
-    pub fn read() -> Self {
-        Self::below(Path::new("/"))
+    pub fn read(commit: &'static str) -> Self {
+        Self::below(Path::new("/"), commit)
     }
 
     /// Reads a machine whose `proc`, `sys` and `boot` lie in `root`.
     #[must_use]
-    pub fn below(root: &Path) -> Self {
+    pub fn below(root: &Path, commit: &'static str) -> Self {
         let root = Root::new(root);
         Self {
             kernel: root.fact("proc/version"),
@@ -120,7 +120,7 @@ impl Machine {
             memory: Memory::read(&root),
             limits: Limits::read(&root),
             load_average: memory::load_average(&root),
-            build: Build::of_this_program(),
+            build: Build::of_this_program(commit),
         }
     }
 }

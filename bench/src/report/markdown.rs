@@ -192,9 +192,10 @@ fn frames(report: &Report) -> String {
         for row in &run.arrivals {
             let told = &row.interval_ns;
             let name = format!("{place} {} at {}", row.frame, row.receiver);
-            let counts = [row.period_ms, row.count, row.gaps, row.bursts].map(|count| count.to_string());
+            let counts = [row.period_ms, row.count, row.gaps].map(|count| count.to_string());
+            let bursts = row.bursts.map_or_else(|| "sent on change too".into(), |count| count.to_string());
             let ends = [told.p50, told.p99, told.max].map(|ns| ns.map_or_else(|| "-".into(), in_words));
-            rows.push(std::iter::once(name).chain(counts).chain(ends).collect());
+            rows.push(std::iter::once(name).chain(counts).chain([bursts]).chain(ends).collect());
         }
     }
     if rows.is_empty() {

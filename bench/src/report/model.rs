@@ -305,8 +305,9 @@ pub struct ArrivalRow {
     pub count: u64,
     /// Intervals longer than one and a half periods.
     pub gaps: u64,
-    /// Intervals shorter than half a period.
-    pub bursts: u64,
+    /// Intervals shorter than half a period; none of a frame that is sent on change too.
+    #[serde(default)]
+    pub bursts: Option<u64>,
     /// Percentiles of the intervals.
     pub interval_ns: PercentilesNs,
 }

@@ -70,7 +70,7 @@ fn arrivals(run: &RunFiles) -> Vec<ArrivalRow> {
                 period_ms: count("period_ms"),
                 count: count("count"),
                 gaps: count("gaps"),
-                bursts: count("bursts"),
+                bursts: row["bursts"].as_u64(),
                 interval_ns: percentiles(&row["interval_ns"]).unwrap_or_default(),
             });
         }
@@ -106,11 +106,13 @@ mod tests {
             "interval_ns": { "p50": 1_000_000, "max": 2_000_000, "count": 49 } }])
         };
         run.summary["arrivals"] = row("DriveValveCommand");
+        run.summary["arrivals"][0]["bursts"] = json!(null);
         run.controllers.get_mut("controller").unwrap()["arrivals"] = row("DriveSensors");
         let told = arrivals(&run);
         let names: Vec<_> =
             told.iter().map(|row| (row.receiver.as_str(), row.frame.as_str(), row.gaps)).collect();
         assert_eq!(names, [("emulator", "DriveValveCommand", 2), ("controller", "DriveSensors", 2)]);
         assert_eq!(told[0].interval_ns.p50, Some(1_000_000));
+        assert_eq!((told[0].bursts, told[1].bursts), (None, Some(1)));
     }
 }

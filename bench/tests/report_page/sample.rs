@@ -268,7 +268,7 @@ fn run(place: usize) -> RunPart {
         period_ms: 1,
         count: 59_990,
         gaps: skipped,
-        bursts: 2,
+        bursts: Some(2),
         interval_ns,
     };
     RunPart {

@@ -16,7 +16,7 @@ use protocol::flight_dump::{self, Event, Log};
 use protocol::frames::{Frame, MessageSpec};
 use protocol::run_folder::LineFile;
 use protocol::timing::{CycleTiming, write_head, write_row};
-use realtime::flight::Dump;
+use realtime::flight::{Dump, Lateness, MOST_DUMPS, keep_first};
 use realtime::{
     ArrivalFigures, Arrivals, Clock, CycleStages, FlightRecorder, Freeze, Instant, IntervalLog,
     MonotonicClock, Severity, StageAccount, StageFigures, Stamped, Trigger, VitalCounts, VitalTotals,
@@ -32,8 +32,8 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// Start of a run that the totals of the vitals leave out: memory is touched for the first time.
 const WARM_UP_NS: u64 = 1_000_000_000;
 
-/// Sensors that wait for a row at most: with none in that time nobody answers, such as before the first tick.
-const MOST_WAITING: usize = 16 * 1024;
+/// Longest time from a wake-up to a row that answers after it; beyond, nobody answers, such as before the first tick.
+const ANSWER_NS: u64 = 1_000_000_000;
 
 /// What a ledger is made of.
 pub struct LedgerSetup {
@@ -113,7 +113,7 @@ impl Stamped for Passed {
 /// A flight recorder and where its dumps go.
 struct Flight {
     ring: FlightRecorder<Row, Passed>,
-    late_ns: u64,
+    lateness: Lateness,
     newest_cycle: u64,
     freeze: Freeze,
     folder: PathBuf,
@@ -163,9 +163,10 @@ impl Ledger {
             write_head(table.lines())?;
             Ok::<_, io::Error>(table)
         });
-        let flight = setup.flight_late.map(|late| Flight {
+        let flight = setup.flight_late.map(|limit| Flight {
             ring: FlightRecorder::new(),
-            late_ns: late.as_nanos() as u64,
+            // Sensors that were overtaken say themselves how long they waited: nothing to add for them.
+            lateness: Lateness { limit, period: Duration::ZERO },
             newest_cycle: 0,
             freeze,
             folder,
@@ -181,7 +182,7 @@ impl Ledger {
             flight,
             vitals: VitalTotals::default(),
             first_ns: None,
-            waiting: Vec::with_capacity(MOST_WAITING),
+            waiting: Vec::new(),
         })
     }
 
@@ -192,13 +193,13 @@ impl Ledger {
     pub fn look(&mut self) -> io::Result<()> {
         self.empty_queues()?;
         let now = MonotonicClock.now();
+        if self.waiting.first().is_some_and(|wait| now.as_nanos().saturating_sub(wait.woke_ns) > ANSWER_NS) {
+            self.give_up_waiting();
+        }
         self.account.advance(now)?;
         let Some(flight) = &mut self.flight else { return Ok(()) };
         if flight.freeze.take() {
-            let cycle = flight.newest_cycle;
-            flight.ring.trigger(Trigger::other(Severity::Signal, cycle, now));
-            let folder = flight.folder.join(flight_dump::FOLDER);
-            eprintln!("controller: asked for the last seconds; they go to {}", folder.display());
+            flight.asked(now);
         }
         flight.advance(now)
     }
@@ -210,9 +211,6 @@ impl Ledger {
         while let Ok(measured) = self.measured.try_recv() {
             match measured {
                 Measured::Waited { arrived_ns, woke_ns } => {
-                    if self.waiting.len() == MOST_WAITING {
-                        self.give_up_waiting();
-                    }
                     self.waiting.push(Wait { arrived_ns, woke_ns });
                 }
                 Measured::Cycle(row) => self.take_row(row)?,
@@ -232,7 +230,10 @@ impl Ledger {
         let spec = passed.frame.standard_id().and_then(MessageSpec::by_id);
         let spec = spec.filter(|_| !passed.sent && Frame::decode(&passed.frame).is_ok());
         if let Some((spec, period)) = spec.and_then(cyclic) {
-            let arrivals = self.arrivals.entry(spec.id).or_insert_with(|| Arrivals::new(spec.name, period));
+            let arrivals = self.arrivals.entry(spec.id).or_insert_with(|| {
+                let arrivals = Arrivals::new(spec.name, period);
+                if spec.send_type == "Cyclic" { arrivals } else { arrivals.on_change_too() }
+            });
             arrivals.note(Instant::from_nanos(passed.stamp_ns));
         }
         if let Some(flight) = &mut self.flight {
@@ -241,18 +242,8 @@ impl Ledger {
     }
 
     fn take_row(&mut self, row: CycleTiming) -> io::Result<()> {
-        let work_ns = row.done_ns.saturating_sub(row.woke_ns);
-        self.account.record(&CycleStages {
-            cycle: row.cycle,
-            // Sensors that were overtaken tell themselves how long they waited.
-            skipped: 0,
-            due_ns: row.due_ns,
-            woke_ns: row.woke_ns,
-            receive_ns: row.receive_ns,
-            step_ns: row.step_ns,
-            send_ns: row.send_ns,
-            done_ns: row.done_ns,
-        })?;
+        // Sensors that were overtaken tell themselves how long they waited.
+        self.account.record(&CycleStages { skipped: 0, ..stages_of(&row) })?;
         let mut waited_ns = row.woke_ns.saturating_sub(row.due_ns);
         for wait in self.waiting.drain(..) {
             waited_ns = waited_ns.max(wait.ns());
@@ -267,7 +258,7 @@ impl Ledger {
             table.write_when_full()?;
         }
         let Some(flight) = &mut self.flight else { return Ok(()) };
-        flight.take(row, waited_ns, work_ns)
+        flight.take(row, waited_ns)
     }
 
     /// An axis is in fault since `cycle`.
@@ -290,11 +281,12 @@ impl Ledger {
     /// # Errors
     /// What the system says, with the file's name.
     pub fn finish(&mut self) -> io::Result<()> {
-        self.empty_queues()?;
+        let mut written = self.empty_queues();
         self.give_up_waiting();
-        self.account.finish(MonotonicClock.now())?;
-        self.write_out()?;
-        self.flight.as_mut().map_or(Ok(()), Flight::finish)
+        keep_first(&mut written, self.account.finish(MonotonicClock.now()).map(drop));
+        keep_first(&mut written, self.write_out());
+        keep_first(&mut written, self.flight.as_mut().map_or(Ok(()), Flight::finish));
+        written
     }
 
     /// The figures so far.
@@ -318,6 +310,20 @@ fn cyclic(spec: &'static MessageSpec) -> Option<(&'static MessageSpec, Duration)
     spec.cycle_time().filter(|_| spec.send_type.starts_with("Cyclic")).map(|period| (spec, period))
 }
 
+/// The row as the account takes it.
+fn stages_of(row: &CycleTiming) -> CycleStages {
+    CycleStages {
+        cycle: row.cycle,
+        skipped: row.skipped,
+        due_ns: row.due_ns,
+        woke_ns: row.woke_ns,
+        receive_ns: row.receive_ns,
+        step_ns: row.step_ns,
+        send_ns: row.send_ns,
+        done_ns: row.done_ns,
+    }
+}
+
 fn counts(row: &CycleTiming) -> VitalCounts {
     let vitals = &row.vitals;
     VitalCounts {
@@ -332,39 +338,46 @@ fn counts(row: &CycleTiming) -> VitalCounts {
 }
 
 impl Flight {
-    /// Takes a row, and freezes when it is worth it.
-    fn take(&mut self, row: CycleTiming, waited_ns: u64, work_ns: u64) -> io::Result<()> {
-        let at = Instant::from_nanos(row.woke_ns);
-        let (cycle, skipped) = (row.cycle, row.skipped);
-        self.newest_cycle = cycle;
+    /// Takes a row after which sensors had waited for so long, and freezes when it is worth it.
+    fn take(&mut self, row: CycleTiming, waited_ns: u64) -> io::Result<()> {
+        self.newest_cycle = row.cycle;
         self.ring.row(Row(row));
-        let severity = if skipped > 0 {
-            Severity::Overrun { ns: waited_ns }
-        } else if work_ns > self.late_ns && work_ns >= waited_ns {
-            Severity::Slow { ns: work_ns }
-        } else if waited_ns > self.late_ns {
-            Severity::Late { ns: waited_ns }
-        } else {
-            return Ok(());
-        };
+        // Sensors that were overtaken count: the cycle is due when the first of them arrived.
+        let stages = CycleStages { due_ns: row.woke_ns.saturating_sub(waited_ns), ..stages_of(&row) };
+        let Some(trigger) = self.lateness.judge(&stages) else { return Ok(()) };
         // Rows of a backlog may lie behind the window of an earlier event.
-        self.advance(at)?;
-        self.ring.trigger(Trigger { severity, cycle, at, late_ns: waited_ns, slow_ns: work_ns });
-        Ok(())
+        let written = self.advance(trigger.at);
+        self.ring.trigger(trigger);
+        written
     }
 
     fn advance(&mut self, now: Instant) -> io::Result<()> {
         let Self { ring, folder, process, log, .. } = self;
         let mut written = Ok(());
-        ring.advance(now, |dump| written = write(&dump, folder, process, log));
+        ring.advance(now, |dump| keep_first(&mut written, write(&dump, folder, process, log)));
         written
     }
 
     fn finish(&mut self) -> io::Result<()> {
         let Self { ring, folder, process, log, .. } = self;
         let mut written = Ok(());
-        ring.finish(|dump| written = write(&dump, folder, process, log));
+        ring.finish(|dump| keep_first(&mut written, write(&dump, folder, process, log)));
         written
+    }
+
+    /// Somebody asked.
+    fn asked(&mut self, now: Instant) {
+        self.ring.trigger(Trigger::other(Severity::Signal, self.newest_cycle, now));
+        let folder = self.folder.join(flight_dump::FOLDER);
+        let folder = folder.display();
+        if self.ring.will_keep(Severity::Signal) {
+            eprintln!("controller: asked for the last seconds; they go to {folder}");
+        } else {
+            eprintln!(
+                "controller: asked for the last seconds, but {folder} has {MOST_DUMPS} dumps that were asked for, and no more \
+                 are kept; move it away and start anew"
+            );
+        }
     }
 }
 

@@ -16,14 +16,14 @@ use protocol::flight_dump::{self, Log};
 use protocol::frames::{Frame, MESSAGES, MessageSpec, RIG_STATUS};
 use protocol::run_folder::LineFile;
 use protocol::timing::{self, CycleTiming};
-use realtime::flight::{Dump, Lateness};
+use realtime::flight::{Dump, Lateness, MOST_DUMPS, keep_first};
 use realtime::stages::Further;
 use realtime::{
     ArrivalFigures, Arrivals, CycleStages, FlightRecorder, IntervalLog, Percentiles, Severity, StageAccount,
     StageFigures, Stamped, Trigger, VitalCounts, VitalTotals, WallClockStep, WallClockWatch,
 };
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -113,6 +113,8 @@ pub struct Evidence {
     log: Log,
     account: StageAccount,
     round_trip: [Further; 2],
+    /// Those of cycles whose rows are to come.
+    trips: VecDeque<RoundTrip>,
     command_age: [Further; 2],
     ages: CommandAges,
     table: Option<LineFile>,
@@ -150,6 +152,7 @@ impl Evidence {
             log,
             account,
             round_trip,
+            trips: VecDeque::new(),
             command_age,
             ages: CommandAges::default(),
             table,
@@ -183,6 +186,7 @@ impl Evidence {
         let stages = stages_of(row);
         self.account.record(&stages)?;
         self.newest = stages;
+        self.record_trips(row.cycle);
         for (axis, cycle) in axes.iter().enumerate() {
             if let Some(ns) = cycle.age_ns(row.due_ns) {
                 self.account.record_further(self.command_age[axis], ns);
@@ -206,9 +210,16 @@ impl Evidence {
         table.write_when_full()
     }
 
-    /// Takes a round trip.
-    pub fn round_trip(&mut self, RoundTrip { axis, ns }: RoundTrip) {
-        self.account.record_further(self.round_trip[axis], ns);
+    /// Takes a round trip. It waits for the row of its cycle, and so belongs to the second of that, however late both are taken.
+    pub fn round_trip(&mut self, trip: RoundTrip) {
+        self.trips.push_back(trip);
+    }
+
+    /// Records the round trips up to this cycle.
+    fn record_trips(&mut self, cycle: u64) {
+        while let Some(RoundTrip { axis, ns, .. }) = self.trips.pop_front_if(|trip| trip.cycle <= cycle) {
+            self.account.record_further(self.round_trip[axis], ns);
+        }
     }
 
     /// Takes a frame that was sent or received.
@@ -258,6 +269,7 @@ impl Evidence {
     /// Writes what is left, and tells the figures, those of a failed file too.
     pub fn finish(mut self, now: realtime::Instant) -> (EvidenceReport, io::Result<()>) {
         let mut written = self.flush();
+        self.record_trips(u64::MAX);
         if let Some((flight, _)) = &mut self.flight {
             let (folder, log) = (&self.folder, &self.log);
             flight.finish(|dump| keep_first(&mut written, write_dump(folder, log, &dump)));
@@ -291,19 +303,20 @@ impl Evidence {
         flight.trigger(trigger);
         if trigger.severity == Severity::Signal {
             let folder = self.folder.join(flight_dump::FOLDER);
-            eprintln!("emulator: asked for the last seconds; they go to {}", folder.display());
+            let folder = folder.display();
+            if flight.will_keep(Severity::Signal) {
+                eprintln!("emulator: asked for the last seconds; they go to {folder}");
+            } else {
+                eprintln!(
+                    "emulator: asked for the last seconds, but {folder} has {MOST_DUMPS} dumps that were asked for, and no more \
+                     are kept; move it away and start anew"
+                );
+            }
         }
     }
 
     fn newest_done(&self) -> realtime::Instant {
         realtime::Instant::from_nanos(self.newest.done_ns)
-    }
-}
-
-/// The first failure says why; what follows may follow from it.
-fn keep_first(written: &mut io::Result<()>, next: io::Result<()>) {
-    if written.is_ok() {
-        *written = next;
     }
 }
 
@@ -337,7 +350,8 @@ fn is_heard_cyclically(message: &MessageSpec) -> bool {
 }
 
 fn arrivals_of(message: &MessageSpec) -> Arrivals {
-    Arrivals::new(message.name, Duration::from_millis(message.cycle_time_ms.into()))
+    let arrivals = Arrivals::new(message.name, Duration::from_millis(message.cycle_time_ms.into()));
+    if message.send_type == "Cyclic" { arrivals } else { arrivals.on_change_too() }
 }
 
 /// The row as the account takes it.

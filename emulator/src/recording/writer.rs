@@ -165,6 +165,8 @@ impl Writer {
         let asked = shared.freeze.take();
         let Some(evidence) = &mut self.evidence else { return Ok(()) };
         for record in records.timings.try_iter() {
+            // Those of a cycle were handed over before its row.
+            records.round_trips.try_iter().for_each(|round_trip| evidence.round_trip(round_trip));
             evidence.timing(&record)?;
         }
         records.round_trips.try_iter().for_each(|round_trip| evidence.round_trip(round_trip));

@@ -1,4 +1,4 @@
-//! What this program was built with and from, as the build script found it.
+//! What this program was built with, as the build script found it, and from, as the program says.
 
 use serde::Serialize;
 
@@ -20,10 +20,10 @@ pub struct Build {
 }
 
 impl Build {
-    pub(super) fn of_this_program() -> Self {
+    pub(super) fn of_this_program(commit: &'static str) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
-            commit: env!("AIRBENCH_BUILD_COMMIT"),
+            commit,
             profile: concat!(
                 env!("AIRBENCH_BUILD_PROFILE"),
                 ", opt-level ",

@@ -13,7 +13,7 @@ fn machine_of(files: &[(&str, &str)]) -> (TempDir, Machine) {
     for (path, text) in files {
         write(&folder, path, text.as_bytes());
     }
-    let machine = Machine::below(folder.path());
+    let machine = Machine::below(folder.path(), "0123456789ab");
     (folder, machine)
 }
 
@@ -75,7 +75,7 @@ fn the_packed_configuration_is_read() {
         .unwrap();
     write(&folder, "proc/config.gz", &packed.finish().unwrap());
     write(&folder, VERSION, DYNAMIC.as_bytes());
-    let told = Machine::below(folder.path()).preemption;
+    let told = Machine::below(folder.path(), "0123456789ab").preemption;
     assert_eq!(told.model, "none");
     assert!(told.told_by.ends_with("/proc/config.gz"), "{}", told.told_by);
 }
@@ -196,12 +196,13 @@ fn what_is_missing_says_so_with_its_file() {
 
 #[test]
 fn this_machine_is_read_whole() {
-    let machine = Machine::read();
+    let machine = Machine::read("0123456789ab");
     for text in
         [&machine.kernel_release, &machine.processor, &machine.processors_online, &machine.load_average]
     {
         assert!(!text.starts_with("unknown"), "{machine:?}");
     }
+    assert_eq!(machine.build.commit, "0123456789ab");
     assert!(machine.build.rustc.starts_with("rustc "), "{}", machine.build.rustc);
     assert!(machine.memory.total_kib > Some(0));
     assert!(!machine.interrupts.is_empty());

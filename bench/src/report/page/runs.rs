@@ -12,7 +12,8 @@ struct Arrivals {
     period_ms: u64,
     count: u64,
     gaps: u64,
-    bursts: u64,
+    /// None of a frame that is sent on change too.
+    bursts: Option<u64>,
     /// The largest of any run; percentiles of runs cannot be added up.
     p99: Option<u64>,
     p999: Option<u64>,
@@ -25,7 +26,7 @@ impl Arrivals {
         self.period_ms = row.period_ms;
         self.count += row.count;
         self.gaps += row.gaps;
-        self.bursts += row.bursts;
+        self.bursts = row.bursts.map(|bursts| bursts + self.bursts.unwrap_or(0)).or(self.bursts);
         self.p99 = self.p99.max(of.p99);
         self.p999 = self.p999.max(of.p999);
         self.max = self.max.max(of.max);
@@ -66,9 +67,10 @@ pub(super) fn arrivals(runs: &[RunPart]) -> String {
 
 /// A frame and what came of it.
 fn arrival_cells(frame: &str, of: &Arrivals) -> Vec<Cell> {
-    let counts = [of.period_ms, of.count, of.gaps, of.bursts].map(|value| number(words::count(value)));
+    let counts = [of.period_ms, of.count, of.gaps].map(|value| number(words::count(value)));
+    let bursts = of.bursts.map_or_else(|| text("sent on change too"), |bursts| number(words::count(bursts)));
     let lengths = [of.p99, of.p999, of.max].map(|ns| number(words::maybe_us(ns)));
-    [text(frame)].into_iter().chain(counts).chain(lengths).collect()
+    [text(frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
 }
 
 /// The runs, what each counted, and each one's percentiles.

@@ -158,6 +158,21 @@ fn a_dump_holds_the_rows_and_the_frames_both_ways_and_how_long_the_oldest_sensor
 }
 
 #[test]
+fn a_dump_that_fails_is_told_though_the_next_one_is_good() {
+    let mut bench = Bench::new(false);
+    let in_its_place = bench.run.path().join("flight/controller-0000000007-fault");
+    fs::create_dir_all(in_its_place.parent().unwrap()).unwrap();
+    fs::write(&in_its_place, "a file").unwrap();
+    for (cycle, s) in [(7, 1), (8, 5)] {
+        let trigger = Trigger::other(Severity::Fault, cycle, Instant::from_nanos(s * 1000 * MS));
+        bench.ledger.flight.as_mut().unwrap().ring.trigger(trigger);
+    }
+    let told = bench.ledger.finish().unwrap_err().to_string();
+    assert!(told.contains("controller-0000000007-fault"), "{told}");
+    assert_eq!(bench.dumps()[1], "controller-0000000008-fault");
+}
+
+#[test]
 fn cyclic_frames_that_came_have_an_account_and_sent_and_broken_ones_have_none() {
     let mut bench = Bench::new(false);
     let sensors = Frame::DriveSensors(Sensors::default()).encode().unwrap();
@@ -177,6 +192,11 @@ fn cyclic_frames_that_came_have_an_account_and_sent_and_broken_ones_have_none() 
     let arrivals = bench.ledger.figures().arrivals;
     let of = |name: &str| arrivals.iter().find(|arrivals| arrivals.frame == name).unwrap();
     assert_eq!((of("DriveSensors").count, of("DriveSensors").gaps), (3, 1));
+    assert_eq!(
+        (of("DriveSensors").bursts, of("Tick").bursts),
+        (Some(0), None),
+        "a tick is sent on change too"
+    );
     assert_eq!((of("Tick").count, of("Tick").period_ms, arrivals.len()), (1, 10, 2));
 }
 

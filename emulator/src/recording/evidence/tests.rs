@@ -47,7 +47,7 @@ fn ages_and_round_trips_are_counted_by_axis() {
     let folder = tempfile::tempdir().unwrap();
     let mut evidence = evidence(folder.path(), true);
     (1..=10).for_each(|cycle| evidence.timing(&record(cycle, 1000)).unwrap());
-    evidence.round_trip(RoundTrip { axis: 1, ns: 70_000 });
+    evidence.round_trip(RoundTrip { axis: 1, cycle: 10, ns: 70_000 });
     let (report, written) = evidence.finish(at(11));
     written.unwrap();
     assert_eq!(report.command_age_cycles.drive, BTreeMap::from([(1, 10)]));
@@ -58,6 +58,26 @@ fn ages_and_round_trips_are_counted_by_axis() {
     let table = std::fs::read_to_string(folder.path().join("emulator-timing.csv")).unwrap();
     assert_eq!(timing::read(&table).unwrap().len(), 10);
     assert_eq!((report.flight, dumped(folder.path())), (FlightFigures::default(), Vec::new()));
+}
+
+#[test]
+fn round_trips_that_are_taken_late_belong_to_the_second_of_their_cycle() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut evidence = evidence(folder.path(), false);
+    // The writer stood still for 2.5 s and finds all of it.
+    for cycle in 1..=2500 {
+        evidence.round_trip(RoundTrip { axis: 0, cycle, ns: 100_000 * (1 + cycle / 1000) });
+    }
+    (1..=2500).for_each(|cycle| evidence.timing(&record(cycle, 1000)).unwrap());
+    let (report, written) = evidence.finish(at(2501));
+    written.unwrap();
+    assert_eq!(report.round_trip_ns.unwrap()[0].count, 2500);
+    let log = std::fs::read_to_string(folder.path().join("emulator.hlog")).unwrap();
+    let lines = log.lines().filter(|line| line.starts_with("Tag=drive-round-trip,"));
+    let maxima_us: Vec<f64> = lines.map(|line| line.split(',').nth(3).unwrap().parse().unwrap()).collect();
+    let about = |got: &f64, us: f64| (got - us).abs() < us / 500.0;
+    let [first, second, third] = &maxima_us[..] else { panic!("{maxima_us:?}") };
+    assert!(about(first, 100.0) && about(second, 200.0) && about(third, 300.0), "{maxima_us:?}");
 }
 
 #[test]
@@ -118,8 +138,19 @@ fn only_good_cyclic_frames_of_others_are_looked_at() {
     }
     let (report, _) = evidence.finish(at(11));
     let [arrivals] = &report.arrivals[..] else { panic!("{:?}", report.arrivals) };
+    assert_eq!(arrivals.bursts, Some(0));
     assert_eq!(
         (arrivals.frame, arrivals.period_ms, arrivals.count, arrivals.gaps),
         ("DriveValveCommand", 1, 10, 0)
     );
+}
+
+#[test]
+fn a_frame_that_is_sent_on_change_too_has_no_account_of_bursts() {
+    let message = |name: &str| MESSAGES.iter().find(|message| message.name == name).unwrap();
+    let bursts = |name: &str| arrivals_of(message(name)).figures().bursts;
+    let on_change = MESSAGES.iter().filter(|message| message.send_type == "CyclicAndOnChange");
+    assert!(on_change.clone().count() > 0);
+    on_change.for_each(|message| assert_eq!(bursts(message.name), None, "{}", message.name));
+    assert_eq!(bursts("DriveValveCommand"), Some(0));
 }

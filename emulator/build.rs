@@ -1,0 +1,34 @@
+//! Tells the program from which commit it is built, so that a run's record can say it. Here and not in a crate that others use:
+//! this script runs after each commit, and whatever depends on it is built anew.
+//!
+//! Nothing here can fail a build: outside git, or without git, the commit is unknown.
+
+use std::path::Path;
+use std::process::Command;
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-env=AIRBENCH_BUILD_COMMIT={}", commit().as_deref().unwrap_or("unknown"));
+}
+
+/// The commit that is checked out, if this checkout is a git repository of its own and not a copy within somebody else's.
+fn commit() -> Option<String> {
+    let top = answer("git", &["rev-parse", "--show-toplevel"])?;
+    let ours = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?.canonicalize().ok()?;
+    if Path::new(&top).canonicalize().ok()? != ours {
+        return None;
+    }
+    // The log of HEAD grows with each commit and each checkout. A path that is not there would run this script every time.
+    if let Some(log) = answer("git", &["rev-parse", "--path-format=absolute", "--git-path", "logs/HEAD"])
+        && Path::new(&log).exists()
+    {
+        println!("cargo::rerun-if-changed={log}");
+    }
+    answer("git", &["rev-parse", "--short=12", "HEAD"])
+}
+
+fn answer(program: &str, arguments: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(arguments).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?.trim().to_owned();
+    (output.status.success() && !text.is_empty() && !text.contains('\n')).then_some(text)
+}
