@@ -62,6 +62,10 @@ pub enum TickNews {
     Ending,
 }
 
+/// Cycles by which the sensors of one axis may be behind those of the other: frames of a node wait side by side at a bus with
+/// arbitration.
+const MOST_PASSED: u64 = 3;
+
 /// What a tick says about frames sent, with counters unwrapped.
 #[derive(Clone, Copy)]
 struct Account {
@@ -78,6 +82,8 @@ pub struct RigView {
     skipped: u64,
     sensors: [Option<Sensors>; 2],
     recent: [Recent; 2],
+    /// Cycle of the newest sensors of each axis.
+    newest: [Option<u64>; 2],
     fresh: [bool; 2],
     received: PerAxis,
     late: PerAxis,
@@ -106,7 +112,13 @@ impl RigView {
         }
         if let Some(known) = self.cycle {
             let ahead = (ALIVE_RANGE + u64::from(sensors.alive) - known % ALIVE_RANGE) % ALIVE_RANGE;
-            self.cycle = Some(known + ahead);
+            // Behind the other axis's newest, and yet new to its own: arbitration let that one pass, and no round is over.
+            let behind = ALIVE_RANGE - ahead;
+            let own = self.newest[axis.index()];
+            let passed = behind <= MOST_PASSED && own.is_some_and(|own| known.saturating_sub(behind) > own);
+            let cycle = if passed { known - behind } else { known + ahead };
+            self.newest[axis.index()] = Some(cycle);
+            self.cycle = Some(known.max(cycle));
         }
         self.sensors[axis.index()] = Some(sensors);
         self.fresh[axis.index()] = true;
@@ -155,6 +167,7 @@ impl RigView {
                 *self.missed_before_first_tick.of(axis) += sent.saturating_sub(received.get(axis));
             }
         }
+        let mut counted = received;
         if let Some(last) = self.account {
             for axis in Axis::ALL {
                 let went = sent - last.sent.min(sent);
@@ -164,9 +177,11 @@ impl RigView {
                 let found = came.saturating_sub(went).min(late);
                 let lost = self.lost.of(axis);
                 *lost = (*lost + went.saturating_sub(came)).saturating_sub(found);
+                // Sensors that arbitration let pass the tick that announces them belong to the next one's account.
+                *counted.of(axis) -= came.saturating_sub(went + found);
             }
         }
-        self.account = Some(Account { sent, received, late: self.late });
+        self.account = Some(Account { sent, received: counted, late: self.late });
     }
 
     /// Takes the rig's status.

@@ -189,3 +189,35 @@ fn a_rig_that_starts_anew_is_noticed_and_loses_nothing() {
     assert_eq!(view.lost(), PerAxis::default());
     assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 100);
 }
+
+/// On the modelled wire the drive's sensors once passed the load's of the cycle before: taken for a round of the counter,
+/// twice, they looked like a rig that had started anew.
+#[test]
+fn sensors_that_pass_others_at_arbitration_are_no_round_of_the_counter() {
+    let mut view = RigView::default();
+    play(&mut view, 0..100, &[]);
+    for cycle in 100..110 {
+        view.take_sensors(Axis::Drive, sensors(cycle + 1));
+        view.take_sensors(Axis::Load, sensors(cycle));
+        assert_eq!(view.cycle(), Some(cycle + 1));
+        assert_eq!(view.fresh_sensors(Axis::Load).map(|(of, _)| of), Some(cycle));
+        assert_eq!(view.fresh_sensors(Axis::Drive).map(|(of, _)| of), Some(cycle + 1));
+    }
+    assert_eq!(view.take_tick(&tick(110, 0)), TickNews::Usual);
+}
+
+/// After a stall the tick is sent first, and arbitration puts the sensors, whose identifiers are lower, ahead of it.
+#[test]
+fn sensors_that_pass_their_tick_are_not_lost() {
+    let mut view = RigView::default();
+    play(&mut view, 0..100, &[]);
+    let before = view.lost();
+    // Cycles 100 to 104 are skipped.
+    Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(105)));
+    view.take_tick(&Tick { catch_up: true, ..tick(105, 5) });
+    for cycle in 106..=110 {
+        Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
+    }
+    view.take_tick(&tick(110, 5));
+    assert_eq!((view.lost().drive, view.lost().load), (before.drive, before.load));
+}
