@@ -1,7 +1,7 @@
 //! What disturbed the runs as a whole: from the events and from what all processes counted.
 //!
-//! What somebody did comes first, what machines do by themselves last; of each what explains most lateness before the rest, and
-//! what explains none in the order of [`Cause`]. Lateness of which nothing was recorded is a finding too. A counter is a
+//! What somebody did comes first, in the order of [`Cause`]; what machines do by themselves last, by the lateness that it explains.
+//! Lateness of which nothing was recorded is a finding too. A counter is a
 //! witness that needs no interpretation, so counters speak even where no late cycle followed.
 
 use super::explain::EVENT_OVER_NS;
@@ -21,7 +21,7 @@ const STORM_SHARE: f64 = 0.05;
 /// this long each while the machine was seen running, or from two on that explain this much together. A host that takes a virtual
 /// CPU away between two threads looks like one such event, and hardly comes back to the same thread; a hog does.
 const HOG_EVENTS: usize = 3;
-const HOG_EVENT_NS: u64 = 1_000_000;
+const HOG_EVENT_NS: u64 = 2_000_000;
 const HOG_TOGETHER_NS: u64 = 8_000_000;
 /// A maximum is that of a row when it is no further from it: logs keep three digits.
 const SAME_MAXIMUM: f64 = 0.98;
@@ -44,7 +44,11 @@ pub fn find(runs: &[RunFiles], events: &[Event]) -> Vec<Finding> {
     .into_iter()
     .flatten()
     .collect();
-    found.sort_by_key(|finding| (finding.by_itself, std::cmp::Reverse(finding.explained_ns), finding.cause));
+    // A counted signal tells more than any length of waiting; what is left to interpret goes by what it explains.
+    found.sort_by_key(|finding| {
+        let explained_ns = if finding.by_itself { finding.explained_ns } else { 0 };
+        (finding.by_itself, std::cmp::Reverse(explained_ns), finding.cause)
+    });
     found
 }
 
