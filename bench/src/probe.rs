@@ -125,6 +125,7 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
         drop((sender, ready));
         let begun = all_ready.iter().take(cpus.len()).collect::<Result<(), _>>();
         let told = begun.and_then(|()| {
+            table.name_cpus(&cpus, MonotonicClock.now().as_nanos())?;
             eprintln!("bench: probe watches {}, gaps over {} us", named(&cpus), arguments.gap_us);
             let until_ns = arguments.seconds.map(|seconds| began_ns + (seconds * 1e9) as u64);
             let time_up = || until_ns.is_some_and(|until_ns| MonotonicClock.now().as_nanos() >= until_ns);
@@ -221,6 +222,14 @@ struct Table {
 }
 
 impl Table {
+    /// A row without length for each CPU: from here on it is watched, be there gaps or none.
+    fn name_cpus(&mut self, cpus: &[usize], now_ns: u64) -> Result<(), ProbeError> {
+        for cpu in cpus {
+            self.file.lines().extend_from_slice(format!("{cpu},{now_ns},{now_ns},0\n").as_bytes());
+        }
+        self.file.write_out().map_err(ProbeError::Write)
+    }
+
     /// Writes what waits.
     fn take(&mut self, gaps: &Receiver<(usize, Gap)>) -> Result<(), ProbeError> {
         for (cpu, gap) in gaps.try_iter() {

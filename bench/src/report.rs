@@ -144,8 +144,10 @@ pub fn from_files(
     let mut events: Vec<_> =
         runs.iter().enumerate().flat_map(|(place, run)| explain::events(place, run)).collect();
     explain::sort_by_severity(&mut events);
+    let mut events = explain::one_of_each_moment(events);
     let findings = findings::find(&runs, &events);
     events.truncate(WORST);
+    events.iter_mut().for_each(|event| explain::beside::add(event, &runs[event.run]));
     let conditions = conditions::conditions(&runs);
     let report = Report {
         schema: SCHEMA.into(),

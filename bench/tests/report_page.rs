@@ -102,6 +102,8 @@ fn the_page_of_a_rich_report_holds_everything() {
         event.evidence.iter().for_each(|sentence| assert!(part("worst").contains(sentence), "{sentence}"));
     }
     assert!(part("worst").contains("5.02 ms late, 5 cycles missed"));
+    assert!(part("worst").contains("-overrun, with frames 301 of 110, 299 of 120."));
+    assert!(part("worst").contains("The rig noted: Cycle 17: stale drive"));
     assert!(part("arrivals").contains("DriveValveCommand"));
     for said in ["frames_malformed", "Run 4 lacks", "no probe.csv"] {
         assert!(part("runs").contains(said), "{said}");

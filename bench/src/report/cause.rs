@@ -1,7 +1,7 @@
 //! The one cause that a report names: what somebody did to the runs, or nothing.
 //!
 //! It reads the report and nothing else. A machine that stood still, or a cycle that nothing explains, is what machines do
-//! by themselves: alone, they count as nothing that was done to the runs.
+//! by themselves: alone, they count as nothing that was done to the runs. What was late and not recorded is `unknown`.
 
 use super::ReportError;
 use super::model::{Cause, Finding, Report, SCHEMA, SCHEMA_VERSION};
@@ -24,12 +24,17 @@ pub fn read(file: &Path) -> Result<Report, ReportError> {
     Ok(report)
 }
 
-/// The cause by its name, or `nothing`, and the sentence behind it.
+/// The cause by its name, `unknown` when something was late that was not recorded, or `nothing`, and the sentence behind it.
 #[must_use]
 pub fn name(report: &Report) -> (String, String) {
-    let by_itself =
-        |finding: &&Finding| matches!(finding.cause, Cause::MachineStoodStill | Cause::Unexplained);
+    let by_itself = |finding: &&Finding| {
+        finding.by_itself || matches!(finding.cause, Cause::MachineStoodStill | Cause::Unexplained)
+    };
     let done = report.findings.iter().find(|finding| !by_itself(finding));
+    let unknown = report.findings.iter().find(|finding| finding.cause == Cause::Unknown);
+    if let (None, Some(finding)) = (done, unknown) {
+        return (in_kebab(Cause::Unknown), finding.sentence.clone());
+    }
     match (done, report.findings.first()) {
         (Some(finding), _) => (in_kebab(finding.cause), finding.sentence.clone()),
         (None, Some(finding)) => {
@@ -60,6 +65,11 @@ mod tests {
         let (cause, sentence) = name(&report_of(vec![run.clone()]));
         assert_eq!(cause, "nothing");
         assert!(sentence.contains("the machine stood still"), "{sentence}");
+        let mut unrecorded = run.clone();
+        unrecorded.rows.clear();
+        unrecorded.summary["skipped"] = 3.into();
+        assert_eq!(name(&report_of(vec![unrecorded])).0, "unknown");
+        assert_eq!(name(&report_of(vec![crate::report::files::RunFiles::default()])).0, "unknown");
         made_up::stall(&mut run, "controller", 700, 5_300_000).vitals.continued = 1;
         assert_eq!(name(&report_of(vec![run])).0, "controller-stopped");
     }

@@ -7,16 +7,18 @@
 //! | file | holds |
 //! |---|---|
 //! | [`rules`] | from what is known of an event to its cause |
+//! | [`beside`] | what the flight recorder and the rig noted beside an event |
 //!
 //! Pure: rows in, events out; it knows nothing of who disturbed a run.
 
+pub mod beside;
 pub mod rules;
 
 use super::files::RunFiles;
 use super::findings::lost_by_gaps;
 use super::joined::PERIOD_NS;
 use super::model::{AroundRow, Event, ProbeGap};
-use super::probe::Gap;
+use super::probe::{self, Gap};
 use protocol::timing::CycleTiming;
 use rules::{Known, Seen};
 use std::collections::BTreeMap;
@@ -72,6 +74,29 @@ pub fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
 /// The worst first.
 pub fn sort_by_severity(events: &mut [Event]) {
     events.sort_by_key(|event| (std::cmp::Reverse(event.late_ns.max(event.slow_ns)), event.run, event.cycle));
+}
+
+/// One event for each moment: what several processes suffered at once, by the same cause, stands under the worst of them.
+/// Wants the worst first.
+#[must_use]
+pub fn one_of_each_moment(events: Vec<Event>) -> Vec<Event> {
+    let severity_ns = |event: &Event| event.late_ns.max(event.slow_ns);
+    let from_ns = |event: &Event| event.cycle * PERIOD_NS;
+    let to_ns = |event: &Event| from_ns(event) + severity_ns(event).max(PERIOD_NS);
+    let mut kept: Vec<Event> = Vec::new();
+    for event in events {
+        let same = kept.iter_mut().find(|other| {
+            (other.run, other.cause) == (event.run, event.cause)
+                && other.process != event.process
+                && from_ns(other) < to_ns(&event)
+                && from_ns(&event) < to_ns(other)
+        });
+        match same {
+            Some(other) => other.evidence.push(format!("Of the same moment: {}", event.sentence)),
+            None => kept.push(event),
+        }
+    }
+    kept
 }
 
 fn execution_ns(row: &CycleTiming) -> u64 {
@@ -163,6 +188,11 @@ fn event(
         evidence: told.evidence,
         around: around(row.cycle, worst.missed, due_ns, run),
         probe: gaps_around(due_ns, row.done_ns, run.gaps.as_deref().unwrap_or_default()),
+        waited_ns: seen.waited_ns,
+        machine_ran: seen.machine_ran(),
+        dump: None,
+        frames: BTreeMap::new(),
+        rig_events: Vec::new(),
     }
 }
 
@@ -193,7 +223,6 @@ fn seen(
         gaps.map(|gap| gap.within_ns(from_ns, to_ns)).max().unwrap_or_default()
     };
     let cpu = row.vitals.cpu;
-    let watched = |gap: &Gap| gap.cpu == cpu;
     Seen {
         process: process.to_owned(),
         late_ns: worst.late_ns,
@@ -203,11 +232,19 @@ fn seen(
         vitals: row.vitals,
         continued: after.map(|row| row.vitals.continued).sum(),
         run_delay: if rows.iter().any(|row| row.vitals.run_delay_ns > 0) { Known::Yes } else { Known::No },
-        probe_watched: run.gaps.as_deref().is_some_and(|gaps| gaps.iter().any(watched)),
+        waited_ns: rows[cluster[0].place..=last].iter().map(|row| row.vitals.run_delay_ns).sum(),
+        together_ns: cluster.iter().map(Late::severity_ns).sum(),
+        probe_watched: probe::watched(run.gaps.as_deref(), cpu, to_ns),
         still_ns: covered(&|gap| gap.cpu == cpu && !gap.another_ran),
         another_ns: covered(&|gap| gap.cpu == cpu && gap.another_ran),
         still_elsewhere_ns: covered(&|gap| gap.cpu != cpu && !gap.another_ran),
         others: others.collect(),
+        ran_elsewhere: run.rows.iter().filter(|(other, _)| *other != process).any(|(_, rows)| {
+            let first = rows.partition_point(|row| row.woke_ns < from_ns);
+            let within = rows[first..].iter().take_while(|row| row.woke_ns < to_ns);
+            let on_time = |row: &CycleTiming| row.woke_ns.saturating_sub(row.due_ns) <= EVENT_OVER_NS;
+            within.into_iter().any(|row| row.vitals.cpu != cpu && on_time(row))
+        }),
     }
 }
 

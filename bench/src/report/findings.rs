@@ -1,24 +1,30 @@
 //! What disturbed the runs as a whole: from the events and from what all processes counted.
 //!
-//! What somebody did comes first, in the order of [`Cause`]: a stopped process, another thread on the CPU, pages, a listener that
-//! does not read, a wire that loses, a stepped clock. What machines do by themselves comes last. A counter is a witness that
-//! needs no interpretation, so counters speak even where no late cycle followed.
+//! What somebody did comes first, in the order of [`Cause`]; what machines do by themselves last, by the lateness that it explains.
+//! Lateness of which nothing was recorded is a finding too. A counter is a
+//! witness that needs no interpretation, so counters speak even where no late cycle followed.
 
+use super::explain::EVENT_OVER_NS;
 use super::explain::rules::in_words;
 use super::files::RunFiles;
+use super::joined::PERIOD_NS;
 use super::model::{Cause, Event, Finding};
+use protocol::timing::CycleTiming;
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// Page faults of a process after its first second that are a storm; memory that is locked gives none.
 const STORM_FAULTS: u64 = 1000;
 /// Share of cycles with faults that is one.
 const STORM_SHARE: f64 = 0.05;
-/// Contention is a finding from one event of the first length on, or from so many of the second. Less is what interrupts and
-/// kernel threads do now and then, and what a virtual CPU that its host takes away between two threads looks like: it stays
-/// with its events. A guess, held against ten undisturbed runs by `scripts/disturb`.
-const CONTENTION_LATE_NS: u64 = 4_000_000;
-const CONTENTION_EVENTS: usize = 10;
-const CONTENTION_OFTEN_NS: u64 = 1_000_000;
+/// Contention counts as done to a run, and not as what its machine does by itself, from so many events of a process on that took
+/// this long each while the machine was seen running, or from two on that explain this much together. A host that takes a virtual
+/// CPU away between two threads looks like one such event, and hardly comes back to the same thread; a hog does.
+const HOG_EVENTS: usize = 3;
+const HOG_EVENT_NS: u64 = 2_000_000;
+const HOG_TOGETHER_NS: u64 = 8_000_000;
+/// A maximum is that of a row when it is no further from it: logs keep three digits.
+const SAME_MAXIMUM: f64 = 0.98;
 
 /// All findings, the most telling first.
 #[must_use]
@@ -27,6 +33,7 @@ pub fn find(runs: &[RunFiles], events: &[Event]) -> Vec<Finding> {
         stopped(runs, events, Cause::EmulatorStopped),
         stopped(runs, events, Cause::ControllerStopped),
         contention(events),
+        unrecorded(runs),
         page_faults(runs, events),
         slow_listener(runs),
         frame_loss(runs),
@@ -37,7 +44,11 @@ pub fn find(runs: &[RunFiles], events: &[Event]) -> Vec<Finding> {
     .into_iter()
     .flatten()
     .collect();
-    found.sort_by_key(|finding| finding.cause);
+    // A counted signal tells more than any length of waiting; what is left to interpret goes by what it explains.
+    found.sort_by_key(|finding| {
+        let explained_ns = if finding.by_itself { finding.explained_ns } else { 0 };
+        (finding.by_itself, std::cmp::Reverse(explained_ns), finding.cause)
+    });
     found
 }
 
@@ -48,6 +59,11 @@ fn of(events: &[Event], cause: Cause) -> impl Iterator<Item = &Event> {
 /// The worst lateness or slowness of events, in words.
 fn worst<'a>(events: impl Iterator<Item = &'a Event>) -> String {
     in_words(events.map(|event| event.late_ns.max(event.slow_ns)).max().unwrap_or_default())
+}
+
+/// Lateness and slowness of all events of a cause, ns.
+fn explained_ns(events: &[Event], cause: Cause) -> u64 {
+    of(events, cause).map(|event| event.late_ns.max(event.slow_ns)).sum()
 }
 
 /// A count under a key of each process's report, summed.
@@ -68,6 +84,8 @@ fn stopped(runs: &[RunFiles], events: &[Event], cause: Cause) -> Option<Finding>
     (count > 0).then(|| Finding {
         cause,
         count,
+        explained_ns: explained_ns(events, cause),
+        by_itself: false,
         sentence: format!("{who} was stopped and continued by a signal {count} time(s){effect}."),
     })
 }
@@ -75,19 +93,76 @@ fn stopped(runs: &[RunFiles], events: &[Event], cause: Cause) -> Option<Finding>
 fn contention(events: &[Event]) -> Option<Finding> {
     let cause = Cause::CpuContention;
     let count = of(events, cause).count() as u64;
-    let at_least = |ns: u64| of(events, cause).filter(|event| event.late_ns.max(event.slow_ns) >= ns).count();
-    let found = at_least(CONTENTION_LATE_NS) > 0 || at_least(CONTENTION_OFTEN_NS) >= CONTENTION_EVENTS;
-    found.then(|| {
-        let mut who: Vec<_> = of(events, cause).map(|event| event.process.as_str()).collect();
+    // What a process waited is no more lateness than it had.
+    let waited_ns = |event: &Event| event.waited_ns.min(event.late_ns.max(event.slow_ns));
+    let mut hogged: BTreeMap<(usize, &str), Vec<u64>> = BTreeMap::new();
+    let mut who: Vec<_> = of(events, cause).map(|event| event.process.as_str()).collect();
+    for event in of(events, cause).filter(|event| event.machine_ran && waited_ns(event) >= HOG_EVENT_NS) {
+        hogged.entry((event.run, &event.process)).or_default().push(waited_ns(event));
+    }
+    let is_hog = |waits: &Vec<u64>| {
+        waits.len() >= HOG_EVENTS || (waits.len() > 1 && waits.iter().sum::<u64>() >= HOG_TOGETHER_NS)
+    };
+    let by_itself = !hogged.values().any(is_hog);
+    let explained_ns = of(events, cause).map(waited_ns).sum();
+    (count > 0).then(|| {
         who.sort_unstable();
         who.dedup();
+        let rare = if by_itself {
+            " So few or so short ones are also what a host does that takes away a virtual CPU."
+        } else {
+            ""
+        };
         let sentence = format!(
             "{count} time(s) other threads of the same or a higher priority, or interrupts, kept {} from the CPU, at worst \
-             for {}.",
+             for {}; together that explains {} of lateness.{rare}",
             who.join(" and "),
-            worst(of(events, cause))
+            worst(of(events, cause)),
+            in_words(explained_ns)
         );
-        Finding { cause, count, sentence }
+        Finding { cause, count, explained_ns, by_itself, sentence }
+    })
+}
+
+/// What is known to have been late or missed, and of which there is no row; or that nothing is known.
+fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
+    let (mut skipped, mut worst_ns, mut untold) = (0, 0, 0);
+    for run in runs {
+        let rows = run.rows.get("emulator").map(Vec::as_slice).unwrap_or_default();
+        let counted = run.summary["skipped"].as_u64();
+        let logged = run.logged.get("emulator-wakeup").and_then(|series| series.samples.max_ns());
+        let longest_ns = logged.or(run.summary["wakeup_ns"]["max"].as_u64());
+        let missing = counted.unwrap_or_default().saturating_sub(rows.iter().map(|row| row.skipped).sum());
+        let late_ns = |row: &CycleTiming| (row.woke_ns + row.skipped * PERIOD_NS).saturating_sub(row.due_ns);
+        let of_rows_ns = rows.iter().map(late_ns).max().unwrap_or_default();
+        let max_ns =
+            longest_ns.filter(|ns| of_rows_ns as f64 / (*ns as f64) < SAME_MAXIMUM).unwrap_or_default();
+        // Rows tell lateness that histograms do not know, never the other way round.
+        if missing > 0 || max_ns > EVENT_OVER_NS {
+            skipped += missing;
+            worst_ns = worst_ns.max(longest_ns.unwrap_or_default());
+        }
+        untold += u64::from(rows.is_empty() && (counted.is_none() || longest_ns.is_none()));
+    }
+    let mut told = Vec::new();
+    if skipped > 0 || worst_ns > EVENT_OVER_NS {
+        let worst = if worst_ns > 0 { in_words(worst_ns) } else { "not told".into() };
+        told.push(format!(
+            "{skipped} cycles skipped, worst wake-up {worst}; no rows recorded, the cause cannot be told (run with \
+             --full-timing)."
+        ));
+    }
+    if untold > 0 {
+        told.push(format!(
+            "{untold} run(s) hold neither rows nor both counts and wake-ups of the rig: whether a cycle was late is not known."
+        ));
+    }
+    (!told.is_empty()).then(|| Finding {
+        cause: Cause::Unknown,
+        count: skipped.max(1),
+        explained_ns: 0,
+        by_itself: true,
+        sentence: told.join(" "),
     })
 }
 
@@ -123,7 +198,8 @@ fn page_faults(runs: &[RunFiles], events: &[Event]) -> Option<Finding> {
         let sentence = format!(
             "{faults} page faults after the first second{who}; {late} late or slow cycle(s) by them."
         );
-        Finding { cause, count: faults.max(late), sentence }
+        let explained_ns = explained_ns(events, cause);
+        Finding { cause, count: faults.max(late), explained_ns, by_itself: false, sentence }
     })
 }
 
@@ -156,6 +232,8 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
     (count > 0).then(|| Finding {
         cause: Cause::SlowListener,
         count,
+        explained_ns: 0,
+        by_itself: false,
         sentence: format!(
             "{count} frames did not fit the full queue of {}, which did not read it in time; other peers had theirs.",
             who.join(", ")
@@ -204,6 +282,8 @@ fn frame_loss(runs: &[RunFiles]) -> Option<Finding> {
         Finding {
             cause: Cause::FrameLoss,
             count: unaccounted.max(on_wire),
+            explained_ns: 0,
+            by_itself: false,
             sentence: format!(
                 "{lost} frames never came, by gaps in the counters at rig and controllers; {witness}."
             ),
@@ -221,6 +301,8 @@ fn clock_step(runs: &[RunFiles]) -> Option<Finding> {
     Some(Finding {
         cause: Cause::ClockStep,
         count: steps.len() as u64,
+        explained_ns: 0,
+        by_itself: false,
         sentence: format!(
             "The wall clock was stepped, by {largest:+.3} s at most ({} sighting(s)); the cycles run on the monotonic clock and \
              were not touched by it.",
@@ -240,84 +322,9 @@ fn left_over(events: &[Event], cause: Cause) -> Option<Finding> {
             "{count} late or slow cycle(s), at worst by {at_worst}, are not explained by what was recorded."
         ),
     };
-    (count > 0).then_some(Finding { cause, count, sentence })
+    let explained_ns = explained_ns(events, cause);
+    (count > 0).then_some(Finding { cause, count, explained_ns, by_itself: true, sentence })
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::{explain, made_up};
-    use serde_json::json;
-
-    fn found(run: RunFiles) -> Vec<Cause> {
-        let events = explain::events(0, &run);
-        find(&[run], &events).iter().map(|finding| finding.cause).collect()
-    }
-
-    #[test]
-    fn nothing_is_found_in_an_undisturbed_run() {
-        assert_eq!(found(made_up::run(3000)), []);
-    }
-
-    #[test]
-    fn counters_speak_without_any_late_cycle() {
-        let cases: [(&str, Value, Cause); 6] = [
-            ("/summary/vitals", json!({ "continued": 1 }), Cause::EmulatorStopped),
-            ("/summary/vitals", json!({ "minor_faults": 5000, "major_faults": 0 }), Cause::PageFaults),
-            ("/summary/bus_host/injected_loss", json!({ "110": 30, "120": 25 }), Cause::FrameLoss),
-            ("/summary/frames_lost_at_rig", json!(7), Cause::FrameLoss),
-            ("/summary/bus/dropped_on_receive", json!(3), Cause::SlowListener),
-            ("/summary/wall_clock_steps", json!([{ "at_s": 1.0, "step_s": -3600.0 }]), Cause::ClockStep),
-        ];
-        for (path, value, cause) in cases {
-            let mut run = made_up::run(100);
-            let (parent, key) = path.trim_start_matches("/summary").rsplit_once('/').unwrap();
-            run.summary.pointer_mut(parent).unwrap()[key] = value;
-            assert_eq!(found(run), [cause], "{path}");
-        }
-        let mut run = made_up::run(100);
-        run.controllers.get_mut("controller").unwrap()["vitals"] = json!({ "continued": 2 });
-        assert_eq!(found(run), [Cause::ControllerStopped]);
-    }
-
-    #[test]
-    fn a_listener_that_does_not_read_costs_nobody_else_a_frame() {
-        let mut run = made_up::run(100);
-        let peers = run.summary.pointer_mut("/bus_host/peers").unwrap().as_array_mut().unwrap();
-        peers.push(json!({ "name": "process 3", "frames_received": 0, "dropped_at_queue": { "120": 40 } }));
-        assert_eq!(found(run), [Cause::SlowListener]);
-    }
-
-    #[test]
-    fn what_a_queue_of_ours_dropped_is_not_lost_on_the_wire() {
-        let mut run = made_up::run(100);
-        run.summary["bus_host"]["peers"][1]["dropped_at_queue"] = json!({ "110": 5 });
-        run.summary["frames_lost_at_rig"] = json!(5);
-        assert_eq!(found(run), [Cause::SlowListener]);
-    }
-
-    #[test]
-    fn faults_in_many_cycles_are_a_storm_without_a_late_one() {
-        let mut run = made_up::run(3000);
-        let rows = run.rows.get_mut("controller").unwrap();
-        rows.iter_mut().step_by(10).for_each(|row| row.vitals.minor_faults = 2);
-        assert_eq!(found(run), [Cause::PageFaults]);
-    }
-
-    #[test]
-    fn a_little_contention_stays_with_its_event_and_much_is_a_finding() {
-        let mut run = made_up::run(3000);
-        made_up::stall(&mut run, "emulator", 100, 300_000).vitals.run_delay_ns = 290_000;
-        assert_eq!(found(run.clone()), []);
-        made_up::stall(&mut run, "emulator", 500, 4_300_000).vitals.run_delay_ns = 4_200_000;
-        assert_eq!(found(run), [Cause::CpuContention]);
-    }
-
-    #[test]
-    fn what_somebody_did_stands_before_what_machines_do() {
-        let mut run = made_up::run(3000);
-        made_up::stall(&mut run, "emulator", 100, 9_300_000);
-        made_up::stall(&mut run, "emulator", 500, 5_300_000).vitals.continued = 1;
-        assert_eq!(found(run), [Cause::EmulatorStopped, Cause::MachineStoodStill]);
-    }
-}
+mod tests;

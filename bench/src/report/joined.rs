@@ -5,8 +5,8 @@
 //!   rig, a later cycle           command arrived     ◄────────────── answer handed over   controller, cycle k
 //! ```
 //!
-//! The later cycle of the rig says which cycle's sensors its command answers. Handing over is stamped when the call returns,
-//! which may be after the other side has taken the frame: such a latency is below what can be told, counts as 0 and is counted.
+//! The later cycle of the rig says which cycle's sensors its command answers. Handing over is stamped before the call that sends,
+//! so the call itself is part of the way. What still comes out below zero counts as 0 and is counted.
 
 use super::files::{PROCESSES, RunFiles};
 use super::samples::Samples;

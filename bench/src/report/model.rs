@@ -192,6 +192,8 @@ pub enum Cause {
     MachineStoodStill,
     /// Nothing that was recorded explains it.
     Unexplained,
+    /// Something was late or missed and nothing of it was recorded, or nothing tells whether anything was.
+    Unknown,
 }
 
 /// One late cycle, or several in a row.
@@ -221,6 +223,21 @@ pub struct Event {
     pub around: BTreeMap<String, Vec<AroundRow>>,
     /// Gaps of the probe around it.
     pub probe: Vec<ProbeGap>,
+    /// How long it was ready and waited for a CPU, over all its cycles, ns.
+    #[serde(default)]
+    pub waited_ns: u64,
+    /// Whether something shows that the machine ran meanwhile.
+    #[serde(default)]
+    pub machine_ran: bool,
+    /// The flight recorder's dump of it, a folder within the run's.
+    #[serde(default)]
+    pub dump: Option<String>,
+    /// Frames in that dump by identifier, in hexadecimal digits.
+    #[serde(default)]
+    pub frames: BTreeMap<String, u64>,
+    /// What the rig noted within 10 ms of it.
+    #[serde(default)]
+    pub rig_events: Vec<String>,
 }
 
 /// One cycle near an event, times against the event's due time.
@@ -264,6 +281,12 @@ pub struct Finding {
     pub cause: Cause,
     /// How often, in events or frames.
     pub count: u64,
+    /// Lateness and slowness that it explains, over all events, ns.
+    #[serde(default)]
+    pub explained_ns: u64,
+    /// Whether machines do this by themselves, as far as was seen; then it is not named as what was done to the runs.
+    #[serde(default)]
+    pub by_itself: bool,
     /// One sentence for a person.
     pub sentence: String,
 }

@@ -1,7 +1,8 @@
 //! `probe.csv`: moments in which a thread that does nothing but look at the clock did not get to look at it.
 //!
 //! A gap in which another thread ran on that CPU says little. One in which none ran says that the CPU itself stood still: the
-//! host of a virtual machine took it away, or its firmware did.
+//! host of a virtual machine took it away, or its firmware did. A row without length says that the probe watches that CPU
+//! from there on; older tables have none, and do not tell of a CPU without gaps whether it was watched.
 
 /// Columns of the table.
 const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
@@ -25,6 +26,28 @@ impl Gap {
     pub fn within_ns(&self, from_ns: u64, to_ns: u64) -> u64 {
         self.to_ns.min(to_ns).saturating_sub(self.from_ns.max(from_ns))
     }
+}
+
+/// Whether a probe watched a CPU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watched {
+    /// It did.
+    Yes,
+    /// It did not.
+    No,
+    /// Its table does not say.
+    NotTold,
+}
+
+/// Whether a CPU was watched at a time, by the rows of a table.
+#[must_use]
+pub fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
+    let Some(gaps) = gaps else { return Watched::No };
+    if gaps.iter().any(|gap| gap.cpu == cpu && gap.from_ns <= at_ns) {
+        return Watched::Yes;
+    }
+    // A table that names the CPUs names them all.
+    if gaps.iter().any(|gap| gap.from_ns == gap.to_ns) { Watched::No } else { Watched::NotTold }
 }
 
 /// What a table has wrong.
@@ -68,6 +91,17 @@ pub fn read(text: &str) -> Result<Vec<Gap>, ProbeError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cpu_without_gaps_was_watched_when_the_table_says_so() {
+        let row = |cpu, from_ns, to_ns| Gap { cpu, from_ns, to_ns, another_ran: false };
+        let table = [row(0, 100, 100), row(1, 100, 100), row(0, 150, 250)];
+        assert_eq!(watched(Some(&table), 1, 500), Watched::Yes);
+        assert_eq!(watched(Some(&table), 2, 500), Watched::No);
+        assert_eq!(watched(Some(&table), 1, 50), Watched::No, "it began later");
+        assert_eq!(watched(Some(&table[2..]), 1, 500), Watched::NotTold);
+        assert_eq!(watched(None, 1, 500), Watched::No);
+    }
 
     #[test]
     fn gaps_are_read_and_what_is_wrong_is_named_with_its_line() {

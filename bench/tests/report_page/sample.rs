@@ -184,6 +184,11 @@ fn event(place: u64, cause: Cause, late_us: f64, sentence: &str, evidence: &[&st
         evidence: evidence.iter().map(|one| (*one).to_owned()).collect(),
         around,
         probe,
+        waited_ns: 0,
+        machine_ran: cause != Cause::MachineStoodStill,
+        dump: (place == 0).then(|| format!("flight/{process}-{cycle:010}-overrun")),
+        frames: BTreeMap::from([("110".into(), 301), ("120".into(), 299)]),
+        rig_events: if place == 0 { vec!["Cycle 17: stale drive".into()] } else { Vec::new() },
     }
 }
 
@@ -402,9 +407,17 @@ pub(crate) fn rich() -> Report {
             Finding {
                 cause: Cause::MachineStoodStill,
                 count: 2,
+                explained_ns: 6_000_000,
+                by_itself: true,
                 sentence: "The machine stood still twice.".into(),
             },
-            Finding { cause: Cause::EmulatorStopped, count: 1, sentence: "The rig was stopped once.".into() },
+            Finding {
+                cause: Cause::EmulatorStopped,
+                count: 1,
+                explained_ns: 5_020_000,
+                by_itself: false,
+                sentence: "The rig was stopped once.".into(),
+            },
         ],
         runs: (0..RUNS).map(run).collect(),
         comparison: Some(comparison()),

@@ -7,7 +7,7 @@
 //! | the process was continued by SIGCONT in these cycles | emulator-stopped, controller-stopped |
 //! | the probe saw the CPU stand still, no thread running on it, for half of it or more | machine-stood-still |
 //! | as the next, and the other process was late in the same moment without waiting for a CPU | machine-stood-still |
-//! | the thread waited for the CPU for half of it or more | cpu-contention |
+//! | the thread waited for the CPU for half of it or more, in the worst cycle or over all of the event | cpu-contention |
 //! | more page faults than 20, or faults that explain a third of it | page-faults |
 //! | the work was slow, nobody else was, and nothing else is known of it | unexplained |
 //! | the probe watched that CPU and saw it free all the time | unexplained |
@@ -19,6 +19,7 @@
 //! once: there a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
 
 use crate::report::model::Cause;
+use crate::report::probe::Watched;
 use protocol::timing::Vitals;
 
 /// Faults in a cycle from which on they are a cause by themselves: a locked process has none.
@@ -55,8 +56,12 @@ pub struct Seen {
     pub continued: u64,
     /// Whether the kernel tells for how long threads wait for a CPU.
     pub run_delay: Known,
+    /// Time that it waited for a CPU in all cycles of the event, ns.
+    pub waited_ns: u64,
+    /// Lateness or slowness of all cycles of the event, ns.
+    pub together_ns: u64,
     /// Whether a probe watched this CPU.
-    pub probe_watched: bool,
+    pub probe_watched: Watched,
     /// Longest gap of that probe within the event in which no thread had the CPU, ns.
     pub still_ns: u64,
     /// Longest in which another one had, ns.
@@ -65,6 +70,8 @@ pub struct Seen {
     pub still_elsewhere_ns: u64,
     /// Other processes that were late or slow in the same moment: name, by how much, for how long they waited for a CPU, ns.
     pub others: Vec<(String, u64, u64)>,
+    /// Whether another process woke on time meanwhile, on another CPU.
+    pub ran_elsewhere: bool,
 }
 
 /// A cause with its reasons.
@@ -87,7 +94,7 @@ pub fn cause(seen: &Seen) -> Told {
 
 fn first_that_holds(seen: &Seen) -> Cause {
     let bad_ns = seen.bad_ns();
-    let waited = seen.vitals.run_delay_ns.saturating_mul(2) >= bad_ns;
+    let waited = seen.waited_half();
     let slow = seen.slow_ns > seen.late_ns;
     if seen.continued > 0 {
         return if seen.process == "emulator" { Cause::EmulatorStopped } else { Cause::ControllerStopped };
@@ -105,7 +112,8 @@ fn first_that_holds(seen: &Seen) -> Cause {
         let elsewhere = seen.still_elsewhere_ns.saturating_mul(2) >= bad_ns || seen.other_stood_still();
         return if elsewhere { Cause::MachineStoodStill } else { Cause::Unexplained };
     }
-    let cpu_was_free = seen.probe_watched && seen.still_ns.max(seen.another_ns).saturating_mul(4) < bad_ns;
+    let cpu_was_free =
+        seen.probe_watched == Watched::Yes && seen.still_ns.max(seen.another_ns).saturating_mul(4) < bad_ns;
     if cpu_was_free || seen.run_delay == Known::No {
         return Cause::Unexplained;
     }
@@ -116,6 +124,21 @@ impl Seen {
     /// What is to be explained, ns.
     fn bad_ns(&self) -> u64 {
         self.late_ns.max(self.slow_ns)
+    }
+
+    /// Whether it waited for a CPU for half of it or more, in the worst cycle or over all of them.
+    fn waited_half(&self) -> bool {
+        self.vitals.run_delay_ns.saturating_mul(2) >= self.bad_ns()
+            || self.waited_ns.saturating_mul(2) >= self.together_ns
+    }
+
+    /// Whether something shows that the machine ran: a thread that kept the probe away, a process on another CPU, or that the
+    /// rig, which its own CPU's timer wakes, was ready for half of it.
+    #[must_use]
+    pub fn machine_ran(&self) -> bool {
+        self.another_ns.saturating_mul(2) >= self.bad_ns()
+            || self.ran_elsewhere
+            || (self.process == "emulator" && self.waited_half())
     }
 
     fn faults(&self) -> u64 {
@@ -166,24 +189,40 @@ fn sentence(cause: Cause, seen: &Seen) -> String {
         Cause::CpuContention => format!(
             "because other threads had CPU {cpu} for {}: to a FIFO thread only threads of the same or a higher priority, \
              interrupts and the kernel's stop threads can do that",
-            in_words(vitals.run_delay_ns)
+            in_words(seen.waited_ns)
         ),
         Cause::PageFaults => {
             format!("because it had to wait for pages: {} faults in one cycle", seen.faults())
         }
-        Cause::MachineStoodStill if seen.still_ns > 0 => format!(
+        Cause::MachineStoodStill if seen.still_ns.saturating_mul(2) >= seen.bad_ns() => format!(
             "because the machine stood still: for {} no thread ran on CPU {cpu}, which the probe saw",
             in_words(seen.still_ns)
         ),
         Cause::MachineStoodStill if seen.other_stood_still() || seen.still_elsewhere_ns > 0 => {
-            "because the machine stood still: more than this process was late in the same moment".to_owned()
+            let waited = in_words(seen.waited_ns);
+            // The kernel's account and the other witness contradict each other: a waiting thread has a CPU that runs.
+            let (likely, although) = if seen.waited_half() {
+                (
+                    "most likely ",
+                    format!(
+                        ", although by the kernel's account it was ready and waited {waited} for CPU {cpu}"
+                    ),
+                )
+            } else {
+                ("", String::new())
+            };
+            format!(
+                "{likely}because the machine stood still: more than this process was late in the same moment{although}"
+            )
         }
         Cause::MachineStoodStill => format!(
-            "most likely because the machine stood still: it did not wait for CPU {cpu}, had {} page faults and was not \
-             stopped, so that the timer's interrupt itself came late",
+            "most likely because the machine stood still: it waited only {} of {} for CPU {cpu}, had {} page faults and was \
+             not stopped, so that the timer's interrupt itself came late",
+            in_words(seen.waited_ns),
+            in_words(seen.together_ns),
             if seen.faults() == 0 { "no".to_owned() } else { seen.faults().to_string() }
         ),
-        _ if seen.probe_watched && seen.slow_ns <= seen.late_ns => {
+        _ if seen.probe_watched == Watched::Yes && seen.slow_ns <= seen.late_ns => {
             format!("and nothing explains it: the probe saw CPU {cpu} free in that time")
         }
         _ if seen.slow_ns > seen.late_ns => {
@@ -202,7 +241,7 @@ fn evidence(seen: &Seen) -> Vec<String> {
         told.push(format!("SIGCONT was counted {} time(s) in these cycles.", seen.continued));
     }
     told.push(match seen.run_delay {
-        Known::Yes => format!("It was ready and waited for the CPU for {}.", in_words(vitals.run_delay_ns)),
+        Known::Yes => format!("It was ready and waited for the CPU for {}.", in_words(seen.waited_ns)),
         Known::No => "The kernel does not tell how long threads wait for a CPU.".to_owned(),
     });
     told.push(format!(
@@ -234,8 +273,10 @@ fn evidence(seen: &Seen) -> Vec<String> {
 
 fn probe_evidence(seen: &Seen) -> String {
     let cpu = seen.vitals.cpu;
-    let mut text = if !seen.probe_watched {
+    let mut text = if seen.probe_watched == Watched::No {
         format!("No probe watched CPU {cpu}: whether it stood still was not seen directly.")
+    } else if seen.probe_watched == Watched::NotTold {
+        format!("The probe's table has no gap of CPU {cpu}, and does not tell whether that CPU was watched.")
     } else if seen.still_ns > 0 {
         format!(
             "The probe saw CPU {cpu} stand still for {} of it, no other thread running.",

@@ -111,6 +111,7 @@ fn a_late_timer_without_any_trace_is_most_likely_the_machine() {
     let event = one(&run);
     assert_eq!(event.cause, Cause::MachineStoodStill);
     assert!(event.sentence.contains("most likely"), "{}", event.sentence);
+    assert!(event.sentence.contains("waited only 800 ns of 3.70 ms"), "{}", event.sentence);
 }
 
 #[test]
@@ -162,4 +163,63 @@ fn late_cycles_in_a_row_are_one_event_and_the_worst_events_come_first() {
     sort_by_severity(&mut events);
     let told: Vec<_> = events.iter().map(|event| (event.cycle, event.late_ns)).collect();
     assert_eq!(told, [(300, 900_000), (102, 700_000)]);
+}
+
+#[test]
+fn waiting_that_is_no_cause_is_told_as_it_was() {
+    let mut run = made_up::run(500);
+    made_up::stall(&mut run, "emulator", 100, 3_700_000).vitals.run_delay_ns = 951_000;
+    let event = one(&run);
+    assert_eq!(event.cause, Cause::MachineStoodStill);
+    assert!(event.sentence.contains("waited only 951.0 us of 3.70 ms"), "{}", event.sentence);
+}
+
+#[test]
+fn witnesses_that_contradict_each_other_make_it_likely_only() {
+    let mut run = made_up::run(500);
+    made_up::stall(&mut run, "emulator", 100, 900_000);
+    made_up::stall(&mut run, "controller", 100, 900_000).vitals.run_delay_ns = 850_000;
+    let events = events(0, &run);
+    let of = |process: &str| events.iter().find(|event| event.process == process).unwrap();
+    let sentence = &of("controller").sentence;
+    assert!(sentence.contains("most likely") && sentence.contains("waited 850.0 us"), "{sentence}");
+}
+
+#[test]
+fn waiting_is_added_up_over_the_cycles_of_an_event() {
+    let mut run = made_up::run(500);
+    for cycle in 100..104 {
+        made_up::stall(&mut run, "emulator", cycle, 400_000 + cycle).vitals.run_delay_ns = 390_000;
+    }
+    let event = one(&run);
+    assert_eq!(event.cause, Cause::CpuContention);
+    assert!(event.sentence.contains("had CPU 0 for 1.56 ms"), "{}", event.sentence);
+}
+
+#[test]
+fn what_two_processes_suffered_at_once_takes_one_place() {
+    let mut run = made_up::run(500);
+    made_up::stall(&mut run, "emulator", 100, 900_000);
+    made_up::stall(&mut run, "controller", 100, 800_000);
+    made_up::stall(&mut run, "controller", 300, 700_000);
+    let mut events = events(0, &run);
+    sort_by_severity(&mut events);
+    let kept = one_of_each_moment(events);
+    let told: Vec<_> = kept.iter().map(|event| (event.process.as_str(), event.cycle)).collect();
+    assert_eq!(told, [("emulator", 100), ("controller", 300)]);
+    let last = kept[0].evidence.last().unwrap();
+    assert!(last.starts_with("Of the same moment: The controller woke"), "{last}");
+}
+
+#[test]
+fn a_watched_cpu_without_gaps_is_never_called_unwatched() {
+    let mut run = made_up::run(500);
+    made_up::stall(&mut run, "emulator", 100, 3_700_000);
+    run.gaps = Some(vec![gap(1, 10, 200_000, false)]);
+    let told = |run: &RunFiles| one(run).evidence.join(" ");
+    assert!(told(&run).contains("does not tell whether that CPU was watched"), "{}", told(&run));
+    run.gaps = Some(vec![gap(0, 0, 0, false), gap(1, 0, 0, false)]);
+    assert!(told(&run).contains("The probe on CPU 0 saw no gap"), "{}", told(&run));
+    run.gaps = Some(vec![gap(1, 0, 0, false)]);
+    assert!(told(&run).contains("No probe watched CPU 0"), "{}", told(&run));
 }

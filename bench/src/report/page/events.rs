@@ -4,7 +4,8 @@ use super::markup::{Cell, Table, folded, list, none, number, words as text};
 use super::timeline::{by_process, timeline};
 use super::words;
 use crate::page_style::escaped;
-use crate::report::model::{AroundRow, Event, Finding, Report};
+use crate::report::explain::EVENT_OVER_NS;
+use crate::report::model::{AroundRow, Cause, Event, Finding, Report};
 
 /// Rows of a card's table; more would make the page heavy, and the flight recorder's dump has them all.
 const MOST_ROWS: usize = 400;
@@ -17,27 +18,57 @@ const HATCH: &str = "<svg width=\"0\" height=\"0\" style=\"position:absolute;wid
 /// All cards.
 pub(super) fn worst(report: &Report) -> String {
     if report.worst.is_empty() {
-        return none("None: no cycle was late, slow or missed beyond the flight recorder's limit.");
+        return none(&nothing(report));
     }
     let cards =
         report.worst.iter().enumerate().map(|(place, event)| card(event, place, report.conditions.probe));
     HATCH.to_owned() + &cards.collect::<String>()
 }
 
+/// What it means that there is no event.
+fn nothing(report: &Report) -> String {
+    if report.runs.is_empty() || report.findings.iter().any(|finding| finding.cause == Cause::Unknown) {
+        return "None was recorded, which does not mean that none was: see what disturbed the runs.".into();
+    }
+    let over = words::length(EVENT_OVER_NS);
+    if report.runs.iter().any(|run| run.lacks.iter().any(|lack| lack.contains("-timing.csv"))) {
+        return format!(
+            "None was recorded: no cycle was missed and no wake-up over {over} counted; slower work shows only beyond the \
+             flight recorder's limit, because not every run wrote its timing tables."
+        );
+    }
+    format!("None: no cycle was missed, nor late or slower than usual by more than {over}.")
+}
+
 fn card(event: &Event, place: usize, is_probed: bool) -> String {
     let rank = place + 1;
     format!(
         "<article class=\"card\" aria-labelledby=\"event-{place}\">\n<h3 id=\"event-{place}\">{rank}. {}: {}</h3>\n\
-         <p class=\"soft\">{}</p>\n<p><span class=\"tag\">{}</span> {}</p>\n{}{}{}</article>\n",
+         <p class=\"soft\">{}</p>\n<p><span class=\"tag\">{}</span> {}</p>\n{}{}{}{}</article>\n",
         escaped(&event.process),
         what(event),
         when(event),
         words::cause(event.cause),
         escaped(&event.sentence),
         list(&event.evidence, "Nothing was recorded that speaks for or against it."),
+        beside(event),
         timeline(event, place, is_probed),
         rows(event, place),
     )
+}
+
+/// What the flight recorder and the rig noted beside it.
+fn beside(event: &Event) -> String {
+    let mut told = Vec::new();
+    if let Some(dump) = &event.dump {
+        let frames: Vec<_> =
+            event.frames.iter().map(|(id, n)| format!("{} of {id}", words::count(*n))).collect();
+        let frames =
+            if frames.is_empty() { "no frames".into() } else { format!("frames {}", frames.join(", ")) };
+        told.push(format!("Flight recorder: {dump}, with {frames}."));
+    }
+    told.extend(event.rig_events.iter().map(|noted| format!("The rig noted: {noted}")));
+    if told.is_empty() { String::new() } else { list(&told, "") }
 }
 
 /// What happened, in figures.

@@ -304,6 +304,11 @@ mod tests {
             evidence: Vec::new(),
             around: BTreeMap::from([("emulator".into(), cycles.iter().map(row).collect())]),
             probe: Vec::new(),
+            waited_ns: 0,
+            machine_ran: false,
+            dump: None,
+            frames: BTreeMap::new(),
+            rig_events: Vec::new(),
         }
     }
 

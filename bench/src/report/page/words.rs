@@ -123,6 +123,7 @@ pub(super) fn cause(cause: Cause) -> &'static str {
         Cause::ClockStep => "the wall clock was stepped",
         Cause::MachineStoodStill => "the machine stood still",
         Cause::Unexplained => "unexplained",
+        Cause::Unknown => "not recorded",
     }
 }
 
