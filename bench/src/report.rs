@@ -19,6 +19,7 @@
 //! | [`ratios`] | ours against the reference, pair by pair |
 //! | [`conditions`] | where and how it was measured |
 //! | [`claim`] | whether that supports a latency claim |
+//! | [`controlled`] | what was not controlled |
 //! | [`comparison`] | groups of runs side by side |
 //! | [`bounds`] | a threshold file held against a report |
 //! | [`markdown`] | the summary for a merge request, and the short table |
@@ -32,6 +33,7 @@ pub mod choice;
 pub mod claim;
 pub mod comparison;
 pub mod conditions;
+pub mod controlled;
 pub mod distributions;
 pub mod explain;
 pub mod files;
@@ -74,6 +76,11 @@ pub enum ReportError {
          emulator-timing.csv"
     )]
     NoRun(PathBuf),
+    /// A comparison of one run.
+    #[error(
+        "--compare: one run cannot be compared; name another folder, or put folders into groups with --group NAME=FOLDER"
+    )]
+    OneRun,
     /// A group that says no folder.
     #[error("--group {0}: write it as NAME=FOLDER")]
     Group(String),
