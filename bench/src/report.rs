@@ -17,6 +17,7 @@
 //! | [`findings`] | what disturbed the runs as a whole |
 //! | [`cause`] | the one cause that a report names |
 //! | [`ratios`] | ours against the reference, pair by pair |
+//! | [`tallies`] | counts that a reader looks for first |
 //! | [`conditions`] | where and how it was measured |
 //! | [`claim`] | whether that supports a latency claim |
 //! | [`controlled`] | what was not controlled |
@@ -51,6 +52,7 @@ pub mod probe;
 pub mod ratios;
 pub mod reference;
 pub mod samples;
+pub mod tallies;
 
 #[cfg(test)]
 mod made_up;
