@@ -105,7 +105,8 @@ pub struct ReportArguments {
     /// Heading of the report.
     #[arg(long)]
     pub title: Option<String>,
-    /// Set the runs side by side by the groups that their conditions.json name; the first run's group comes first.
+    /// Set the runs side by side by the groups that their conditions.json name, the first run's group first; runs of one group
+    /// alone stand each for itself.
     #[arg(long)]
     pub compare: bool,
     /// Put a run, or the runs in a folder, into a group to be set beside others; may be repeated.

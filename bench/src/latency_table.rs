@@ -3,18 +3,16 @@
 //! | row | ours | held against |
 //! |---|---|---|
 //! | ratios of the report | wake-up of the rig | cyclictest, same priority, interval and CPU |
-//! | round trips | `drive-round-trip` of the rig | ping-pongs beside the run: `ping-pong.json` in its folder |
-//! | spinning | wake-up p99 of runs that wake early and spin | 1 us |
+//! | | `drive-round-trip` of the rig | ping-pongs beside the run |
+//! | spinning | wake-up p99 of runs that wake early and spin | what is claimed of it |
 //!
-//! Medians and intervals are those of [`ratios`], over the pairs.
+//! Medians and intervals are those of [`ratios`], over the pairs; what is claimed stands in `bench/latency-bounds*.toml`.
 
 use crate::SummaryError;
 use crate::grid::Grid;
-use crate::join::read_object;
 use crate::report::model::{Ratio, Report, RunPart};
 use crate::report::ratios;
 use clap::Args;
-use serde_json::{Map, Value};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -31,26 +29,14 @@ pub struct LatencyTableArguments {
     pub made_by: Option<String>,
 }
 
-/// Ping-pongs that stand beside a run, where their p50 stands, and what a row calls them.
-const PING_PONGS: [(&str, &str); 4] = [
-    ("/bus/p50", "ping-pong p50 on the same bus"),
-    ("/bus/to_arrival_ns/p50", "ping-pong p50 to arrival on the same bus"),
-    ("/embedded/p50", "ping-pong p50 on the embedded bus"),
-    ("/socketpair/p50", "ping-pong p50 on a bare socketpair"),
-];
-/// The figure that they are held against.
-const ROUND_TRIP: &str = "drive-round-trip";
 /// The rig's wake-up.
 const WAKE_UP: &str = "emulator-wakeup";
-/// What wake-ups that spin are held against, ns.
-const SPIN_BOUND_NS: u64 = 1000;
-/// Largest ratios that are claimed on an idle machine, by the beginning of a row's name.
-const CLAIMED: [(&str, f64); 4] = [
-    ("emulator-wakeup p50 / cyclictest", 1.1),
-    ("emulator-wakeup p99 / cyclictest", 1.1),
-    ("emulator-wakeup p99, spinning", 1.0),
-    ("drive-round-trip p50 / ping-pong p50 on the same bus", 1.5),
-];
+/// What is claimed of plain runs and of those that spin: the files that `scripts/latency --claims` judges by.
+const CLAIMS: [&str; 2] =
+    [include_str!("../latency-bounds.toml"), include_str!("../latency-bounds-spin.toml")];
+/// The figure of the runs that spin that is claimed, and the name of its row.
+const SPIN_CLAIM: &str = "emulator-wakeup.p99_ns";
+const SPIN_ROW: &str = "emulator-wakeup p99, spinning / claimed";
 /// Facts of the machine that are told above the table, by the beginning of their names.
 const FACTS: [&str; 6] =
     ["processor", "kernel", "preemption: model", "hypervisor", "frequency", "clock source"];
@@ -63,10 +49,6 @@ pub fn table(arguments: &LatencyTableArguments) -> Result<String, SummaryError> 
     let plain = read(&arguments.report)?;
     let spin = arguments.spin.as_deref().map(read).transpose()?;
     let mut rows = plain.ratios.clone();
-    let round_trip =
-        |run: &'_ RunPart| run.percentiles_ns.get(ROUND_TRIP).and_then(|round_trip| round_trip.p50);
-    let runs = plain.runs.iter().filter_map(|run| Some((round_trip(run)?, Path::new(&run.folder))));
-    rows.extend(round_trips(runs));
     rows.extend(spin.and_then(|spin| spinning(&spin.runs)));
     let mut out = head(&plain, arguments.made_by.as_deref());
     let _ = write!(out, "{}", grid(&rows).markdown()); // writing to a string cannot fail
@@ -78,25 +60,20 @@ fn read(path: &Path) -> Result<Report, SummaryError> {
     serde_json::from_str(&text).map_err(|error| SummaryError::read(path, error))
 }
 
-/// From the p50 of each run's round trip and the run's folder.
-fn round_trips<'a>(runs: impl Iterator<Item = (u64, &'a Path)>) -> Vec<Ratio> {
-    let beside =
-        |(ours_ns, folder): (u64, &Path)| Some((ours_ns, read_object(&folder.join("ping-pong.json")).ok()?));
-    let beside: Vec<(u64, Map<String, Value>)> = runs.filter_map(beside).collect();
-    let row = |(place, name): &(&str, &str)| {
-        let pair = |(ours_ns, told): &(u64, Map<String, Value>)| {
-            let theirs_ns = Value::Object(told.clone()).pointer(place)?.as_u64()?;
-            (theirs_ns > 0).then_some((*ours_ns, theirs_ns))
-        };
-        let pairs_ns = beside.iter().filter_map(pair).collect();
-        ratios::ratio(format!("{ROUND_TRIP} p50 / {name}"), pairs_ns)
+/// The largest value that is claimed of a figure.
+fn claimed(figure: &str) -> Option<f64> {
+    let of = |text: &str| {
+        let file: toml::Table = text.parse().ok()?;
+        let max = file.get("bounds")?.get(figure)?.get("max")?.clone();
+        max.as_float().or_else(|| max.as_integer().map(|max| max as f64))
     };
-    PING_PONGS.iter().filter_map(row).collect()
+    CLAIMS.iter().find_map(|text| of(text))
 }
 
 fn spinning(runs: &[RunPart]) -> Option<Ratio> {
-    let p99 = |run: &RunPart| Some((run.percentiles_ns.get(WAKE_UP)?.p99?, SPIN_BOUND_NS));
-    ratios::ratio(format!("{WAKE_UP} p99, spinning / 1 us"), runs.iter().filter_map(p99).collect())
+    let most_ns = claimed(SPIN_CLAIM)? as u64;
+    let p99 = |run: &RunPart| Some((run.percentiles_ns.get(WAKE_UP)?.p99?, most_ns));
+    ratios::ratio(SPIN_ROW.to_owned(), runs.iter().filter_map(p99).collect())
 }
 
 fn grid(rows: &[Ratio]) -> Grid {
@@ -109,10 +86,14 @@ fn grid(rows: &[Ratio]) -> Grid {
             }
             _ => "too few pairs".to_owned(),
         };
-        let bound = CLAIMED.iter().find(|(name, _)| ratio.name == *name || starts(&ratio.name, name));
-        let claimed = bound.map_or_else(
+        let most = if ratio.name == SPIN_ROW {
+            Some(1.0)
+        } else {
+            claimed(&format!("ratio.{}", ratios::short_name(&ratio.name)))
+        };
+        let claimed = most.map_or_else(
             || "-".to_owned(),
-            |(_, most)| format!("{most} {}", if ratio.median <= *most { "kept" } else { "**broken**" }),
+            |most| format!("{most} {}", if ratio.median <= most { "kept" } else { "**broken**" }),
         );
         vec![
             ratio.name.clone(),
@@ -173,8 +154,8 @@ mod tests {
         let wake_up = (0..10).map(|n| (13_000 + n * 100, 13_000)).collect();
         let rows = [
             row("emulator-wakeup p50 / cyclictest p50", wake_up),
-            row("drive-round-trip p50 / ping-pong p50 on the same bus", vec![(60_000, 30_000)]),
-            row("drive-round-trip p50 / ping-pong p50 on a bare socketpair", vec![(60_000, 30_000)]),
+            row("drive-round-trip p50 / ping-pong-bus p50", vec![(60_000, 30_000)]),
+            row("drive-round-trip p50 / ping-pong-socketpair p50", vec![(60_000, 30_000)]),
         ];
         let text = grid(&rows).markdown();
         let lines: Vec<&str> = text.lines().filter(|line| line.contains(" / ")).collect();
@@ -191,21 +172,13 @@ mod tests {
     }
 
     #[test]
-    fn round_trips_are_held_against_the_ping_pongs_of_their_own_run() {
-        let folder = tempfile::tempdir().unwrap();
-        let run = |name: &str, theirs_ns: u64| {
-            let path = folder.path().join(name);
-            std::fs::create_dir(&path).unwrap();
-            let told =
-                serde_json::json!({ "bus": { "p50": theirs_ns, "to_arrival_ns": { "p50": theirs_ns - 1 } } });
-            std::fs::write(path.join("ping-pong.json"), told.to_string()).unwrap();
-            path
-        };
-        let runs = [(60, run("a", 40)), (90, run("b", 30)), (70, folder.path().join("none beside it"))];
-        let rows = round_trips(runs.iter().map(|(ours_ns, folder)| (*ours_ns, folder.as_path())));
-        let names: Vec<_> = rows.iter().map(|row| row.name.rsplit(" / ").next().unwrap()).collect();
-        assert_eq!(names, ["ping-pong p50 on the same bus", "ping-pong p50 to arrival on the same bus"]);
-        assert_eq!(rows[0].pairs_ns, [(60, 40), (90, 30)]);
-        assert!((rows[0].median - 2.25).abs() < 1e-12);
+    fn every_claim_is_a_figure_that_a_report_can_have() {
+        let names: Vec<_> =
+            ratios::names().map(|name| format!("ratio.{}", ratios::short_name(&name))).collect();
+        let plain: toml::Table = CLAIMS[0].parse().unwrap();
+        let told: Vec<_> = plain["bounds"].as_table().unwrap().keys().collect();
+        assert_eq!(told.len(), 3);
+        assert!(told.iter().all(|figure| names.contains(figure)), "{told:?}");
+        assert_eq!(claimed(SPIN_CLAIM), Some(1000.0));
     }
 }

@@ -111,6 +111,9 @@ fn spread_runs(arguments: &SpreadArguments) -> Result<Exit, RunsError> {
 
 fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
     let chosen = report::choice::choose(&arguments.folders, &arguments.group)?;
+    if arguments.compare && chosen.len() < 2 {
+        return Err(ReportError::OneRun);
+    }
     let compare = arguments.compare || !arguments.group.is_empty();
     let mut made = report::make(&chosen, arguments.title.as_deref(), compare);
     if let Some(file) = &arguments.bounds {

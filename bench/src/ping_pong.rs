@@ -18,6 +18,7 @@ pub mod cli;
 mod line;
 mod rally;
 
+use crate::report::kinds::{PING_PONG, TO_ARRIVAL};
 use cli::{PingPongArguments, PongArguments};
 use line::{Line, OnBus, OnSocket};
 use protocol::bus::{self, BusError, BusUrl, StampClock};
@@ -125,9 +126,14 @@ pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
         add(path, &name(arguments), &figures)?;
     }
     if let Some(path) = &arguments.out {
-        let tag = format!("ping-pong-{}", name(arguments));
+        let tag = format!("{PING_PONG}{}", name(arguments));
         let length = Duration::from_secs_f64(arguments.seconds);
-        write_hlog(path, &[(&tag, rally.round_trip_ns.histogram())], started.as_secs_f64(), length)
+        let to_arrival = format!("{tag}{TO_ARRIVAL}");
+        let mut parts = vec![(tag.as_str(), rally.round_trip_ns.histogram())];
+        if arguments.bus.is_some() {
+            parts.push((&to_arrival, rally.to_arrival_ns.histogram()));
+        }
+        write_hlog(path, &parts, started.as_secs_f64(), length)
             .map_err(|error| PingPongError::write(path, error))?;
     }
     Ok(if interrupt.came() { Exit::Interrupted } else { Exit::Good })

@@ -17,8 +17,10 @@
 //! | [`findings`] | what disturbed the runs as a whole |
 //! | [`cause`] | the one cause that a report names |
 //! | [`ratios`] | ours against the reference, pair by pair |
+//! | [`tallies`] | counts that a reader looks for first |
 //! | [`conditions`] | where and how it was measured |
 //! | [`claim`] | whether that supports a latency claim |
+//! | [`controlled`] | what was not controlled |
 //! | [`comparison`] | groups of runs side by side |
 //! | [`bounds`] | a threshold file held against a report |
 //! | [`markdown`] | the summary for a merge request, and the short table |
@@ -32,6 +34,7 @@ pub mod choice;
 pub mod claim;
 pub mod comparison;
 pub mod conditions;
+pub mod controlled;
 pub mod distributions;
 pub mod explain;
 pub mod files;
@@ -49,6 +52,7 @@ pub mod probe;
 pub mod ratios;
 pub mod reference;
 pub mod samples;
+pub mod tallies;
 
 #[cfg(test)]
 mod made_up;
@@ -74,6 +78,11 @@ pub enum ReportError {
          emulator-timing.csv"
     )]
     NoRun(PathBuf),
+    /// A comparison of one run.
+    #[error(
+        "--compare: one run cannot be compared; name another folder, or put folders into groups with --group NAME=FOLDER"
+    )]
+    OneRun,
     /// A group that says no folder.
     #[error("--group {0}: write it as NAME=FOLDER")]
     Group(String),

@@ -303,7 +303,7 @@ fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Res
     let path = folder.join("conditions.json");
     let conditions = json!({
         "schema_version": 1,
-        "load_generator": load,
+        "load_generator": load.unwrap_or("none"),
         "group": format!("{}, {}", spec.experiment, spec.in_words()),
         "pair": spec.number,
         "reference_command": null,

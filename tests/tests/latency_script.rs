@@ -53,13 +53,13 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     for part in [
         "pair 1 of 1, cyclictest:",
         "left",
-        "drive-round-trip p50 / ping-pong p50 on the same bus",
-        "spinning / 1 us",
+        "drive-round-trip p50 / ping-pong-bus p50",
+        "spinning / claimed",
     ] {
         assert!(ended.stdout.contains(part), "'{part}' is missing in: {}{}", ended.stdout, ended.stderr);
     }
     let run = Path::new(out).join("pair-01/run");
-    for file in ["run.json", "summary.json", "ping-pong.json", "conditions.json"] {
+    for file in ["run.json", "summary.json", "ping-pong.json", "ping-pong-bus.hlog", "conditions.json"] {
         assert!(run.join(file).exists(), "{file}");
     }
     for file in

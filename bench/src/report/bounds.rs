@@ -3,7 +3,8 @@
 //! ```toml
 //! [bounds]
 //! "emulator-wakeup.p99_ns" = { max = 50000 }
-//! "ratio.emulator-wakeup.p50" = { max = 1.1 }
+//! "ratio.emulator-wakeup.p50" = { max = 1.1 }                   # against cyclictest
+//! "ratio.drive-round-trip.p50/ping-pong-bus" = { max = 1.5 }    # against another reference
 //! "counts.skipped" = { max = 0 }
 //! "findings.frame-loss" = { max = 0 }
 //! ```
@@ -82,7 +83,7 @@ fn one(figure: &str, bound: &toml::Value, report: &Report) -> Result<BoundResult
 fn value(figure: &str, report: &Report) -> Option<Option<f64>> {
     if let Some(name) = figure.strip_prefix("ratio.") {
         let told = report.ratios.iter().find(|ratio| ratios::short_name(&ratio.name) == name);
-        let known = ["emulator-wakeup.p50", "emulator-wakeup.p99"].contains(&name);
+        let known = ratios::names().any(|known| ratios::short_name(&known) == name);
         return told.map(|ratio| Some(ratio.median)).or(known.then_some(None));
     }
     if let Some(name) = figure.strip_prefix("counts.") {
@@ -122,7 +123,7 @@ fn unknown(figure: &str, report: &Report) -> BoundsError {
             known.insert(format!("{}.{key}", distribution.name));
         }
     }
-    known.extend(report.ratios.iter().map(|ratio| format!("ratio.{}", ratios::short_name(&ratio.name))));
+    known.extend(ratios::names().map(|name| format!("ratio.{}", ratios::short_name(&name))));
     known.extend(report.runs.iter().flat_map(|run| run.counts.keys().map(|key| format!("counts.{key}"))));
     known.insert("findings.frame-loss".into());
     let mut known: Vec<_> = known.into_iter().collect();

@@ -25,13 +25,20 @@ const FIGURES: [(&str, Pick); 4] = [
     ("max", |told| told.max),
 ];
 
-/// Compares the groups of the runs in the order in which they first appear; nothing with fewer than two.
+/// Compares the groups of the runs in the order in which they first appear; runs of one group, or of none, stand each for
+/// itself. Nothing with fewer than two runs.
 #[must_use]
 pub fn compare(runs: &[RunPart]) -> Option<Comparison> {
+    let alone = runs.iter().all(|run| run.group == runs[0].group);
+    let named = |(place, run): (usize, &RunPart)| match alone {
+        true => format!("{place} {}", run.folder),
+        false => run.group.clone(),
+    };
+    let group_of: Vec<String> = runs.iter().enumerate().map(named).collect();
     let mut groups: Vec<String> = Vec::new();
-    for run in runs {
-        if !groups.contains(&run.group) {
-            groups.push(run.group.clone());
+    for group in &group_of {
+        if !groups.contains(group) {
+            groups.push(group.clone());
         }
     }
     if groups.len() < 2 {
@@ -44,8 +51,8 @@ pub fn compare(runs: &[RunPart]) -> Option<Comparison> {
     for tag in tags {
         for (percentile, of) in FIGURES {
             let values = |group: &String| -> Vec<u64> {
-                let own = runs.iter().filter(|run| run.group == *group);
-                own.filter_map(|run| of(run.percentiles_ns.get(tag)?)).collect()
+                let own = runs.iter().zip(&group_of).filter(|(_, of_run)| *of_run == group);
+                own.filter_map(|(run, _)| of(run.percentiles_ns.get(tag)?)).collect()
             };
             let values: Vec<_> = groups.iter().map(values).collect();
             // A figure that a group lacks compares to nothing.
@@ -166,6 +173,10 @@ mod tests {
         assert_eq!(noise.rows[0].cells[1].beyond_noise, Some(false));
         let few = compare(&runs(&[100, 101, 102], &[200, 201, 202])).unwrap();
         assert_eq!(few.rows[0].cells[1].beyond_noise, None);
-        assert!(compare(&runs(&[1, 2], &[])).is_none());
+        let each = compare(&runs(&[1, 2], &[])).unwrap();
+        assert_eq!(each.groups, ["0 made-up", "1 made-up"], "without groups each run is one");
+        assert_eq!((each.rows[0].cells[1].median_ns, each.rows[0].cells[1].beyond_noise), (2, None));
+        assert!(compare(&runs(&[1], &[])).is_none());
+        assert!(compare(&[]).is_none());
     }
 }

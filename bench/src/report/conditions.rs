@@ -65,6 +65,9 @@ fn machine(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
         flatten(&mut facts, "", &run.run["machine"]);
+        if !run.conditions["uncommitted_files"].is_null() {
+            facts.add("uncommitted files", &text(&run.conditions["uncommitted_files"]));
+        }
         for key in ["emulator_version", "counts_allocations", "bus", "pace"] {
             if !run.run[key].is_null() {
                 facts.add(&key.replace('_', " "), &text(&run.run[key]));
@@ -119,6 +122,12 @@ fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
                 facts.add(process, &controller);
             }
         }
+        if let Some(command) = run.conditions["command"].as_str() {
+            facts.add("measured by", command);
+        }
+        for (name, command) in run.ping_pong["commands"].as_object().into_iter().flatten() {
+            facts.add(&format!("ping-pong {name}"), &text(command));
+        }
     }
     facts.told()
 }
@@ -151,10 +160,16 @@ mod tests {
         let told = conditions(&[made_up::run(10), made_up::run(10)]);
         let value =
             |name: &str| told.machine.iter().find(|fact| fact.name == name).map(|fact| fact.value.as_str());
-        assert_eq!(value("cpufreq: governor"), Some("performance"));
+        assert_eq!(value("preemption: model"), Some("PREEMPT_RT"));
         assert_eq!(value("processors"), Some("2"));
         assert_eq!(told.command_lines[0].value, "emulator run");
         assert!(told.privileges.iter().any(|fact| fact.name == "controller, granted"));
+        let mut run = made_up::run(10);
+        run.conditions["command"] = "scripts/latency --pairs 2".into();
+        run.conditions["uncommitted_files"] = 3.into();
+        let with = conditions(&[run]);
+        assert!(with.command_lines.iter().any(|fact| fact.value == "scripts/latency --pairs 2"));
+        assert!(with.machine.iter().any(|fact| fact.name == "uncommitted files" && fact.value == "3"));
         assert!(told.reference.is_none() && told.reference_missing_because.is_some());
     }
 

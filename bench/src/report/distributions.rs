@@ -49,6 +49,9 @@ pub fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
             ));
         }
     }
+    for (tag, samples) in &run.ping_pongs {
+        found.insert(tag.clone(), Series { samples: samples.clone(), maxima_ns: BTreeMap::new() });
+    }
     found.retain(|_, series| series.samples.count() > 0);
     found
 }
@@ -67,6 +70,14 @@ pub fn percentiles_of_run(
                 if what == "round-trip" { format!("drive-{what}") } else { format!("{process}-{what}") };
             if let Some(percentiles) = percentiles(&summary[key]) {
                 told.entry(tag).or_insert(percentiles);
+            }
+        }
+    }
+    for (name, _) in kinds::PING_PONGS {
+        let figures = &run.ping_pong[name];
+        for (end, figures) in [("", figures), (kinds::TO_ARRIVAL, &figures["to_arrival_ns"])] {
+            if let Some(percentiles) = percentiles(figures) {
+                told.entry(format!("{}{name}{end}", kinds::PING_PONG)).or_insert(percentiles);
             }
         }
     }

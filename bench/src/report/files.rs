@@ -2,8 +2,10 @@
 
 use super::hlog::{self, Passing};
 use super::joined::Series;
+use super::kinds::PING_PONGS;
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
+use super::samples::Samples;
 use protocol::timing::{self, CycleTiming};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -43,6 +45,10 @@ pub struct RunFiles {
     pub gaps: Option<Vec<Gap>>,
     /// The reference beside this run.
     pub reference: Option<Reference>,
+    /// Ping-pongs beside this run, by tag.
+    pub ping_pongs: BTreeMap<String, Samples>,
+    /// `ping-pong.json`; null when missing.
+    pub ping_pong: Value,
     /// What is missing or damaged, a sentence each.
     pub lacks: Vec<String>,
 }
@@ -78,6 +84,7 @@ impl RunFiles {
         run.take_flights();
         run.gaps = run.parse("probe.csv", probe::read);
         run.reference = run.parse("cyclictest.json", reference::read);
+        run.take_ping_pongs();
         run.tell_what_is_missing();
         run
     }
@@ -116,6 +123,18 @@ impl RunFiles {
         let read = hlog::each(&text, |passing| self.take_interval(passing));
         if let Err(error) = read {
             self.lacks.push(format!("{name} is damaged and was read up to there: {error}"));
+        }
+    }
+
+    /// The ping-pongs that `scripts/latency` put beside the run.
+    fn take_ping_pongs(&mut self) {
+        self.ping_pong = self.json("ping-pong.json");
+        for (name, _) in PING_PONGS {
+            let file = format!("ping-pong-{name}.hlog");
+            let Some(intervals) = self.parse(&file, hlog::read) else { continue };
+            for interval in intervals {
+                self.ping_pongs.entry(interval.tag).or_default().add(&interval.samples);
+            }
         }
     }
 

@@ -14,6 +14,17 @@ const OF_A_PROCESS: [(&str, &str); 7] = [
     ("period-error", "Difference of two wake-ups from the period"),
 ];
 
+/// Ping-pongs that `scripts/latency` sets beside a run: its name for each, and what it is.
+pub const PING_PONGS: [(&str, &str); 3] = [
+    ("bus", "on the same bus"),
+    ("embedded", "on the embedded bus"),
+    ("socketpair", "on a bare pair of sockets"),
+];
+/// What begins the tag of a ping-pong.
+pub const PING_PONG: &str = "ping-pong-";
+/// What ends the tag of one that is measured to the answer's arrival, as the rig's round trip is.
+pub const TO_ARRIVAL: &str = "-to-arrival";
+
 /// What follows the axis in a tag: drive-, load-.
 const OF_AN_AXIS: [(&str, Source, &str); 4] = [
     ("round-trip", Source::Emulator, "Sensors sent to the command that answers them received"),
@@ -70,7 +81,27 @@ pub fn all() -> Vec<Kind> {
     }
     // What is set beside each other stands beside each other.
     kinds.insert(1, reference);
+    let after =
+        kinds.iter().position(|kind| kind.tag == "drive-round-trip").map_or(kinds.len(), |place| place + 1);
+    kinds.splice(after..after, ping_pongs());
     kinds
+}
+
+fn ping_pongs() -> impl Iterator<Item = Kind> {
+    let ends = [
+        ("", "16 bytes there and back, the answer read"),
+        (
+            TO_ARRIVAL,
+            "16 bytes there and back, to the answer's arrival at the queue, as the rig's round trip",
+        ),
+    ];
+    PING_PONGS.into_iter().flat_map(move |(name, place)| {
+        ends.map(|(end, what)| Kind {
+            tag: format!("{PING_PONG}{name}{end}"),
+            source: Source::Reference,
+            about: format!("Ping-pong beside the runs, {place}: {what}"),
+        })
+    })
 }
 
 /// The kind of a tag; one that is not known is shown after the others, with its tag for a name.
@@ -80,7 +111,8 @@ pub fn of(tag: &str) -> Kind {
     known.unwrap_or_else(|| {
         let prefix =
             |(process, source, _): &(&str, Source, &str)| tag.starts_with(process).then_some(*source);
-        let source = PROCESSES.iter().find_map(prefix).unwrap_or(Source::Emulator);
+        let foreign = if tag.starts_with(PING_PONG) { Source::Reference } else { Source::Emulator };
+        let source = PROCESSES.iter().find_map(prefix).unwrap_or(foreign);
         Kind { tag: tag.into(), source, about: tag.replace('-', " ") }
     })
 }
@@ -106,5 +138,7 @@ mod tests {
         assert_eq!(of("load-rig-to-controller").source, Source::Joined);
         assert_eq!(of("controller-of-somebody").source, Source::Controller);
         assert!(place("controller-of-somebody") > place("drive-round-trip"));
+        assert_eq!(of("ping-pong-bus-to-arrival").source, Source::Reference);
+        assert_eq!(place("ping-pong-bus"), place("drive-round-trip") + 1);
     }
 }

@@ -30,13 +30,19 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
             { "name": "process 2", "frames_received": 4 * cycles, "dropped_at_queue": {} },
         ] },
     });
-    let granted = ["memory locked, current and future", "pinned to CPU 0", "SCHED_FIFO priority 80"];
+    let dma = "/dev/cpu_dma_latency at 0 us";
+    let granted = [dma, "memory locked, current and future", "pinned to CPU 0", "SCHED_FIFO priority 80"];
     run.run = serde_json::json!({
         "started_unix_s": 1.79e9, "realtime_granted": granted, "realtime_refused": [], "counts_allocations": false,
         "emulator_command_line": ["emulator", "run"],
         "machine": { "kernel": "Linux version 6.1.0-rt (x) #1 SMP PREEMPT_RT", "processors": 2,
-            "cpufreq": { "governor": "performance" }, "hypervisor": "none" },
+            "preemption": { "model": "PREEMPT_RT" }, "hypervisor": "none", "clock_source": "tsc", "isolated": "0-1",
+            "frequency_governors": ["CPUs 0,1: governor performance, driver x, 800 to 3000 MHz"],
+            "smt": "no CPUs share a core (control: off)", "rt_throttling": { "about": "off" },
+            "interrupts": { "CPU 0": "may come: none; do come: none", "CPU 1": "may come: none; do come: none" },
+            "memory": { "swap_used_kib": 0 }, "build": { "profile": "release, opt-level 3" } },
     });
+    let granted = [dma, "memory locked, current and future", "pinned to CPU 1", "SCHED_FIFO priority 80"];
     let controller = serde_json::json!({
         "realtime_granted": granted, "axes": { "drive": { "sensors_lost": 0 }, "load": { "sensors_lost": 0 } },
         "bus": { "dropped_on_receive": 0 },
@@ -133,7 +139,7 @@ pub(crate) fn slow<'a>(run: &'a mut RunFiles, process: &str, cycle: u64, by_ns: 
 /// Puts a reference with these samples beside a run.
 pub(crate) fn reference(run: &mut RunFiles, samples: Samples) {
     run.reference = Some(super::reference::Reference {
-        command_line: "cyclictest -p 80".into(),
+        command_line: "cyclictest -p 80 -a 0 -i 1000".into(),
         whole_us: false,
         samples,
         beyond_histogram: 0,

@@ -3,6 +3,7 @@
 use super::cause::in_kebab;
 use super::explain::rules::in_words;
 use super::model::{BoundResult, Comparison, Distribution, Event, PercentilesNs, Ratio, Report, Source};
+use super::tallies;
 use crate::grid::Grid;
 use std::fmt::Write as _;
 
@@ -24,6 +25,9 @@ pub fn summary(report: &Report) -> String {
     section("What disturbed the runs", &findings(report));
     section("Worst events", &worst(&report.worst));
     section("Runs", &runs(report));
+    let grid = |grid: Option<Grid>| grid.map_or_else(String::new, |grid| grid.markdown());
+    section("Lost, late, duplicate, malformed frames", &grid(tallies::frames(&report.runs)));
+    section("Command age in cycles", &grid(tallies::command_ages(&report.runs)));
     section("Frames", &frames(report));
     section("Conditions", &conditions(report));
     out.trim_end().to_owned() + "\n"

@@ -20,30 +20,45 @@ use super::samples::Pick;
 /// Least confidence of an interval.
 const CONFIDENCE: f64 = 0.95;
 
-/// What is set against cyclictest: distribution, percentile.
-const COMPARED: [(&str, &str, Pick); 2] =
-    [("emulator-wakeup", "p50", |told| told.p50), ("emulator-wakeup", "p99", |told| told.p99)];
+/// What is set against what: our distribution, percentile, the reference's distribution.
+const COMPARED: [(&str, &str, Pick, &str); 6] = [
+    ("emulator-wakeup", "p50", |told| told.p50, reference::TAG),
+    ("emulator-wakeup", "p99", |told| told.p99, reference::TAG),
+    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-bus"),
+    // Like for like: both end when the answer has arrived.
+    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-bus-to-arrival"),
+    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-embedded"),
+    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-socketpair"),
+];
+
+/// Names of all ratios that there can be.
+pub fn names() -> impl Iterator<Item = String> {
+    COMPARED.iter().map(|(tag, percentile, _, theirs)| format!("{tag} {percentile} / {theirs} {percentile}"))
+}
 
 /// The ratios of all runs that have a reference beside them.
 #[must_use]
 pub fn ratios(runs: &[RunPart]) -> Vec<Ratio> {
     let mut ratios = Vec::new();
-    for (tag, percentile, of) in COMPARED {
+    for ((tag, _, of, theirs), name) in COMPARED.into_iter().zip(names()) {
         let pair = |run: &RunPart| {
             let ours = of(run.percentiles_ns.get(tag)?)?;
-            let theirs = of(run.percentiles_ns.get(reference::TAG)?)?;
+            let theirs = of(run.percentiles_ns.get(theirs)?)?;
             (theirs > 0).then_some((ours, theirs))
         };
-        let pairs: Vec<_> = runs.iter().filter_map(pair).collect();
-        ratios.extend(ratio(format!("{tag} {percentile} / {} {percentile}", reference::TAG), pairs));
+        ratios.extend(ratio(name, runs.iter().filter_map(pair).collect()));
     }
     ratios
 }
 
-/// The name of a ratio in a threshold file: `emulator-wakeup.p50` for `emulator-wakeup p50 / cyclictest p50`.
+/// The name of a ratio in a threshold file: `emulator-wakeup.p50` for `emulator-wakeup p50 / cyclictest p50`, and
+/// `drive-round-trip.p50/ping-pong-bus` for one against another reference.
 #[must_use]
 pub fn short_name(name: &str) -> String {
-    name.split(" / ").next().unwrap_or(name).replace(' ', ".")
+    let (ours, theirs) = name.split_once(" / ").unwrap_or((name, reference::TAG));
+    let ours = ours.replace(' ', ".");
+    let theirs = theirs.split(' ').next().unwrap_or(theirs);
+    if theirs == reference::TAG { ours } else { format!("{ours}/{theirs}") }
 }
 
 /// The ratio of these pairs, ours first; nothing without a pair.
@@ -85,6 +100,8 @@ fn order(count: usize) -> Option<(usize, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::model::PercentilesNs;
+    use crate::report::{made_up, parts};
 
     #[test]
     fn ten_pairs_give_the_second_and_the_ninth() {
@@ -93,7 +110,8 @@ mod tests {
         assert!((told.median - 0.55).abs() < 1e-12);
         assert_eq!(told.interval, Some((0.2, 0.9)));
         assert!((told.confidence.unwrap() - 0.978_515_625).abs() < 1e-12);
-        assert_eq!(short_name(&told.name), "a.p50");
+        assert_eq!(short_name("a p50 / cyclictest p50"), "a.p50");
+        assert_eq!(short_name("a p50 / ping-pong-bus p50"), "a.p50/ping-pong-bus");
     }
 
     #[test]
@@ -103,6 +121,29 @@ mod tests {
             assert_eq!(order(count), Some((j, confidence)), "{count}");
         }
         assert_eq!(order(20).unwrap().0, 6);
+    }
+
+    #[test]
+    fn round_trips_are_held_against_the_ping_pongs_of_their_own_run() {
+        let run = |ours: Option<u64>, bus: Option<u64>| {
+            let told = |p50: Option<u64>| PercentilesNs { p50, count: 1, ..PercentilesNs::default() };
+            let of = [
+                ("drive-round-trip", ours),
+                ("ping-pong-bus", bus),
+                ("ping-pong-bus-to-arrival", bus.map(|ns| ns - 10)),
+            ];
+            let of = of.map(|(tag, p50)| (tag.to_owned(), told(p50)));
+            parts::part(&made_up::run(10), None, of.into())
+        };
+        let told = ratios(&[run(Some(60), Some(40)), run(Some(90), Some(30)), run(Some(70), None)]);
+        let told: Vec<_> = told.iter().map(|ratio| (ratio.name.as_str(), ratio.pairs_ns.clone())).collect();
+        assert_eq!(
+            told,
+            [
+                ("drive-round-trip p50 / ping-pong-bus p50", vec![(60, 40), (90, 30)]),
+                ("drive-round-trip p50 / ping-pong-bus-to-arrival p50", vec![(60, 30), (90, 20)]),
+            ]
+        );
     }
 
     #[test]

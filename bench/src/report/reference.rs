@@ -28,6 +28,28 @@ pub struct Reference {
     pub beyond_histogram: u64,
 }
 
+/// The value of an option in a command line, by its letter and its long name: `-p 80`, `-p80`, `--priority 80`, `--priority=80`.
+#[must_use]
+pub fn option<'a>(command_line: &'a str, letter: char, long: &str) -> Option<&'a str> {
+    let short = format!("-{letter}");
+    let mut words = command_line.split_whitespace();
+    while let Some(word) = words.next() {
+        if let Some(rest) = word.strip_prefix("--") {
+            if rest == long {
+                return words.next();
+            }
+            if let Some(value) = rest.strip_prefix(long).and_then(|rest| rest.strip_prefix('=')) {
+                return Some(value);
+            }
+        } else if word == short {
+            return words.next();
+        } else if let Some(value) = word.strip_prefix(&short) {
+            return Some(value);
+        }
+    }
+    None
+}
+
 #[derive(Deserialize)]
 struct File {
     #[serde(rename = "cmdline:", alias = "cmdline", default)]
@@ -111,6 +133,14 @@ mod tests {
         let fine = read(&text(1, &thread.replace("7939", "13"))).unwrap();
         assert!(!fine.whole_us);
         assert_eq!(fine.samples.percentiles_ns().p50, Some(13));
+    }
+
+    #[test]
+    fn options_are_found_in_all_their_forms() {
+        for line in ["cyclictest -m -p 80 -q", "cyclictest -p80", "c --priority=80 -a 1", "c --priority 80"] {
+            assert_eq!(option(line, 'p', "priority"), Some("80"), "{line}");
+        }
+        assert_eq!(option("cyclictest -m --policy=fifo", 'p', "priority"), None);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::files::RunFiles;
 use super::made_up;
-use super::model::{Cause, Report};
+use super::model::{Cause, Report, Source};
 use super::samples::Samples;
 use super::{Made, choice, from_files, hlog, make, output};
 use std::path::Path;
@@ -55,9 +55,43 @@ fn all_files_are_written_and_the_log_holds_every_sample() {
         assert!(out.join(name).metadata().unwrap().len() > 100, "{name}");
     }
     let markdown = std::fs::read_to_string(out.join("report.md")).unwrap();
-    for heading in ["# Test", "## Percentiles in us", "## Runs", "## Conditions"] {
+    for heading in ["# Test", "## Percentiles in us", "## Runs", "## Lost, late, duplicate", "## Conditions"]
+    {
         assert!(markdown.contains(heading), "{heading}");
     }
+}
+
+#[test]
+fn ping_pongs_beside_a_run_are_references_with_ratios() {
+    let folder = tempfile::tempdir().unwrap();
+    made_up::write(&made_up::run(2000), folder.path());
+    let part = |tag: &str, ns: u64| hlog::Interval {
+        tag: tag.into(),
+        start_s: 0.0,
+        duration_s: 10.0,
+        samples: (0..100).map(|_| ns).collect(),
+    };
+    let parts = [part("ping-pong-bus", 20_000), part("ping-pong-bus-to-arrival", 16_000)];
+    let mut log = Vec::new();
+    hlog::write(&mut log, 1e9, &parts).unwrap();
+    std::fs::write(folder.path().join("ping-pong-bus.hlog"), log).unwrap();
+    // An older measurement left the figures alone.
+    let told =
+        serde_json::json!({ "socketpair": { "p50": 8_000, "count": 100 }, "commands": { "bus": "bench x" } });
+    std::fs::write(folder.path().join("ping-pong.json"), told.to_string()).unwrap();
+    let report = made_in(folder.path()).report;
+    let bus = report.distributions.iter().find(|one| one.name == "ping-pong-bus").unwrap();
+    assert_eq!((bus.source, bus.percentiles_ns.count), (Source::Reference, 100));
+    let names: Vec<_> = report.ratios.iter().map(|ratio| ratio.name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "drive-round-trip p50 / ping-pong-bus p50",
+            "drive-round-trip p50 / ping-pong-bus-to-arrival p50",
+            "drive-round-trip p50 / ping-pong-socketpair p50",
+        ]
+    );
+    assert!(report.conditions.command_lines.iter().any(|fact| fact.name == "ping-pong bus"));
 }
 
 #[test]

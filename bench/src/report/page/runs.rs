@@ -3,7 +3,9 @@
 use super::figures::{PERCENTILES, percentiles};
 use super::markup::{Cell, Table, folded, list, number, words as text};
 use super::words;
+use crate::grid::Grid;
 use crate::report::model::{ArrivalRow, PercentilesNs, RunPart};
+use crate::report::tallies;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What came of one frame at one receiver over all runs.
@@ -89,12 +91,25 @@ pub(super) fn counts(runs: &[RunPart]) -> String {
         ]);
     }
     format!(
-        "{}{}{}{}",
+        "{}{}{}{}{}{}",
         table.html_or("No run was given."),
         lacking(runs),
+        tally("Lost, late, duplicate, malformed frames", tallies::frames(runs)),
+        tally("Command age in cycles", tallies::command_ages(runs)),
         counted(runs),
         each_percentiles(runs)
     )
+}
+
+/// A table of counts under its heading.
+fn tally(title: &str, grid: Option<Grid>) -> String {
+    let Some(grid) = grid else { return String::new() };
+    let mut table = Table::new(title, grid.head);
+    for mut row in grid.rows {
+        let counts = row.split_off(1);
+        table.row(row.into_iter().map(text).chain(counts.into_iter().map(number)));
+    }
+    format!("<h3>{title}</h3>\n{}", table.html_or("Nothing was counted."))
 }
 
 /// What folders do not hold, and the page therefore does not say.
