@@ -50,12 +50,9 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     let load = ["--load", "sleep 1000"];
     let ended =
         latency(&[&["--pairs", "1", "--seconds", "2", "--out", out][..], &load].concat()).expect_code(0);
-    for part in [
-        "pair 1 of 1, cyclictest:",
-        "left",
-        "drive-round-trip p50 / ping-pong-bus p50",
-        "spinning / claimed",
-    ] {
+    for part in
+        ["pair 1 of 1, cyclictest:", "left", "drive-round-trip p50 / ping-pong-bus p50", "spinning / claimed"]
+    {
         assert!(ended.stdout.contains(part), "'{part}' is missing in: {}{}", ended.stdout, ended.stderr);
     }
     let run = Path::new(out).join("pair-01/run");

@@ -1,7 +1,7 @@
 //! What disturbed the runs as a whole: from the events and from what all processes counted.
 //!
-//! What somebody did comes first, in the order of [`Cause`]; what machines do by themselves last, by the lateness that it explains.
-//! Lateness of which nothing was recorded is a finding too. A counter is a
+//! What somebody did comes first, in the order of [`Cause`]; what machines do by themselves last, by the lateness that it
+//! explains. Lateness of which nothing was recorded is a finding too. A counter is a
 //! witness that needs no interpretation, so counters speak even where no late cycle followed.
 
 use super::explain::EVENT_OVER_NS;
