@@ -7,7 +7,7 @@
 //! | [`files`] | what a run left in its folder |
 //! | [`hlog`] | interval logs, read and written |
 //! | [`probe`] | gaps that the spin-gap probe saw |
-//! | [`reference`] | cyclictest's own JSON |
+//! | [`mod@reference`] | cyclictest's own JSON |
 //! | [`kinds`] | the distributions that a report knows |
 //! | [`samples`] | percentiles, bins |
 //! | [`joined`] | rows of rig and controllers on one clock |

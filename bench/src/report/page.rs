@@ -4,14 +4,14 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`families`] | which distributions stand in one chart, and which reference beside them |
-//! | [`figures`] | key figures and ratios |
-//! | [`histograms`], [`maxima`] | their charts |
-//! | [`events`], [`timeline`] | the worst events, the cycles around them; findings |
-//! | [`runs`] | arrivals, counts, each run's percentiles |
-//! | [`comparison`] | groups side by side; bounds |
-//! | [`conditions`] | machine and command lines, what was not controlled, how to read |
-//! | [`svg`], [`markup`], [`words`] | drawings, tables, numbers |
+//! | `families` | which distributions stand in one chart, and which reference beside them |
+//! | `figures` | key figures and ratios |
+//! | `histograms`, `maxima` | their charts |
+//! | `events`, `timeline` | the worst events, the cycles around them; findings |
+//! | `runs` | arrivals, counts, each run's percentiles |
+//! | `comparison` | groups side by side; bounds |
+//! | `conditions` | machine and command lines, what was not controlled, how to read |
+//! | `svg`, `markup`, `words` | drawings, tables, numbers |
 
 mod comparison;
 mod conditions;
