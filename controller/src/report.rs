@@ -49,7 +49,7 @@ pub struct Report {
     pub allocations_in_cycle: Option<u64>,
     /// Rows lost to a full queue.
     pub records_dropped: u64,
-    /// Sensor frames of the axis that wakes us that had arrived before the loop began; they are no wake-ups.
+    /// Sensor frames of the axis that wakes us that had arrived before the loop began and were overtaken; they are no wake-ups.
     pub sensors_before_start: u64,
     /// Stamps and frames lost to a full queue: histograms, timing table and flight recorder lack them.
     pub timing_dropped: u64,

@@ -72,7 +72,7 @@ pub struct Outlets {
 pub struct StopwatchAccount {
     /// Stamps and frames that found no room in a queue.
     pub dropped: u64,
-    /// Sensors of the axis that wakes us that had arrived before the loop began.
+    /// Sensors of the axis that wakes us that had arrived before the loop began, and that no row answers.
     pub before_start: u64,
 }
 
@@ -210,6 +210,10 @@ impl<C: Clock + Send> Stopwatch<C> {
             let skipped = self.newest.map_or(0, |newest| cycle.saturating_sub(newest + 1));
             self.newest = Some(cycle);
             let due_ns = arrived_ns.max(self.began_ns);
+            if axis == self.wakes && (1..self.began_ns).contains(&arrived_ns) {
+                // Answered all the same: in its row it waited since the loop began.
+                self.account.before_start -= 1;
+            }
             // Sensors that arrive while others are being taken wait for nobody.
             let woke_ns = self.wake_up.woke_ns.max(due_ns);
             self.wake_up.woke_ns = woke_ns;
