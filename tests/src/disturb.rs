@@ -17,7 +17,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Length of each run, s of the rig's time.
-const RUN_S: u64 = 5;
+const RUN_S: u64 = 4;
 /// A process stands still for so long.
 const STOP: Duration = Duration::from_millis(5);
 /// Another program takes the CPU for so long, and so often.
@@ -132,7 +132,7 @@ fn inject(disturbance: Disturbance, scene: &Scene, emulator: &Running, controlle
         Disturbance::CpuContention => hog(),
         Disturbance::SlowListener => {
             let listener = scene.peer();
-            std::thread::sleep(Duration::from_secs(3));
+            std::thread::sleep(Duration::from_millis(1500));
             drop(listener);
         }
         Disturbance::ClockStep => step_the_clock(),
