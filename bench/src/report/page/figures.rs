@@ -89,7 +89,7 @@ fn quotient(ours: u64, reference: u64) -> Option<f64> {
 }
 
 const WIDTH: f64 = 960.0;
-const LEFT: f64 = 300.0;
+const LEFT: f64 = 400.0;
 const ROW: f64 = 30.0;
 const TOP: f64 = 14.0;
 
