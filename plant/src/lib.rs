@@ -40,6 +40,7 @@
 //! experimental rig", The Archive of Mechanical Engineering LVIII (2011) no. 2, DOI 10.2478/v10180-011-0014-6.
 
 mod chamber;
+pub mod effects;
 mod integrator;
 mod lanes;
 mod linkage;

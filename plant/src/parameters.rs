@@ -9,12 +9,15 @@
 pub mod table;
 
 mod reader;
+mod switched;
 
 use serde::Serialize;
 
 use reader::Entries;
 pub use reader::ParameterError;
 pub use table::VALVE_POINTS;
+
+use crate::effects::sheet::{Place, Switched};
 
 /// The numbers of one rig; made from a rig file, or the shipped baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -183,6 +186,44 @@ impl RigParameters {
     /// [`ParameterError`] as from a file that says so.
     pub fn with(&self, path: &str, numbers: &[f64]) -> Result<Self, ParameterError> {
         Self::from_entries(self.entries.with(path, numbers)?)
+    }
+
+    /// The same rig with one effect switched on, or with other numbers where it is on already.
+    ///
+    /// `place` is `drive`, `drive.a` and so on; `numbers` are keys of the effect's sheet in the file's units; keys that are
+    /// not named get their defaults.
+    ///
+    /// # Errors
+    /// [`ParameterError`] as from a file that says so.
+    pub fn with_effect(
+        &self,
+        name: &str,
+        place: &str,
+        numbers: &[(&str, f64)],
+    ) -> Result<Self, ParameterError> {
+        Self::from_entries(self.entries.with_effect(name, place, numbers)?)
+    }
+
+    /// The same rig with all effects off.
+    #[must_use]
+    pub fn without_effects(&self) -> Self {
+        let mut entries = self.entries.clone();
+        entries.effects.clear();
+        RigParameters { entries, ..self.clone() }
+    }
+
+    /// The same rig with one effect off at one place.
+    #[must_use]
+    pub fn without_effect(&self, name: &str, place: Place) -> Self {
+        let mut entries = self.entries.clone();
+        entries.effects.retain(|effect| effect.name != name || effect.place != place);
+        RigParameters { entries, ..self.clone() }
+    }
+
+    /// The effects that are switched on, in the order of the catalogue.
+    #[must_use]
+    pub fn effects(&self) -> &[Switched] {
+        &self.entries.effects
     }
 
     /// Supply, exhaust and emergency stop.

@@ -8,7 +8,9 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::switched;
 use super::table::{KEYS, Key, Unit};
+use crate::effects::sheet::Switched;
 
 /// Why a rig file is refused; every message gives the place, the key, the value and what is allowed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -105,6 +107,7 @@ pub(super) struct Entry {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Entries {
     pub(super) file: String,
+    pub(super) effects: Vec<Switched>,
     entries: BTreeMap<(&'static str, &'static str), Entry>,
 }
 
@@ -122,7 +125,8 @@ impl Entries {
         for key in KEYS {
             entries.insert((key.table, key.name), place.read_key(root.get_ref(), key)?);
         }
-        Ok(Entries { file: file.to_owned(), entries })
+        let effects = switched::read(root.get_ref(), &place)?;
+        Ok(Entries { file: file.to_owned(), effects, entries })
     }
 
     /// The entry of a key of the table.
@@ -172,19 +176,45 @@ impl Entries {
     }
 }
 
+impl Entries {
+    /// The same rig with an effect switched on, by a file of its own that says so.
+    pub(super) fn with_effect(
+        &self,
+        name: &str,
+        place: &str,
+        numbers: &[(&str, f64)],
+    ) -> Result<Self, ParameterError> {
+        let keys: String = numbers.iter().map(|(key, number)| format!("{key} = {number:?}\n")).collect();
+        let text = format!("[effects.{name}.{place}]\n{keys}");
+        let in_file = Place { text: &text, file: &self.file };
+        let root = DeTable::parse(&text).map_err(|error| ParameterError::Syntax {
+            file: self.file.clone(),
+            line: 1,
+            message: error.message().to_owned(),
+        })?;
+        let mut changed = self.clone();
+        for effect in switched::read(root.get_ref(), &in_file)? {
+            changed.effects.retain(|old| old.name != effect.name || old.place != effect.place);
+            changed.effects.push(effect);
+        }
+        switched::sort(&mut changed.effects);
+        Ok(changed)
+    }
+}
+
 /// Text and name of the file being read.
-struct Place<'t> {
+pub(super) struct Place<'t> {
     text: &'t str,
-    file: &'t str,
+    pub(super) file: &'t str,
 }
 
 impl Place<'_> {
-    fn line(&self, offset: usize) -> usize {
+    pub(super) fn line(&self, offset: usize) -> usize {
         1 + self.text.as_bytes()[..offset.min(self.text.len())].iter().filter(|byte| **byte == b'\n').count()
     }
 
     /// The value as the file writes it, on one line and cut to a readable length.
-    fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
+    pub(super) fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
         let words =
             self.text.get(value.span()).unwrap_or("").split_whitespace().collect::<Vec<_>>().join(" ");
         if words.chars().count() > 60 { words.chars().take(57).chain("...".chars()).collect() } else { words }
@@ -200,7 +230,7 @@ impl Place<'_> {
                 known: known.join(", "),
             }
         };
-        for (name, value) in root {
+        for (name, value) in root.iter().filter(|(name, _)| name.get_ref() != "effects") {
             let known: Vec<&str> =
                 KEYS.iter().filter(|key| key.table == name.get_ref()).map(|key| key.name).collect();
             if known.is_empty() {
@@ -258,7 +288,7 @@ impl Place<'_> {
     }
 }
 
-fn as_number(value: &DeValue<'_>) -> Option<f64> {
+pub(super) fn as_number(value: &DeValue<'_>) -> Option<f64> {
     match value {
         DeValue::Float(float) => float.as_str().parse().ok(),
         DeValue::Integer(integer) => {

@@ -45,6 +45,24 @@ pub enum Unit {
     NewtonPerMetre,
     /// N s/m.
     NewtonSecondPerMetre,
+    /// Hundredth.
+    Percent,
+    /// 100 Pa.
+    Millibar,
+    /// Metre.
+    Metre,
+    /// 1e-3 m/s.
+    MillimetrePerSecond,
+    /// Hertz.
+    Hertz,
+    /// 1/s.
+    PerSecond,
+    /// Normal litre per minute, 1e-3/60 m^3/s.
+    NormalLitrePerMinute,
+    /// 1e-5 N/Pa.
+    NewtonPerBar,
+    /// W/(m^2 K).
+    WattPerSquareMetreKelvin,
 }
 
 impl Unit {
@@ -53,7 +71,11 @@ impl Unit {
         // Divisions by powers of ten round once; a factor of 1e-3 would round twice.
         match self {
             Unit::Bar => value * 1e5,
-            Unit::Millimetre | Unit::Millisecond => value / 1e3,
+            Unit::Millimetre | Unit::Millisecond | Unit::MillimetrePerSecond => value / 1e3,
+            Unit::Percent => value / 1e2,
+            Unit::Millibar => value * 1e2,
+            Unit::NewtonPerBar => value / 1e5,
+            Unit::NormalLitrePerMinute => value / 6e4,
             Unit::Micrometre | Unit::SquareMillimetre | Unit::CubicCentimetre => value / 1e6,
             Unit::NewtonSecondPerMillimetre => value * 1e3,
             _ => value,
@@ -80,6 +102,15 @@ impl Unit {
             Unit::NewtonSecondPerMillimetre => "N/(mm/s)",
             Unit::NewtonPerMetre => "N/m",
             Unit::NewtonSecondPerMetre => "N s/m",
+            Unit::Percent => "%",
+            Unit::Millibar => "mbar",
+            Unit::Metre => "m",
+            Unit::MillimetrePerSecond => "mm/s",
+            Unit::Hertz => "Hz",
+            Unit::PerSecond => "1/s",
+            Unit::NormalLitrePerMinute => "Nl/min",
+            Unit::NewtonPerBar => "N/bar",
+            Unit::WattPerSquareMetreKelvin => "W/(m^2 K)",
         }
     }
 }

@@ -1,0 +1,161 @@
+//! The catalogue: what the baseline leaves out and a real servo-pneumatic axis has; one file for each effect.
+//!
+//! All are off unless a rig file switches them on by name and place, as `[effects.piston-leakage.drive]`. A new effect is one
+//! file and one line in the list below.
+//!
+//! Source: effects.md, the catalogue of physical effects; each file names its own.
+
+#![allow(dead_code, missing_docs)] // until the integrator calls them
+
+pub mod sheet;
+
+use crate::parameters::RigParameters;
+use sheet::{Effect, Element, Part, Place, PlaceKind, Sheet, Switched};
+
+/// What an effect is kept in, by the kind of its place: of one axis, `Axis` once, `Chamber` for a and b, `Channel` for position,
+/// force, a and b.
+macro_rules! slot {
+    ($type:ty, Axis) => { Option<$type> };
+    ($type:ty, Chamber) => { [Option<$type>; 2] };
+    ($type:ty, Channel) => { [Option<$type>; 4] };
+    ($type:ty, Linkage) => { Option<$type> };
+    ($type:ty, Supply) => { Option<$type> };
+}
+
+macro_rules! put {
+    ($slot:expr, $place:expr, $effect:expr, Axis) => {
+        $slot = Some($effect)
+    };
+    ($slot:expr, $place:expr, $effect:expr, Linkage) => {
+        $slot = Some($effect)
+    };
+    ($slot:expr, $place:expr, $effect:expr, Supply) => {
+        $slot = Some($effect)
+    };
+    ($slot:expr, $place:expr, $effect:expr, Chamber) => {
+        $slot[chamber($place)] = Some($effect)
+    };
+    ($slot:expr, $place:expr, $effect:expr, Channel) => {
+        $slot[channel($place)] = Some($effect)
+    };
+}
+
+macro_rules! catalogue {
+    ($($module:ident: $type:ident, $kind:ident;)*) => {
+        $(mod $module;)*
+        $(use $module::$type;)*
+
+        /// The effects of one axis that are switched on; those of linkage and supply stand with the drive's.
+        #[derive(Debug, Clone, Default)]
+        pub(crate) struct AxisEffects {
+            $(pub(crate) $module: slot!($type, $kind),)*
+        }
+
+        /// The data sheets of all effects, in the order of the catalogue.
+        pub const SHEETS: &[Sheet] = &[$($type::SHEET),*];
+
+        impl AxisEffects {
+            fn switch_on(&mut self, switched: &Switched, numbers: &[f64], rig: &RigParameters) {
+                $(if switched.name == $type::SHEET.name {
+                    put!(self.$module, switched.place, $type::new(numbers, rig), $kind);
+                })*
+            }
+        }
+    };
+}
+
+#[rustfmt::skip] // a list of one line for each effect
+catalogue! {
+    critical_pressure_ratio: CriticalPressureRatio, Axis;
+    valve_characteristic: ValveCharacteristic, Axis;
+    valve_dead_zone: ValveDeadZone, Axis;
+    valve_hysteresis: ValveHysteresis, Axis;
+    valve_offset: ValveOffset, Axis;
+    valve_null_leakage: ValveNullLeakage, Axis;
+    spool_second_order: SpoolSecondOrder, Axis;
+    spool_rate_limit: SpoolRateLimit, Axis;
+    line_delay: LineDelay, Axis;
+    line_resistance: LineResistance, Axis;
+    check_valve_restriction: CheckValveRestriction, Axis;
+    silencer_back_pressure: SilencerBackPressure, Axis;
+    supply_droop: SupplyDroop, Supply;
+    command_dead_time: CommandDeadTime, Axis;
+    heat_exchange: HeatExchange, Axis;
+    dead_volume: DeadVolume, Axis;
+    piston_leakage: PistonLeakage, Axis;
+    rod_leakage: RodLeakage, Chamber;
+    stribeck_friction: StribeckFriction, Axis;
+    presliding: Presliding, Axis;
+    friction_asymmetry: FrictionAsymmetry, Axis;
+    pressure_dependent_friction: PressureDependentFriction, Axis;
+    position_dependent_friction: PositionDependentFriction, Axis;
+    inclination: Inclination, Axis;
+    position_dependent_force: PositionDependentForce, Axis;
+    rest_time_dependent_break_away: RestTimeDependentBreakAway, Axis;
+    coupling_backlash: CouplingBacklash, Linkage;
+    coupling_compliance: CouplingCompliance, Linkage;
+    end_cushion: EndCushion, Axis;
+    position_sensor_lag: PositionSensorLag, Axis;
+    position_sensor_offset: PositionSensorOffset, Axis;
+    position_sensor_gain: PositionSensorGain, Axis;
+    pressure_sensor_lag: PressureSensorLag, Chamber;
+    pressure_sensor_offset: PressureSensorOffset, Chamber;
+    pressure_sensor_gain: PressureSensorGain, Chamber;
+    force_sensor_offset: ForceSensorOffset, Axis;
+    force_sensor_gain: ForceSensorGain, Axis;
+    time_skew: TimeSkew, Channel;
+}
+
+impl AxisEffects {
+    /// The effects of both axes that a rig has switched on.
+    pub(crate) fn of(rig: &RigParameters) -> [AxisEffects; 2] {
+        let mut axes = [AxisEffects::default(), AxisEffects::default()];
+        for switched in rig.effects() {
+            let sheet = sheet(switched.name).expect("the reader knows the effect");
+            let numbers: Vec<f64> = sheet
+                .keys
+                .iter()
+                .zip(&switched.numbers)
+                .map(|(key, number)| key.unit.to_si(*number))
+                .collect();
+            axes[usize::from(switched.place.part == Part::Load)].switch_on(switched, &numbers, rig);
+        }
+        axes
+    }
+}
+
+/// The sheet of an effect by its name.
+#[must_use]
+pub fn sheet(name: &str) -> Option<&'static Sheet> {
+    SHEETS.iter().find(|sheet| sheet.name == name)
+}
+
+fn chamber(place: Place) -> usize {
+    usize::from(place.element == Some(Element::B))
+}
+
+/// In the order of a measurement's columns.
+fn channel(place: Place) -> usize {
+    match place.element {
+        Some(Element::Position) | None => 0,
+        Some(Element::Force) => 1,
+        Some(Element::A) => 2,
+        Some(Element::B) => 3,
+    }
+}
+
+impl Sheet {
+    /// The place of this kind that a rig file calls so, as `drive` or `drive.a`.
+    #[must_use]
+    pub fn place_named(&self, name: &str) -> Option<Place> {
+        self.place.places().iter().copied().find(|place| place.to_string() == name)
+    }
+}
+
+impl PlaceKind {
+    /// The names of its places.
+    #[must_use]
+    pub fn names(self) -> Vec<String> {
+        self.places().iter().map(Place::to_string).collect()
+    }
+}

@@ -1,0 +1,207 @@
+//! What is known of an effect before it is switched on: its name, where it can be, its keys with units and ranges.
+//!
+//! The reader of rig files, the drawing of sealed rigs, the study and the documents all read these sheets, so that each
+//! range stands in one place: the file of its effect.
+
+use std::fmt;
+
+use crate::parameters::RigParameters;
+use crate::parameters::table::Unit;
+
+/// The data sheet of an effect.
+#[derive(Debug, Clone, Copy)]
+pub struct Sheet {
+    /// Name in rig files and reports, as `piston-leakage`.
+    pub name: &'static str,
+    /// Room of the catalogue.
+    pub group: Group,
+    /// Where it can be switched on.
+    pub place: PlaceKind,
+    /// The change to the baseline in a sentence.
+    pub law: &'static str,
+    /// Where law and range come from.
+    pub source: &'static str,
+    /// Its numbers; the first one is its amplitude.
+    pub keys: &'static [EffectKey],
+}
+
+/// One number of an effect, in the file's unit.
+#[derive(Debug, Clone, Copy)]
+pub struct EffectKey {
+    /// Name in the rig file, ending in its unit.
+    pub name: &'static str,
+    /// Unit of the value in the file.
+    pub unit: Unit,
+    /// Smallest value that a file may hold.
+    pub min: f64,
+    /// Largest value that a file may hold.
+    pub max: f64,
+    /// Smallest and largest magnitude that occur on axes of this kind: what sealed rigs and studies draw from.
+    pub drawn: [f64; 2],
+    /// Whether the drawn magnitude gets either sign.
+    pub signed: bool,
+    /// Value when the file is silent; without one the file must hold the key.
+    pub default: Option<f64>,
+    /// Value at which the rig is the baseline; `None` for a number that only shapes the effect, or when there is none.
+    pub neutral: Option<f64>,
+    /// What the number is.
+    pub meaning: &'static str,
+}
+
+impl EffectKey {
+    /// The allowed values in words, as `0 to 10 %`.
+    #[must_use]
+    pub fn range(&self) -> String {
+        format!("{} to {} {}", self.min, self.max, self.unit.name()).trim_end().to_owned()
+    }
+}
+
+/// Rooms of the catalogue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Group {
+    /// Valve, lines, silencer, supply.
+    Flow,
+    /// What the air in the chambers does.
+    Chamber,
+    /// Forces and friction.
+    Motion,
+    /// What sensors make of the truth.
+    Sensor,
+}
+
+/// Where effects of a kind can be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlaceKind {
+    /// `drive` or `load`.
+    Axis,
+    /// One chamber or its sensor: `drive.a`, `drive.b`, `load.a`, `load.b`.
+    Chamber,
+    /// One channel of the measurement: `drive.position`, `drive.force`, `drive.a`, `drive.b`, and those of the load.
+    Channel,
+    /// `linkage`.
+    Linkage,
+    /// `supply`, of both axes.
+    Supply,
+}
+
+impl PlaceKind {
+    /// All places of the kind.
+    #[must_use]
+    pub fn places(self) -> &'static [Place] {
+        use Element::{A, B, Force, Position};
+        use Part::{Drive, Linkage, Load, Supply};
+        const fn at(part: Part, element: Option<Element>) -> Place {
+            Place { part, element }
+        }
+        match self {
+            PlaceKind::Axis => const { &[at(Drive, None), at(Load, None)] },
+            PlaceKind::Chamber => {
+                const { &[at(Drive, Some(A)), at(Drive, Some(B)), at(Load, Some(A)), at(Load, Some(B))] }
+            }
+            PlaceKind::Channel => {
+                const {
+                    &[
+                        at(Drive, Some(Position)),
+                        at(Drive, Some(Force)),
+                        at(Drive, Some(A)),
+                        at(Drive, Some(B)),
+                        at(Load, Some(Position)),
+                        at(Load, Some(Force)),
+                        at(Load, Some(A)),
+                        at(Load, Some(B)),
+                    ]
+                }
+            }
+            PlaceKind::Linkage => const { &[at(Linkage, None)] },
+            PlaceKind::Supply => const { &[at(Supply, None)] },
+        }
+    }
+}
+
+/// A place at the rig where an effect is switched on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Place {
+    /// Axis or joint.
+    pub part: Part,
+    /// Chamber or channel, for effects of one.
+    pub element: Option<Element>,
+}
+
+/// Parts of the rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Part {
+    /// The drive axis.
+    Drive,
+    /// The load axis.
+    Load,
+    /// What joins the axes.
+    Linkage,
+    /// What feeds both.
+    Supply,
+}
+
+/// Elements of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Element {
+    /// Cap-side chamber, its pressure sensor.
+    A,
+    /// Rod-side chamber, its pressure sensor.
+    B,
+    /// Position sensor.
+    Position,
+    /// Force sensor.
+    Force,
+}
+
+impl Part {
+    /// As in rig files and reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Part::Drive => "drive",
+            Part::Load => "load",
+            Part::Linkage => "linkage",
+            Part::Supply => "supply",
+        }
+    }
+}
+
+impl Element {
+    /// As in rig files and reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Element::A => "a",
+            Element::B => "b",
+            Element::Position => "position",
+            Element::Force => "force",
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(self.part.name())?;
+        self.element.map_or(Ok(()), |element| write!(out, ".{}", element.name()))
+    }
+}
+
+/// An effect switched on at one place, with its numbers in the file's units, in the order of its sheet's keys.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Switched {
+    /// Name of the effect.
+    pub name: &'static str,
+    /// Where it is.
+    pub place: Place,
+    /// One number for each key of its sheet.
+    pub numbers: Vec<f64>,
+}
+
+/// What every effect of the catalogue is made from; its laws are its own functions.
+pub(crate) trait Effect: Sized {
+    /// Its data sheet.
+    const SHEET: Sheet;
+
+    /// The effect at one place: `numbers` in SI, one for each key, already checked against the sheet.
+    fn new(numbers: &[f64], rig: &RigParameters) -> Self;
+}
