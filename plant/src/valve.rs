@@ -23,7 +23,7 @@ use crate::parameters::table::VALVE_POINTS;
 const HINGES: usize = VALVE_POINTS - 1;
 
 /// From bar and m^3/h to Pa and m^3/s: Q_N in m^3/s per K_V in m^3/h and Pa [Neugebauer 2011, eq. 4].
-const FLOW_PER_KV: f64 = 25.9 / 1e5 / 3600.0;
+pub(crate) const FLOW_PER_KV: f64 = 25.9 / 1e5 / 3600.0;
 
 /// Largest count of the signed 12-bit valve command.
 const COMMAND_COUNTS: f64 = 2047.0;

@@ -1,9 +1,9 @@
 //! presliding: the contact is a brush of bristles, so before it breaks away the piston moves elastically (LuGre).
 //!
 //! ```text
-//! dz/dt = v - |v| s_0 z / g(v)                                                 [Canudas de Wit 1995, eq. 2]
-//! F     = s_0 z + s_1(v) dz/dt            against the motion, in place of stick and slip         [eq. 5]
-//! g(v)  = F_sli + (F_brk - F_sli) exp(-(v / v_s)^2)                                              [eq. 6]
+//! dz/dt  = v - |v| s_0 z / g(v)                                                        [Canudas de Wit 1995]
+//! F      = s_0 z + s_1(v) dz/dt           against the motion, in place of stick and slip
+//! g(v)   = F_sli + (F_brk - F_sli) exp(-(v / v_s)^2)                                   (theirs is g / s_0)
 //! s_1(v) = s_1 g / (g + s_1 |v|)          s_1 = 2 * 0.7 sqrt(s_0 m)
 //! ```
 //!
@@ -16,7 +16,8 @@
 //! | F_sli, F_brk | levels of sliding friction and break-away at this instant | N | 0 <= F_sli <= F_brk |
 //! | v_s | speed over which the one gives way to the other | m/s | 1 mm/s |
 //!
-//! Viscous friction stands beside it (b v of the baseline). Valid for dry and boundary friction of seals and guides. A force that
+//! Viscous friction stands beside it (b v of the baseline). With levels that depend on the direction, those of the motion count,
+//! at rest those of the force. Valid for dry and boundary friction of seals and guides. A force that
 //! comes faster than the bristles settle breaks away below F_brk, and a force that swings below F_brk lets the piston creep
 //! [Dupont 2002]: known limits of LuGre; the elasto-plastic form mends the second.
 //!
@@ -43,8 +44,8 @@
 //! m (v'^2 - v_0^2) / 2 + s_0 (z'^2 - z^2) / 2 <= F_applied (x' - x) - b v^2 h
 //! ```
 //!
-//! because on the exact path `v F - s_0 z dz/dt = |v| g (q (1 - y) + y^2)`, y = d s_0 z / g, q = s_1(v) |v| / g = w / (1 + w), and
-//! that is never negative for q <= 4. g is taken at a predicted midpoint speed, which keeps the second order.
+//! because on the exact path `v F - s_0 z dz/dt = |v| g (q (1 - y) + y^2)`, y = d s_0 z / g, q = s_1(v) |v| / g = w / (1 + w),
+//! and that is never negative for q <= 4. g is taken at a predicted midpoint speed, which keeps the second order.
 //!
 //! Properties: friction never adds energy; the deflection stays below F_brk / s_0; sliding steadily it is g(v); below
 //! break-away it settles at z = F / s_0; above it slides; slowly loaded it moves by -(F_brk / s_0) ln(1 - F / F_brk); it tends to
@@ -63,7 +64,7 @@ use crate::parameters::table::Unit;
 /// v_s, m/s: a guess of what lies between creeping and sliding; the effect stribeck-friction has its own.
 const STRIBECK_M_PER_S: f64 = 1e-3;
 
-/// Damping ratio of the bristles at rest: settles without ringing.
+/// Damping ratio of the unloaded bristles at rest: settles without ringing. Under a force F it is sqrt(1 - F / F_brk) of it.
 const DAMPING_RATIO: f64 = 0.7;
 
 /// Least level of friction, N: a fiftieth of the force sensor's noise.
@@ -75,7 +76,7 @@ const NEWTON_STEPS: u32 = 4;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Presliding {
-    /// S_0, stiffness of the bristles.
+    /// s_0, stiffness of the bristles.
     pub(crate) stiffness_n_per_m: f64,
 }
 
@@ -84,7 +85,7 @@ pub(crate) struct Presliding {
 pub(crate) struct Bristle {
     /// Of the rod.
     pub(crate) velocity_m_per_s: f64,
-    /// Z.
+    /// z, mean deflection of the bristles.
     pub(crate) deflection_m: f64,
 }
 
@@ -95,7 +96,7 @@ pub(crate) struct Under {
     pub(crate) force_n: f64,
     /// All that moves with the piston.
     pub(crate) mass_kg: f64,
-    /// B.
+    /// b, viscous friction.
     pub(crate) viscous_n_s_per_m: f64,
     /// Level of sliding friction.
     pub(crate) sliding_n: f64,
@@ -402,7 +403,10 @@ mod tests {
                     let psi = phi_1(balance.relaxation * speed) / (1.0 + balance.fading * speed);
                     let left_n = balance.push_n - balance.slope * speed - balance.room_n * (1.0 - psi);
                     // Never above the root but for roundings of 1600 N; below it by what no sensor sees.
-                    assert!((-1e-11..1e-5).contains(&left_n), "{left_n:e} N at {push_n}^2 N of {share}, s_0 = {s_0}");
+                    assert!(
+                        (-1e-11..1e-5).contains(&left_n),
+                        "{left_n:e} N at {push_n}^2 N of {share}, s_0 = {s_0}"
+                    );
                 }
             }
         }
