@@ -7,6 +7,7 @@
 
 #![allow(dead_code, missing_docs)] // until the integrator calls them
 
+mod first_order;
 pub mod sheet;
 
 use crate::parameters::RigParameters;
