@@ -8,6 +8,7 @@
 #![allow(dead_code, missing_docs)] // until the integrator calls them
 
 mod node;
+mod first_order;
 pub mod sheet;
 
 use crate::parameters::RigParameters;
