@@ -70,6 +70,15 @@ impl Valve {
         }
     }
 
+    /// Conductance of supply and exhaust edge at an opening |s| of 0 to 1, m^3/s per Pa.
+    pub(crate) fn conductances(&self, opening: f64) -> [f64; 2] {
+        let sum = |hinges: &[Pair; HINGES]| {
+            let beyond = |i: usize| (opening - self.point[i].drive()).max(0.0);
+            (0..HINGES).map(|i| hinges[i].drive() * beyond(i)).sum()
+        };
+        [sum(&self.supply_hinge), sum(&self.exhaust_hinge)]
+    }
+
     /// Which edge each chamber sees and how far it is open, for spools in [-1, 1].
     ///
     /// s > 0: supply to a, b to exhaust; s < 0: supply to b, a to exhaust.
