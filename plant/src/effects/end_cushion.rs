@@ -59,7 +59,7 @@ impl Effect for EndCushion {
                 signed: false,
                 default: None,
                 neutral: Some(f64::INFINITY),
-                meaning: "K_V of the cushion's orifice, open towards the chamber",
+                meaning: "K_V of the cushion's orifice; a chamber that fills goes past it",
             },
             EffectKey {
                 name: "length_mm",
@@ -176,10 +176,9 @@ mod tests {
         assert_eq!(stop(0.0), 1000.0);
         assert!((stop(0.5) + 1000.0).abs() < 1e-10);
         assert!((stop(0.4995) + 500.0).abs() < 1e-9);
-        // A function of the place alone: in and out are the same force.
-        let work =
-            |steps: [u32; 2]| (stop(f64::from(steps[0]) * 1e-4) + stop(f64::from(steps[1]) * 1e-4)) / 2.0;
-        assert_eq!(work([3, 4]), work([4, 3]));
+        // k s^2 / 2 over the last millimetre, 0.5 J, whichever way it is gone: a function of the place alone.
+        let work: f64 = (0..1000).map(|i| stop((f64::from(i) + 0.5) * 1e-6) * 1e-6).sum();
+        assert!((work - 0.5).abs() < 1e-12, "{work} J");
     }
 
     proptest! {
