@@ -12,8 +12,8 @@
 //! Properties: |term| <= h; y stays while x moves less than 2 h back; between reversals y follows at distance h;
 //! rate-independent; h = 0 adds nothing.
 //!
-//! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989, chapter 1; range: textbook prior, data
-//! sheets of proportional spool valves give 0.3 to 3 %.
+//! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989, chapter 1; range: textbook prior,
+//! data sheets of proportional spool valves give 0.3 to 3 %.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
