@@ -10,9 +10,8 @@
 //! q net normal flow into the chamber, leakage included, m^3/s; p_N q is the baseline's; T gas, T0 gas and wall of the
 //! baseline, K; h heat transfer coefficient, W/(m^2 K), in [1, 1e5]; S wetted wall, m^2: two faces and the bore's wall of a
 //! chamber with cross-section A, m^2, and volume V, m^3 (the rod's own wall is left out). R = 287, c_v = 718, c_p = 1005
-//! J/(kg K), gamma = c_p / c_v, perfect gas. h is one constant: a real one grows with pressure and speed by a factor of two
-//! or so. The wall keeps T0, since it holds a thousand times the heat of the gas. h to infinity is the baseline, h = 0 the
-//! adiabatic chamber.
+//! J/(kg K), gamma = c_p / c_v, perfect gas. h is one constant: a real one grows with pressure and speed. The wall keeps T0,
+//! since it holds more than a hundred times the heat of the gas. h to infinity is the baseline, h = 0 the adiabatic chamber.
 //!
 //! For the integrator: T relaxes with the time constant m c_v / (h S), which at 1e5 W/(m^2 K) is shorter than a step: its
 //! part must be taken implicitly or as an exponential. No regularisation: T_f jumps with the sign of q, where p_N q is 0.

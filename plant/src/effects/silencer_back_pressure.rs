@@ -11,7 +11,7 @@
 //! `node.rs` solves it there without regularisation, for any span.
 //!
 //! Properties: without flow the outside pressure stays to the bit; back pressure of a steady flow is that of eq. (4), and the
-//! less the larger n; positive; never past the equilibrium; both chambers see one pressure.
+//! less the larger n; positive; never past the equilibrium.
 //!
 //! Source: eq. (4) of Neugebauer 2011, DOI 10.2478/v10180-011-0014-6; resistances of silencers, Beater, Pneumatic Drives,
 //! 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
