@@ -1,4 +1,5 @@
-//! check-valve-restriction: a non-return valve at each chamber port needs a pressure to crack and restricts as a second orifice.
+//! check-valve-restriction: a non-return valve at each chamber port needs a pressure to crack and restricts as a second
+//! orifice.
 //!
 //! ```text
 //! shut while |p_far - p_chamber| <= p_c
@@ -11,15 +12,15 @@
 //! g(p_up, p_down) = sqrt((p_up - p_down) p_down), choked p_up / 2                 [Neugebauer 2011, eq. 4]
 //! ```
 //!
-//! q normal flow into the chamber, m^3/s; p_chamber absolute, Pa, positive; p_c cracking pressure, Pa, in [0, 1 bar], the spring
-//! against the flow either way, as of a piloted valve that opens both ways; k conductance of the orifice, m^3/s per Pa; 100 m^3/h,
-//! the largest number of the file, counts as no orifice. The orifice lies next to the chamber. At -q = k p_chamber / 2 it is
-//! choked and the port may have any lower pressure; a larger outflow is answered by a port without air, so that the implicit
-//! solution for q stays at or below. No regularisation: the caller solves q against a drop that never falls with q; at q = 0 it
-//! jumps by 2 p_c, which is the band in which `cracks` is false.
+//! q normal flow into the chamber, m^3/s; p_chamber absolute, Pa, positive; p_c cracking pressure, Pa, in [0, 1 bar], the
+//! spring against the flow either way, as of a piloted valve that opens both ways; k conductance of the orifice, m^3/s per
+//! Pa; 100 m^3/h, the largest number of the file, counts as no orifice. The orifice lies next to the chamber. At -q = k
+//! p_chamber / 2 it is choked and the port may have any lower pressure; a larger outflow is answered by a port without air,
+//! so that the implicit solution for q stays at or below. No regularisation: the caller solves q against a drop that never
+//! falls with q; at q = 0 it jumps by 2 p_c, which is the band in which `cracks` is false.
 //!
-//! Properties: opposes the flow; never falls with q; through valve and orifice the choked outflow is never exceeded; vents stop
-//! p_c above the exhaust; p_c = 0 and 100 m^3/h add nothing.
+//! Properties: opposes the flow; never falls with q; through valve and orifice the choked outflow is never exceeded; vents
+//! stop p_c above the exhaust; p_c = 0 and 100 m^3/h add nothing.
 //!
 //! Source: two resistances in series, ISO 6358-3:2014; spring of the non-return valve, Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; range: textbook prior.

@@ -5,12 +5,12 @@
 //! ```
 //!
 //! u command as latched for the period, in [-1, 1]; d dead time, s, in [0, 10 ms], beside the period that the command is
-//! latched in. Valid for bus, driver and coil together, as long as their delay is constant; a jittering one is none. Before the
-//! first command there was the first one. No regularisation: the memory holds what was commanded.
+//! latched in. Valid for bus, driver and coil together, as long as their delay is constant; a jittering one is none. Before
+//! the first command there was the first one. No regularisation: the memory holds what was commanded.
 //!
-//! Properties: while u stands the term is 0; d = 0 adds nothing; both chambers are late alike.
+//! Properties: while u stands the term is 0; an edge is taken back whole until it is d old.
 //!
-//! Source: dead time of sampled loops, Astrom and Wittenmark, Computer-Controlled Systems, 1997, chapter 2; range: textbook prior.
+//! Source: dead time of sampled loops, Astrom and Wittenmark, Computer-Controlled Systems, 1997; range: textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

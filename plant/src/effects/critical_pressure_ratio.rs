@@ -9,13 +9,13 @@
 //! Q normal flow into the chamber, m^3/s, its sign that of p_far - p_port; c conductance of the edge, m^3/s per Pa, not
 //! negative; p_far, p_port absolute, Pa, positive; b critical pressure ratio, in [0.05, 0.6].
 //!
-//! Both lines are one formula without a branch, c / (2 (1 - b)) sqrt((p_up - m) ((1 - 2 b) p_up + m)) with
-//! m = max(p_down, b p_up); at b = 0.5 it is eq. (4) to the bit. Valid for one orifice and for two in series, for which b is
-//! small; a valve with a moving seat or a spring has a fourth number, the cracking pressure, which is not here. Vertical at
-//! r = 1 as the baseline is: no regularisation, the chamber's own state solves for it.
+//! Both lines are one formula without a branch, c / (2 (1 - b)) sqrt((p_up - m) ((1 - 2 b) p_up + m)) with m = max(p_down, b
+//! p_up); at b = 0.5 it is eq. (4) to the bit. Valid for one orifice and for two in series, for which b is small; a valve
+//! with a moving seat or a spring has a fourth number, the cracking pressure, which is not here. Vertical at r = 1 as the
+//! baseline is: no regularisation, the chamber's own state solves for it.
 //!
-//! Properties: choked flow is the same for every b; b = 0.5 adds nothing; a smaller b never passes more; turns
-//! with the pressures.
+//! Properties: choked flow is the same for every b; b = 0.5 adds nothing; a smaller b never passes more; turns with the
+//! pressures.
 //!
 //! Source: ISO 6358-1:2013, flow-rate characteristics of components, with subsonic index m = 0.5; range: textbook prior for
 //! valves of this size (Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7).

@@ -4,14 +4,15 @@
 //! V_0' = V_own        term = V_own - V_0
 //! ```
 //!
-//! V_own dead volume of each chamber of the axis, m^3, in [5, 200] cm^3, hose and fittings included; V_0 that of the rig file. It
-//! takes the file's place, so the chambers' volumes are V_own + A xi. Valid while the air in the hose has the chamber's pressure. No
-//! regularisation: a constant.
+//! V_own dead volume of each chamber of the axis, m^3, in [5, 200] cm^3, hose and fittings included; V_0 that of the rig
+//! file. It takes the file's place, so the chambers' volumes are V_own + A xi. Valid while the air in the hose has the
+//! chamber's pressure. No regularisation: a constant.
 //!
-//! Properties: the sum is the own volume whatever the file says; at the file's value nothing is added; it counts most near the end
-//! of the stroke, where the chamber is small.
+//! Properties: the sum is the own volume whatever the file says; at the file's value nothing is added; it counts most near
+//! the end of the stroke, where the chamber is small.
 //!
-//! Source: inactive volume at the ends of the stroke, Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336; range: textbook prior.
+//! Source: inactive volume at the ends of the stroke, Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336; range:
+//! textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

@@ -7,20 +7,21 @@
 //! S = 2 A + 2 sqrt(pi A) V / A                                  T = p V / (m R)
 //! ```
 //!
-//! q net normal flow into the chamber, leakage included, m^3/s; p_N q is the baseline's; T gas, T0 gas and wall of the baseline,
-//! K; h heat transfer coefficient, W/(m^2 K), in [1, 1e5]; S wetted wall, m^2: two faces and the bore's wall of a chamber with
-//! cross-section A, m^2, and volume V, m^3 (the rod's own wall is left out). R = 287, c_v = 718, c_p = 1005 J/(kg K), gamma =
-//! c_p / c_v, perfect gas. h is one constant: a real one grows with pressure and speed by a factor of two or so. The wall keeps T0,
-//! since it holds a thousand times the heat of the gas. h to infinity is the baseline, h = 0 the adiabatic chamber.
+//! q net normal flow into the chamber, leakage included, m^3/s; p_N q is the baseline's; T gas, T0 gas and wall of the
+//! baseline, K; h heat transfer coefficient, W/(m^2 K), in [1, 1e5]; S wetted wall, m^2: two faces and the bore's wall of a
+//! chamber with cross-section A, m^2, and volume V, m^3 (the rod's own wall is left out). R = 287, c_v = 718, c_p = 1005
+//! J/(kg K), gamma = c_p / c_v, perfect gas. h is one constant: a real one grows with pressure and speed. The wall keeps T0,
+//! since it holds more than a hundred times the heat of the gas. h to infinity is the baseline, h = 0 the adiabatic chamber.
 //!
-//! For the integrator: T relaxes with the time constant m c_v / (h S), which at 1e5 W/(m^2 K) is shorter than a step: its part
-//! must be taken implicitly or as an exponential. No regularisation: T_f jumps with the sign of q, where p_N q is 0.
+//! For the integrator: T relaxes with the time constant m c_v / (h S), which at 1e5 W/(m^2 K) is shorter than a step: its
+//! part must be taken implicitly or as an exponential. No regularisation: T_f jumps with the sign of q, where p_N q is 0.
 //!
 //! Properties: at T0 with shut valve nothing is added; heat flows from warm to cold; inflow heats by gamma - 1, outflow takes
 //! T with it; an adiabatic shut chamber keeps p V^gamma; relaxation has the time constant above.
 //!
-//! Source: Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, energy balance of a chamber; Carneiro and de Almeida 2006,
-//! Reduced-order thermodynamic models for servo-pneumatic actuator chambers, Proc. IMechE I 220; range: textbook prior.
+//! Source: Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, energy balance of a chamber; Carneiro and de
+//! Almeida 2006, Reduced-order thermodynamic models for servo-pneumatic actuator chambers, Proc. IMechE I 220; range:
+//! textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

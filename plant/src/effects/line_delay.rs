@@ -4,16 +4,16 @@
 //! Q_chamber(t) = Q(t - l / a)        term = Q(t - l / a) - Q(t)        1 / a = 2.9 ms/m
 //! ```
 //!
-//! Q normal flow at the valve's port, m^3/s, positive into the chamber; l length of each line, m, in [0, 5]; a speed of sound,
-//! 345 m/s, that of air at 293 to 296 K (343 m/s at 293.15 K would make 2.91). The line only delays: its volume stands in the
-//! chamber's dead volume, its resistance is line-resistance, waves that come back from the piston are damped within a few
-//! travel times and left out. Valid while l / a is short against the strokes, for tubes of 4 mm and more up to some metres; a
-//! longer or narrower one smears the edge too. No regularisation: the memory holds the flows of the last 15 ms.
+//! Q normal flow at the valve's port, m^3/s, positive into the chamber; l length of each line, m, in [0, 5]; a speed of
+//! sound, 345 m/s, that of air at 293 to 296 K (343 m/s at 293.15 K would make 2.91). The line only delays: its volume stands
+//! in the chamber's dead volume, its resistance is line-resistance, waves that come back from the piston are damped within a
+//! few travel times and left out. Valid while l / a is short against the strokes, for tubes of 4 mm and more up to some
+//! metres; a longer or narrower one smears the edge too. No regularisation: the memory holds the flows of the last 15 ms.
 //!
 //! Properties: a constant flow is not changed; what enters the line leaves it; l = 0 adds nothing.
 //!
-//! Source: Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336, connecting tubes (delay l / a and attenuation); range: textbook
-//! prior, tubes of 0.5 to 4 m.
+//! Source: Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336, connecting tubes (delay l / a and attenuation); range:
+//! textbook prior, tubes of 0.5 to 4 m.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

@@ -7,15 +7,16 @@
 //!
 //! q normal flow into the chamber, m^3/s; p_chamber absolute, Pa, positive; dp drop of q_full into a chamber at p_ref, Pa, in
 //! [0, 1 bar]; K_V,max the supply edge's largest. The valve sees the pressure of its own end of the line: above the chamber's
-//! while it fills, below while it vents. Turbulent pipe flow at the mean density of the chamber, so valid while the drop is small
-//! against p; the compressible law p1^2 - p2^2 ~ q^2 has the same first order and half the drop where it is not small (full
-//! flow into an empty chamber). A large outflow could make the sum negative: there the edge's flow points inwards, so the
-//! implicit solution for q never goes there. No regularisation: smooth, with zero slope at q = 0.
+//! while it fills, below while it vents. Turbulent pipe flow at the mean density of the chamber, so valid while the drop is
+//! small against p; the compressible law p1^2 - p2^2 ~ q^2 has the same first order and half the drop where it is not small
+//! (full flow into an empty chamber). A large outflow could make the sum negative: there the edge's flow points inwards, so
+//! the implicit solution for q never goes there. No regularisation: smooth, with zero slope at q = 0.
 //!
-//! Properties: opposes the flow; odd in q; quadruple at twice the flow; half at twice the pressure; dp at the reference; dp = 0
-//! adds nothing; a valve that never opens has no drop.
+//! Properties: opposes the flow; odd in q; quadruple at twice the flow; half at twice the pressure; dp at the reference; dp =
+//! 0 adds nothing; a valve that never opens has no drop.
 //!
-//! Source: Darcy and Weisbach for gases, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, tubes; range: textbook prior.
+//! Source: Darcy and Weisbach for gases, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, tubes; range:
+//! textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

@@ -6,14 +6,14 @@
 //! ```
 //!
 //! q_ab normal flow from a to b, m^3/s; p_a, p_b absolute, Pa, positive; q_ref leakage from 6 to 1 bar absolute, m^3/s, in
-//! [0, 50 Nl/min]. Isothermal, viscous gas in a narrow gap: mean density times difference of pressures. Valid for a sound or worn
-//! seal; a torn lip is an orifice, whose flow chokes. No regularisation: smooth everywhere.
+//! [0, 50 Nl/min]. Isothermal, viscous gas in a narrow gap: mean density times difference of pressures. Valid for a sound or
+//! worn seal; a torn lip is an orifice, whose flow chokes. No regularisation: smooth everywhere.
 //!
-//! Properties: from high to low; what a loses b gains, to the bit; 0 at equal pressures; q_ref at the reference; q_ref = 0 adds
-//! nothing.
+//! Properties: from high to low; what a loses b gains, to the bit; 0 at equal pressures; q_ref at the reference; q_ref = 0
+//! adds nothing.
 //!
-//! Source: laminar gap flow of a gas, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; leakage between the chambers also
-//! in Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior.
+//! Source: laminar gap flow of a gas, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; leakage between the
+//! chambers also in Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

@@ -4,9 +4,10 @@
 //! q_out = k (p^2 - p_atm^2)        k = q_ref / ((6 bar)^2 - (1 bar)^2)        term: -q_out into the chamber
 //! ```
 //!
-//! q_out normal flow out of the chamber, m^3/s, negative when the atmosphere enters; p chamber, p_atm atmosphere, absolute, Pa,
-//! positive; q_ref leakage from 6 to 1 bar absolute, m^3/s, in [0, 50 Nl/min]. The gap is that of piston-leakage: isothermal and
-//! viscous. Valid for sound and worn seals; a rod seal that lifts off with pressure or speed is none. No regularisation: smooth.
+//! q_out normal flow out of the chamber, m^3/s, negative when the atmosphere enters; p chamber, p_atm atmosphere, absolute,
+//! Pa, positive; q_ref leakage from 6 to 1 bar absolute, m^3/s, in [0, 50 Nl/min]. The gap is that of piston-leakage:
+//! isothermal and viscous. Valid for sound and worn seals; a rod seal that lifts off with pressure or speed is none. No
+//! regularisation: smooth.
 //!
 //! Properties: from high to low; 0 at atmospheric pressure; q_ref at the reference; q_ref = 0 adds nothing.
 //!

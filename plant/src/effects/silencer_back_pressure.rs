@@ -4,17 +4,17 @@
 //! V dp_e/dt = p_N (q_fed - Q(p_e -> p_out))        Q: eq. (4) with K_V = n K_V,exhaust,max
 //! ```
 //!
-//! p_e pressure behind the exhaust edges of one axis, p_out that behind the silencer, absolute, Pa; q_fed normal flow that both
-//! exhaust edges bring, m^3/s, negative where they draw; V volume, m^3, in [5, 1000] cm^3; n in [0.1, 100], K_V of the silencer in
-//! units of the exhaust edge's largest. Valid for a sintered silencer taken as one orifice; its slow blocking by dirt is a
-//! smaller n. Isothermal as the chambers. At equal pressures the law is vertical as the baseline's is; the step of `node.rs`
-//! solves it there without regularisation, for any span.
+//! p_e pressure behind the exhaust edges of one axis, p_out that behind the silencer, absolute, Pa; q_fed normal flow that
+//! both exhaust edges bring, m^3/s, negative where they draw; V volume, m^3, in [5, 1000] cm^3; n in [0.1, 100], K_V of the
+//! silencer in units of the exhaust edge's largest. Valid for a sintered silencer taken as one orifice; its slow blocking by
+//! dirt is a smaller n. Isothermal as the chambers. At equal pressures the law is vertical as the baseline's is; the step of
+//! `node.rs` solves it there without regularisation, for any span.
 //!
-//! Properties: without flow the outside pressure stays to the bit; back pressure of a steady flow is that of eq. (4), and the less
-//! the larger n; positive; never past the equilibrium; both chambers see one pressure.
+//! Properties: without flow the outside pressure stays to the bit; back pressure of a steady flow is that of eq. (4), and the
+//! less the larger n; positive; never past the equilibrium.
 //!
-//! Source: eq. (4) of Neugebauer 2011, DOI 10.2478/v10180-011-0014-6; resistances of silencers, Beater, Pneumatic Drives, 2007, DOI
-//! 10.1007/978-3-540-69471-7; range: textbook prior.
+//! Source: eq. (4) of Neugebauer 2011, DOI 10.2478/v10180-011-0014-6; resistances of silencers, Beater, Pneumatic Drives,
+//! 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::node::Node;
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};

@@ -4,8 +4,8 @@
 //! |ds/dt| <= rate:    s(t + h) = s + min(max(s_free - s, -rate h), rate h)
 //! ```
 //!
-//! s spool, share of full opening; s_free where lag or second-order system would have it after the span h, s; rate in
-//! [5, 2000] 1/s, full opening counts 1. Valid for an actuator whose force saturates against a viscous load, both ways alike.
+//! s spool, share of full opening; s_free where lag or second-order system would have it after the span h, s; rate in [5,
+//! 2000] 1/s, full opening counts 1. Valid for an actuator whose force saturates against a viscous load, both ways alike.
 //! Linear for small steps: the 1.6 ms lag asks for 625 1/s times its step. No regularisation: the limit acts on the way of a
 //! span, so the spool lies on the exact ramp at the ends of the spans.
 //!

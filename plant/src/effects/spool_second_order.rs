@@ -8,16 +8,17 @@
 //! v(t) = exp(-a t) (v C - (a v + w^2 e) S)    S = sinh(sqrt(D) t) / sqrt(D)
 //! ```
 //!
-//! s spool, share of full opening; target in [-1, 1]; f natural frequency, Hz, in [20, 400]; z damping, in [0.2, 1.5]. For
-//! D < 0 C and S are the cosine and sine of sqrt(-D) t; where |D| t^2 < 1e-4 the series serves, whose error is below 1e-16, so
+//! s spool, share of full opening; target in [-1, 1]; f natural frequency, Hz, in [20, 400]; z damping, in [0.2, 1.5]. For D
+//! < 0 C and S are the cosine and sine of sqrt(-D) t; where |D| t^2 < 1e-4 the series serves, whose error is below 1e-16, so
 //! that critical damping is no special case. The solution is exact for any span. Valid for a position-controlled spool below
-//! its rate limit; with z < 1 the spool swings past the target, at full command past 1, where the edges stay as open as they get.
+//! its rate limit; with z < 1 the spool swings past the target, at full command past 1, where the edges stay as open as they
+//! get.
 //!
-//! Properties: at rest on the target it stays to the bit; two spans are one of their sum; the energy v^2 + w^2 e^2 never grows;
-//! steady state is the target.
+//! Properties: at rest on the target it stays to the bit; two spans are one of their sum; the energy v^2 + w^2 e^2 never
+//! grows; steady state is the target.
 //!
-//! Source: Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, valves with position-controlled spool; range: textbook
-//! prior around the 100 Hz of the rig's valve.
+//! Source: Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, valves with position-controlled spool; range:
+//! textbook prior around the 100 Hz of the rig's valve.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

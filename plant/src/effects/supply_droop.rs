@@ -5,12 +5,12 @@
 //! c sqrt((p_supply - m) m) = q_full                m = max(p_supply - dp, p_supply / 2),  q_full = 12.95 K_V,max p_supply
 //! ```
 //!
-//! p node that feeds the supply edges of both axes, p_set what the regulator holds without flow (the baseline's node, which an
-//! emergency stop discharges), absolute, Pa; q_drawn normal flow drawn by both axes, m^3/s, negative where chambers feed back; V
-//! volume, m^3, in [50, 10000] cm^3; dp droop, Pa, in [0, 2 bar]: the fall of the node while one full supply edge draws. Valid for
-//! a self-relieving regulator whose set-point is quick and stiff, so that hose and seat alone give way; the overshoot of a real one
-//! after a step is left out. At equal pressures the law is vertical; the step of `node.rs` solves it without regularisation. A droop
-//! below 1 mPa counts as 1 mPa, and of 0 the node is p_set to the bit.
+//! p node that feeds the supply edges of both axes, p_set what the regulator holds without flow (the baseline's node, which
+//! an emergency stop discharges), absolute, Pa; q_drawn normal flow drawn by both axes, m^3/s, negative where chambers feed
+//! back; V volume, m^3, in [50, 10000] cm^3; dp droop, Pa, in [0, 2 bar]: the fall of the node while one full supply edge
+//! draws. Valid for a self-relieving regulator whose set-point is quick and stiff, so that hose and seat alone give way; the
+//! overshoot of a real one after a step is left out. At equal pressures the law is vertical; the step of `node.rs` solves it
+//! without regularisation. A droop below 1 mPa counts as 1 mPa, and of 0 the node is p_set to the bit.
 //!
 //! Properties: without flow the set pressure stays to the bit; one full edge makes dp; recovers at rest; positive; never past
 //! the equilibrium; dp = 0 adds nothing.

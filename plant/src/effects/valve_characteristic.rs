@@ -6,18 +6,18 @@
 //! K_V,exhaust' = (1 - r/2) K_V,exhaust(w)        terms = K_V' - K_V(o)
 //! ```
 //!
-//! o = |s| opening, in [0, 1]; c bend, in [-0.4, 0.4], positive passes more at half opening; r ratio of the edges, in
-//! [-0.4, 0.4], positive favours the supply edges; K_V in any unit, that of the tables handed in.
+//! o = |s| opening, in [0, 1]; c bend, in [-0.4, 0.4], positive passes more at half opening; r ratio of the edges, in [-0.4,
+//! 0.4], positive favours the supply edges; K_V in any unit, that of the tables handed in.
 //!
 //! |c| <= 1/2 keeps w growing with o, so that a bent table still never falls, and within [0, 1]; the dead band of the tables
 //! narrows or widens by the bend with them. A common factor on both edges is no effect but `parameter:kv-scale`. No
 //! regularisation: the tables have the only corners.
 //!
-//! Properties: shut and full opening of the bend stay; no table falls; c = r = 0 adds nothing; with c = 0 the edges stand
-//! as (1 + r/2) to (1 - r/2).
+//! Properties: shut and full opening of the bend stay; no table falls; c = r = 0 adds nothing; with c = 0 the edges stand as
+//! (1 + r/2) to (1 - r/2).
 //!
-//! Source: flow gain of a spool with shaped or round ports, Merritt, Hydraulic Control Systems, 1967, chapter 5; bend and ratio
-//! are this catalogue's own shape; range: textbook prior.
+//! Source: flow gain of a spool with shaped or round ports, Merritt, Hydraulic Control Systems, 1967, chapter 5; bend and
+//! ratio are this catalogue's own shape; range: textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -74,7 +74,7 @@ impl ValveCharacteristic {
     /// What is added to K_V of supply and exhaust edge at `opening` in [0, 1]; `kv` gives both from the tables.
     pub(crate) fn terms(&self, kv: impl Fn(f64) -> [f64; 2], opening: f64) -> [f64; 2] {
         let bent = opening + 2.0 * self.bend * opening * (1.0 - opening);
-        let [supply, exhaust] = kv(bent.max(0.0).min(1.0));
+        let [supply, exhaust] = kv(bent.clamp(0.0, 1.0));
         let [supply_before, exhaust_before] = kv(opening);
         let half = self.edge_ratio / 2.0;
         [supply * (1.0 + half) - supply_before, exhaust * (1.0 - half) - exhaust_before]

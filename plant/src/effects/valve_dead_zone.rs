@@ -9,11 +9,11 @@
 //! tables have themselves. Valid for a lap equal on both sides; an unequal one is a dead zone and an offset. Outside [-1, 1]
 //! the line goes on. No regularisation: continuous, with a corner at d as a lapped spool has.
 //!
-//! Properties: odd; continuous; full opening stays; inside the lap spool and term sum to 0 to the bit; never opens wider
-//! than the spool; d = 0 adds nothing.
+//! Properties: odd; continuous; full opening stays; inside the lap spool and term sum to 0 to the bit; never opens wider than
+//! the spool; d = 0 adds nothing.
 //!
-//! Source: lapped spool, Merritt, Hydraulic Control Systems, 1967, chapter 5; Beater, Pneumatic Drives, 2007,
-//! DOI 10.1007/978-3-540-69471-7; range: textbook prior.
+//! Source: lapped spool, Merritt, Hydraulic Control Systems, 1967, chapter 5; Beater, Pneumatic Drives, 2007, DOI
+//! 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

@@ -12,8 +12,7 @@
 //! Properties: |term| <= h; y stays while x moves less than 2 h back; between reversals y follows at distance h;
 //! rate-independent; h = 0 adds nothing.
 //!
-//! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989, chapter 1; range: textbook prior, data
-//! sheets of proportional spool valves give 0.3 to 3 %.
+//! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989; range: textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -32,7 +31,7 @@ impl Effect for ValveHysteresis {
         group: Group::Flow,
         place: PlaceKind::Axis,
         law: "a play of half-width h lies between command and spool",
-        source: "play operator, Krasnosel'skii and Pokrovskii 1989 ch. 1; range: textbook prior",
+        source: "play operator, Krasnosel'skii and Pokrovskii 1989; range: textbook prior",
         keys: &[EffectKey {
             name: "half_width_percent",
             unit: Unit::Percent,

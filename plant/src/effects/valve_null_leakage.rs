@@ -9,10 +9,11 @@
 //! level between. Valid for the radial clearance of a spool, whose leakage is hidden by the opening as soon as that is wider;
 //! the path of the air is short, so eq. (4) serves. No regularisation: continuous, with one corner.
 //!
-//! Properties: never negative; nothing where the edge is open beyond the floor; no edge passes less than its floor;
-//! e = 0 adds nothing.
+//! Properties: never negative; nothing where the edge is open beyond the floor; no edge passes less than its floor; e = 0
+//! adds nothing.
 //!
-//! Source: centre leakage of a spool with clearance, Merritt, Hydraulic Control Systems, 1967, chapter 5; range: textbook prior.
+//! Source: centre leakage of a spool with clearance, Merritt, Hydraulic Control Systems, 1967, chapter 5; range: textbook
+//! prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;

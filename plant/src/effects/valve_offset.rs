@@ -5,8 +5,8 @@
 //! ```
 //!
 //! u command, in [-1, 1]; u_0 null offset, share of full command, in [-0.1, 0.1], positive extends. Valid for a wrong
-//! electrical or mechanical null; it neither drifts nor depends on pressure or temperature. The target is kept within
-//! [-1, 1], since the spool has stops: at full command the offset is not seen. No regularisation: a constant.
+//! electrical or mechanical null; it neither drifts nor depends on pressure or temperature. The target is kept within [-1,
+//! 1], since the spool has stops: at full command the offset is not seen. No regularisation: a constant.
 //!
 //! Properties: the same for every state and time; u_0 = 0 adds nothing.
 //!
