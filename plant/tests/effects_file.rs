@@ -161,7 +161,22 @@ const CASES: &[(&str, usize, &str)] = &[
         1,
         "unknown key effects.piston-leakage.drive = 2.5; known here: drive, load",
     ),
-    ("[effects.piston-leakage.left]\nleakage_nl_per_min = 2.5", 0, "unknown key effects.piston-leakage.left"),
+    (
+        "[effects.piston-leakage.left]\nleakage_nl_per_min = 2.5",
+        0,
+        "unknown key effects.piston-leakage.left = [effects.piston-leakage.left]; known here: drive, load",
+    ),
+    ("[effects.piston-leakage.left]", 0, "unknown key effects.piston-leakage.left = "),
+    (
+        "[effects.rod-leakage.drive]",
+        0,
+        "unknown key effects.rod-leakage.drive = [effects.rod-leakage.drive]; known here: drive.a, drive.b, load.a, load.b",
+    ),
+    (
+        "[effects.rod-leakage]",
+        0,
+        "effects.rod-leakage = [effects.rod-leakage] is of the wrong type; allowed: drive.a, ",
+    ),
     (
         "[effects.piston-leakage.drive.a]\nleakage_nl_per_min = 2.5",
         0,
@@ -176,8 +191,7 @@ const CASES: &[(&str, usize, &str)] = &[
     (
         "[effects.rod-leakage.linkage.a]\nleakage_nl_per_min = 2.5",
         0,
-        "unknown key effects.rod-leakage.linkage.a = [effects.rod-leakage.linkage.a]; \
-         known here: drive.a, drive.b, load.a, load.b",
+        "unknown key effects.rod-leakage.linkage = linkage; known here: drive.a, drive.b, load.a, load.b",
     ),
     (
         "[effects.rod-leakage.drive]\nb = 2.5",
@@ -262,6 +276,8 @@ fn an_effect_switched_on_by_a_call_is_that_of_a_file() {
     let wanted =
         "effects.piston-leakage.drive.leakage_nl_per_min = 51.0 is out of range; allowed: 0 to 50 Nl/min";
     assert!(error.expect_err("out of range").to_string().ends_with(wanted));
+    let error = baseline.with_effect("piston-leakage", "drive", &[("leakage_nl_per_min", f64::NAN)]);
+    assert!(error.expect_err("no number").to_string().contains("leakage_nl_per_min = nan is out of range"));
 }
 
 #[test]
