@@ -5,20 +5,23 @@
 //!
 //! Source: effects.md, the catalogue of physical effects; each file names its own.
 
-#![allow(dead_code, missing_docs)] // until the integrator calls them
-
 mod acting;
+mod actuation;
+mod air;
 mod first_order;
 mod flows;
 mod friction;
 mod memory;
 mod node;
+mod readings;
+mod replaced;
 pub mod sheet;
 mod sums;
 mod terms;
 
 use crate::parameters::RigParameters;
-pub(crate) use acting::{Effects, dead_volumes_m3, linkage};
+pub(crate) use acting::Effects;
+pub(crate) use replaced::{dead_volumes_m3, linkage};
 use sheet::{Effect, Element, Part, Place, PlaceKind, Sheet, Switched};
 pub(crate) use terms::Term;
 pub use terms::Terms;
@@ -198,3 +201,6 @@ impl PlaceKind {
         self.places().iter().map(Place::to_string).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

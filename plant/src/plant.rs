@@ -140,6 +140,16 @@ impl Plant {
         terms
     }
 
+    #[cfg(test)]
+    pub(crate) fn effects(&self) -> Option<&Effects> {
+        self.effects.as_deref()
+    }
+
+    #[cfg(test)]
+    pub(crate) fn integrator(&self) -> &Integrator {
+        &self.integrator
+    }
+
     fn each_term(&self, inputs: &Inputs, tell: &mut dyn FnMut(Term)) {
         if let Some(effects) = &self.effects {
             effects.each_term(&self.integrator, &self.state, inputs, tell);

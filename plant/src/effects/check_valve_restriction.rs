@@ -17,7 +17,7 @@
 //! Pa; 100 m^3/h, the largest number of the file, counts as no orifice. The orifice lies next to the chamber. At -q = k
 //! p_chamber / 2 it is choked and the port may have any lower pressure; a larger outflow is answered by a port without air,
 //! so that the implicit solution for q stays at or below. No regularisation: the caller solves q against a drop that never
-//! falls with q; at q = 0 it jumps by 2 p_c, which is the band in which `cracks` is false.
+//! falls with q; at q = 0 it jumps by 2 p_c, which is the band in which no flow passes.
 //!
 //! Properties: opposes the flow; never falls with q; through valve and orifice the choked outflow is never exceeded; vents
 //! stop p_c above the exhaust; p_c = 0 and 100 m^3/h add nothing.
@@ -80,11 +80,6 @@ impl Effect for CheckValveRestriction {
 }
 
 impl CheckValveRestriction {
-    /// Whether a difference between both sides opens the valve, Pa.
-    pub(crate) fn cracks(&self, difference_pa: f64) -> bool {
-        difference_pa.abs() > self.cracking_pa
-    }
-
     /// What is added to the chamber's pressure for that of the valve's port, Pa; flow in m^3/s, pressure absolute, Pa.
     pub(crate) fn term(&self, flow_m3_per_s: f64, chamber_pa: f64) -> f64 {
         let root = flow_m3_per_s / self.conductance;
@@ -111,14 +106,6 @@ mod tests {
 
     fn effect(cracking_pa: f64, kv: f64) -> CheckValveRestriction {
         CheckValveRestriction::new(&[cracking_pa, kv], &RigParameters::baseline())
-    }
-
-    #[test]
-    fn it_is_shut_up_to_the_cracking_pressure_either_way() {
-        let effect = effect(2e4, 1.0);
-        assert!(!effect.cracks(0.0) && !effect.cracks(2e4) && !effect.cracks(-2e4));
-        assert!(effect.cracks(2.0001e4) && effect.cracks(-2.0001e4));
-        assert!(!self::effect(0.0, 1.0).cracks(0.0) && self::effect(0.0, 1.0).cracks(-1.0));
     }
 
     #[test]

@@ -1,9 +1,12 @@
 //! Friction with effects: the levels of one axis in both directions, each the sum of its named terms.
 
 use super::acting::Effects;
-use super::sums::{BreakAwayLevel, SlidingLevel, Viscous};
-use crate::integrator::Integrator;
-use crate::motion::Levels;
+use super::memory::AxisMoving;
+use super::presliding::{Bristle, Under};
+use super::sums::{BreakAwayLevel, Bristles, SlidingLevel, Viscous};
+use crate::integrator::{Integrator, Middle};
+use crate::motion::{Levels, Place, side};
+use crate::truth::AirAt;
 
 /// What the levels depend on beside the speed.
 #[derive(Debug, Clone, Copy)]
@@ -92,5 +95,80 @@ impl Effects {
             }),
             viscous_n_s_per_m: DIRECTIONS.map(|direction| self.viscous(of, axis, direction)),
         }
+    }
+
+    /// What friction depends on at an instant.
+    pub(crate) fn rubbing_at(&self, of: &Integrator, axis: usize, place: Place, air: &AirAt) -> Rubbing {
+        Rubbing {
+            extension_m: place.extension,
+            gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa()),
+            rest_s: self.memory.moving.axes[axis].rest_s,
+        }
+    }
+
+    /// Friction of the bristles at an instant, along the own extension; `None` for an axis without them.
+    pub(crate) fn bristles(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        rubbing: &Rubbing,
+        place: Place,
+        force_n: f64,
+    ) -> Option<Bristles> {
+        let effect = self.on[axis].presliding?;
+        let deflection_m = self.memory.moving.axes[axis].deflection_m;
+        let bristle = Bristle { velocity_m_per_s: place.velocity, deflection_m };
+        let under = self.under(of, axis, rubbing, place.velocity, force_n);
+        Some(Bristles { presliding: effect.force(bristle, under) })
+    }
+
+    /// Where a bristled axis stands: all that its friction depends on.
+    pub(crate) fn under(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        rubbing: &Rubbing,
+        velocity: f64,
+        force_n: f64,
+    ) -> Under {
+        let levels = self.levels(of, axis, rubbing, velocity.abs());
+        let direction = side(if velocity == 0.0 { force_n } else { velocity });
+        Under {
+            force_n,
+            mass_kg: of.motion.mass_kg(axis),
+            viscous_n_s_per_m: levels.viscous_n_s_per_m[direction],
+            sliding_n: levels.sliding_n[direction],
+            break_away_n: levels.break_away_n[direction],
+        }
+    }
+
+    pub(super) fn rubbing(&self, of: &Integrator, axis: usize, middle: &Middle, own: &AxisMoving) -> Rubbing {
+        let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
+        Rubbing {
+            extension_m: middle.extension.to_array()[axis],
+            gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa()),
+            rest_s: own.rest_s,
+        }
+    }
+
+    /// The speed of a moving axis in the middle of a step, m/s, by its force at the beginning; 0 if it would turn.
+    pub(super) fn middle_speed(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        rubbing: &Rubbing,
+        velocity: f64,
+        push: f64,
+        span_s: f64,
+    ) -> f64 {
+        if self.on[axis].stribeck_friction.is_none() {
+            return velocity.abs();
+        }
+        let levels = self.levels(of, axis, rubbing, velocity.abs());
+        let direction = if velocity == 0.0 { push.signum() } else { velocity.signum() };
+        let friction =
+            levels.sliding_n[side(direction)] + levels.viscous_n_s_per_m[side(direction)] * velocity.abs();
+        let acceleration = (push * direction - friction) / of.motion.mass_kg(axis);
+        (velocity.abs() + acceleration * span_s / 2.0).max(0.0)
     }
 }

@@ -3,7 +3,10 @@
 //! A substep may be discarded and made again in parts; so the copyable half ([`Moving`]) goes through a step by value, and
 //! histories grow only when a substep counts. All room is taken at construction: a step allocates nothing.
 
-use crate::integrator::PERIOD_S;
+use super::AxisEffects;
+use crate::integrator::{Integrator, Lanes, PERIOD_S};
+use crate::lanes::Pair;
+use crate::state::State;
 
 /// Commands that a dead time can look back to, periods; the longest allowed is 10 ms.
 const COMMANDS: usize = 12;
@@ -98,6 +101,63 @@ impl History {
 
     fn at(&self, steps: usize) -> f64 {
         self.values[(self.newest + self.values.len() - steps) % self.values.len()]
+    }
+}
+
+/// All that effects remember.
+#[derive(Debug, Clone)]
+pub(crate) struct Memory {
+    pub(crate) moving: Moving,
+    pub(crate) commands: [Commands; 2],
+    /// What left the valve for each chamber, at the midpoints of substeps.
+    pub(super) lines: [[Option<History>; 2]; 2],
+    /// What the channels position, force, a, b would have shown, at the ends of substeps.
+    pub(super) channels: [[Option<History>; 4]; 2],
+}
+
+impl Memory {
+    pub(super) fn at_rest(on: &[AxisEffects; 2], of: &Integrator, state: &State) -> Self {
+        let lanes = Lanes::load(state);
+        let volume_m3 = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
+        let stored_j = lanes.air().map(|air| air.stored);
+        let axis = |i: usize| {
+            let lane = |pair: Pair| pair.to_array()[i];
+            let pressure_pa = [0, 1].map(|chamber| lane(stored_j[chamber]) / lane(volume_m3[chamber]));
+            let position_m =
+                if i == 0 { lane(lanes.extension) } else { of.motion.stroke_m() - lane(lanes.extension) };
+            let truths = [position_m, pressure_pa[0], pressure_pa[1]];
+            AxisMoving {
+                spool: lane(lanes.spool),
+                play: lane(lanes.spool),
+                spool_rate_per_s: 0.0,
+                silencer_pa: 0.0,
+                silencer_pa_per_s: 0.0,
+                normal_volume_m3: stored_j.map(|stored| lane(stored) / of.chambers.normal_pa()),
+                air_rate_w: [0.0; 2],
+                port_flow_m3_per_s: lanes.air().map(|air| lane(air.flow)),
+                deflection_m: 0.0,
+                rest_s: 0.0,
+                shown: truths,
+                seen: truths,
+            }
+        };
+        let axes = [axis(0), axis(1)];
+        let steps = |delay_s: f64| delay_s / of.substep_s();
+        let lines = [0, 1].map(|i| {
+            let axis: &AxisMoving = &axes[i];
+            axis.port_flow_m3_per_s
+                .map(|flow| on[i].line_delay.map(|effect| History::new(flow, steps(effect.delay_s()) + 2.0)))
+        });
+        let channels = [0, 1].map(|i| {
+            let axis: &AxisMoving = &axes[i];
+            let values = [axis.seen[0], 0.0, axis.seen[1], axis.seen[2]];
+            [0, 1, 2, 3].map(|channel: usize| {
+                on[i].time_skew[channel]
+                    .map(|effect| History::new(values[channel], steps(effect.delay_s) + 1.0))
+            })
+        });
+        let commands = [0, 1].map(|i: usize| Commands::new(axes[i].spool));
+        Memory { moving: Moving { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 }, commands, lines, channels }
     }
 }
 

@@ -3,7 +3,8 @@
 //! The balances are told in the order of `sums.rs`, axis by axis, then those of linkage and supply. A term of an effect that is off
 //! is not told.
 
-use super::acting::{Effects, HeatAt};
+use super::acting::Effects;
+use super::air::HeatAt;
 use super::sheet::{Element, Part};
 use super::sums::Balance;
 use super::sums::{Damping, DeadSpace, ExhaustSide, Gap, Stiffness};
@@ -127,8 +128,8 @@ impl Effects {
             for (chamber, (name, element)) in CHAMBERS.into_iter().enumerate() {
                 let (at, element) = (Some(name), Some(element));
                 let edges = [["supply_a", "exhaust_a"], ["supply_b", "exhaust_b"]];
-                for edge in 0..2 {
-                    teller.balance(&ports.edges[chamber][edge], Some(edges[chamber][edge]), element);
+                for (edge, name) in ports.edges[chamber].iter().zip(edges[chamber]) {
+                    teller.balance(edge, Some(name), element);
                 }
                 teller.balance(&ports.port[chamber], at, element);
                 teller.balance(&ports.port_flow[chamber], at, element);
@@ -141,7 +142,7 @@ impl Effects {
                     flow_m3_per_s: flows[chamber] + leakage[chamber].sum(0.0),
                 };
                 // With the piston's work, which the step takes from the volume swept.
-                let mut rate = self.air_rate(of, axis, chamber, heat);
+                let mut rate = self.air_rate(of, axis, chamber, heat, 0.0);
                 let area_m2 = [1.0, -1.0][chamber] * of.chambers.areas_m2()[chamber];
                 rate.heat_exchange -=
                     self.work_share(axis) * air.of_axis_pa(axis)[chamber] * area_m2 * place.velocity;
