@@ -272,7 +272,7 @@ impl Laws for Effects {
         let volumes = |extension| [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
         let mut stored = to.air().map(|air| air.stored.to_array());
-        for axis in 0..2 {
+        for axis in [0, 1] {
             if !self.adds_air(axis) {
                 continue;
             }
