@@ -89,8 +89,10 @@ balance!(/** Stiffness of the linkage. */
 balance!(/** Damping of the linkage. */
     Damping "damping" in "N_s_per_m" = file + coupling_compliance);
 balance!(/** What a position sensor shows, before noise and steps. */
-    PositionReading "position_reading" in "m" = truth + time_skew + position_sensor_lag + position_sensor_gain + position_sensor_offset);
+    PositionReading "position_reading" in "m" = truth
+    + time_skew + position_sensor_lag + position_sensor_gain + position_sensor_offset);
 balance!(/** What a force sensor shows, before noise and steps. */
     ForceReading "force_reading" in "N" = truth + time_skew + force_sensor_gain + force_sensor_offset);
 balance!(/** What a pressure sensor shows, before noise and steps. */
-    PressureReading "pressure_reading" in "Pa" = truth + time_skew + pressure_sensor_lag + pressure_sensor_gain + pressure_sensor_offset);
+    PressureReading "pressure_reading" in "Pa" = truth
+    + time_skew + pressure_sensor_lag + pressure_sensor_gain + pressure_sensor_offset);

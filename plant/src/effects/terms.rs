@@ -1,7 +1,7 @@
 //! The list of all terms at an instant: what each switched-on effect adds to which balance, for `truth.csv` and for tests.
 //!
-//! The balances are told in the order of `sums.rs`, axis by axis, then those of linkage and supply. A term of an effect that is off
-//! is not told.
+//! The balances are told in the order of `sums.rs`, axis by axis, then those of linkage and supply. A term of an effect that
+//! is off is not told.
 
 use super::acting::Effects;
 use super::air::HeatAt;

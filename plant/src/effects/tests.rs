@@ -60,8 +60,8 @@ fn switching_an_effect_off_changes_its_sums_by_exactly_its_fields() {
         for term in gone {
             let name = switched.name.replace('-', "_");
             assert_eq!(term.effect, name);
-            // The other terms of its balance stay to the bit, so the sum changes by its field; drops at a port are compared below,
-            // at the same flow.
+            // The other terms of its balance stay to the bit, so the sum changes by its field; drops at a port are compared
+            // below, at the same flow.
             let siblings = |term: &&Term, other: &&Term| {
                 other.balance == term.balance && other.part == term.part && other.element == term.element
             };

@@ -1,8 +1,8 @@
 //! What a step moves by: the laws of the baseline, or the same with effects beside them.
 //!
-//! The integrator is written once, over [`Laws`]. With [`Baseline`] the compiler finds every question answered by a constant or by the
-//! baseline's own formula, so a rig without effects pays nothing for their being possible; a hash of bits and a count of
-//! instructions hold that down. `effects/acting.rs` is the other answer.
+//! The integrator is written once, over [`Laws`]. With [`Baseline`] the compiler finds every question answered by a constant or
+//! by the baseline's own formula, so a rig without effects pays nothing for their being possible; a hash of bits and a count
+//! of instructions hold that down. `effects/acting.rs` is the other answer.
 
 use super::{Held, Integrator, Lanes, Middle, Node, Span};
 use crate::chamber::Air;

@@ -184,7 +184,10 @@ pub(super) const EFFECTS: Rule = Rule {
             return Vec::new();
         }
         let asked = [
-            ("//! Source: ", "end the head of an effect with '//! Source: ' and where law and range come from"),
+            (
+                "//! Source: ",
+                "end the head of an effect with '//! Source: ' and where law and range come from",
+            ),
             ("#[cfg(test)]", "test each property that the head of an effect claims"),
         ];
         let missing = asked.iter().filter(|(text, _)| !file.text.contains(text));
