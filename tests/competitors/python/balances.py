@@ -6,8 +6,8 @@
     sensor           force sensor less what it should read              N
     gap              x_load - x_drive less what the contact takes       m, linked records with both axes
 
-A column of a regression is the difference that compensating an effect of one unit makes (candidates.py), so each law stands once, here
-or in flows.py.
+A column of a regression is the difference that compensating an effect of one unit makes (candidates.py), so each law stands once,
+in this file or in flows.py.
 """
 
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ class View:
 
 
 def earlier(y, delay_s):
-    """The signal without a delay. What is shifted is the smoothed part: interpolated noise would be less noise, and look like an effect."""
+    """The signal without a delay; its smoothed part is shifted: interpolation lessens noise, which would look like an effect."""
     if not delay_s:
         return y
     smoothed = smooth(y)
@@ -59,19 +59,23 @@ def earlier(y, delay_s):
 
 
 def corrected(record, name, rig, effects):
-    """The axis' readings with sensor effects taken off: y - offset, (1 - gain) y, y + lag dy/dt, y a while later."""
+    """The axis' readings with sensor effects taken off: y - offset, y - gain y, y + lag dy/dt, y a while later.
+
+    What is taken off is made of smoothed signals: a share of the noise, taken off, would look like an effect.
+    """
     data = record.axes[name]
     own = lambda effect, key, element=None: effects.get((effect, key, element) if element else (effect, key), 0.0)
     skew = lambda y, element: earlier(y, own("time-skew", "delay_ms", element) * 1e-3)
     x = data.x - (rig.load_offset_m if name == "load" else 0.0)
     x = skew(x, "position") + own("position-sensor-lag", "time_constant_ms") * 1e-3 * slope(x)
-    x = x * (1.0 - own("position-sensor-gain", "gain_percent") / 100) - own("position-sensor-offset", "offset_mm") * 1e-3
-    force = skew(data.force, "force") * (1.0 - own("force-sensor-gain", "gain_percent") / 100)
-    force = force - own("force-sensor-offset", "offset_n")
+    x = x - own("position-sensor-gain", "gain_percent") / 100 * smooth(x) - own("position-sensor-offset", "offset_mm") * 1e-3
+    # The gain meets what the sensor should read, not its noise, wherever that is known.
+    gain = own("force-sensor-gain", "gain_percent") / 100 if record.linked else 0.0
+    force = skew(data.force, "force") * (1.0 - gain) - own("force-sensor-offset", "offset_n")
     pressures = []
     for element, p in (("a", data.pa), ("b", data.pb)):
         p = skew(p, element) + own("pressure-sensor-lag", "time_constant_ms", element) * 1e-3 * slope(p)
-        p = p * (1.0 - own("pressure-sensor-gain", "gain_percent", element) / 100)
+        p = p - own("pressure-sensor-gain", "gain_percent", element) / 100 * smooth(p)
         pressures.append(p - own("pressure-sensor-offset", "offset_mbar", element) * 100.0)
     return x, force, pressures
 
@@ -82,18 +86,19 @@ def view(record, name, rig, effects, other_drawn=None):
     xi = x if drive else rig.stroke_m - x
     area = effects.get(("parameter:piston-area", "factor"), 1.0)
     volume = effects.get(("dead-volume", "volume_cm3"), rig.dead_volume_m3 * 1e6) * 1e-6
-    volume_a = rig.dead_volume_m3 + area * rig.area_a_m2 * xi
-    volume_b = rig.dead_volume_m3 + area * rig.area_b_m2 * (rig.stroke_m - xi)
-    # The difference to the file meets the smoothed pressure: times the noise it would explain noise.
-    more = volume - rig.dead_volume_m3
+    volume_a = rig.dead_volume_m3 + rig.area_a_m2 * xi
+    volume_b = rig.dead_volume_m3 + rig.area_b_m2 * (rig.stroke_m - xi)
+    # Differences to the file meet smoothed signals: times the noise they would explain noise.
+    more_a = volume - rig.dead_volume_m3 + (area - 1.0) * rig.area_a_m2 * smooth(xi)
+    more_b = volume - rig.dead_volume_m3 + (area - 1.0) * rig.area_b_m2 * (rig.stroke_m - smooth(xi))
     measured = (slope(pa * volume_a) / rig.normal_pa, slope(pb * volume_b) / rig.normal_pa)
     supply = np.full(len(x), rig.supply_pa) if record.supply_pa is None else record.supply_pa
     mass = rig.drive_kg + record.added_mass_kg if drive else rig.load_kg
     return View(
         name=name, u=record.axes[name].u, xi=smooth(xi), v=slope(xi), a=curvature(xi), pa=smooth(pa), pb=smooth(pb),
         force=smooth(force), pa_mid=middle(smooth(pa)), pb_mid=middle(smooth(pb)),
-        raw={"xi": xi, "pa": pa, "pb": pb, "force": force, "air_a": pa * volume_a + smooth(pa) * more,
-             "air_b": pb * volume_b + smooth(pb) * more},
+        raw={"xi": xi, "pa": pa, "pb": pb, "force": force, "air_a": pa * volume_a + smooth(pa) * more_a,
+             "air_b": pb * volume_b + smooth(pb) * more_b},
         measured=measured, supply=supply,
         other_drawn=np.zeros(len(x)) if other_drawn is None else other_drawn,
         mass_kg=mass, carriage_kg=rig.carriage_kg + record.added_mass_kg if drive else 0.0,
@@ -173,18 +178,25 @@ def over_position(data, rig, effects, effect, x):
 
 
 def axis_balances(data, rig, effects, known_flows=None):
-    """Residuals of one axis by balance, one value for each sample; `known_flows` are those of the same balances, where they stay."""
+    """Residuals of one axis by balance, one value for each sample; `known_flows` are the chambers', where they are known."""
     out = flow_balances(data, rig, effects) if known_flows is None else known_flows
     return out | force_balances(data, rig, effects)
 
 
-# Effects that need the flow itself. They get the model's: the measured one carries the very noise that they would have to explain.
-NEED_FLOW = {"line-resistance", "check-valve-restriction", "silencer-back-pressure", "end-cushion", "supply-droop", "heat-exchange"}
+# Effects that need the flow itself. They get the model's: the measured one carries the very noise that they would explain.
+NEED_FLOW = {
+    "line-resistance", "check-valve-restriction", "silencer-back-pressure", "end-cushion", "supply-droop", "heat-exchange",
+}  # fmt: skip
 
 
 def flow_balances(data, rig, effects):
     if any(key[0] in NEED_FLOW for key in effects):
-        data = replace(data, measured=flows.chamber_flows(data, rig, {}))
+        known = flows.chamber_flows(data, rig, {})
+        for _ in range(3):
+            # Half way each time: a drop lessens the flow that makes it.
+            model = flows.chamber_flows(replace(data, measured=known), rig, effects)
+            known = [0.5 * (before + after) for before, after in zip(known, model, strict=True)]
+        data = replace(data, measured=known)
     model = flows.chamber_flows(data, rig, effects)
     leak = flows.leakages(data, rig, effects)
     warm = heat(data, rig, effects)
@@ -199,7 +211,8 @@ def force_balances(data, rig, effects):
     area = effects.get(("parameter:piston-area", "factor"), 1.0)
     mass = data.mass_kg * effects.get(("parameter:mass", "factor"), 1.0)
     raw = data.raw
-    pneumatic = area * (raw["pa"] * rig.area_a_m2 - raw["pb"] * rig.area_b_m2)
+    pneumatic = raw["pa"] * rig.area_a_m2 - raw["pb"] * rig.area_b_m2
+    pneumatic = pneumatic + (area - 1.0) * (data.pa * rig.area_a_m2 - data.pb * rig.area_b_m2)
     pneumatic -= area * rig.atmosphere_pa * (rig.area_a_m2 - rig.area_b_m2)
     x = data.xi if data.sign > 0 else rig.stroke_m - data.xi
     applied = effects.get(("inclination", "force_n"), 0.0)
@@ -215,7 +228,8 @@ def force_balances(data, rig, effects):
     acceleration = (step(raw["xi"]) - np.append(0.0, step(raw["xi"])[:-1])) / PERIOD_S**2
     viscous = rig.viscous_n_s_per_m * (velocity - data.v)
     resisting = np.sign(data.v) * friction(data, rig, effects) + viscous
-    expected = 0.0 if data.linked else data.carriage_kg * acceleration
+    gain = 1.0 + effects.get(("force-sensor-gain", "gain_percent"), 0.0) / 100
+    expected = 0.0 if data.linked else data.carriage_kg * gain * acceleration
     return {
         "force": filtered(driving - between * acceleration - resisting, FORCE),
         "break": filtered(driving, BRIEF),
@@ -340,8 +354,10 @@ MOTION_ONLY = {
 
 
 def residuals(record, rig, events, place=None, effects=None, base=None):
-    """All balances of a record, with effects compensated at one place (drive, load, linkage, supply); `base` are those without, from
-    which comes what the place leaves alone."""
+    """All balances of a record, with effects compensated at one place (drive, load, linkage, supply).
+
+    `base` are those without, from which comes what the place leaves alone.
+    """
     effects = effects or {}
     views = {name: view(record, name, rig, effects if name == place else {}) for name in record.axes}
     if place == "supply" and len(views) == 2:

@@ -1,8 +1,10 @@
 """The library: what each effect of the catalogue would look like in the balances, and how a coefficient becomes its value.
 
-A candidate is a small amount of an effect, compensated; its column is the difference that makes in all balances. The number of an effect is
+A candidate is a small amount of an effect, compensated; its column is the difference that makes in all balances. The number of an
+effect is
 
-    linear    neutral + coefficient * amount                 most effects
+    linear    neutral + coefficient * amount                 most effects, from small amounts
+    far       the same from a large amount, near which the coefficient must stay (0.6 to 1.7): delays, lags, volumes
     inverse   amount / coefficient                           what grows as the number falls (heat exchange)
     root      amount / sqrt(coefficient)                     the same for orifices, whose drop falls with the square
     grid      amount, the coefficient should be 1            shapes that are not linear; the best of a few amounts is taken
@@ -35,7 +37,7 @@ class Candidate:
         return self.effect.startswith("parameter:")
 
     def value(self, coefficient):
-        if self.law == "linear":
+        if self.law in ("linear", "far"):
             return self.neutral + coefficient * self.amount
         if self.law == "inverse":
             return self.amount / max(coefficient, 1e-3)
@@ -54,6 +56,8 @@ class Candidate:
         """Whether a coefficient has the sign and the size that the effect could have; a shape has the size 1."""
         if self.law in ("grid", "inverse", "root"):
             return 0.3 < coefficient < 3.0
+        if self.law == "far":
+            return 0.6 < coefficient < 1.7
         if self.one_sided and coefficient <= 0.0:
             return False
         return abs(coefficient * self.amount) >= self.least
@@ -100,17 +104,17 @@ SHAPES = [
     ("heat-exchange", "coefficient_w_per_m2_k", "W/(m^2 K)", "grid", (15.0, 30.0, 60.0, 120.0), {}),
     ("stribeck-friction", "velocity_mm_per_s", "mm/s", "grid", (4.0, 8.0, 15.0, 30.0, 45.0), {}),
 ]
-# Factors of the baseline's numbers, carried along: a wrong number is no missing effect.
+# Factors of the baseline's numbers, carried along: a wrong number is no missing effect. The last is the least share that counts.
 PARAMETERS = [
-    ("mass", "kg"),
-    ("viscous-friction", "N/(mm/s)"),
-    ("sliding-friction", "N"),
-    ("break-away-force", "N"),
-    ("supply-pressure", "bar"),
-    ("spool-time-constant", "ms"),
-    ("flow-lag", "ms"),
-    ("kv-scale", ""),
-    ("piston-area", "mm^2"),
+    ("mass", "kg", 0.01),
+    ("viscous-friction", "N/(mm/s)", 0.01),
+    ("sliding-friction", "N", 0.01),
+    ("break-away-force", "N", 0.03),
+    ("supply-pressure", "bar", 0.005),
+    ("spool-time-constant", "ms", 0.1),
+    ("flow-lag", "ms", 0.03),
+    ("kv-scale", "", 0.005),
+    ("piston-area", "mm^2", 0.008),
 ]
 
 
@@ -146,29 +150,46 @@ def of_axis(place, rig):
         for amount in amounts:
             rest = tuple(((effect, other), value) for other, value in more.items())
             out.append(Candidate(effect, place, None, key, unit, amount, (((effect, key), amount), *rest), law))
-    out += nonlinear_but_monotone(place, rig) + over_position(place)
-    for name, unit in PARAMETERS:
-        value = parameter_value(name, rig, place)
-        compensated = (((f"parameter:{name}", "factor"), 1.01),)
-        out.append(
-            Candidate(f"parameter:{name}", place, None, name, unit, 0.01 * value, compensated, "linear", value, 0.005 * value, False)
-        )
+    out += nonlinear_but_monotone(place, rig) + over_position(place) + far(place)
+    for name, unit, share in PARAMETERS:
+        value, effect = parameter_value(name, rig, place), f"parameter:{name}"
+        compensated, least = (((effect, "factor"), 1.01),), share * value
+        out.append(Candidate(effect, place, None, name, unit, 0.01 * value, compensated, "linear", value, least, False))
     return out
 
 
 def nonlinear_but_monotone(place, rig):
     """Effects whose number has a neutral value of its own."""
-    volume = rig.dead_volume_m3 * 1e6
-    out = [
-        Candidate(
-            "dead-volume", place, None, "volume_cm3", "cm^3", 2.0,
-            ((("dead-volume", "volume_cm3"), volume + 2.0),), "linear", volume, 0.5, False,
-        )
-    ]  # fmt: skip
-    compensated = ((("critical-pressure-ratio", "critical_ratio"), 0.45),)
-    out.append(
-        Candidate("critical-pressure-ratio", place, None, "critical_ratio", "", -0.05, compensated, "linear", 0.5, 0.012)
-    )
+    effect, key, volume = "dead-volume", "volume_cm3", rig.dead_volume_m3 * 1e6
+    more = (((effect, key), volume + 2.0),)
+    out = [Candidate(effect, place, None, key, "cm^3", 2.0, more, "linear", volume, 0.5, False)]
+    effect, key = "critical-pressure-ratio", "critical_ratio"
+    for below, law in ((0.05, "linear"), (0.15, "far"), (0.3, "far")):
+        out.append(Candidate(effect, place, None, key, "", -below, (((effect, key), 0.5 - below),), law, 0.5, 0.012))
+    return out
+
+
+# Larger amounts of what is linear for small ones only: (effect, key, unit, elements, amounts).
+FAR = [
+    ("line-delay", "length_m", "m", (None,), (0.8, 1.6, 3.0)),
+    ("command-dead-time", "delay_ms", "ms", (None,), (1.0, 2.0, 4.0)),
+    ("position-sensor-lag", "time_constant_ms", "ms", (None,), (2.0, 5.0)),
+    ("pressure-sensor-lag", "time_constant_ms", "ms", ("a", "b"), (3.0, 7.0)),
+    ("time-skew", "delay_ms", "ms", ("position", "force", "a", "b"), (2.5, 5.0)),
+    ("valve-dead-zone", "dead_zone_percent", "%", (None,), (2.0, 4.0)),
+    ("valve-hysteresis", "half_width_percent", "%", (None,), (1.0, 2.0)),
+    ("friction-asymmetry", "asymmetry_percent", "%", (None,), (-40.0, 40.0)),
+    ("line-resistance", "drop_bar", "bar", (None,), (0.3,)),
+    ("check-valve-restriction", "cracking_pressure_bar", "bar", (None,), (0.3,)),
+]
+
+
+def far(place):
+    out = []
+    for effect, key, unit, elements, amounts in FAR:
+        for element in elements:
+            path = (effect, key, element) if element else (effect, key)
+            out += [Candidate(effect, place, element, key, unit, a, ((path, a),), "far") for a in amounts]
     return out
 
 

@@ -1,7 +1,7 @@
 """Valve, lines and lags: the flow into each chamber as the model has it, with any effect of the catalogue switched on.
 
-`effects` holds numbers in the units of the effects' data sheets, by (effect, key). Flows are normal m3/s into the chamber. What an
-effect needs of the flow itself (drops in lines, silencer, droop) is taken from the measured flow, d(pV)/dt.
+`effects` holds numbers in the units of the effects' data sheets, by (effect, key). Flows are normal m3/s into the chamber. What
+an effect needs of the flow itself (drops in lines, silencer, droop) it takes from `measured`, which balances.py gives it.
 """
 
 import numpy as np

@@ -53,7 +53,27 @@ def build(records, rig, scale=None, only=None):
             blocks.append((time / BLOCK_S).astype(int) + 10_000 * number)
             labels.append(np.full(len(rows_here), label))
     parts = np.vstack(columns), np.concatenate(ys), np.concatenate(blocks), np.concatenate(labels)
-    return Regression(library, *parts, names, scale)
+    regression = Regression(library, *parts, names, dict(scale))
+    if only is None:
+        coarser(regression)
+    return regression
+
+
+def coarser(regression):
+    """Where even all candidates together leave more than the noise of the data sheet (coloured, jitter), that is the noise."""
+    columns, y = regression.columns, regression.y
+    rms = np.sqrt((columns**2).mean(axis=0)) + 1e-12
+    gram = (columns / rms).T @ (columns / rms)
+    # A ridge of a hundredth of a column's own weight: many columns are nearly alike.
+    ridge = 0.01 * len(y) * np.eye(len(rms))
+    left = y - (columns / rms) @ np.linalg.solve(gram + ridge, (columns / rms).T @ y)
+    for label, key in enumerate(regression.names):
+        rows = regression.balance == label
+        if rows.sum() > 20:
+            factor = max(1.0, float(np.sqrt(np.mean(left[rows] ** 2))))
+            regression.scale[key] *= factor
+            regression.y[rows] /= factor
+            regression.columns[rows] /= factor
 
 
 def rows_of(key, mask):

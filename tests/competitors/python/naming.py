@@ -43,8 +43,8 @@ def entry(one, value, error):
 
 def spread_of_shape(one, library):
     """For the best of a few amounts: half the way to the next one."""
-    others = [c.amount for c in library if (c.effect, c.place, c.key) == (one.effect, one.place, one.key) and c.amount != one.amount]
-    return 0.5 * min((abs(c - one.amount) for c in others), default=one.amount)
+    same = [c.amount for c in library if (c.effect, c.place, c.key) == (one.effect, one.place, one.key)]
+    return 0.5 * min((abs(amount - one.amount) for amount in same if amount != one.amount), default=one.amount)
 
 
 def named(regression, choice):
@@ -57,8 +57,8 @@ def named(regression, choice):
         error = one.error(coefficient, errors[position]) if one.law != "grid" else spread_of_shape(one, regression.candidates)
         made = entry(one, one.value(coefficient), error)
         if one.is_parameter:
-            value = made["parameters"][0]
-            parameters.append({"name": one.effect, "axis": one.place} | {key: value[key] for key in ("value", "unit", "standard_error")})
+            numbers = {key: made["parameters"][0][key] for key in ("value", "unit", "standard_error")}
+            parameters.append({"name": one.effect, "axis": one.place} | numbers)
             continue
         rest = [p for p in choice.chosen if p != place]
         without = regression.y - regression.columns[:, rest] @ fit(regression, rest) if rest else regression.y
@@ -95,7 +95,7 @@ def not_excited(regression):
     out = []
     for place, one in enumerate(regression.candidates):
         strength = float(np.linalg.norm(regression.columns[:, place]))
-        least = one.least / abs(one.amount) if one.law in ("linear", "give") and one.least else 1.0
+        least = one.least / abs(one.amount) if one.law in ("linear", "far", "give") and one.least else 1.0
         if strength * least * 4.0 < 3.0 and not one.is_parameter:
             out.append({"effect": one.effect, "where": {"axis": one.place, "element": one.element}})
     unique = []

@@ -2,7 +2,8 @@
 
     program.py METHOD close --rig rig.toml --train A.csv [B.csv ...] --test C.csv --out DIR
 
-writes DIR/report.json and never fails on a record: what cannot be used is `bad-data`, with the reason. `--test` is opened for `gap` alone.
+writes DIR/report.json and never fails on a record: what cannot be used is `bad-data`, with the reason. `--test` is opened for
+`gap` alone.
 """
 
 import argparse
@@ -24,7 +25,6 @@ import sindy
 import stepwise
 
 METHODS = {"stepwise-bic": stepwise.select, "pysindy-stlsq": sindy.stlsq, "pysindy-ensemble": sindy.ensemble}
-# Two explanations whose BIC differs by less are ambiguous.
 SCHEMA = 1
 
 
@@ -59,8 +59,10 @@ def judge(method, rig, trains, test_path):
     report = empty(verdict)
     report["named"], report["parameters"] = effects, parameters
     report["candidates"] = [scored(regression, place, score) for place, score in ranked[:20] if np.isfinite(score)]
-    without = [{"effect": effect, "where": {"axis": place, "element": None}} for place in trains[0].axes for effect in candidates.WITHOUT_SIGNATURE]
-    report["not_excited"] = naming.not_excited(regression) + without
+    report["not_excited"] = naming.not_excited(regression)
+    for place in trains[0].axes:
+        unseen = [{"effect": effect, "where": {"axis": place, "element": None}} for effect in candidates.WITHOUT_SIGNATURE]
+        report["not_excited"] += unseen
     report["detection_limits"] = naming.detection_limits(regression)
     report["gap"] = gap(rig, test_path, regression, choice)
     return report

@@ -20,8 +20,8 @@ def curvature(y):
     return savgol_filter(y, SECOND, ORDER, deriv=2, delta=PERIOD_S)
 
 
-# A Savitzky-Golay derivative is the plain difference of neighbours, smoothed by a kernel that follows from it: RATE smooths what acts
-# over a period just as `slope` smooths its effect, FORCE what accelerates as `curvature` does. Data and model pass the same kernel.
+# A Savitzky-Golay derivative is the plain difference of neighbours, smoothed by a kernel that follows from it: RATE smooths what
+# acts over a period just as `slope` smooths its effect, FORCE what accelerates as `curvature` does. Data and model pass the same.
 RATE = np.cumsum(savgol_coeffs(FIRST, ORDER, deriv=1))[:-1]
 FORCE = np.cumsum(np.cumsum(savgol_coeffs(SECOND, ORDER, deriv=2)))[:-2]
 

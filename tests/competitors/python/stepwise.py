@@ -2,8 +2,8 @@
 
     BIC = RSS + k ln(n) + 2 ln(candidates) for each column
 
-with the noise known (the balances are in its units), n the number of rows. Textbook otherwise; a column must have the sign and the least
-size that its effect can have.
+with the noise known (the balances are in its units), n the number of rows. Textbook otherwise; a column must have the sign and
+the least size that its effect can have.
 """
 
 import numpy as np
@@ -75,8 +75,8 @@ class Problem:
     def rival(self, place, chosen):
         """Another amount of the same shape is no second effect."""
         one = self.candidates[place]
-        same = [c for c in map(self.candidates.__getitem__, chosen) if (c.effect, c.place, c.element) == (one.effect, one.place, one.element)]
-        return any(c.key == one.key or c.law != "linear" or one.law != "linear" for c in same)
+        same = [self.candidates[other] for other in chosen if self.key(other) == self.key(place)]
+        return any(c.key == one.key or "grid" in (c.law, one.law) for c in same)
 
     def sure(self, chosen):
         """Whether each column stands by clustered errors."""
