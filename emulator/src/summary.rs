@@ -3,13 +3,13 @@
 //! Keys that others read are those of bus.md. What only the controllers know (the position errors) stands as null until
 //! the controllers' own files are joined to it.
 
-use crate::commands::CommandCounters;
 use crate::event::Event;
 use crate::recording::evidence::{CommandAges, FlightFigures};
 use crate::station::FrameCounters;
 use plant::Scene;
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
+use protocol::commands::CommandCounters;
 use realtime::{ArrivalFigures, Machine, Percentiles, VitalTotals, WallClockStep};
 use serde::Serialize;
 
