@@ -13,9 +13,11 @@
 //! | [`recording`] | the queues out of the 1 ms path, the files, and the evidence of real time |
 //! | `finish` | histograms, summary, exit code |
 //! | [`console`] | what a person types |
+//! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
 //! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
 
 pub mod bus_load;
+pub mod catalogue;
 pub mod cli;
 pub mod commands;
 pub mod console;
@@ -28,6 +30,7 @@ pub mod live_cycles;
 pub mod pace;
 pub mod recording;
 pub mod run;
+pub mod seal;
 pub mod sources;
 pub mod station;
 pub mod summary;

@@ -8,6 +8,7 @@
 #![allow(dead_code, missing_docs)] // until the integrator calls them
 
 mod acting;
+pub mod draw;
 mod first_order;
 mod flows;
 mod friction;
