@@ -137,7 +137,8 @@ impl Rehearsal {
             self.inputs.valve[axis.index()] = plant::quantise_valve(opening);
         }
         let truth = self.plant.truth(&self.inputs);
-        let record = CycleRecord { cycle, valve: self.inputs.valve, readings, truth };
+        let terms = self.plant.terms(&self.inputs);
+        let record = CycleRecord { cycle, valve: self.inputs.valve, readings, truth, terms };
         self.plant.step(&self.inputs);
         let mut axes = [None, None];
         self.records.try_iter().for_each(|record| axes[record.axis.index()] = Some(record));

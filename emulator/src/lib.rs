@@ -12,9 +12,11 @@
 //! | [`recording`] | the queues out of the 1 ms path, the files, and the evidence of real time |
 //! | `finish` | histograms, summary, exit code |
 //! | [`console`] | what a person types |
+//! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
 //! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
 
 pub mod bus_load;
+pub mod catalogue;
 pub mod cli;
 pub mod console;
 pub mod event;
@@ -25,6 +27,7 @@ pub mod inputs;
 pub mod pace;
 pub mod recording;
 pub mod run;
+pub mod seal;
 pub mod station;
 pub mod summary;
 pub mod telegrams;

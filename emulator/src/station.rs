@@ -299,6 +299,7 @@ impl Station {
             valve: self.inputs.valve,
             readings: self.readings,
             truth: self.plant.truth(&self.inputs),
+            terms: self.plant.terms(&self.inputs),
         });
         self.plant.step(&self.inputs);
     }

@@ -8,6 +8,7 @@
 mod acting;
 mod actuation;
 mod air;
+pub mod draw;
 mod first_order;
 mod flows;
 mod friction;

@@ -7,6 +7,7 @@
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
+//!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
@@ -23,6 +24,7 @@ pub mod bus_cycles;
 pub mod disturb;
 pub mod events;
 pub mod guest;
+pub mod hidden;
 pub mod launch;
 pub mod load;
 pub mod own;
