@@ -162,8 +162,7 @@ impl Integrator {
             let carried = laws.carried();
             let local_s = f64::from(substep) * self.coarse.span_s;
             let node = self.node(&self.coarse, supply_pa, held.stopped);
-            let from = lanes;
-            let at = At { of: self, span: &self.coarse, from: &from, node, held, local_s };
+            let at = At { of: self, span: &self.coarse, from: &lanes, node, held, local_s };
             let (next, handed_on, corner) = self.smooth(laws, at, carried);
             let valves_move =
                 self.supply.check_valves_shut(supply_pa) != self.supply.check_valves_shut(node.end_pa);
@@ -176,11 +175,11 @@ impl Integrator {
                     (lanes, carried) = self.careful(laws, at, carried);
                     supply_pa = node.end_pa;
                 }
-                laws.keep(at, &lanes, carried);
+                laws.keep(self, held, &lanes, carried);
             } else {
                 lanes = next;
                 supply_pa = node.end_pa;
-                laws.keep(at, &lanes, handed_on);
+                laws.keep(self, held, &lanes, handed_on);
             }
         }
         lanes.store(state);
@@ -238,7 +237,7 @@ impl Integrator {
         };
         let [to_middle, way] = laws.ways(at);
         if held.linked {
-            let approach = self.approach(span, &to_middle, &from, moving, &forces);
+            let approach = self.approach(span, to_middle, &from, moving, &forces);
             forces.contact = Pair::both(self.linkage.midpoint_force(approach));
         }
         let force = forces.sum();
@@ -303,15 +302,14 @@ impl Integrator {
         if held.linked {
             let [to_middle, _] = laws.ways(at);
             // First as if what rests stays; then again with what the contact sets in motion.
-            forces.contact =
-                Pair::both(self.contact(self.approach(span, &to_middle, &from, moving, &forces)));
+            forces.contact = Pair::both(self.contact(self.approach(span, to_middle, &from, moving, &forces)));
             let resting_force = forces.pneumatic + forces.hand + forces.contact;
             let starts = self.starting(laws, at, &middle, resting_force, moving);
             if starts.any() {
                 forces.sliding_friction =
                     forces.sliding_friction + laws.starting(at, &middle, resting_force, starts);
                 forces.contact = zero;
-                let approach = self.approach(span, &to_middle, &from, moving | starts, &forces);
+                let approach = self.approach(span, to_middle, &from, moving | starts, &forces);
                 forces.contact = Pair::both(self.contact(approach));
             }
         }

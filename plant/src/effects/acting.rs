@@ -14,7 +14,7 @@ use super::presliding::Bristle;
 use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
 use crate::integrator::laws::{At, Laws};
-use crate::integrator::{Integrator, Lanes, Middle};
+use crate::integrator::{Held, Integrator, Lanes, Middle};
 use crate::lanes::{Mask, Pair};
 use crate::motion::{MotionSpan, Place, side};
 use crate::parameters::{LinkageParameters, RigParameters};
@@ -26,8 +26,8 @@ use crate::truth::Forces;
 pub(crate) struct Effects {
     pub(crate) on: [AxisEffects; 2],
     pub(crate) memory: Memory,
-    /// Factors of the motion: for the two lengths of step and both directions, to the middle and to the end.
-    pub(super) ways: [[[MotionSpan; 2]; 2]; 2],
+    /// Factors of the motion: for the two lengths of step and the directions of drive and load, to the middle and to the end.
+    pub(super) ways: [[[[MotionSpan; 2]; 2]; 2]; 2],
     pub(super) substep_s: f64,
     pub(super) stroke_m: f64,
     pub(super) temperature_k: f64,
@@ -51,7 +51,7 @@ impl Effects {
         let mut effects = Box::new(Effects {
             memory: Memory::at_rest(&on, of, state),
             on,
-            ways: [[[of.spans()[0].motion_to_end; 2]; 2]; 2],
+            ways: [[[[of.spans()[0].motion_to_end; 2]; 2]; 2]; 2],
             substep_s: of.substep_s(),
             stroke_m: rig.cylinder().stroke_m,
             temperature_k: rig.gas().temperature_k,
@@ -69,11 +69,14 @@ impl Effects {
 
     /// Takes over the masses of an integrator; to be called when they change.
     pub(crate) fn move_with(&mut self, of: &Integrator) {
+        const DIRECTIONS: [f64; 2] = [1.0, -1.0];
         let viscous = |axis: usize, direction| self.viscous(of, axis, direction);
         let ways = of.spans().map(|span| {
-            [1.0, -1.0].map(|direction| {
-                let viscous = [viscous(0, direction), viscous(1, direction)];
-                [span.span_s / 2.0, span.span_s].map(|span_s| of.motion.span_with(viscous, span_s))
+            DIRECTIONS.map(|drive| {
+                DIRECTIONS.map(|load| {
+                    let viscous = [viscous(0, drive), viscous(1, load)];
+                    [span.span_s / 2.0, span.span_s].map(|span_s| of.motion.span_with(viscous, span_s))
+                })
             })
         });
         self.ways = ways;
@@ -112,6 +115,9 @@ impl Laws for Effects {
     fn middle(&self, at: At<'_>, carried: &mut Moving) -> Middle {
         let At { of, span, from, node, .. } = at;
         let half_s = span.span_s / 2.0;
+        // From the beginning of the substep that this step is a part of; both are sums of equal parts, with roundings.
+        let substeps = at.local_s / self.substep_s;
+        let ahead_s = (substeps - (substeps + 1e-9).floor()) * self.substep_s + half_s;
         let extension = of.ahead(span, from);
         let volume = [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let volume_from = [of.chambers.volume_a(from.extension), of.chambers.volume_b(from.extension)];
@@ -147,7 +153,7 @@ impl Laws for Effects {
             own.port_flow_m3_per_s = ports.flow_m3_per_s;
             for (chamber, flow) in flow.iter_mut().enumerate() {
                 let port = ports.flow_m3_per_s[chamber];
-                flow[axis] = self.line(axis, chamber, port, at.local_s % self.substep_s + half_s).sum(port);
+                flow[axis] = self.line(axis, chamber, port, ahead_s).sum(port);
             }
             if let Some(effect) = self.on[axis].silencer_back_pressure {
                 let outside_pa = of.chambers.exhaust_pa();
@@ -228,18 +234,10 @@ impl Laws for Effects {
         Pair::new(drive, load)
     }
 
-    fn ways(&self, at: At<'_>) -> [MotionSpan; 2] {
-        let [extending, retracting] = &self.ways[usize::from(at.span.span_s < self.substep_s)];
-        let backwards = at.from.velocity.less(Pair::both(0.0));
-        [0, 1].map(|reach: usize| {
-            let (there, back) = (&extending[reach], &retracting[reach]);
-            MotionSpan {
-                keep: backwards.choose(back.keep, there.keep),
-                gain: backwards.choose(back.gain, there.gain),
-                drift: backwards.choose(back.drift, there.drift),
-                push: backwards.choose(back.push, there.push),
-            }
-        })
+    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2] {
+        let [drive, load] = at.from.velocity.to_array().map(side);
+        let [to_middle, to_end] = &self.ways[usize::from(at.span.span_s < self.substep_s)][drive][load];
+        [to_middle, to_end]
     }
 
     fn holds(&self, at: At<'_>, middle: &Middle, axis: usize, force: f64) -> bool {
@@ -312,15 +310,15 @@ impl Laws for Effects {
         Pair::new(carried.axes[0].spool, carried.axes[1].spool)
     }
 
-    fn keep(&mut self, at: At<'_>, lanes: &Lanes, carried: Moving) {
-        let of = at.of;
+    fn keep(&mut self, of: &Integrator, held: Held, lanes: &Lanes, carried: Moving) {
+        let span_s = self.substep_s;
         self.memory.moving = carried;
         for axis in 0..2 {
             let lane = |pair: Pair| pair.to_array()[axis];
             // Bristles never come to rest to the bit.
             let creep = if self.on_bristles()[axis] { CREEP_M_PER_S } else { 0.0 };
             let own = &mut self.memory.moving.axes[axis];
-            own.rest_s = if lane(lanes.velocity).abs() <= creep { own.rest_s + at.span.span_s } else { 0.0 };
+            own.rest_s = if lane(lanes.velocity).abs() <= creep { own.rest_s + span_s } else { 0.0 };
             for (line, flow) in self.memory.lines[axis].iter_mut().zip(own.port_flow_m3_per_s) {
                 line.iter_mut().for_each(|line| line.push(flow));
             }
@@ -330,7 +328,7 @@ impl Laws for Effects {
             let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
             let on = &self.on[axis];
             for (i, truth) in [x, a, b].into_iter().enumerate() {
-                let (shown, seen, span_s) = (own.shown[i], own.seen[i], at.span.span_s);
+                let (shown, seen) = (own.shown[i], own.seen[i]);
                 own.shown[i] = match i {
                     0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
                     _ => on.pressure_sensor_lag[i - 1]
@@ -342,7 +340,7 @@ impl Laws for Effects {
                 self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
             }
             if self.memory.channels[axis][1].is_some() {
-                let forces = Forces::at(of, Some(self), lanes, at.held.hand, at.held.linked);
+                let forces = Forces::at(of, Some(self), lanes, held.hand, held.linked);
                 let force = forces.sensor_n(of, axis);
                 self.memory.channels[axis][1].iter_mut().for_each(|history| history.push(force));
             }

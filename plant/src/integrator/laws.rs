@@ -53,7 +53,7 @@ pub(crate) trait Laws {
     fn break_away(&self, at: At<'_>, middle: &Middle, force: Pair) -> Pair;
 
     /// Factors of the motion to the middle and to the end of a step.
-    fn ways(&self, at: At<'_>) -> [MotionSpan; 2];
+    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2];
 
     /// Whether a resting axis stays under this force, N without any friction.
     fn holds(&self, at: At<'_>, middle: &Middle, axis: usize, force: f64) -> bool;
@@ -75,7 +75,7 @@ pub(crate) trait Laws {
     fn spool(&self, at: At<'_>, carried: &Self::Carried) -> Pair;
 
     /// A substep counts: what it handed on is kept.
-    fn keep(&mut self, at: At<'_>, to: &Lanes, carried: Self::Carried);
+    fn keep(&mut self, of: &Integrator, held: Held, to: &Lanes, carried: Self::Carried);
 }
 
 /// The laws of rig-model.md.
@@ -143,8 +143,8 @@ impl Laws for Baseline {
     }
 
     #[inline(always)]
-    fn ways(&self, at: At<'_>) -> [MotionSpan; 2] {
-        [at.span.motion_to_middle, at.span.motion_to_end]
+    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2] {
+        [&at.span.motion_to_middle, &at.span.motion_to_end]
     }
 
     #[inline(always)]
@@ -167,7 +167,7 @@ impl Laws for Baseline {
     }
 
     #[inline(always)]
-    fn keep(&mut self, _: At<'_>, _: &Lanes, (): ()) {}
+    fn keep(&mut self, _: &Integrator, _: Held, _: &Lanes, (): ()) {}
 }
 
 /// Air of both chambers in one place, for laws that treat them alike.
