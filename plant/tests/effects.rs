@@ -76,7 +76,9 @@ fn each_effect_alone_at_its_extremes_leaves_a_rig() {
     let baseline = RigParameters::baseline();
     for sheet in SHEETS {
         for place in sheet.place.names() {
-            for (end, shapes) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            // Without a second key there are no shapes to vary.
+            let ends = [(0, 0), (1, 0), (0, 1), (1, 1)];
+            for (end, shapes) in ends.into_iter().take(if sheet.keys.len() == 1 { 2 } else { 4 }) {
                 let rig = with(&baseline, sheet, &place, end, shapes);
                 for linked in [false, true] {
                     let ended = survives(&rig, linked);
