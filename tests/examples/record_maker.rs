@@ -6,12 +6,14 @@ use plant::{Axis, RigParameters};
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
-use system_tests::record_maker::{Experiment, Hidden, Recipe, simulate, write};
+use system_tests::record_maker::{Experiment, Hidden, Recipe, comparison, simulate, write};
 
-const USAGE: &str = "record_maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes]
+const USAGE: &str =
+    "record_maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes]
     [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form] [--wrong parameter:NAME=FACTOR]...
     [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1]
-record_maker list";
+record_maker list
+record_maker compare";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -25,8 +27,40 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             Ok(())
         }
+        Some("compare") => compare(),
         _ => Err(USAGE.into()),
     }
+}
+
+/// Null records of all experiments against the plant, as Markdown.
+fn compare() -> Result<(), Box<dyn Error>> {
+    let rig = RigParameters::baseline();
+    println!("| record | signal | rms | window 50 % | 90 % | 99 % | worst | left out | free run |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for (axis, both_axes) in [(Axis::Drive, false), (Axis::Load, false), (Axis::Drive, true)] {
+        for experiment in [Experiment::Train, Experiment::HeldOut(0), Experiment::HeldOut(1)] {
+            let record = simulate(&Recipe { axis, both_axes, experiment, ..Recipe::default() }, &rig)?;
+            let windows = comparison::against_plant(&record, &rig, comparison::WINDOW)?;
+            let free = comparison::against_plant(&record, &rig, record.rows.len())?;
+            for axis in Axis::ALL.into_iter().filter(|own| both_axes || *own == axis) {
+                let linked = if both_axes { "linked, " } else { "" };
+                for (signal, name) in comparison::SIGNALS.iter().enumerate() {
+                    let difference = &windows[axis.index()][signal];
+                    let [half, most, nearly, worst] =
+                        [50.0, 90.0, 99.0, 100.0].map(|p| difference.percentile(p));
+                    println!(
+                        "| {linked}{} {experiment:?} | {name} | {:.3} | {half:.4} | {most:.3} | {nearly:.3} | {worst:.2} | {} of {} | {:.2} |",
+                        axis.name(),
+                        difference.rms(),
+                        difference.left_out[0],
+                        difference.left_out[1],
+                        free[axis.index()][signal].rms(),
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error>> {
