@@ -63,8 +63,18 @@ pub(super) fn run(
 /// # Errors
 /// As [`simulate`].
 pub fn replay(recipe: &Recipe, rig: &RigParameters, valves: &[[f64; 2]]) -> Result<Record, MakeError> {
+    replay_with(recipe, rig, valves, STEPS_PER_MS)
+}
+
+/// The same with another number of steps in a millisecond.
+pub(super) fn replay_with(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    valves: &[[f64; 2]],
+    steps_per_ms: usize,
+) -> Result<Record, MakeError> {
     let (_, scene) = read(recipe, rig)?;
-    let mut made = Made::new(recipe, rig, &scene, STEPS_PER_MS)?;
+    let mut made = Made::new(recipe, rig, &scene, steps_per_ms)?;
     let mut record = record(recipe, &scene, valves.len());
     for (cycle, valve) in valves.iter().enumerate() {
         made.sample(cycle as u64, *valve, &mut |_| {});

@@ -151,11 +151,8 @@ impl Motion {
         let mut level = self.sliding_n * (1.0 + side * laws.asymmetry) + self.on_both(at);
         if let Some([velocity, exponent]) = laws.stribeck {
             let share = speed / velocity;
-            let falls = if laws.foreign {
-                1.0 / (1.0 + share * share)
-            } else {
-                libm::exp(-libm::pow(share, exponent))
-            };
+            let power = libm::pow(share, exponent);
+            let falls = if laws.foreign { 1.0 / (1.0 + power) } else { libm::exp(-power) };
             level += (self.break_away_n - self.sliding_n) * falls;
         }
         level.max(0.0)
