@@ -203,13 +203,11 @@ impl Made {
         }
         let state = made.start(extension_m);
         let mut sensing: [Sensing; 2] = sensing;
-        for i in 0..2 {
-            if !made.active[i] {
-                // An axis that rests is seen once.
-                let mut evaluated = Evaluated::NONE;
-                evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
-                sensing[i].see(made.sensed(&state, &evaluated, i));
-            }
+        for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| !made.active[*i]) {
+            // An axis that rests is seen once.
+            let mut evaluated = Evaluated::NONE;
+            evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
+            sensing.see(made.sensed(&state, &evaluated, i));
         }
         Ok(Made {
             rig: made,

@@ -204,7 +204,7 @@ impl Motion {
         let cosine =
             if off.abs() < reach { 0.5 + 0.5 * libm::cos(std::f64::consts::PI * off / reach) } else { 0.0 };
         let phase = turn - 0.25 - (turn - 0.25).floor();
-        let triangle = (3.0_f64 / 2.0).sqrt() * (1.0 - 4.0 * (phase - 0.5).abs()) * -1.0;
+        let triangle = (3.0_f64 / 2.0).sqrt() * (4.0 * (phase - 0.5).abs() - 1.0);
         bump * cosine + slope * libm::sin(std::f64::consts::FRAC_PI_2 * along) + ripple * triangle
     }
 
