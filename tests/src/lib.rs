@@ -10,6 +10,7 @@
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
+//!   record_maker  blind records for the study of the workflow, from a simulation of its own
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
@@ -30,6 +31,7 @@ pub mod load;
 pub mod own;
 pub mod peer;
 pub mod process;
+pub mod record_maker;
 pub mod records;
 pub mod scene;
 pub mod skip;
