@@ -31,6 +31,8 @@ class Candidate:
     neutral: float = 0.0
     least: float = 0.0
     one_sided: bool = True
+    # Standard deviation of the coefficient that is expected beforehand; parameters have one.
+    prior: float | None = None
 
     @property
     def is_parameter(self):
@@ -104,17 +106,18 @@ SHAPES = [
     ("heat-exchange", "coefficient_w_per_m2_k", "W/(m^2 K)", "grid", (15.0, 30.0, 60.0, 120.0), {}),
     ("stribeck-friction", "velocity_mm_per_s", "mm/s", "grid", (4.0, 8.0, 15.0, 30.0, 45.0), {}),
 ]
-# Factors of the baseline's numbers, carried along: a wrong number is no missing effect. The last is the least share that counts.
+# Factors of the baseline's numbers, carried along: a wrong number is no missing effect. The shares are
+# the least that counts, and the tolerance of the file: what stands there was measured or comes from a data sheet.
 PARAMETERS = [
-    ("mass", "kg", 0.01),
-    ("viscous-friction", "N/(mm/s)", 0.01),
-    ("sliding-friction", "N", 0.01),
-    ("break-away-force", "N", 0.03),
-    ("supply-pressure", "bar", 0.005),
-    ("spool-time-constant", "ms", 0.1),
-    ("flow-lag", "ms", 0.03),
-    ("kv-scale", "", 0.005),
-    ("piston-area", "mm^2", 0.008),
+    ("mass", "kg", 0.01, 0.03),
+    ("viscous-friction", "N/(mm/s)", 0.01, 0.05),
+    ("sliding-friction", "N", 0.01, 0.05),
+    ("break-away-force", "N", 0.03, 0.05),
+    ("supply-pressure", "bar", 0.005, 0.03),
+    ("spool-time-constant", "ms", 0.1, 0.2),
+    ("flow-lag", "ms", 0.03, 0.1),
+    ("kv-scale", "", 0.005, 0.05),
+    ("piston-area", "mm^2", 0.008, 0.01),
 ]
 
 
@@ -151,10 +154,11 @@ def of_axis(place, rig):
             rest = tuple(((effect, other), value) for other, value in more.items())
             out.append(Candidate(effect, place, None, key, unit, amount, (((effect, key), amount), *rest), law))
     out += nonlinear_but_monotone(place, rig) + over_position(place) + far(place)
-    for name, unit, share in PARAMETERS:
+    for name, unit, share, tolerance in PARAMETERS:
         value, effect = parameter_value(name, rig, place), f"parameter:{name}"
         compensated, least = (((effect, "factor"), 1.01),), share * value
-        out.append(Candidate(effect, place, None, name, unit, 0.01 * value, compensated, "linear", value, least, False))
+        numbers = (unit, 0.01 * value, compensated, "linear", value, least, False, tolerance / 0.01)
+        out.append(Candidate(effect, place, None, name, *numbers))
     return out
 
 

@@ -56,6 +56,7 @@ def build(records, rig, scale=None, only=None):
     regression = Regression(library, *parts, names, dict(scale))
     if only is None:
         coarser(regression)
+        add_priors(regression)
     return regression
 
 
@@ -85,3 +86,17 @@ def moved_balances(record, rig, events, base, one):
     """What one amount of the candidate makes in each balance."""
     moved, _ = balances.residuals(record, rig, events, one.place, dict(one.compensated), base)
     return {key: base[key] - moved[key] for key in base}
+
+
+def add_priors(regression):
+    """A row for each parameter that says 0 within its tolerance: several that are off together would else cost nothing."""
+    rows = np.zeros((0, len(regression.candidates)))
+    for place, one in enumerate(regression.candidates):
+        if one.prior:
+            row = np.zeros((1, len(regression.candidates)))
+            row[0, place] = 1.0 / one.prior
+            rows = np.vstack([rows, row])
+    regression.columns = np.vstack([regression.columns, rows])
+    regression.y = np.concatenate([regression.y, np.zeros(len(rows))])
+    regression.block = np.concatenate([regression.block, np.full(len(rows), -1)])
+    regression.balance = np.concatenate([regression.balance, np.full(len(rows), -1)])

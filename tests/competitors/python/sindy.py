@@ -47,7 +47,8 @@ def held_out(regression):
     """Rows of the last third of each record, by time."""
     record = regression.block // 10_000
     out = np.zeros(len(regression.y), bool)
-    for number in np.unique(record):
+    # Rows of priors belong to no record, and are no test.
+    for number in np.unique(record[record >= 0]):
         own = record == number
         out |= own & (regression.block >= np.quantile(regression.block[own], 2 / 3))
     return out
@@ -97,9 +98,19 @@ def ensemble(regression):
         many = EnsembleOptimizer(single, bagging=True, n_models=MODELS)
         many.fit(columns, regression.y[:, None])
     coefficients = np.array(many.coef_list).reshape(MODELS, -1)
-    inclusion = np.mean(coefficients != 0.0, axis=0)
-    median = np.median(coefficients, axis=0) * (inclusion >= INCLUDED)
-    return chosen_from(regression, live, median, inclusion * np.abs(median))
+    inclusion = inclusion_of_effects(regression, live, coefficients)
+    mean = coefficients.mean(axis=0) * (inclusion >= INCLUDED)
+    return chosen_from(regression, live, mean, inclusion * np.abs(mean))
+
+
+def inclusion_of_effects(regression, live, coefficients):
+    """In how many of the models an effect is: by any of its columns, between which the models toss a coin."""
+    keys = [(one.effect, one.place, one.element) for one in (regression.candidates[place] for place in live)]
+    out = np.zeros(len(live))
+    for key in set(keys):
+        own = np.array([other == key for other in keys])
+        out[own] = np.mean(np.any(coefficients[:, own] != 0.0, axis=1))
+    return out
 
 
 def chosen_from(regression, live, coefficients, score):
