@@ -8,6 +8,9 @@
 //! The frames are the bus's own, coded and decoded, and the order is that of the lockstep barrier: what is rehearsed gives
 //! the same measurement, to the byte, as emulator and controllers in lockstep. This is the only place where the controller
 //! looks into the plant (tuning, which does too, belongs to the tests); the rehearsed controllers see the frames alone.
+//!
+//! What is simulated is behind [`SimulatedRig`], so that another simulation can take the plant's place under the same frames and
+//! the same order.
 
 use crate::axis::{AxisController, AxisRecord};
 use crate::pace::STOPPED_CYCLES;
@@ -15,9 +18,7 @@ use crate::station::{News, Outlets, Station};
 use crossbeam_channel::{Receiver, bounded};
 use plant::scene::{Action, HandForces, Holder, Outcome, RigCall};
 use plant::tables::CycleRecord;
-use plant::{
-    Axis, AxisReadings, Inputs as PlantInputs, People, Plant, RigParameters, Scene, Sensors, SetupError,
-};
+use plant::{AxisReadings, Inputs as PlantInputs, People, Plant, RigParameters, Scene, Sensors, SetupError};
 use protocol::bus::control::Role;
 use protocol::bus::{Bus, BusCounters, BusError, Received, SendError};
 use protocol::can::CanFrame;
@@ -31,6 +32,41 @@ use std::time::Duration;
 /// Rows and news of a cycle: two and some.
 const OUTLET_ROOM: usize = 64;
 
+/// A rig that is simulated, with what people do to it: what a rehearsal moves by one period at a time.
+pub trait SimulatedRig {
+    /// What a cycle leaves: what the rig shows, and what only a simulation knows.
+    type Cycle;
+
+    /// Begins a cycle: people act, then the sensors are sampled. `acting` are the valve openings of drive and load over the
+    /// cycle, unless an emergency stop comes in it.
+    fn sample(&mut self, cycle: u64, acting: [f64; 2], tell: &mut dyn FnMut(Outcome)) -> [AxisReadings; 2];
+
+    /// What the rig has to say about its own emergency stop in `cycle`; what is given counts as said.
+    fn rig_call(&mut self, cycle: u64) -> Option<RigCall>;
+
+    /// Takes note of a stop or a release by a controller.
+    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Outcome>;
+
+    /// What the rig tells of itself now.
+    fn standing(&self) -> Standing;
+
+    /// Ends the cycle: moves by one period under these valve openings of drive and load.
+    fn step(&mut self, cycle: u64, valve: [f64; 2]) -> Self::Cycle;
+}
+
+/// What a rig tells of itself beside its sensors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Absolute pressure of the supply node, Pa.
+    pub supply_pressure_pa: f64,
+    /// Whether the load's eye sits in the carriage.
+    pub linked: bool,
+    /// Whether the emergency stop is tripped.
+    pub emergency_stop: bool,
+    /// Whether the non-return valves at the chambers are shut.
+    pub check_valves_shut: bool,
+}
+
 /// What a rehearsal is made of.
 pub struct RehearsalParts<'a> {
     /// The rig that is simulated.
@@ -43,12 +79,9 @@ pub struct RehearsalParts<'a> {
     pub controllers: Vec<AxisController>,
 }
 
-/// A plant and its controllers, moved by one cycle at a time.
-pub struct Rehearsal {
-    plant: Plant,
-    people: People,
-    sensors: Sensors,
-    inputs: PlantInputs,
+/// A simulated rig and its controllers, moved by one cycle at a time.
+pub struct Rehearsal<R = PeopledPlant> {
+    rig: R,
     station: Station,
     wire: Wire,
     records: Receiver<AxisRecord>,
@@ -60,11 +93,20 @@ pub struct Rehearsal {
 }
 
 /// What a cycle left.
-pub struct Rehearsed {
+pub struct Rehearsed<C = CycleRecord> {
     /// What the rig shows and what only a simulation knows.
-    pub cycle: CycleRecord,
+    pub cycle: C,
     /// What each axis did; `None` where it was not recorded.
     pub axes: [Option<AxisRecord>; 2],
+}
+
+/// The plant with its sensors, and the people around it.
+pub struct PeopledPlant {
+    plant: Plant,
+    people: People,
+    sensors: Sensors,
+    inputs: PlantInputs,
+    readings: [AxisReadings; 2],
 }
 
 /// Frames that the controllers sent in a cycle, by what the rig does with them.
@@ -77,27 +119,80 @@ struct Wire {
     latched: [Option<ValveCommand>; 2],
 }
 
+impl SimulatedRig for PeopledPlant {
+    type Cycle = CycleRecord;
+
+    fn sample(&mut self, cycle: u64, _acting: [f64; 2], tell: &mut dyn FnMut(Outcome)) -> [AxisReadings; 2] {
+        let hands = self.people.begin_cycle(cycle, &mut self.plant, tell);
+        // Added to none, for the signs of zero that the emulator has.
+        (HandForces::default() + hands).put_into(&mut self.inputs);
+        self.readings = self.sensors.sample(&self.plant, &self.inputs);
+        self.readings
+    }
+
+    fn rig_call(&mut self, cycle: u64) -> Option<RigCall> {
+        self.people.rig_call(cycle)
+    }
+
+    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Outcome> {
+        self.people.emergency_stop(holder, release, &mut self.plant)
+    }
+
+    fn standing(&self) -> Standing {
+        Standing {
+            supply_pressure_pa: self.plant.supply_pressure_pa(),
+            linked: self.plant.linked(),
+            emergency_stop: self.plant.emergency_stop(),
+            check_valves_shut: self.plant.check_valves_shut(),
+        }
+    }
+
+    fn step(&mut self, cycle: u64, valve: [f64; 2]) -> CycleRecord {
+        self.inputs.valve = valve;
+        let truth = self.plant.truth(&self.inputs);
+        self.plant.step(&self.inputs);
+        CycleRecord { cycle, valve, readings: self.readings, truth }
+    }
+}
+
 impl Rehearsal {
-    /// A rehearsal before its first cycle.
+    /// A rehearsal of the plant before its first cycle.
     ///
     /// # Errors
     /// [`SetupError`] if the rig cannot be set up so.
     pub fn new(parts: RehearsalParts<'_>) -> Result<Self, SetupError> {
         let RehearsalParts { rig, scene, seed, controllers } = parts;
         let plant = Plant::new(rig, &scene.setup())?;
+        let mut sensors = Sensors::new(rig, seed);
+        let inputs = PlantInputs::default();
+        // The emulator's station draws once before its first cycle; equal draws give equal noise.
+        let readings = sensors.sample(&plant, &inputs);
+        let people = People::new(scene);
+        Ok(Self::with_rig(PeopledPlant { plant, people, sensors, inputs, readings }, controllers))
+    }
+
+    /// Does something to the rig that the scene does not hold, before the next cycle.
+    pub fn act(&mut self, action: Action) {
+        self.rig.people.act(action, &mut self.rig.plant, |_| {});
+    }
+
+    /// The plant.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.rig.plant
+    }
+}
+
+impl<R: SimulatedRig> Rehearsal<R> {
+    /// A rehearsal of any simulated rig under the controllers of both axes, before its first cycle.
+    #[must_use]
+    pub fn with_rig(rig: R, controllers: Vec<AxisController>) -> Self {
         let (record_sender, records) = bounded(OUTLET_ROOM);
         let (news_sender, news) = bounded(OUTLET_ROOM);
         let (_, changes) = bounded(1);
         let outlets = Outlets { records: record_sender, news: news_sender, changes, waits: false };
-        let mut sensors = Sensors::new(rig, seed);
-        let inputs = PlantInputs::default();
-        // The emulator's station draws once before its first cycle; equal draws give equal noise.
-        let _ = sensors.sample(&plant, &inputs);
-        Ok(Self {
-            people: People::new(scene),
-            plant,
-            sensors,
-            inputs,
+        Self {
+            rig,
             station: Station::new(controllers, outlets),
             wire: Wire::default(),
             records,
@@ -105,43 +200,34 @@ impl Rehearsal {
             saturated: [[false; 4]; 2],
             cycle: 0,
             closing: false,
-        })
+        }
     }
 
     /// Moves on by one cycle.
-    pub fn step(&mut self, mut tell: impl FnMut(u64, Outcome)) -> Rehearsed {
+    pub fn step(&mut self, mut tell: impl FnMut(u64, Outcome)) -> Rehearsed<R::Cycle> {
         let cycle = self.cycle;
         self.cycle += 1;
-        let hands = self.people.begin_cycle(cycle, &mut self.plant, |outcome| tell(cycle, outcome));
-        // Added to none, for the signs of zero that the emulator has.
-        (HandForces::default() + hands).put_into(&mut self.inputs);
-        let readings = self.sensors.sample(&self.plant, &self.inputs);
+        let stopped = self.rig.standing().emergency_stop;
+        let acting = openings(&self.wire.acting(), stopped);
+        let readings = self.rig.sample(cycle, acting, &mut |outcome| tell(cycle, outcome));
         // The rig's last cycle is the one in which it hears that all are done; nobody answers it.
         self.closing = self.station.done();
         self.publish(cycle, &readings);
         // What the controllers sent in the last cycle arrives before this one acts.
         let stops = std::mem::take(&mut self.wire.stops);
         for (stop, holder) in stops.into_iter().zip([Holder::Drive, Holder::Load]) {
-            let outcome =
-                stop.and_then(|stop| self.people.emergency_stop(holder, stop.release, &mut self.plant));
+            let outcome = stop.and_then(|stop| self.rig.emergency_stop(holder, stop.release));
             outcome.into_iter().for_each(|outcome| tell(cycle, outcome));
         }
         self.wire.latch();
         if !self.closing {
             self.station.answer(&mut self.wire);
         }
-        for axis in Axis::ALL {
-            let command = self.wire.latched[axis.index()].filter(|command| command.enable);
-            let opening =
-                command.filter(|_| !self.plant.emergency_stop()).map_or(0.0, |command| command.opening);
-            self.inputs.valve[axis.index()] = plant::quantise_valve(opening);
-        }
-        let truth = self.plant.truth(&self.inputs);
-        let record = CycleRecord { cycle, valve: self.inputs.valve, readings, truth };
-        self.plant.step(&self.inputs);
+        let valve = openings(&self.wire.latched, self.rig.standing().emergency_stop);
+        let cycle = self.rig.step(cycle, valve);
         let mut axes = [None, None];
         self.records.try_iter().for_each(|record| axes[record.axis.index()] = Some(record));
-        Rehearsed { cycle: record, axes }
+        Rehearsed { cycle, axes }
     }
 
     fn publish(&mut self, cycle: u64, readings: &[AxisReadings; 2]) {
@@ -153,7 +239,7 @@ impl Rehearsal {
                 .for_each(|(saturated, reading)| *saturated |= reading.saturated);
         }
         // Ahead of the sensors, as the rig does.
-        if let Some(call) = self.people.rig_call(cycle) {
+        if let Some(call) = self.rig.rig_call(cycle) {
             let release = call == RigCall::Release;
             let reason = if release { EmergencyStopReason::None } else { EmergencyStopReason::Operator };
             self.hand_over(&Frame::RigEmergencyStop(EmergencyStop { reason, release }));
@@ -167,6 +253,7 @@ impl Rehearsal {
         }
         if periods::status_is_due(cycle) {
             let [drive, load] = std::mem::take(&mut self.saturated);
+            let standing = self.rig.standing();
             let status = RigStatus {
                 drive_position_saturated: drive[0],
                 drive_force_saturated: drive[1],
@@ -176,10 +263,10 @@ impl Rehearsal {
                 load_force_saturated: load[1],
                 load_pressure_a_saturated: load[2],
                 load_pressure_b_saturated: load[3],
-                supply_pressure_pa: self.plant.supply_pressure_pa(),
-                linked: self.plant.linked(),
-                emergency_stop: self.plant.emergency_stop(),
-                check_valves_shut: self.plant.check_valves_shut(),
+                supply_pressure_pa: standing.supply_pressure_pa,
+                linked: standing.linked,
+                emergency_stop: standing.emergency_stop,
+                check_valves_shut: standing.check_valves_shut,
                 ..RigStatus::default()
             };
             self.hand_over(&Frame::RigStatus(status));
@@ -193,9 +280,10 @@ impl Rehearsal {
         self.station.take(&frame);
     }
 
-    /// Does something to the rig that the scene does not hold, before the next cycle.
-    pub fn act(&mut self, action: Action) {
-        self.people.act(action, &mut self.plant, |_| {});
+    /// The rig.
+    #[must_use]
+    pub fn rig(&self) -> &R {
+        &self.rig
     }
 
     /// The controllers.
@@ -207,12 +295,6 @@ impl Rehearsal {
     /// The controllers, whose programs may be changed between two cycles.
     pub fn station_mut(&mut self) -> &mut Station {
         &mut self.station
-    }
-
-    /// The plant.
-    #[must_use]
-    pub fn plant(&self) -> &Plant {
-        &self.plant
     }
 
     /// Cycles begun.
@@ -243,12 +325,24 @@ fn sensor_frame(readings: &AxisReadings, cycle: u64) -> SensorFrame {
     }
 }
 
+/// Valve openings as these commands act.
+fn openings(commands: &[Option<ValveCommand>; 2], emergency_stop: bool) -> [f64; 2] {
+    commands.map(|command| {
+        let command = command.filter(|command| command.enable && !emergency_stop);
+        plant::quantise_valve(command.map_or(0.0, |command| command.opening))
+    })
+}
+
 impl Wire {
+    /// The commands that act once they are latched.
+    fn acting(&self) -> [Option<ValveCommand>; 2] {
+        std::array::from_fn(|axis| self.commands[axis].or(self.latched[axis]))
+    }
+
     /// The commands of the last cycle act now.
     fn latch(&mut self) {
-        for (latched, command) in self.latched.iter_mut().zip(&mut self.commands) {
-            *latched = command.take().or(*latched);
-        }
+        self.latched = self.acting();
+        self.commands = [None, None];
     }
 }
 

@@ -9,6 +9,8 @@
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
+//!   record_maker  blind records for the study of the workflow, from a simulation of its own
+//!   study ─── the judge of the discrepancy workflow, for scripts/study
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
@@ -28,8 +30,10 @@ pub mod load;
 pub mod own;
 pub mod peer;
 pub mod process;
+pub mod record_maker;
 pub mod records;
 pub mod scene;
 pub mod skip;
+pub mod study;
 pub mod tune;
 pub mod turn;

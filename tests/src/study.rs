@@ -21,12 +21,14 @@
 //! | [`course`], [`signature`] | true states of a record; what an effect changes in windows that start from them |
 //! | [`limits`] | amplitude from which an ideal observer sees an effect |
 //! | [`classes`] | which effects leave the same signature in a record |
+//! | [`compute`] | both, for all places and draws |
 //! | [`document`] | both as tables of a page |
 //!
 //! The commands: `scripts/study --help`; what they found: `tests/docs/study.md`.
 
 pub mod campaign;
 pub mod classes;
+pub mod compute;
 pub mod course;
 pub mod document;
 pub mod draws;

@@ -26,8 +26,9 @@ fn main() -> ExitCode {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // A second one ends the study at once; its folder stays good.
-        let registered = signal_hook::flag::register_conditional_shutdown(signal, INTERRUPTED.into(), Arc::clone(&stop))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)));
+        let registered =
+            signal_hook::flag::register_conditional_shutdown(signal, INTERRUPTED.into(), Arc::clone(&stop))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)));
         if let Err(error) = registered {
             eprintln!("study: signals cannot be caught: {error}");
         }
@@ -120,7 +121,9 @@ fn run(arguments: &RunArguments, stop: &AtomicBool) -> Done {
     };
     match campaign.run()? {
         CampaignEnd::Complete => say("complete"),
-        CampaignEnd::Stopped(left) => say(&format!("stopped, {left} draws are left: the same command goes on")),
+        CampaignEnd::Stopped(left) => {
+            say(&format!("stopped, {left} draws are left: the same command goes on"))
+        }
     }
     Ok(())
 }
@@ -128,7 +131,11 @@ fn run(arguments: &RunArguments, stop: &AtomicBool) -> Done {
 fn scored(arguments: &ScoreArguments) -> Done {
     let limits: Option<Limits> = read_if_there(&committed(LIMITS))?;
     let known = known_classes(&arguments.folders)?;
-    let score = score(&arguments.folders, &arguments.label, Known { limits: limits.as_ref(), classes: known.as_ref() })?;
+    let score = score(
+        &arguments.folders,
+        &arguments.label,
+        Known { limits: limits.as_ref(), classes: known.as_ref() },
+    )?;
     let folder = arguments.to.as_ref().unwrap_or(&arguments.folders[0]);
     let path = |extension: &str| folder.join(format!("score-{}.{extension}", arguments.label));
     write_whole(&path("json"), format!("{:#}\n", serde_json::json!(score)).as_bytes())?;

@@ -50,6 +50,19 @@ const MOST_SAID: u64 = 1 << 20;
 /// Makes a record: measurement into the first folder, truth into the second; says why it cannot.
 pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
 
+/// Makes a record with the record maker.
+///
+/// # Errors
+/// What it says.
+pub fn make_record(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    measurement: &Path,
+    truth: &Path,
+) -> Result<(), String> {
+    crate::record_maker::make(recipe, rig, measurement, truth).map_err(|error| error.to_string())
+}
+
 /// How a campaign runs.
 pub struct Campaign<'a> {
     /// Study and folder.
@@ -108,7 +121,9 @@ pub enum CampaignError {
         reason: String,
     },
     /// A record has a column that the measurement file does not have.
-    #[error("draw {number}: column '{column}' of its record is none of rig-model.md: it could tell what is hidden")]
+    #[error(
+        "draw {number}: column '{column}' of its record is none of rig-model.md: it could tell what is hidden"
+    )]
     Column {
         /// Which draw.
         number: usize,
@@ -116,7 +131,9 @@ pub enum CampaignError {
         column: String,
     },
     /// The disk is nearly full.
-    #[error("{free_mib} MiB are left on the disk, {least_free_mib} are wanted: free some and start again, nothing is lost")]
+    #[error(
+        "{free_mib} MiB are left on the disk, {least_free_mib} are wanted: free some and start again, nothing is lost"
+    )]
     Disk {
         /// What is left.
         free_mib: u64,
@@ -165,7 +182,11 @@ impl Campaign<'_> {
                         let mut finished = finished.lock().expect("no holder panics");
                         *finished += 1;
                         let left = time_left(began.elapsed(), *finished, missing.len());
-                        (self.say)(&format!("{finished}/{} draw {}: {told}; {left} left", missing.len(), draw.number));
+                        (self.say)(&format!(
+                            "{finished}/{} draw {}: {told}; {left} left",
+                            missing.len(),
+                            draw.number
+                        ));
                     }
                 }
             }
@@ -220,7 +241,9 @@ impl Campaign<'_> {
         let Some(program) = self.program else { return Ok(Some(format!("records {made_s:.1} s"))) };
         let number = draw.number;
         let ran = make_whole(&self.study.run(self.label, number), |folder| {
-            self.let_loose(draw, program, folder).map_err(CampaignEndOr::Error)?.ok_or(CampaignEndOr::Interrupted)
+            self.let_loose(draw, program, folder)
+                .map_err(CampaignEndOr::Error)?
+                .ok_or(CampaignEndOr::Interrupted)
         });
         let taken = match ran {
             Ok(taken) => taken,
@@ -228,7 +251,8 @@ impl Campaign<'_> {
             Err(CampaignEndOr::Error(error)) => return Err(error),
         };
         if self.drop_records {
-            fs::remove_dir_all(self.study.records(number)).map_err(|error| CampaignError::Files { number, error })?;
+            fs::remove_dir_all(self.study.records(number))
+                .map_err(|error| CampaignError::Files { number, error })?;
         }
         let Taken { ended, wall_s, memory_kib } = taken;
         Ok(Some(format!("records {made_s:.1} s, program {ended:?} {wall_s:.1} s {} MiB", memory_kib >> 10)))
@@ -263,12 +287,20 @@ impl Campaign<'_> {
         })
     }
 
-    fn let_loose(&self, draw: &Draw, program: &Program, folder: &Path) -> Result<Option<Taken>, CampaignError> {
+    fn let_loose(
+        &self,
+        draw: &Draw,
+        program: &Program,
+        folder: &Path,
+    ) -> Result<Option<Taken>, CampaignError> {
         let number = draw.number;
         let files = |error| CampaignError::Files { number, error };
         let empty = tempfile::tempdir().map_err(files)?;
         let records = self.study.records(number);
-        let test = EXPERIMENTS.iter().find(|(experiment, _)| *experiment == draw.test()).map_or("train", |found| found.1);
+        let test = EXPERIMENTS
+            .iter()
+            .find(|(experiment, _)| *experiment == draw.test())
+            .map_or("train", |found| found.1);
         fs::write(empty.path().join("rig.toml"), RigParameters::BASELINE_TOML).map_err(files)?;
         for (name, copy) in [("train", "train.csv"), (test, "test.csv")] {
             let record = records.join(name).join("measurement.csv");
@@ -284,19 +316,19 @@ impl Campaign<'_> {
         };
         let told = fs::metadata(&said).map_err(files)?.len();
         if told > MOST_SAID {
-            File::options().write(true).open(&said).and_then(|file| file.set_len(MOST_SAID)).map_err(files)?;
+            File::options()
+                .write(true)
+                .open(&said)
+                .and_then(|file| file.set_len(MOST_SAID))
+                .map_err(files)?;
         }
         let report = empty.path().join("out/report.json");
         // What cannot be copied was not written, or is no file: the judge says so.
         if fs::metadata(&report).is_ok_and(|report| report.is_file() && report.len() <= LARGEST_REPORT) {
             fs::copy(&report, folder.join("report.json")).map_err(files)?;
         }
-        let result = RunResult {
-            schema_version: SCHEMA_VERSION,
-            number,
-            program: program.identity().clone(),
-            taken,
-        };
+        let result =
+            RunResult { schema_version: SCHEMA_VERSION, number, program: program.identity().clone(), taken };
         fs::write(folder.join("result.json"), format!("{:#}\n", json!(result))).map_err(files)?;
         Ok(Some(taken))
     }

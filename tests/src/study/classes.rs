@@ -11,9 +11,10 @@
 //! Parameters of the baseline are compared too, by 5 %. A wrong parameter is no missing effect, so such a twin is told but is not
 //! in the class.
 
+use crate::record_maker::PARAMETERS;
 use crate::study::SCHEMA_VERSION;
 use crate::study::course::Course;
-use crate::study::draws::{BESIDES, Draw, axis_of};
+use crate::study::draws::{Draw, axis_of};
 use crate::study::folder::{FolderError, Plan, read};
 use crate::study::limits::threshold;
 use crate::study::signature::{Observer, alike, length};
@@ -95,7 +96,7 @@ pub fn classes_of(draw: &Draw, course: Course) -> Result<DrawClasses, ParameterE
             others.push((sheet.name.to_owned(), place.to_string(), observer.signature(&other)));
         }
     }
-    for name in BESIDES {
+    for name in PARAMETERS {
         let other = with_parameter(rig, name, PARAMETER_FACTOR)?;
         others.push((name.to_owned(), String::new(), observer.signature(&other)));
     }
@@ -103,7 +104,8 @@ pub fn classes_of(draw: &Draw, course: Course) -> Result<DrawClasses, ParameterE
     for hidden in &draw.recipe.hidden {
         let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
         let place = hidden.place.to_string();
-        let numbers: Vec<_> = sheet.keys.iter().map(|key| key.name).zip(hidden.numbers.iter().copied()).collect();
+        let numbers: Vec<_> =
+            sheet.keys.iter().map(|key| key.name).zip(hidden.numbers.iter().copied()).collect();
         let own = observer.signature(&rig.with_effect(sheet.name, &place, &numbers)?);
         let other = others.iter().filter(|(effect, at, _)| effect != hidden.name || *at != place);
         let mut members: Vec<_> = other
@@ -134,7 +136,11 @@ fn nominal(sheet: &Sheet) -> Vec<(&'static str, f64)> {
     let key = &sheet.keys[0];
     let mean = (key.drawn[0] * key.drawn[1]).sqrt();
     // The middle must not be the baseline itself.
-    let value = if key.neutral.is_some_and(|neutral| (mean / neutral).ln().abs() < 0.1) { key.drawn[1] } else { mean };
+    let value = if key.neutral.is_some_and(|neutral| (mean / neutral).ln().abs() < 0.1) {
+        key.drawn[1]
+    } else {
+        mean
+    };
     vec![(key.name, value)]
 }
 
@@ -144,7 +150,7 @@ fn nominal(sheet: &Sheet) -> Vec<(&'static str, f64)> {
 /// [`ParameterError`] when the rig file would not take it.
 ///
 /// # Panics
-/// For a name that is none of [`BESIDES`].
+/// For a name that is none of [`PARAMETERS`].
 pub fn with_parameter(rig: &RigParameters, name: &str, factor: f64) -> Result<RigParameters, ParameterError> {
     let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect::<Vec<_>>();
     let (friction, cylinder, valve) = (rig.friction(), rig.cylinder(), rig.valve());
@@ -156,11 +162,15 @@ pub fn with_parameter(rig: &RigParameters, name: &str, factor: f64) -> Result<Ri
         "parameter:viscous-friction" => {
             rig.with("friction.viscous_n_per_mm_per_s", &[friction.viscous_n_s_per_m / 1e3 * factor])
         }
-        "parameter:sliding-friction" => rig.with("friction.sliding_force_n", &[friction.sliding_force_n * factor]),
+        "parameter:sliding-friction" => {
+            rig.with("friction.sliding_force_n", &[friction.sliding_force_n * factor])
+        }
         "parameter:break-away-force" => {
             rig.with("friction.break_away_force_n", &[friction.break_away_force_n * factor])
         }
-        "parameter:supply-pressure" => rig.with("supply.pressure_bar", &[rig.supply().pressure_pa / 1e5 * factor]),
+        "parameter:supply-pressure" => {
+            rig.with("supply.pressure_bar", &[rig.supply().pressure_pa / 1e5 * factor])
+        }
         "parameter:spool-time-constant" => {
             rig.with("valve.spool_time_constant_ms", &[valve.spool_time_constant_s * 1e3 * factor])
         }
@@ -186,7 +196,10 @@ pub fn read_draw(path: &Path, number: usize) -> Result<DrawClasses, FolderError>
     let classes: DrawClasses = serde_json::from_str(&read(path)?)
         .map_err(|error| FolderError::content(path, format!("holds no classes of this version: {error}")))?;
     if classes.schema_version != SCHEMA_VERSION || classes.number != number {
-        return Err(FolderError::content(path, "holds the classes of another draw: delete it and compute it again"));
+        return Err(FolderError::content(
+            path,
+            "holds the classes of another draw: delete it and compute it again",
+        ));
     }
     Ok(classes)
 }
@@ -198,7 +211,7 @@ mod tests {
     #[test]
     fn every_parameter_of_the_study_can_be_off() {
         let rig = RigParameters::baseline();
-        for name in BESIDES {
+        for name in PARAMETERS {
             for factor in [0.85, 1.15] {
                 let own = with_parameter(&rig, name, factor);
                 // The break-away force cannot fall below the sliding force, nor the other way round.

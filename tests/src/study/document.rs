@@ -16,7 +16,8 @@ pub fn limit_table(limits: &Limits) -> String {
     );
     for sheet in SHEETS {
         let key = &sheet.keys[0];
-        let drawn = format!("{} to {}{}", key.drawn[0], key.drawn[1], if key.signed { ", either sign" } else { "" });
+        let drawn =
+            format!("{} to {}{}", key.drawn[0], key.drawn[1], if key.signed { ", either sign" } else { "" });
         let own = limits.limits.iter().filter(|limit| limit.effect == sheet.name);
         for limit in own.filter(|limit| !limit.place.starts_with("load")) {
             let _ = writeln!(
@@ -86,14 +87,22 @@ pub fn twin_table(classes: &Classes) -> String {
             *row.twins.entry(name).or_default() += 1;
         }
     }
-    let mut table =
-        String::from("| effect | draws | alone in its class | median of the largest cosine | twins, in so many draws |\n|---|---|---|---|---|\n");
+    let mut table = String::from(
+        "| effect | draws | alone in its class | median of the largest cosine | twins, in so many draws |\n|---|---|---|---|---|\n",
+    );
     for sheet in SHEETS {
         let Some(row) = rows.get_mut(sheet.name) else { continue };
         row.largest.sort_by(f64::total_cmp);
         let median = row.largest[row.largest.len() / 2];
         let twins: Vec<_> = row.twins.iter().map(|(name, count)| format!("{name} {count}")).collect();
-        let _ = writeln!(table, "| {} | {} | {} | {median:.3} | {} |", sheet.name, row.draws, row.alone, twins.join(", "));
+        let _ = writeln!(
+            table,
+            "| {} | {} | {} | {median:.3} | {} |",
+            sheet.name,
+            row.draws,
+            row.alone,
+            twins.join(", ")
+        );
     }
     table
 }
@@ -131,9 +140,15 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits() {
-        for (value, text) in
-            [(0.012_345, "0.0123"), (1.0, "1"), (12.34, "12.3"), (1234.5, "1234"), (0.1, "0.1"), (0.0, "0"), (120.0, "120")]
-        {
+        for (value, text) in [
+            (0.012_345, "0.0123"),
+            (1.0, "1"),
+            (12.34, "12.3"),
+            (1234.5, "1234"),
+            (0.1, "0.1"),
+            (0.0, "0"),
+            (120.0, "120"),
+        ] {
             assert_eq!(digits(value), text);
         }
     }

@@ -4,7 +4,7 @@
 //! more draws keeps those of a smaller one, and a shard needs no other shard.
 //!
 //! - Amplitude: log-uniform over the `drawn` range of the effect's sheet, either sign where the sheet says so. Each number
-//!   that only shapes the effect: one half its default, one half uniform over its range.
+//!   that only shapes the effect: one half its default, one half uniform over its `drawn` range.
 //! - Place: any of the effect's kind. The record is of the axis it is at; of both, linked, for what needs two.
 //! - A fifth has a functional form that is not the catalogue's, a half 1 to 3 parameters of the baseline off by 1 to 3 %, a third
 //!   coloured noise and jitter: each drawn by itself.
@@ -12,7 +12,7 @@
 //!
 //! Source: issue 5 and effects.md, Blind protocol of discrepancy-notes.md.
 
-use crate::record_maker::{Experiment, Hidden, Recipe};
+use crate::record_maker::{Experiment, Hidden, PARAMETERS, Recipe};
 use plant::Axis;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Part, Place, PlaceKind, Sheet};
@@ -25,19 +25,6 @@ use std::str::FromStr;
 /// Parameters that a case of wrong parameters alone is about, with their names in reports.
 pub const ALONE: [&str; 4] =
     ["parameter:mass", "parameter:viscous-friction", "parameter:supply-pressure", "parameter:kv-scale"];
-
-/// Parameters that may be off besides, in half of the draws.
-pub const BESIDES: [&str; 9] = [
-    "parameter:mass",
-    "parameter:viscous-friction",
-    "parameter:sliding-friction",
-    "parameter:break-away-force",
-    "parameter:supply-pressure",
-    "parameter:spool-time-constant",
-    "parameter:flow-lag",
-    "parameter:kv-scale",
-    "parameter:piston-area",
-];
 
 /// How many draws of what.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -99,7 +86,8 @@ impl FromStr for Shard {
     type Err = BadShard;
 
     fn from_str(text: &str) -> Result<Self, BadShard> {
-        let numbers = text.split_once('/').and_then(|(part, parts)| Some((part.parse().ok()?, parts.parse().ok()?)));
+        let numbers =
+            text.split_once('/').and_then(|(part, parts)| Some((part.parse().ok()?, parts.parse().ok()?)));
         match numbers {
             Some((part, parts)) if part < parts => Ok(Shard { part, parts }),
             _ => Err(BadShard(text.to_owned())),
@@ -158,7 +146,9 @@ pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
         }
     }
     let more = |kind, stream, count, make: &dyn Fn(Generator) -> Recipe| {
-        (0..count).map(move |repetition| (kind, make(Generator::new(seed, stream, repetition)))).collect::<Vec<_>>()
+        (0..count)
+            .map(move |repetition| (kind, make(Generator::new(seed, stream, repetition))))
+            .collect::<Vec<_>>()
     };
     drawn.extend(more(Kind::Null, 1000, shape.nulls, &Generator::null));
     for (place, name) in ALONE.iter().enumerate() {
@@ -263,7 +253,7 @@ impl Generator {
         let mut wrong_parameters = Vec::new();
         if self.one_in(2.0) {
             for _ in 0..=self.below(3) {
-                let name = BESIDES[self.below(BESIDES.len())].to_owned();
+                let name = PARAMETERS[self.below(PARAMETERS.len())].to_owned();
                 let factor = 1.0 + self.sign() * self.uniform([0.01, 0.03]);
                 if wrong_parameters.iter().all(|(other, _)| *other != name) {
                     wrong_parameters.push((name, factor));
@@ -406,7 +396,8 @@ mod tests {
     #[test]
     fn several_effects_are_different_ones() {
         for draw in many() {
-            let names: std::collections::BTreeSet<_> = draw.recipe.hidden.iter().map(|hidden| hidden.name).collect();
+            let names: std::collections::BTreeSet<_> =
+                draw.recipe.hidden.iter().map(|hidden| hidden.name).collect();
             let expected = match draw.kind {
                 Kind::Single => 1,
                 Kind::Null | Kind::Parameter => 0,

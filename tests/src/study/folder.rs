@@ -126,8 +126,10 @@ impl Study {
         let text = read(&path)?;
         let plan: Plan = serde_json::from_str(&text)
             .map_err(|error| FolderError::content(&path, format!("is no list of draws: {error}")))?;
-        if plan.schema_version != SCHEMA_VERSION || plan.shard.part >= plan.shard.parts || plan.text() != text {
-            let what = "is not what this program draws from the same seed: use the version that began this study";
+        if plan.schema_version != SCHEMA_VERSION || plan.shard.part >= plan.shard.parts || plan.text() != text
+        {
+            let what =
+                "is not what this program draws from the same seed: use the version that began this study";
             return Err(FolderError::content(&path, what));
         }
         Ok(Study { root: root.to_owned(), plan, draws: plan.draws() })
@@ -183,8 +185,12 @@ pub fn draw_as_json(draw: &Draw) -> Value {
 
 fn hidden_as_json(hidden: &Hidden) -> Value {
     let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
-    let numbers: serde_json::Map<_, _> =
-        sheet.keys.iter().zip(&hidden.numbers).map(|(key, number)| (key.name.to_owned(), json!(number))).collect();
+    let numbers: serde_json::Map<_, _> = sheet
+        .keys
+        .iter()
+        .zip(&hidden.numbers)
+        .map(|(key, number)| (key.name.to_owned(), json!(number)))
+        .collect();
     json!({"effect": hidden.name, "where": hidden.place.to_string(), "numbers": numbers})
 }
 
@@ -219,7 +225,10 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
 ///
 /// # Errors
 /// Those of `fill`, and [`FolderError`] with the path.
-pub fn make_whole<T, E: From<FolderError>>(path: &Path, fill: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, E> {
+pub fn make_whole<T, E: From<FolderError>>(
+    path: &Path,
+    fill: impl FnOnce(&Path) -> Result<T, E>,
+) -> Result<T, E> {
     let beside = beside(path);
     let fresh = || {
         if beside.exists() {
@@ -265,7 +274,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         Study::begin(folder.path(), &Plan::new(7, SHAPE)).unwrap();
         let path = folder.path().join("draws.json");
-        let text = fs::read_to_string(&path).unwrap().replace("\"foreign_form\": false", "\"foreign_form\": true");
+        let text =
+            fs::read_to_string(&path).unwrap().replace("\"foreign_form\": false", "\"foreign_form\": true");
         fs::write(&path, text).unwrap();
         let error = Study::open(folder.path()).unwrap_err().to_string();
         assert!(error.contains("use the version that began this study"), "{error}");

@@ -84,7 +84,12 @@ fn as_text<S: Serializer>(place: &Place, out: S) -> Result<S::Ok, S::Error> {
 
 /// Judges what a program said about a draw, given the class of each of its hidden effects.
 #[must_use]
-pub fn judge(draw: &Draw, classes: &[Vec<Member>], taken: &Taken, report: &Result<Report, String>) -> Judgement {
+pub fn judge(
+    draw: &Draw,
+    classes: &[Vec<Member>],
+    taken: &Taken,
+    report: &Result<Report, String>,
+) -> Judgement {
     let error = match (taken.ended, report) {
         (Ended::TimedOut, _) => Some("took longer than its time limit".to_owned()),
         (Ended::Signalled(signal), _) => Some(format!("crashed with signal {signal}")),
@@ -120,14 +125,19 @@ pub fn judge(draw: &Draw, classes: &[Vec<Member>], taken: &Taken, report: &Resul
         alone: top && verdict == Some(Verdict::Named) && names.len() == 1 && names[0].alternatives.is_empty(),
         too_many: names.len() - matched.len(),
         false_alarm: hidden.is_empty() && missing,
-        parameter_right: draw.kind == Kind::Parameter && !missing && good.is_some_and(|report| reported(report, draw)),
+        parameter_right: draw.kind == Kind::Parameter
+            && !missing
+            && good.is_some_and(|report| reported(report, draw)),
         claimed_closed_ratio: good.and_then(Report::claimed_closed),
     }
 }
 
 /// Whether the one wrong parameter is among those reported.
 fn reported(report: &Report, draw: &Draw) -> bool {
-    draw.recipe.wrong_parameters.iter().all(|(name, _)| report.parameters.iter().any(|told| told.name == *name))
+    draw.recipe
+        .wrong_parameters
+        .iter()
+        .all(|(name, _)| report.parameters.iter().any(|told| told.name == *name))
 }
 
 fn called(verdict: Option<Verdict>, first: Option<&Named>) -> String {
@@ -144,11 +154,22 @@ fn called(verdict: Option<Verdict>, first: Option<&Named>) -> String {
 
 /// Names of effects in a class, the true one included.
 fn effects<'a>(hidden: &'a Hidden, class: &'a [Member]) -> BTreeSet<&'a str> {
-    class.iter().filter(|member| member.is_twin()).map(|member| member.effect.as_str()).chain([hidden.name]).collect()
+    class
+        .iter()
+        .filter(|member| member.is_twin())
+        .map(|member| member.effect.as_str())
+        .chain([hidden.name])
+        .collect()
 }
 
 /// The name of a class within an entry of the report; `None` when the entry does not stand for the class.
-fn stands_for<'a>(entry: &'a Named, report: &Report, hidden: &Hidden, class: &[Member], alone: bool) -> Option<&'a Named> {
+fn stands_for<'a>(
+    entry: &'a Named,
+    report: &Report,
+    hidden: &Hidden,
+    class: &[Member],
+    alone: bool,
+) -> Option<&'a Named> {
     let verdict = report.verdict;
     let effects = effects(hidden, class);
     let of_class = |name: &Named| effects.contains(name.sheet.name);
@@ -181,7 +202,11 @@ fn matching<'a>(
     class: &dyn Fn(usize) -> &'a Vec<Member>,
 ) -> Vec<(&'a Named, usize)> {
     /// Assigns the hidden effects from `at` on to the names that are left.
-    fn assign<'a>(options: &[Vec<Option<(&'a Named, bool)>>], at: usize, used: u64) -> (usize, Vec<(&'a Named, usize)>) {
+    fn assign<'a>(
+        options: &[Vec<Option<(&'a Named, bool)>>],
+        at: usize,
+        used: u64,
+    ) -> (usize, Vec<(&'a Named, usize)>) {
         let Some(own) = options.get(at) else { return (0, Vec::new()) };
         let mut best = assign(options, at + 1, used);
         for (entry, option) in own.iter().enumerate().take(64) {

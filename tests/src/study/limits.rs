@@ -200,7 +200,9 @@ pub fn limits_in(
 ) -> Result<Vec<Limit>, ParameterError> {
     let mut cases = Vec::new();
     for sheet in SHEETS {
-        for place in sheet.place.places().iter().filter(|place| Measured::of(sheet.place, **place) == measured) {
+        for place in
+            sheet.place.places().iter().filter(|place| Measured::of(sheet.place, **place) == measured)
+        {
             cases.extend(Scale::of(&sheet.keys[0]).into_iter().map(|scale| (sheet, *place, scale)));
         }
     }
@@ -217,6 +219,8 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
     let name = place.to_string();
     let threshold = threshold(scale.two_sided(key));
     let strength_at = |value: f64| {
+        // An excursion to the end of the range and back may round beyond it.
+        let value = value.clamp(key.min, key.max);
         let rig = observer.rig().with_effect(sheet.name, &name, &[(key.name, value)])?;
         Ok::<_, ParameterError>(length(&observer.signature(&rig)) / threshold)
     };
@@ -239,7 +243,10 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
 }
 
 /// The least strength over a drawn range.
-fn weakest(key: &EffectKey, strength_at: impl Fn(f64) -> Result<f64, ParameterError>) -> Result<f64, ParameterError> {
+fn weakest(
+    key: &EffectKey,
+    strength_at: impl Fn(f64) -> Result<f64, ParameterError>,
+) -> Result<f64, ParameterError> {
     const POINTS: i32 = 7;
     let [least, most] = key.drawn.map(f64::ln);
     let value = |at: i32| (least + (most - least) * f64::from(at) / f64::from(POINTS - 1)).exp();
@@ -287,7 +294,6 @@ fn search<E>([most, drawn]: [f64; 2], strength_at: impl Fn(f64) -> Result<f64, E
     }
     Ok(Found { limit: Some(high), strength })
 }
-
 
 #[cfg(test)]
 mod tests {

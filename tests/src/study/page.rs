@@ -24,11 +24,15 @@ pub fn page(score: &Score) -> String {
         ("errors", "Without a good report", errors(score)),
         ("cases", "All cases", cases(score)),
     ];
-    let contents: String =
-        sections.iter().map(|(name, title, _)| format!("<li><a href=\"#{name}\">{title}</a></li>\n")).collect();
+    let contents: String = sections
+        .iter()
+        .map(|(name, title, _)| format!("<li><a href=\"#{name}\">{title}</a></li>\n"))
+        .collect();
     let body: String = sections
         .iter()
-        .map(|(name, title, markup)| format!("<section>\n<h2 id=\"{name}\">{title}</h2>\n{markup}</section>\n"))
+        .map(|(name, title, markup)| {
+            format!("<section>\n<h2 id=\"{name}\">{title}</h2>\n{markup}</section>\n")
+        })
         .collect();
     document(
         &title,
@@ -48,7 +52,9 @@ fn lead(score: &Score) -> String {
     let shape = &score.shape;
     let classes = match score.without_classes {
         0 => String::new(),
-        count => format!(" The classes of {count} draws are not known: there an effect counts as alone in its class."),
+        count => format!(
+            " The classes of {count} draws are not known: there an effect counts as alone in its class."
+        ),
     };
     format!(
         "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, {} of each wrong parameter, {} pairs, \
@@ -80,7 +86,11 @@ fn table(heads: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String 
     for row in rows {
         text.push_str("<tr>");
         for (at, cell) in row.iter().enumerate() {
-            let _ = if at == 0 { write!(text, "<th scope=\"row\">{cell}</th>") } else { write!(text, "<td>{cell}</td>") };
+            let _ = if at == 0 {
+                write!(text, "<th scope=\"row\">{cell}</th>")
+            } else {
+                write!(text, "<td>{cell}</td>")
+            };
         }
         text.push_str("</tr>\n");
     }
@@ -96,7 +106,12 @@ fn percent(share: f64) -> String {
 fn told(rate: &Rate) -> String {
     let Some(share) = rate.share else { return "<span class=\"none\">none</span>".to_owned() };
     let [low, high] = rate.interval.map(percent);
-    format!("{} of {}, {} % <span class=\"soft\">({low} to {high})</span>", rate.count, rate.of, percent(share))
+    format!(
+        "{} of {}, {} % <span class=\"soft\">({low} to {high})</span>",
+        rate.count,
+        rate.of,
+        percent(share)
+    )
 }
 
 fn headline(score: &Score) -> String {
@@ -112,7 +127,8 @@ fn splits(head: &str, splits: &[Split]) -> String {
         let rates = [split.class_right, split.top, split.alone, split.where_right];
         std::iter::once(escaped(&split.name)).chain(rates.iter().map(told)).collect()
     };
-    let heads = [head, "class among the names", "first name right", "right alone, where alone in class", "where"];
+    let heads =
+        [head, "class among the names", "first name right", "right alone, where alone in class", "where"];
     table(&heads, splits.iter().map(row))
 }
 
@@ -135,7 +151,9 @@ fn confusion(score: &Score) -> String {
 
 /// A cell: how often, framed when right, shaded by its share of the row.
 fn cell(row: &ConfusionRow, name: &str) -> String {
-    let Some([all, right, at_place]) = row.called.get(name) else { return "<span class=\"soft\">·</span>".to_owned() };
+    let Some([all, right, at_place]) = row.called.get(name) else {
+        return "<span class=\"soft\">·</span>".to_owned();
+    };
     let share = all * 100 / row.of.max(1);
     let (shade, frame) = if right > &0 { ("--s2", "2px solid var(--ink)") } else { ("--s1", "0") };
     let text = if right == &0 || at_place == all { all.to_string() } else { format!("{at_place}/{all}") };
@@ -157,7 +175,9 @@ fn nothing_hidden(score: &Score) -> String {
 
 fn spread(name: &str, spread: &Spread, scale: f64, unit: &str) -> Vec<String> {
     let quantile = |at: usize| {
-        spread.quantiles.map_or("<span class=\"none\">none</span>".to_owned(), |all| format!("{:.1} {unit}", all[at] * scale))
+        spread.quantiles.map_or("<span class=\"none\">none</span>".to_owned(), |all| {
+            format!("{:.1} {unit}", all[at] * scale)
+        })
     };
     let mut row = vec![name.to_owned(), spread.of.to_string()];
     row.extend((0..4).map(quantile));
@@ -207,7 +227,11 @@ fn cases(score: &Score) -> String {
                 format!("{mark} {} {} ({over}, class of {})", hidden.effect, hidden.place, hidden.class_size)
             })
             .collect();
-        let marks = [(case.foreign_form, "form"), (case.wrong_parameters, "parameters"), (case.coloured_noise, "noise")];
+        let marks = [
+            (case.foreign_form, "form"),
+            (case.wrong_parameters, "parameters"),
+            (case.coloured_noise, "noise"),
+        ];
         let marks: Vec<_> = marks.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect();
         let error = case.judgement.error.as_ref().map_or(String::new(), |error| format!(": {error}"));
         vec![

@@ -105,7 +105,17 @@ impl Program {
         let began = Instant::now();
         let taken = |ended, memory_kib| Taken { ended, wall_s: began.elapsed().as_secs_f64(), memory_kib };
         let started = Command::new(&self.path)
-            .args(["close", "--rig", "rig.toml", "--train", "train.csv", "--test", "test.csv", "--out", "out"])
+            .args([
+                "close",
+                "--rig",
+                "rig.toml",
+                "--train",
+                "train.csv",
+                "--test",
+                "test.csv",
+                "--out",
+                "out",
+            ])
             .args(&self.arguments)
             .current_dir(folder)
             .stdin(Stdio::null())

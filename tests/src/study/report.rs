@@ -126,7 +126,8 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     if says_names && named.is_empty() {
         return Err(format!("verdict {:?} without a name", raw.verdict));
     }
-    let says_none = matches!(raw.verdict, Verdict::NothingMissing | Verdict::ParametersOnly | Verdict::BadData);
+    let says_none =
+        matches!(raw.verdict, Verdict::NothingMissing | Verdict::ParametersOnly | Verdict::BadData);
     if says_none && !named.is_empty() {
         return Err(format!("verdict {:?} with names", raw.verdict));
     }
@@ -182,7 +183,9 @@ mod tests {
     #[test]
     fn what_is_no_report_says_why() {
         let entry = |effect, axis, element| {
-            named(&format!(r#"{{"effect": "{effect}", "where": {{"axis": "{axis}", "element": {element}}}}}"#))
+            named(&format!(
+                r#"{{"effect": "{effect}", "where": {{"axis": "{axis}", "element": {element}}}}}"#
+            ))
         };
         let nan = named(
             r#"{"effect": "inclination", "where": {"axis": "drive", "element": null},
@@ -198,7 +201,10 @@ mod tests {
             (&entry("phlogiston", "drive", "null"), "phlogiston"),
             (&entry("inclination", "drive", "\"a\""), "cannot be at 'drive.a'"),
             (&entry("rod-leakage", "nowhere", "\"a\""), "cannot be at"),
-            (&entry("inclination", "drive", "null").replace("\"named\",", "\"nothing-missing\","), "with names"),
+            (
+                &entry("inclination", "drive", "null").replace("\"named\",", "\"nothing-missing\","),
+                "with names",
+            ),
             (&nan, "report.json"),
         ] {
             let error = parse(text.as_bytes()).unwrap_err();

@@ -106,7 +106,9 @@ pub enum ScoreError {
         parts: u32,
     },
     /// Draws have no result.
-    #[error("{folder}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end")]
+    #[error(
+        "{folder}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
+    )]
     MissingRuns {
         /// Folder of the study.
         folder: String,
@@ -202,8 +204,12 @@ fn check_shards(studies: &[Study]) -> Result<(), ScoreError> {
 }
 
 fn check_complete(study: &Study, label: &str) -> Result<(), ScoreError> {
-    let missing: Vec<_> =
-        study.draws.iter().map(|draw| draw.number).filter(|number| !study.run(label, *number).exists()).collect();
+    let missing: Vec<_> = study
+        .draws
+        .iter()
+        .map(|draw| draw.number)
+        .filter(|number| !study.run(label, *number).exists())
+        .collect();
     let Some(first) = missing.first() else { return Ok(()) };
     let folder = study.root.display().to_string();
     Err(ScoreError::MissingRuns { folder, label: label.to_owned(), count: missing.len(), first: *first })
@@ -226,9 +232,11 @@ fn case(
     limits: Option<&Limits>,
 ) -> Case {
     let recipe = &draw.recipe;
-    let members: Vec<Vec<Member>> =
-        classes.map_or_else(Vec::new, |classes| classes.hidden.iter().map(|hidden| hidden.members.clone()).collect());
-    let over_limit: Vec<_> = (0..recipe.hidden.len()).map(|at| over_limit(draw, at, classes, limits)).collect();
+    let members: Vec<Vec<Member>> = classes.map_or_else(Vec::new, |classes| {
+        classes.hidden.iter().map(|hidden| hidden.members.clone()).collect()
+    });
+    let over_limit: Vec<_> =
+        (0..recipe.hidden.len()).map(|at| over_limit(draw, at, classes, limits)).collect();
     let twins = recipe.hidden.iter().enumerate().any(|(at, _)| {
         let others = recipe.hidden.iter().enumerate().filter(|(other, _)| *other != at);
         let own = members.get(at);
@@ -250,7 +258,10 @@ fn case(
         judgement: judge(draw, &members, &result.taken, report),
         wall_s: result.taken.wall_s,
         memory_kib: result.taken.memory_kib,
-        repeat: format!("scripts/study run --out {root} --only {} --label again --program PROGRAM", draw.number),
+        repeat: format!(
+            "scripts/study run --out {root} --only {} --label again --program PROGRAM",
+            draw.number
+        ),
     }
 }
 

@@ -79,7 +79,9 @@ mkdir out && echo '{"verdict": "nothing-missing"}' >out/report.json"#;
 #[test]
 fn a_program_sees_copies_in_an_empty_folder_and_its_report_is_kept() {
     // $9 is the folder: after the shift only what the study adds is left.
-    let bench = Bench::new(&ANSWERS.replace("shift 9; [ \"$1\" = \"\" ] && exit 8", "shift 9; [ \"$1\" = --more ] || exit 8"));
+    let bench = Bench::new(
+        &ANSWERS.replace("shift 9; [ \"$1\" = \"\" ] && exit 8", "shift 9; [ \"$1\" = --more ] || exit 8"),
+    );
     assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete);
     for draw in &bench.study.draws {
         let result = read_result(&bench.path(draw.number, "result.json")).unwrap();

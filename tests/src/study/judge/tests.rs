@@ -29,9 +29,9 @@ fn twin(effect: &str, place: &str, cosine: f64) -> Member {
 fn entry(text: &str) -> String {
     let (name, alternatives) = text.split_once('[').unwrap_or((text, ""));
     let (effect, place) = name.split_once('@').unwrap_or((name, "drive"));
-    let (axis, element) = place.split_once('.').map_or((place, "null".to_owned()), |(axis, element)| {
-        (axis, format!("\"{element}\""))
-    });
+    let (axis, element) = place
+        .split_once('.')
+        .map_or((place, "null".to_owned()), |(axis, element)| (axis, format!("\"{element}\"")));
     let alternatives: Vec<_> =
         alternatives.trim_end_matches(']').split(',').filter(|name| !name.is_empty()).map(entry).collect();
     format!(
@@ -143,8 +143,10 @@ fn nothing_hidden_and_something_named_is_a_false_alarm() {
     assert!(alarm(said("ambiguous", &["inclination[valve-offset]"])));
     assert!(alarm(said("outside-catalogue", &[])));
     assert!(!alarm(said("nothing-missing", &[])));
-    assert!(!alarm(parse(br#"{"verdict": "parameters-only", "parameters": [{"name": "parameter:mass",
-        "value": 5.1, "unit": "kg", "standard_error": 0.1}]}"#)));
+    assert!(!alarm(parse(
+        br#"{"verdict": "parameters-only", "parameters": [{"name": "parameter:mass",
+        "value": 5.1, "unit": "kg", "standard_error": 0.1}]}"#
+    )));
 }
 
 #[test]

@@ -124,7 +124,12 @@ impl Tables {
             splits: splits(&singles),
             effects: SHEETS
                 .iter()
-                .map(|sheet| split(sheet.name, singles.iter().copied().filter(|case| hidden(case).effect == sheet.name)))
+                .map(|sheet| {
+                    split(
+                        sheet.name,
+                        singles.iter().copied().filter(|case| hidden(case).effect == sheet.name),
+                    )
+                })
                 .collect(),
             confusion: SHEETS
                 .iter()
@@ -136,7 +141,9 @@ impl Tables {
             numbers: numbers(&singles),
             wall_s: Spread::of(cases.iter().map(|case| case.wall_s)),
             memory_mib: Spread::of(cases.iter().map(|case| case.memory_kib as f64 / 1024.0)),
-            claimed_closed_ratio: Spread::of(named_right.filter_map(|case| case.judgement.claimed_closed_ratio)),
+            claimed_closed_ratio: Spread::of(
+                named_right.filter_map(|case| case.judgement.claimed_closed_ratio),
+            ),
             errors,
         }
     }
@@ -173,7 +180,11 @@ fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
     let all_right = |case: &Case| case.judgement.hidden.iter().all(|hidden| hidden.right);
     let alone_in_class = |case: &&Case| hidden(case).class_size == 1;
     vec![
-        line("one effect, 3 x limit and more: its class among the names", "at least 95 %", Rate::of(clear(), right)),
+        line(
+            "one effect, 3 x limit and more: its class among the names",
+            "at least 95 %",
+            Rate::of(clear(), right),
+        ),
         line(
             "the same, alone in its class: right alone",
             "at least 85 %",
@@ -184,7 +195,11 @@ fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
             "all",
             Rate::of(clear().filter(|case| right(case)), |case| hidden(case).where_right),
         ),
-        line("nothing hidden: called missing", "at most 2 %", Rate::of(nulls(), |case| case.judgement.false_alarm)),
+        line(
+            "nothing hidden: called missing",
+            "at most 2 %",
+            Rate::of(nulls(), |case| case.judgement.false_alarm),
+        ),
         line(
             "a parameter off: reported, no effect named",
             "all",
@@ -196,7 +211,11 @@ fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
             Rate::of(parameters(), |case| case.judgement.false_alarm),
         ),
         line("two effects, separable: both classes named", "at least 80 %", Rate::of(pairs(), all_right)),
-        line("two effects, separable: no third", "at least 90 %", Rate::of(pairs(), |case| case.judgement.too_many == 0)),
+        line(
+            "two effects, separable: no third",
+            "at least 90 %",
+            Rate::of(pairs(), |case| case.judgement.too_many == 0),
+        ),
         line("three effects, separable: all classes named", "no target", Rate::of(triples(), all_right)),
         line(
             "no good report (crash, time limit, bad JSON, refused)",
@@ -207,7 +226,8 @@ fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
 }
 
 fn splits(singles: &[&Case]) -> Vec<Split> {
-    let part = |name: &str, is: &dyn Fn(&Case) -> bool| split(name, singles.iter().copied().filter(|case| is(case)));
+    let part =
+        |name: &str, is: &dyn Fn(&Case) -> bool| split(name, singles.iter().copied().filter(|case| is(case)));
     let between = |least: f64, most: f64| {
         move |case: &Case| over_limit(case).is_some_and(|ratio| ratio >= least && ratio < most)
     };
@@ -255,14 +275,19 @@ fn row<'a>(truth: &str, cases: impl Iterator<Item = &'a Case>) -> ConfusionRow {
 
 fn nothing_hidden(cases: &[Case]) -> Vec<ConfusionRow> {
     let nulls = |off| of_kind(cases, Kind::Null).filter(move |case| case.wrong_parameters == off);
-    let mut rows = vec![row("nothing, parameters right", nulls(false)), row("nothing, parameters off by 1 to 3 %", nulls(true))];
+    let mut rows = vec![
+        row("nothing, parameters right", nulls(false)),
+        row("nothing, parameters off by 1 to 3 %", nulls(true)),
+    ];
     let wrong = |case: &Case| {
         let name = case.recipe["wrong_parameters"][0]["name"].as_str();
         name.unwrap_or_default().to_owned()
     };
-    rows.extend(crate::study::draws::ALONE.iter().map(|name| {
-        row(name, of_kind(cases, Kind::Parameter).filter(|case| wrong(case) == *name))
-    }));
+    rows.extend(
+        crate::study::draws::ALONE
+            .iter()
+            .map(|name| row(name, of_kind(cases, Kind::Parameter).filter(|case| wrong(case) == *name))),
+    );
     rows
 }
 
@@ -283,7 +308,9 @@ fn numbers(singles: &[&Case]) -> Numbers {
         untold: singles
             .iter()
             .filter(|case| case.judgement.top && hidden(case).where_right)
-            .filter(|case| !hidden(case).numbers.iter().any(|number| number.amplitude && number.covered.is_some()))
+            .filter(|case| {
+                !hidden(case).numbers.iter().any(|number| number.amplitude && number.covered.is_some())
+            })
             .count(),
     }
 }

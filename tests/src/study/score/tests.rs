@@ -78,12 +78,15 @@ fn whoever_tells_the_truth_has_all_points() {
     for rate in [all.class_right, all.top, all.alone, all.where_right] {
         assert_eq!((rate.count, rate.of), (38, 38));
     }
-    let rate = |name: &str| score.tables.headline.iter().find(|line| line.name.starts_with(name)).unwrap().rate;
+    let rate =
+        |name: &str| score.tables.headline.iter().find(|line| line.name.starts_with(name)).unwrap().rate;
     assert_eq!((rate("nothing hidden").count, rate("nothing hidden").of), (0, 2));
     assert_eq!(rate("a parameter off: reported").count, 4);
     assert_eq!(rate("no good report").count, 0);
-    assert_eq!(score.tables.numbers.covered.count, 38);
-    assert_eq!(score.tables.numbers.off_ratio.quantiles.unwrap()[3], 0.0);
+    let foreign = score.cases.iter().filter(|case| case.kind == Kind::Single && case.foreign_form).count();
+    assert_eq!(score.tables.numbers.covered.count, 38 - foreign);
+    // Reading JSON may round the last digit.
+    assert!(score.tables.numbers.off_ratio.quantiles.unwrap()[3] < 1e-15);
     assert_eq!(score.tables.claimed_closed_ratio.quantiles.unwrap()[0], 1.0);
     assert_eq!(score.tables.confusion[3].called[&score.tables.confusion[3].truth], [1, 1, 1]);
 

@@ -1,0 +1,121 @@
+//! Makes one record of the study by hand: `record_maker make --effect piston-leakage --place drive --value 2.5 --out A --truth B`.
+#![allow(clippy::print_stdout)] // This is what it is for.
+
+use plant::effects::SHEETS;
+use plant::{Axis, RigParameters};
+use std::error::Error;
+use std::path::PathBuf;
+use std::time::Instant;
+use system_tests::record_maker::{Experiment, Hidden, Recipe, comparison, simulate, write};
+
+const USAGE: &str =
+    "record_maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes]
+    [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form] [--wrong parameter:NAME=FACTOR]...
+    [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1]
+record_maker list
+record_maker compare";
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    match arguments.next().as_deref() {
+        Some("make") => make(arguments),
+        Some("list") => {
+            for sheet in SHEETS {
+                let keys: Vec<_> =
+                    sheet.keys.iter().map(|key| format!("{} {}", key.name, key.range())).collect();
+                println!("{} at {}: {}", sheet.name, sheet.place.names().join(", "), keys.join(", "));
+            }
+            Ok(())
+        }
+        Some("compare") => compare(),
+        _ => Err(USAGE.into()),
+    }
+}
+
+/// Null records of all experiments against the plant, as Markdown.
+fn compare() -> Result<(), Box<dyn Error>> {
+    let rig = RigParameters::baseline();
+    println!("| record | signal | rms | window 50 % | 90 % | 99 % | worst | left out | free run |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for (axis, both_axes) in [(Axis::Drive, false), (Axis::Load, false), (Axis::Drive, true)] {
+        for experiment in [Experiment::Train, Experiment::HeldOut(0), Experiment::HeldOut(1)] {
+            let record = simulate(&Recipe { axis, both_axes, experiment, ..Recipe::default() }, &rig)?;
+            let windows = comparison::against_plant(&record, &rig, comparison::WINDOW)?;
+            let free = comparison::against_plant(&record, &rig, record.rows.len())?;
+            for axis in Axis::ALL.into_iter().filter(|own| both_axes || *own == axis) {
+                let linked = if both_axes { "linked, " } else { "" };
+                for (signal, name) in comparison::SIGNALS.iter().enumerate() {
+                    let difference = &windows[axis.index()][signal];
+                    let [half, most, nearly, worst] =
+                        [50.0, 90.0, 99.0, 100.0].map(|p| difference.percentile(p));
+                    println!(
+                        "| {linked}{} {experiment:?} | {name} | {:.3} | {half:.4} | {most:.3} | {nearly:.3} | {worst:.2} | {} of {} | {:.2} |",
+                        axis.name(),
+                        difference.rms(),
+                        difference.left_out[0],
+                        difference.left_out[1],
+                        free[axis.index()][signal].rms(),
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error>> {
+    let (mut recipe, mut out, mut truth) = (Recipe::default(), None, None);
+    let (mut name, mut place) = (None, None);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{argument} needs a value\n{USAGE}"));
+        match argument.as_str() {
+            "--out" => out = Some(PathBuf::from(value()?)),
+            "--truth" => truth = Some(PathBuf::from(value()?)),
+            "--seed" => recipe.seed = value()?.parse()?,
+            "--axis" => recipe.axis = if value()? == "load" { Axis::Load } else { Axis::Drive },
+            "--both-axes" => recipe.both_axes = true,
+            "--foreign-form" => recipe.foreign_form = true,
+            "--coloured-noise" => recipe.coloured_noise = true,
+            "--jitter" => recipe.jitter = true,
+            "--noise" => recipe.noise = value()?.parse()?,
+            "--experiment" => {
+                recipe.experiment = match value()?.as_str() {
+                    "train" => Experiment::Train,
+                    "held-out-0" => Experiment::HeldOut(0),
+                    "held-out-1" => Experiment::HeldOut(1),
+                    other => return Err(format!("--experiment {other}\n{USAGE}").into()),
+                }
+            }
+            "--wrong" => {
+                let text = value()?;
+                let (name, factor) = text.split_once('=').ok_or(USAGE)?;
+                recipe.wrong_parameters.push((name.to_owned(), factor.parse()?));
+            }
+            "--effect" => name = Some(value()?),
+            "--place" => place = Some(value()?),
+            "--value" => {
+                let (name, place) = (name.take().ok_or(USAGE)?, place.take().ok_or(USAGE)?);
+                recipe.hidden.push(hidden(&name, &place, &value()?)?);
+            }
+            other => return Err(format!("{other}?\n{USAGE}").into()),
+        }
+    }
+    let (out, truth) = (out.ok_or(USAGE)?, truth.ok_or(USAGE)?);
+    let began = Instant::now();
+    let record = simulate(&recipe, &RigParameters::baseline())?;
+    println!("{} rows in {:.2} s", record.rows.len(), began.elapsed().as_secs_f64());
+    write(&record, &out, &truth)?;
+    Ok(())
+}
+
+/// An effect by its place's name; keys that are not given have their defaults.
+fn hidden(name: &str, place: &str, values: &str) -> Result<Hidden, Box<dyn Error>> {
+    let sheet = plant::effects::sheet(name).ok_or_else(|| format!("no effect {name}; see `list`"))?;
+    let place = sheet.place_named(place).ok_or_else(|| format!("{name} is not at {place}; see `list`"))?;
+    let given = values.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>()?;
+    let number = |(index, key): (usize, &plant::effects::sheet::EffectKey)| {
+        given.get(index).copied().or(key.default).ok_or_else(|| format!("{name}: {} is missing", key.name))
+    };
+    let numbers = sheet.keys.iter().enumerate().map(number).collect::<Result<_, _>>()?;
+    Ok(Hidden { name: sheet.name, place, numbers })
+}

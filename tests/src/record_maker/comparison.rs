@@ -1,0 +1,157 @@
+//! A null record against the plant at the same inputs: the record's own valve commands, in windows of equal start and in one run.
+//!
+//! ```text
+//!   window    plant set to the record's true state, 100 ms under the record's commands      difference / noise at each ms
+//!   free run  plant set once, at the first row                                              the same, for information
+//! ```
+//!
+//! As rig-model.md has it (Accuracy), single samples of the force at stick and contact events are left out of its figure: those in
+//! which one of both holds the piston and the other does not, or in which the piston was caught or let go since the last one, or
+//! the contact made or lost. They are counted.
+
+use super::{Record, Row};
+use plant::{Inputs, Plant, RigParameters, Setup, SetupError, State};
+
+/// Length of a window, rows.
+pub const WINDOW: usize = 100;
+
+/// Names of the signals of an axis, in the order of [`Row::without_noise`].
+pub const SIGNALS: [&str; 4] = ["position", "force", "pressure a", "pressure b"];
+
+/// Differences of one signal in units of its sensor's noise.
+#[derive(Debug, Clone, Default)]
+pub struct Difference {
+    /// Rms of each window.
+    pub windows: Vec<f64>,
+    /// Samples left out, of all.
+    pub left_out: [usize; 2],
+    squares: f64,
+    samples: usize,
+}
+
+/// Of both axes and their signals; empty for an axis that rests.
+pub type Differences = [[Difference; 4]; 2];
+
+impl Difference {
+    /// Rms over all samples.
+    #[must_use]
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.samples.max(1) as f64).sqrt()
+    }
+
+    /// The window's rms that so many per cent of the windows do not exceed.
+    #[must_use]
+    pub fn percentile(&self, percent: f64) -> f64 {
+        let mut sorted = self.windows.clone();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.len().saturating_sub(1);
+        sorted.get((percent / 100.0 * last as f64).round() as usize).copied().unwrap_or(0.0)
+    }
+
+    fn add(&mut self, window: &Window) {
+        if window.samples > 0 {
+            self.windows.push((window.squares / window.samples as f64).sqrt());
+        }
+        self.squares += window.squares;
+        self.samples += window.samples;
+        self.left_out[0] += window.left_out;
+        self.left_out[1] += window.left_out + window.samples;
+    }
+}
+
+#[derive(Default)]
+struct Window {
+    squares: f64,
+    samples: usize,
+    left_out: usize,
+}
+
+/// Compares a record with the plant of `rig` in windows of `rows`, each from the record's true state.
+///
+/// # Errors
+/// [`SetupError`] when a true state is none that the plant can be in.
+pub fn against_plant(record: &Record, rig: &RigParameters, rows: usize) -> Result<Differences, SetupError> {
+    let mut differences = Differences::default();
+    let recorded = |i: usize| record.recipe.both_axes || record.recipe.axis.index() == i;
+    for rows in record.rows.chunks(rows) {
+        let mut plant = Plant::in_state(rig, &state(record, rig, &rows[0])?)?;
+        let mut windows: [[Window; 4]; 2] = Default::default();
+        let mut held_before = [[true; 2]; 2];
+        let mut touched_before = false;
+        for (at, row) in rows.iter().enumerate() {
+            let inputs = Inputs { valve: row.valve, ..Inputs::default() };
+            let truth = plant.truth(&inputs);
+            let touched = row.contact_force_n != 0.0 || truth.contact_force_n != 0.0;
+            let both = (row.contact_force_n != 0.0) == (truth.contact_force_n != 0.0);
+            let contact_event = !both || touched != touched_before;
+            touched_before = touched;
+            for i in (0..2).filter(|i| recorded(*i)) {
+                let other = &truth.axes[i];
+                let held = [row.axes[i].rod_velocity_m_per_s == 0.0, other.rod_velocity_m_per_s == 0.0];
+                let event = contact_event || held[0] != held[1] || held != held_before[i];
+                held_before[i] = held;
+                let mounted_m = [0.0, rig.sensors().load_position_offset_m][i];
+                let shown = [
+                    other.position_m + mounted_m,
+                    other.sensor_force_n,
+                    other.pressure_a_pa,
+                    other.pressure_b_pa,
+                ];
+                let noise = noises(rig);
+                for signal in 0..4 {
+                    let window = &mut windows[i][signal];
+                    if signal == 1 && at > 0 && event {
+                        window.left_out += 1;
+                        continue;
+                    }
+                    let difference = (row.without_noise[i][signal] - shown[signal]) / noise[signal];
+                    window.squares += difference * difference;
+                    window.samples += 1;
+                }
+            }
+            plant.step(&inputs);
+        }
+        for i in (0..2).filter(|i| recorded(*i)) {
+            for signal in 0..4 {
+                differences[i][signal].add(&windows[i][signal]);
+            }
+        }
+    }
+    Ok(differences)
+}
+
+/// Noise of position, force and pressures, SI.
+fn noises(rig: &RigParameters) -> [f64; 4] {
+    let sensors = rig.sensors();
+    [sensors.position_noise_m, sensors.force_noise_n, sensors.pressure_noise_pa, sensors.pressure_noise_pa]
+}
+
+/// The plant's state at a row; what a record does not hold is that of a start.
+fn state(record: &Record, rig: &RigParameters, row: &Row) -> Result<State, SetupError> {
+    let setup = Setup { linked: record.linked, added_mass_kg: record.added_mass_kg, ..Setup::default() };
+    let mut state = *Plant::new(rig, &setup)?.state();
+    for (axis, truth) in state.axes.iter_mut().zip(&row.axes) {
+        axis.extension_m = truth.extension_m;
+        axis.rod_velocity_m_per_s = truth.rod_velocity_m_per_s;
+        axis.spool = truth.spool;
+        [axis.stored_air_a_j, axis.stored_air_b_j] = truth.stored_air_j;
+        [axis.flow_a_m3_per_s, axis.flow_b_m3_per_s] = truth.flow_m3_per_s;
+    }
+    state.supply_pressure_pa = row.supply_pressure_pa;
+    Ok(state)
+}
+
+/// Compares two records of the same commands, the second made in parts that begin where the first one is; as
+/// [`against_plant`], for studies of the step.
+#[must_use]
+pub fn between(rows: &[Row], others: &[Row], rig: &RigParameters) -> [[f64; 4]; 2] {
+    let noise = noises(rig);
+    let rms = |i: usize, signal: usize| {
+        let squares = rows.iter().zip(others).map(|(row, other)| {
+            let difference = row.without_noise[i][signal] - other.without_noise[i][signal];
+            (difference / noise[signal]).powi(2)
+        });
+        (squares.sum::<f64>() / rows.len().max(1) as f64).sqrt()
+    };
+    [0, 1].map(|i| [0, 1, 2, 3].map(|signal| rms(i, signal)))
+}

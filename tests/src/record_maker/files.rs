@@ -1,0 +1,191 @@
+//! Files of a record: `measurement.csv` for whoever names the effect, `truth.csv` and `truth.json` for the judge, in two folders.
+//!
+//! The measurement holds time and the columns of the recorded axes, no others [rig-model.md, Measurement file]. Numbers have the
+//! fewest digits that read back to the same bits.
+
+use super::{Experiment, MakeError, Recipe, Record, Row, TrueAxis, hidden, simulate};
+use plant::{Axis, RigParameters};
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::path::Path;
+
+/// Columns of an axis after its prefix, as in every measurement file.
+const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
+/// Columns of an axis in the truth.
+const TRUE: [&str; 21] = [
+    "extension_m",
+    "rod_velocity_m_per_s",
+    "rod_acceleration_m_per_s2",
+    "spool",
+    "pressure_a_Pa",
+    "pressure_b_Pa",
+    "stored_air_a_J",
+    "stored_air_b_J",
+    "temperature_a_K",
+    "temperature_b_K",
+    "flow_a_m3_per_s",
+    "flow_b_m3_per_s",
+    "edge_flow_a_m3_per_s",
+    "edge_flow_b_m3_per_s",
+    "exhaust_pressure_Pa",
+    "pneumatic_force_N",
+    "friction_N",
+    "position_without_noise_m",
+    "force_without_noise_N",
+    "pressure_a_without_noise_Pa",
+    "pressure_b_without_noise_Pa",
+];
+
+/// Makes a record and writes it: `measurement.csv` into one folder, `truth.csv` and `truth.json` into another.
+///
+/// # Errors
+/// As [`simulate`], and when a file cannot be written.
+pub fn make(recipe: &Recipe, rig: &RigParameters, measurement: &Path, truth: &Path) -> Result<(), MakeError> {
+    write(&simulate(recipe, rig)?, measurement, truth)
+}
+
+/// Writes a record's files into both folders, which are made if missing.
+///
+/// # Errors
+/// [`MakeError::File`].
+pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), MakeError> {
+    save(measurement, "measurement.csv", &measurement_csv(record))?;
+    save(truth, "truth.csv", &truth_csv(record))?;
+    let mut text = format!("{:#}", truth_json(&record.recipe)?);
+    text.push('\n');
+    save(truth, "truth.json", text.as_bytes())
+}
+
+fn save(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), MakeError> {
+    let path = folder.join(name);
+    let failed = |error| MakeError::File { path: path.display().to_string(), error };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    std::fs::write(&path, bytes).map_err(failed)
+}
+
+fn recorded(record: &Record) -> impl Iterator<Item = Axis> + use<> {
+    let (both, one) = (record.recipe.both_axes, record.recipe.axis);
+    Axis::ALL.into_iter().filter(move |axis| both || *axis == one)
+}
+
+/// `measurement.csv`.
+pub(super) fn measurement_csv(record: &Record) -> Vec<u8> {
+    let mut out = Vec::with_capacity(record.rows.len() * 64);
+    put(&mut out, format_args!("# linked={} added_mass_kg={}\ntime_s", record.linked, record.added_mass_kg));
+    for axis in recorded(record) {
+        MEASURED.iter().for_each(|column| put(&mut out, format_args!(",{}_{column}", axis.name())));
+    }
+    for (cycle, row) in record.rows.iter().enumerate() {
+        put(&mut out, format_args!("\n{}.{:03}", cycle / 1000, cycle % 1000));
+        for axis in recorded(record) {
+            let readings = &row.readings[axis.index()];
+            let [position, force] = [readings.position.value, readings.force.value];
+            let [a, b] = [readings.pressure_a.value, readings.pressure_b.value];
+            put(&mut out, format_args!(",{},{position},{force},{a},{b}", row.valve[axis.index()]));
+        }
+    }
+    out.push(b'\n');
+    out
+}
+
+fn truth_csv(record: &Record) -> Vec<u8> {
+    let mut out = Vec::with_capacity(record.rows.len() * 400);
+    put(&mut out, format_args!("time_s"));
+    for axis in recorded(record) {
+        TRUE.iter().for_each(|column| put(&mut out, format_args!(",{}_{column}", axis.name())));
+    }
+    put(&mut out, format_args!(",supply_pressure_Pa,linkage_contact_force_N"));
+    for (cycle, row) in record.rows.iter().enumerate() {
+        put(&mut out, format_args!("\n{}.{:03}", cycle / 1000, cycle % 1000));
+        for axis in recorded(record) {
+            // Debug, for tiny numbers with an exponent: Display would spell out their zeros.
+            values(row, axis).iter().for_each(|value| put(&mut out, format_args!(",{value:?}")));
+        }
+        put(&mut out, format_args!(",{:?},{:?}", row.supply_pressure_pa, row.contact_force_n));
+    }
+    out.push(b'\n');
+    out
+}
+
+/// In the order of [`TRUE`].
+fn values(row: &Row, axis: Axis) -> [f64; TRUE.len()] {
+    let TrueAxis {
+        extension_m,
+        rod_velocity_m_per_s,
+        rod_acceleration_m_per_s2,
+        spool,
+        pressure_pa,
+        stored_air_j,
+        temperature_k,
+        flow_m3_per_s,
+        edge_flow_m3_per_s,
+        exhaust_pressure_pa,
+        pneumatic_force_n,
+        friction_n,
+    } = row.axes[axis.index()];
+    let [position, force, a, b] = row.without_noise[axis.index()];
+    [
+        extension_m,
+        rod_velocity_m_per_s,
+        rod_acceleration_m_per_s2,
+        spool,
+        pressure_pa[0],
+        pressure_pa[1],
+        stored_air_j[0],
+        stored_air_j[1],
+        temperature_k[0],
+        temperature_k[1],
+        flow_m3_per_s[0],
+        flow_m3_per_s[1],
+        edge_flow_m3_per_s[0],
+        edge_flow_m3_per_s[1],
+        exhaust_pressure_pa,
+        pneumatic_force_n,
+        friction_n,
+        position,
+        force,
+        a,
+        b,
+    ]
+}
+
+/// The recipe, complete: effects with their place and numbers as reports name them.
+fn truth_json(recipe: &Recipe) -> Result<Value, MakeError> {
+    let hidden = recipe.hidden.iter().map(|hidden| {
+        let keys = hidden::sheet(hidden)?.keys.iter().zip(&hidden.numbers);
+        let parameters: Vec<_> = keys
+            .map(|(key, value)| json!({ "name": key.name, "value": value, "unit": key.unit.name() }))
+            .collect();
+        let place = json!({
+            "axis": hidden.place.part.name(),
+            "element": hidden.place.element.map(|element| element.name()),
+        });
+        Ok(json!({ "effect": hidden.name, "where": place, "parameters": parameters }))
+    });
+    let experiment = match recipe.experiment {
+        Experiment::Train => json!("train"),
+        Experiment::HeldOut(number) => json!({ "held-out": number }),
+    };
+    let wrong: Vec<_> = recipe
+        .wrong_parameters
+        .iter()
+        .map(|(name, factor)| json!({ "name": name, "factor": factor }))
+        .collect();
+    Ok(json!({
+        "schema_version": 1,
+        "seed": recipe.seed,
+        "axis": recipe.axis.name(),
+        "both_axes": recipe.both_axes,
+        "hidden": hidden.collect::<Result<Vec<_>, MakeError>>()?,
+        "foreign_form": recipe.foreign_form,
+        "wrong_parameters": wrong,
+        "coloured_noise": recipe.coloured_noise,
+        "jitter": recipe.jitter,
+        "noise": recipe.noise,
+        "experiment": experiment,
+    }))
+}
+
+fn put(out: &mut Vec<u8>, text: std::fmt::Arguments<'_>) {
+    out.write_fmt(text).expect("memory takes every byte");
+}

@@ -1,0 +1,196 @@
+//! Between valve and chamber: line resistance, check valve and cushion in series, and the flow that fits them all.
+//!
+//! ```text
+//!   far side ── edges ── p_port ── line ── check valve ── cushion ── p_chamber          Q = E(p_port), p_port = p_chamber + drop(Q)
+//! ```
+//!
+//! E falls with p_port and the drop grows with Q, so `Q - E(p_chamber + drop(Q))` has one root between 0 and the flow without
+//! drops. It is found by the Illinois rule [Dowell, Jarratt 1971, BIT 11]. Flows are normal flows into the chamber, m^3/s.
+
+use super::numbers::{CONDUCTANCE_PER_KV, Numbers};
+use super::valve::flow;
+
+/// What is on between valve and chamber; SI.
+#[derive(Debug, Clone, Default)]
+pub(super) struct PortLaws {
+    pub(super) foreign: bool,
+    /// Drop of the line at the reference flow, Pa.
+    pub(super) line_drop_pa: f64,
+    /// Cracking pressure, Pa, and K_V of the seat, m^3/h.
+    pub(super) check_valve: Option<[f64; 2]>,
+    /// K_V of the cushion, m^3/h, and its length, m.
+    pub(super) cushion: Option<[f64; 2]>,
+}
+
+/// The ports of one axis.
+#[derive(Debug, Clone)]
+pub(super) struct Ports {
+    laws: PortLaws,
+    full_flow_m3_per_s: f64,
+    reference_pa: f64,
+}
+
+/// Exponent of the foreign line: Blasius' law for smooth turbulent pipes.
+const BLASIUS: f64 = 1.75;
+/// The foreign check valve opens over this share of the full flow.
+const OPENS_OVER: f64 = 0.03;
+/// The foreign cushion is this much wider at its beginning than at the end.
+const TAPER: f64 = 1.0;
+/// Flows below are none, of the full one.
+const NEGLIGIBLE: f64 = 1e-9;
+
+impl Ports {
+    pub(super) fn new(numbers: &Numbers, laws: PortLaws) -> Self {
+        Ports {
+            laws,
+            full_flow_m3_per_s: numbers.full_flow_m3_per_s(),
+            reference_pa: numbers.supply_pa / 2.0,
+        }
+    }
+
+    /// The port's pressure, Pa, and the flow, m^3/s, for a chamber whose piston face is `to_end_m` from its end.
+    ///
+    /// `edges` is the flow of all edges into the chamber at a port pressure, m^3/s, falling.
+    #[inline(always)]
+    pub(super) fn pressure(&self, chamber_pa: f64, to_end_m: f64, edges: impl Fn(f64) -> f64) -> (f64, f64) {
+        let laws = &self.laws;
+        let cushioned = laws.cushion.is_some_and(|[_, length_m]| to_end_m < length_m);
+        if laws.line_drop_pa == 0.0 && laws.check_valve.is_none() && !cushioned {
+            return (chamber_pa, edges(chamber_pa));
+        }
+        self.solve(chamber_pa, to_end_m, edges)
+    }
+
+    fn solve(&self, chamber_pa: f64, to_end_m: f64, edges: impl Fn(f64) -> f64) -> (f64, f64) {
+        let free = edges(chamber_pa);
+        let least = NEGLIGIBLE * self.full_flow_m3_per_s;
+        if free.abs() <= least {
+            return (chamber_pa, free);
+        }
+        let direction = free.signum();
+        let miss = |flow: f64| {
+            let port_pa = self.beyond(direction * flow, chamber_pa, to_end_m);
+            (flow - direction * edges(port_pa), port_pa)
+        };
+        // The limit of a small flow: what the check valve needs to crack.
+        let (mut low, mut high) = (0.0, free.abs());
+        let (mut miss_low, port_pa) = miss(least * 1e-3);
+        if miss_low >= 0.0 {
+            return (port_pa, 0.0);
+        }
+        let (mut miss_high, mut port_pa) = miss(high);
+        let mut found = high;
+        for _ in 0..60 {
+            if high - low <= 1e-9 * self.full_flow_m3_per_s {
+                break;
+            }
+            let tried = (low * miss_high - high * miss_low) / (miss_high - miss_low);
+            let missed;
+            (missed, port_pa) = miss(tried);
+            found = tried;
+            if missed.abs() <= 1e-9 * self.full_flow_m3_per_s {
+                break;
+            }
+            if missed > 0.0 {
+                (high, miss_high) = (tried, missed);
+                miss_low /= 2.0;
+            } else {
+                (low, miss_low) = (tried, missed);
+                miss_high /= 2.0;
+            }
+        }
+        (port_pa, direction * found)
+    }
+
+    /// Pressure on the valve's side of the port at a flow, Pa.
+    fn beyond(&self, flow: f64, chamber_pa: f64, to_end_m: f64) -> f64 {
+        let (laws, direction) = (&self.laws, flow.signum());
+        let mut pa = chamber_pa;
+        if let Some([kv, length_m]) = laws.cushion
+            && to_end_m < length_m
+            && flow < 0.0
+        {
+            let wider = if laws.foreign { 1.0 + TAPER * (to_end_m / length_m).max(0.0) } else { 1.0 };
+            pa = behind_orifice(CONDUCTANCE_PER_KV * kv * wider, flow, pa);
+        }
+        if let Some([cracking_pa, kv]) = laws.check_valve {
+            let opened = flow.abs() / self.full_flow_m3_per_s;
+            let share = if laws.foreign { 0.7 + 0.3 * libm::tanh(opened / OPENS_OVER) } else { 1.0 };
+            pa = behind_orifice(CONDUCTANCE_PER_KV * kv, flow, pa) + direction * cracking_pa * share;
+        }
+        if laws.line_drop_pa > 0.0 && pa > 0.0 {
+            let share = flow.abs() / self.full_flow_m3_per_s;
+            let grown = if laws.foreign { libm::pow(share, BLASIUS) } else { share * share };
+            pa += direction * laws.line_drop_pa * grown * self.reference_pa / pa;
+        }
+        pa.max(0.0)
+    }
+}
+
+/// Pressure on the other side of an orifice with `pa` on the chamber's; 0 where it would have to pass more than it can.
+fn behind_orifice(c: f64, flow: f64, pa: f64) -> f64 {
+    let throat = flow / c;
+    if flow > 0.0 {
+        // Upstream of the chamber: subsonic, or choked.
+        let subsonic = pa + throat * throat / pa;
+        return if subsonic <= 2.0 * pa { subsonic } else { 2.0 * throat };
+    }
+    let root = pa * pa / 4.0 - throat * throat;
+    if root < 0.0 { 0.0 } else { pa / 2.0 + root.sqrt() }
+}
+
+/// A volume that both chambers' exhausts, or both axes' supplies, have in common; SI.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Node {
+    pub(super) volume_m3: f64,
+    pub(super) outside_pa: f64,
+    pub(super) passage: Passage,
+}
+
+/// How a node is joined to what is outside.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Passage {
+    /// An orifice of this conductance, m^3/s per Pa.
+    Orifice(f64),
+    /// A flow in proportion to the difference, m^3/s per Pa.
+    Linear(f64),
+    /// A porous plug: in proportion to the difference of the squares, m^3/s per Pa^2.
+    Porous(f64),
+}
+
+impl Node {
+    /// The supply node behind a regulator that falls by `droop_pa` when one full supply edge draws.
+    pub(super) fn supply(numbers: &Numbers, [droop_pa, volume_m3]: [f64; 2], foreign: bool) -> Self {
+        let (full, set_pa) = (numbers.full_flow_m3_per_s(), numbers.supply_pa);
+        let passage = if foreign {
+            Passage::Linear(full / droop_pa)
+        } else {
+            Passage::Orifice(full / (droop_pa * (set_pa - droop_pa)).sqrt())
+        };
+        Node { volume_m3, outside_pa: set_pa, passage }
+    }
+
+    /// The volume behind both exhaust edges, vented by a silencer of `kv_ratio` times the exhaust edge.
+    pub(super) fn silencer(numbers: &Numbers, [kv_ratio, volume_m3]: [f64; 2], foreign: bool) -> Self {
+        let c = kv_ratio * numbers.exhaust_edge_m3_per_s_pa[numbers.opening.len() - 1];
+        let outside_pa = numbers.exhaust_pa;
+        // Sintered bronze instead of a hole; as much flow at half a bar.
+        let at_pa = outside_pa + SILENCERS_AGREE_PA;
+        let porous = flow(c, at_pa, outside_pa) / (at_pa * at_pa - outside_pa * outside_pa);
+        let passage = if foreign { Passage::Porous(porous) } else { Passage::Orifice(c) };
+        Node { volume_m3, outside_pa, passage }
+    }
+
+    /// Normal flow from outside into the node, m^3/s.
+    #[inline(always)]
+    pub(super) fn inflow(&self, node_pa: f64) -> f64 {
+        match self.passage {
+            Passage::Orifice(c) => flow(c, self.outside_pa, node_pa),
+            Passage::Linear(per_pa) => per_pa * (self.outside_pa - node_pa),
+            Passage::Porous(per_pa2) => per_pa2 * (self.outside_pa * self.outside_pa - node_pa * node_pa),
+        }
+    }
+}
+
+/// Back pressure at which both forms of the silencer pass as much, Pa.
+const SILENCERS_AGREE_PA: f64 = 0.5e5;

@@ -1,0 +1,427 @@
+//! Both axes of the record maker, moved by explicit midpoint steps that are short beside every time constant of the rig.
+//!
+//! ```text
+//!   stage 1   rates at t          truth for the sensors, break-away decided here
+//!   stage 2   rates at t + h/2    from the state half a step on; bristles by their exact exponential
+//!   end       y + h rates         then: caught if the velocity changed sign, ends of the stroke, bounds of the lagged flow
+//! ```
+//!
+//! It shares no code and no scheme with the plant, which goes by exact exponentials of 100 us and locates corners; here corners
+//! cost the length of a step. What both must agree on is rig-model.md. How far they agree stands in `tests/docs/record-maker.md`.
+
+use super::axis::{AIR, Air, Axis, EXHAUST, FLOW, LINE_LAG_SHARE, NORMAL, V, X, Y};
+use super::coupling::Coupling;
+use super::port::Node;
+use super::sensing::{CHANNELS, Sensing};
+use super::valve::Play;
+
+/// Steps in a millisecond: 10 us, a tenth of the plant's substep. See the table of convergence in the docs.
+pub(super) const STEPS_PER_MS: usize = 100;
+
+/// Periods that a late command may be old, and one.
+const COMMANDS: usize = 16;
+/// Slower than this a piston on bristles is at rest, m/s.
+const CREEP_M_PER_S: f64 = 1e-5;
+/// Share of the foreign dead time that is a lag.
+const LATE_LAG_SHARE: f64 = 0.2;
+
+/// Constant parts of the rig.
+#[derive(Debug, Clone)]
+pub(super) struct Rig {
+    pub(super) axes: [Axis; 2],
+    /// Axes that are moved; the other one rests.
+    pub(super) active: [bool; 2],
+    pub(super) coupling: Option<Coupling>,
+    pub(super) supply: Option<Node>,
+    /// Command dead time of each axis, s.
+    pub(super) late_s: [f64; 2],
+    pub(super) foreign: bool,
+    pub(super) steps_per_ms: usize,
+}
+
+/// Everything that changes.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    pub(super) y: [Y; 2],
+    /// Deflection of the bristles, m.
+    pub(super) bristles: [f64; 2],
+    /// Direction of sliding; 0 for a piston that is held.
+    pub(super) direction: [f64; 2],
+    pub(super) rest_since_s: [f64; 2],
+    pub(super) supply_pa: f64,
+    play: [Play; 2],
+    late: [f64; 2],
+    commands: [[f64; COMMANDS]; 2],
+    lines: [Line; 2],
+    pub(super) steps: u64,
+}
+
+/// What flowed through the valve in the middle of each of the last steps.
+#[derive(Debug, Clone, Default)]
+struct Line {
+    ring: Vec<[f64; 2]>,
+    leaves: [f64; 2],
+}
+
+/// What an evaluation of all laws gives.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Evaluated {
+    pub(super) rates: [Y; 2],
+    pub(super) air: [Air; 2],
+    pub(super) contact_n: f64,
+    pub(super) friction_n: [f64; 2],
+    supply_rate: f64,
+}
+
+/// Slow drift of the foreign forms' offsets at a time: 1 on average.
+pub(super) fn drift(time_s: f64) -> f64 {
+    1.0 + 0.15 * libm::sin(std::f64::consts::TAU * time_s / 13.0 + 0.7)
+}
+
+impl Rig {
+    /// At rest, extensions in m.
+    pub(super) fn start(&self, extension_m: [f64; 2]) -> State {
+        let y = [0, 1].map(|i| self.axes[i].start(extension_m[i]));
+        let line = |i: usize| {
+            let steps =
+                self.delay_steps(i).map_or(0, |steps| (steps.ceil() as usize + 2).next_power_of_two());
+            Line { ring: vec![[0.0; 2]; steps], leaves: [0.0; 2] }
+        };
+        State {
+            y,
+            bristles: [0.0; 2],
+            direction: [0.0; 2],
+            rest_since_s: [0.0; 2],
+            supply_pa: self.axes[0].numbers.supply_pa,
+            play: [Play::default(); 2],
+            late: [0.0; 2],
+            commands: [[0.0; COMMANDS]; 2],
+            lines: [line(0), line(1)],
+            steps: 0,
+        }
+    }
+
+    fn delay_steps(&self, axis: usize) -> Option<f64> {
+        let laws = &self.axes[axis].laws;
+        let pure = if laws.foreign { 1.0 - LINE_LAG_SHARE } else { 1.0 };
+        (laws.line_delay_s > 0.0).then(|| pure * laws.line_delay_s / self.step_s())
+    }
+
+    pub(super) fn step_s(&self) -> f64 {
+        1e-3 / self.steps_per_ms as f64
+    }
+
+    pub(super) fn time_s(&self, state: &State) -> f64 {
+        state.steps as f64 * self.step_s()
+    }
+
+    /// Moves by one period under these commands; the sensors see the truth of each step, `at_start` that of the first one.
+    pub(super) fn advance(
+        &self,
+        state: &mut State,
+        commands: [f64; 2],
+        sensing: &mut [Sensing; 2],
+        mut at_start: impl FnMut(&State, &Evaluated),
+    ) {
+        for (past, command) in state.commands.iter_mut().zip(commands) {
+            past.rotate_right(1);
+            past[0] = command;
+        }
+        for step in 0..self.steps_per_ms {
+            let targets = self.targets(state, step);
+            let first = self.evaluate_first(state, targets);
+            for i in 0..2 {
+                if self.active[i] {
+                    sensing[i].see(self.sensed(state, &first, i));
+                }
+            }
+            if step == 0 {
+                at_start(state, &first);
+            }
+            self.step(state, targets, &first);
+        }
+    }
+
+    /// True values of position, force, pressures of an axis, in rig coordinates.
+    pub(super) fn sensed(&self, state: &State, evaluated: &Evaluated, i: usize) -> [f64; CHANNELS] {
+        let axis = &self.axes[i];
+        let x = state.y[i][X];
+        let position = if i == 0 { x } else { axis.numbers.stroke_m - x };
+        let force = axis.numbers.behind_kg[i] * evaluated.rates[i][V] - evaluated.contact_n;
+        let [a, b] = evaluated.air[i].pressure_pa;
+        [position, force, a, b]
+    }
+
+    /// Where both spools are sent in a step of the period.
+    fn targets(&self, state: &mut State, step: usize) -> [f64; 2] {
+        let mut targets = [0.0; 2];
+        for (i, target) in targets.iter_mut().enumerate() {
+            if !self.active[i] {
+                continue;
+            }
+            let past = &state.commands[i];
+            let pure = if self.foreign { 1.0 - LATE_LAG_SHARE } else { 1.0 };
+            let late_s = self.late_s[i];
+            let mut command = past[0];
+            if late_s > 0.0 {
+                // Over the step; it meets at most one edge of the command.
+                let end_ms = (step + 1) as f64 / self.steps_per_ms as f64 - pure * late_s * 1e3;
+                let begin_ms = end_ms - 1.0 / self.steps_per_ms as f64;
+                let at = |ms: f64| past[((-ms.floor()).max(0.0) as usize).min(COMMANDS - 1)];
+                let before_edge = (end_ms.ceil() - 1.0 - begin_ms).max(0.0) * self.steps_per_ms as f64;
+                let share = before_edge.min(1.0);
+                command = share * at(begin_ms) + (1.0 - share) * at(end_ms - 1e-9);
+                if self.foreign {
+                    let kept = libm::exp(-self.step_s() / (LATE_LAG_SHARE * late_s));
+                    let before = state.late[i];
+                    state.late[i] = command + (before - command) * kept;
+                    command = (before + state.late[i]) / 2.0;
+                }
+            }
+            let drift =
+                if self.foreign { drift(state.steps as f64 * 1e-3 / self.steps_per_ms as f64) } else { 1.0 };
+            *target = self.axes[i].valve.target(command, &mut state.play[i], drift);
+        }
+        targets
+    }
+
+    /// Evaluates the laws at the start of a step, and lets go what is torn off.
+    fn evaluate_first(&self, state: &mut State, targets: [f64; 2]) -> Evaluated {
+        let lines = [0, 1].map(|i| self.delay_steps(i).map(|_| state.lines[i].leaves));
+        let time_s = self.time_s(state);
+        let rest_s = [0, 1].map(|i| time_s - state.rest_since_s[i]);
+        let mut direction = state.direction;
+        let at = Instant { y: &state.y, bristles: state.bristles, supply_pa: state.supply_pa, rest_s };
+        let evaluated = self.evaluate(&at, &mut direction, targets, lines, true);
+        state.direction = direction;
+        evaluated
+    }
+
+    fn evaluate(
+        &self,
+        at: &Instant<'_>,
+        direction: &mut [f64; 2],
+        targets: [f64; 2],
+        lines: [Option<[f64; 2]>; 2],
+        lets_go: bool,
+    ) -> Evaluated {
+        let mut evaluated = Evaluated::NONE;
+        let mut drawn = 0.0;
+        for i in 0..2 {
+            if !self.active[i] {
+                continue;
+            }
+            let (axis, y) = (&self.axes[i], &at.y[i]);
+            let air = axis.air(y, at.supply_pa);
+            drawn += air.drawn;
+            let line = lines[i].unwrap_or(air.edge_flow);
+            evaluated.rates[i] = axis.rates(y, &air, at.supply_pa, targets[i], line);
+            evaluated.air[i] = air;
+        }
+        if let Some(node) = &self.supply {
+            let normal_pa = self.axes[0].numbers.normal_pa;
+            evaluated.supply_rate = normal_pa * (node.inflow(at.supply_pa) - drawn) / node.volume_m3;
+        }
+        if let Some(coupling) = &self.coupling {
+            let stroke_m = self.axes[0].numbers.stroke_m;
+            let [drive, load] = at.y;
+            evaluated.contact_n = coupling.force(stroke_m - drive[X] - load[X], -drive[V] - load[V]);
+        }
+        for i in 0..2 {
+            if self.active[i] {
+                self.move_axis(i, at, direction, &mut evaluated, lets_go);
+            }
+        }
+        evaluated
+    }
+
+    /// Rates of x and v of one axis.
+    #[inline(always)]
+    fn move_axis(
+        &self,
+        i: usize,
+        at: &Instant<'_>,
+        direction: &mut [f64; 2],
+        evaluated: &mut Evaluated,
+        lets_go: bool,
+    ) {
+        let (axis, y) = (&self.axes[i], &at.y[i]);
+        let motion = &axis.motion;
+        let place = axis.at(y, &evaluated.air[i], at.rest_s[i]);
+        let pushed_n = evaluated.air[i].force_n + motion.pushes(y[X]) + evaluated.contact_n;
+        let stroke_m = axis.numbers.stroke_m;
+        let pressed = |force: f64| y[X] <= 0.0 && force < 0.0 || y[X] >= stroke_m && force > 0.0;
+        if motion.laws.presliding.is_some() {
+            let friction_n = motion.bristles(place, y[V], at.bristles[i]);
+            let sum = pushed_n + friction_n;
+            let held = y[V] == 0.0 && pressed(sum);
+            evaluated.friction_n[i] = friction_n;
+            evaluated.rates[i][X] = if held { 0.0 } else { y[V] };
+            evaluated.rates[i][V] = if held { 0.0 } else { sum / motion.mass_kg };
+            return;
+        }
+        if direction[i] == 0.0 && lets_go && !pressed(pushed_n) {
+            let way = if pushed_n < 0.0 { -1.0 } else { 1.0 };
+            if pushed_n.abs() > motion.break_away(place, way) {
+                direction[i] = way;
+            }
+        }
+        if direction[i] == 0.0 {
+            evaluated.friction_n[i] = -pushed_n;
+            return;
+        }
+        let friction_n = motion.sliding(place, y[V], direction[i]);
+        evaluated.friction_n[i] = friction_n;
+        evaluated.rates[i][X] = y[V];
+        evaluated.rates[i][V] = (pushed_n + friction_n) / motion.mass_kg;
+    }
+
+    /// Moves by one step from what its start was evaluated to.
+    fn step(&self, state: &mut State, targets: [f64; 2], first: &Evaluated) {
+        let h = self.step_s();
+        let rest_s = [0, 1].map(|i| self.time_s(state) - state.rest_since_s[i]);
+        let mut y = state.y;
+        let mut bristles = state.bristles;
+        for i in 0..2 {
+            if self.active[i] {
+                add(&mut y[i], &first.rates[i], h / 2.0);
+                if self.axes[i].motion.laws.presliding.is_some() {
+                    let place = self.axes[i].at(&state.y[i], &first.air[i], rest_s[i]);
+                    bristles[i] = self.axes[i].motion.deflect(place, state.y[i][V], bristles[i], h / 2.0);
+                }
+            }
+        }
+        let supply_pa = state.supply_pa + h / 2.0 * first.supply_rate;
+        let lines = [0, 1].map(|i| self.leaving(state, i, &y[i], supply_pa));
+        let mut direction = state.direction;
+        let at = Instant { y: &y, bristles, supply_pa, rest_s };
+        let middle = self.evaluate(&at, &mut direction, targets, lines, false);
+        for i in 0..2 {
+            if !self.active[i] {
+                continue;
+            }
+            let from = state.y[i];
+            add(&mut state.y[i], &middle.rates[i], h);
+            let axis = &self.axes[i];
+            if axis.motion.laws.presliding.is_some() {
+                let place = axis.at(&y[i], &middle.air[i], rest_s[i]);
+                state.bristles[i] = axis.motion.deflect(place, y[i][V], state.bristles[i], h);
+            }
+            self.catch(state, i, &from);
+            let after_pa = state.supply_pa + h * middle.supply_rate;
+            bound(axis, &mut state.y[i], &from, [state.supply_pa, after_pa]);
+        }
+        state.supply_pa += h * middle.supply_rate;
+        state.steps += 1;
+    }
+
+    /// What leaves the lines of an axis in the middle of this step; keeps what enters them.
+    fn leaving(&self, state: &mut State, i: usize, y: &Y, supply_pa: f64) -> Option<[f64; 2]> {
+        let delay = self.delay_steps(i).filter(|_| self.active[i])?;
+        let enters = self.axes[i].air(y, supply_pa).edge_flow;
+        let now = state.steps as usize;
+        let line = &mut state.lines[i];
+        let mask = line.ring.len() - 1;
+        line.ring[now & mask] = enters;
+        let back = delay.floor() as usize;
+        let share = delay - delay.floor();
+        let past = |back: usize, chamber: usize| {
+            if back > now { 0.0 } else { line.ring[(now - back) & mask][chamber] }
+        };
+        let leaves =
+            [0, 1].map(|chamber| past(back, chamber) * (1.0 - share) + past(back + 1, chamber) * share);
+        line.leaves = leaves;
+        Some(leaves)
+    }
+
+    /// Catches a piston that turned round within the step, and stops one at the ends.
+    #[inline(always)]
+    fn catch(&self, state: &mut State, i: usize, from: &Y) {
+        let axis = &self.axes[i];
+        let end_s = (state.steps + 1) as f64 * self.step_s();
+        let y = &mut state.y[i];
+        let sticks = axis.motion.laws.presliding.is_none();
+        if sticks && state.direction[i] != 0.0 && y[V] * state.direction[i] <= 0.0 {
+            // It goes on to where a straight line of the velocity meets zero.
+            let share = if from[V] == y[V] { 0.0 } else { (from[V] / (from[V] - y[V])).clamp(0.0, 1.0) };
+            y[X] = from[X] + from[V] * share * self.step_s() / 2.0;
+            y[V] = 0.0;
+            state.direction[i] = 0.0;
+            state.rest_since_s[i] = end_s;
+        }
+        if !sticks && y[V].abs() > CREEP_M_PER_S {
+            state.rest_since_s[i] = end_s;
+        }
+        let stroke_m = axis.numbers.stroke_m;
+        if y[X] < 0.0 && y[V] <= 0.0 || y[X] > stroke_m && y[V] >= 0.0 {
+            y[X] = y[X].clamp(0.0, stroke_m);
+            if y[V] != 0.0 {
+                y[V] = 0.0;
+                state.direction[i] = 0.0;
+                state.rest_since_s[i] = end_s;
+            }
+        }
+    }
+}
+
+/// A state as the laws see it.
+struct Instant<'a> {
+    y: &'a [Y; 2],
+    bristles: [f64; 2],
+    supply_pa: f64,
+    rest_s: [f64; 2],
+}
+
+impl Evaluated {
+    const NO_AIR: Air = Air {
+        pressure_pa: [0.0; 2],
+        volume_m3: [0.0; 2],
+        edge_flow: [0.0; 2],
+        drawn: 0.0,
+        vented: 0.0,
+        exhaust_pa: 0.0,
+        force_n: 0.0,
+    };
+    /// Nothing moves.
+    pub(super) const NONE: Evaluated = Evaluated {
+        rates: [[0.0; 14]; 2],
+        air: [Self::NO_AIR; 2],
+        contact_n: 0.0,
+        friction_n: [0.0; 2],
+        supply_rate: 0.0,
+    };
+}
+
+#[inline(always)]
+fn add(y: &mut Y, rates: &Y, span_s: f64) {
+    for (y, rate) in y.iter_mut().zip(rates) {
+        *y += rate * span_s;
+    }
+}
+
+/// A lagged flow neither fills a chamber past its supply nor empties it past its exhaust: it stops, and the air stays at the
+/// bound that it has just passed.
+#[inline(always)]
+fn bound(axis: &Axis, y: &mut Y, from: &Y, supply_pa: [f64; 2]) {
+    let volumes = axis.volumes(y[X]);
+    let silenced = axis.silencer.is_some();
+    let exhaust = |y: &Y| if silenced { y[EXHAUST] } else { axis.numbers.exhaust_pa };
+    for chamber in 0..2 {
+        let flow = y[FLOW + chamber];
+        let pressure = y[AIR + chamber] / volumes[chamber];
+        let (passed, bounds) = if flow > 0.0 && pressure >= supply_pa[1] {
+            (1.0, supply_pa)
+        } else if flow < 0.0 && pressure <= exhaust(y) {
+            (-1.0, [exhaust(from), exhaust(y)])
+        } else {
+            continue;
+        };
+        y[FLOW + chamber] = 0.0;
+        let before = from[AIR + chamber] / axis.volumes(from[X])[chamber];
+        if (bounds[0] - before) * passed > 0.0 {
+            let beyond = y[AIR + chamber] - bounds[1] * volumes[chamber];
+            y[AIR + chamber] -= beyond;
+            y[NORMAL + chamber] -= beyond;
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Sensors of one axis in the record maker: lag, age, gain, offset, sampling instant, noise, rounding.
+//!
+//! ```text
+//!   truth, each step ─► lags ─► ring of the last milliseconds ─► at t_k (- age) (+ jitter) ─► gain, offset ─► noise ─► rounded
+//! ```
+//!
+//! A period is integrated before it is sampled, so that an instant a little after t_k is the truth too and no guess.
+
+use super::noise::{Noise, Stream};
+use plant::parameters::SensorParameters;
+use plant::{AxisReadings, Reading};
+
+/// Position, force, pressure a, pressure b.
+pub(super) const CHANNELS: usize = 4;
+
+/// What of the sensors' effects is on, for each channel; SI.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SensingLaws {
+    pub(super) foreign: bool,
+    pub(super) lag_s: [f64; CHANNELS],
+    pub(super) age_s: [f64; CHANNELS],
+    pub(super) gain: [f64; CHANNELS],
+    pub(super) offset: [f64; CHANNELS],
+}
+
+/// Sensors of one axis.
+#[derive(Debug, Clone)]
+pub(super) struct Sensing {
+    laws: SensingLaws,
+    parameters: SensorParameters,
+    /// What the sensor reads too much by its mounting, m.
+    mounted_m: f64,
+    step_s: f64,
+    /// Shares left after a step in each of three lags in a row, 0 for none, and their times.
+    lags: [[Option<Lag>; 3]; CHANNELS],
+    before: [f64; CHANNELS],
+    ring: Vec<[f64; CHANNELS]>,
+    /// Steps seen.
+    steps: usize,
+    noise: [Noise; CHANNELS],
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Lag {
+    time_s: f64,
+    kept: f64,
+    shown: f64,
+}
+
+/// Share of the foreign skew that is a lag.
+const AGE_LAG_SHARE: f64 = 0.25;
+/// Longest look back and ahead, ms.
+const REACH_MS: usize = 14;
+/// Half of the pressure range of use and a force of use, where the foreign gains are those of the catalogue.
+const GAIN_AGREES_PA: f64 = 4e5;
+const GAIN_BENDS_N: f64 = 40.0;
+
+impl Sensing {
+    pub(super) fn new(
+        laws: SensingLaws,
+        parameters: &SensorParameters,
+        axis: usize,
+        step_s: f64,
+        streams: impl Fn(usize) -> Stream,
+        (noise, coloured): (f64, bool),
+    ) -> Self {
+        let lag = |time_s: f64| {
+            (time_s > 0.0).then(|| Lag { time_s, kept: libm::exp(-step_s / time_s), shown: 0.0 })
+        };
+        let lags = std::array::from_fn(|channel| {
+            let (lag_s, age_s) = (laws.lag_s[channel], laws.age_s[channel]);
+            if laws.foreign {
+                // Two equal lags in a row, as an anti-aliasing filter has; a skew whose end is soft.
+                [lag(lag_s / 2.0), lag(lag_s / 2.0), lag(AGE_LAG_SHARE * age_s)]
+            } else {
+                [lag(lag_s), None, None]
+            }
+        });
+        let rms = [
+            parameters.position_noise_m,
+            parameters.force_noise_n,
+            parameters.pressure_noise_pa,
+            parameters.pressure_noise_pa,
+        ];
+        let per_ms = (1e-3 / step_s).round() as usize;
+        Sensing {
+            laws,
+            parameters: *parameters,
+            mounted_m: [0.0, parameters.load_position_offset_m][axis],
+            step_s,
+            lags,
+            before: [0.0; CHANNELS],
+            ring: vec![[0.0; CHANNELS]; (REACH_MS * per_ms).next_power_of_two()],
+            steps: 0,
+            noise: std::array::from_fn(|channel| {
+                Noise::new(streams(channel), noise * rms[channel], coloured)
+            }),
+        }
+    }
+
+    /// Takes the truth at the start of a step.
+    #[inline(always)]
+    pub(super) fn see(&mut self, truth: [f64; CHANNELS]) {
+        let first = self.steps == 0;
+        let mut shown = truth;
+        for channel in 0..CHANNELS {
+            let mut from = self.before[channel];
+            for lag in self.lags[channel].iter_mut().flatten() {
+                let before = if first { shown[channel] } else { lag.shown };
+                let from_now = if first { shown[channel] } else { from };
+                from = before;
+                lag.shown = lag.after(before, from_now, shown[channel], self.step_s);
+                shown[channel] = lag.shown;
+            }
+        }
+        self.before = truth;
+        let size = self.ring.len();
+        self.ring[self.steps & (size - 1)] = shown;
+        self.steps += 1;
+    }
+
+    /// What the sensors would show without noise at step `at` and `late_s` after it.
+    pub(super) fn without_noise(&self, at: usize, late_s: f64, drift: f64) -> [f64; CHANNELS] {
+        let laws = &self.laws;
+        std::array::from_fn(|channel| {
+            let skew = if laws.foreign { 1.0 - AGE_LAG_SHARE } else { 1.0 };
+            let back_s = skew * laws.age_s[channel] - late_s;
+            let truth = self.seen(channel, at as f64 - back_s / self.step_s);
+            let mounted = if channel == 0 { self.mounted_m } else { 0.0 };
+            truth + self.gained(channel, truth) + laws.offset[channel] * drift + mounted
+        })
+    }
+
+    fn seen(&self, channel: usize, step: f64) -> f64 {
+        let last = self.steps - 1;
+        let oldest = self.steps.saturating_sub(self.ring.len());
+        let step = step.clamp(oldest as f64, last as f64);
+        let before = (step.floor() as usize).min(last.saturating_sub(1));
+        let mask = self.ring.len() - 1;
+        let [one, other] = [before, (before + 1).min(last)].map(|step| self.ring[step & mask][channel]);
+        one + (step - before as f64) * (other - one)
+    }
+
+    fn gained(&self, channel: usize, truth: f64) -> f64 {
+        let gain = self.laws.gain[channel];
+        if !self.laws.foreign || gain == 0.0 {
+            return gain * truth;
+        }
+        let bent = match channel {
+            0 => 0.8 + 0.4 * truth / self.parameters.position_range_m,
+            1 => 1.0 + 0.1 * libm::tanh(truth / GAIN_BENDS_N),
+            _ => 0.8 + 0.2 * truth / GAIN_AGREES_PA,
+        };
+        gain * bent * truth
+    }
+
+    /// Readings of values without noise: noise added, rounded, clipped.
+    pub(super) fn read(&mut self, values: [f64; CHANNELS]) -> AxisReadings {
+        let parameters = &self.parameters;
+        let pressure = [parameters.pressure_step_pa(), 0.0, parameters.pressure_counts()];
+        let grids = [
+            [parameters.position_step_m(), 0.0, parameters.position_counts()],
+            [parameters.force_step_n(), -parameters.force_counts(), parameters.force_counts()],
+            pressure,
+            pressure,
+        ];
+        let mut reading = |channel: usize| {
+            let [step, least, most] = grids[channel];
+            let counts = ((values[channel] + self.noise[channel].sample()) / step).round();
+            let clipped = counts.clamp(least, most);
+            Reading { value: clipped * step, saturated: clipped != counts }
+        };
+        AxisReadings {
+            position: reading(0),
+            force: reading(1),
+            pressure_a: reading(2),
+            pressure_b: reading(3),
+        }
+    }
+}
+
+impl Lag {
+    /// What is shown after a step in which the truth went straight from one value to another.
+    #[inline(always)]
+    fn after(&self, shown: f64, from: f64, to: f64, step_s: f64) -> f64 {
+        let slope = (to - from) / step_s;
+        let behind = slope * self.time_s;
+        to - behind + (shown - from + behind) * self.kept
+    }
+}

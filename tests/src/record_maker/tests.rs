@@ -1,0 +1,1 @@
+//! Claims of the record maker.

@@ -1,0 +1,195 @@
+//! The valve of the record maker: command to spool, spool to four edges, an edge and two pressures to a flow.
+//!
+//! ```text
+//!   command (late, shifted, with play) ─► target ─► spool, rate ─► opening (overlap) ─► c of: supply-a a-exhaust supply-b b-exhaust
+//! ```
+//!
+//! Each law has the catalogue's form and another one that means the same (`foreign`); the table of both stands in
+//! `tests/docs/record-maker.md`.
+
+use super::numbers::Numbers;
+use plant::parameters::VALVE_POINTS;
+
+/// What of the valve's effects is on; SI.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ValveLaws {
+    pub(super) foreign: bool,
+    pub(super) offset: f64,
+    pub(super) play: f64,
+    pub(super) dead_zone: f64,
+    pub(super) bend: f64,
+    pub(super) edge_ratio: f64,
+    pub(super) null_leakage: f64,
+    /// Natural frequency in Hz and damping.
+    pub(super) second_order: Option<[f64; 2]>,
+    pub(super) rate_per_s: Option<f64>,
+    pub(super) critical_ratio: Option<f64>,
+}
+
+/// Conductances of the four edges, m^3/s per Pa.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Edges {
+    pub(super) supply: [f64; 2],
+    pub(super) exhaust: [f64; 2],
+}
+
+/// The valve of one axis.
+#[derive(Debug, Clone)]
+pub(super) struct Valve {
+    laws: ValveLaws,
+    time_s: f64,
+    opening: [f64; VALVE_POINTS],
+    edges: [[f64; VALVE_POINTS]; 2],
+}
+
+/// What the play between command and spool remembers.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Play {
+    command: f64,
+    /// By how much its output lags behind the command.
+    lag: f64,
+}
+
+/// Spool, its rate, and the third state that only the foreign form has.
+pub(super) type Spool = [f64; 3];
+
+impl Valve {
+    pub(super) fn new(numbers: &Numbers, laws: ValveLaws) -> Self {
+        let edges = [numbers.supply_edge_m3_per_s_pa, numbers.exhaust_edge_m3_per_s_pa];
+        Valve { laws, time_s: numbers.spool_time_s, opening: numbers.opening, edges }
+    }
+
+    /// Where the spool is sent by a command that acts now; to be asked once a step, since the play moves.
+    pub(super) fn target(&self, command: f64, play: &mut Play, drift: f64) -> f64 {
+        let (half, moved) = (self.laws.play, command - play.command);
+        play.command = command;
+        if half > 0.0 && self.laws.foreign && moved != 0.0 {
+            // Coleman, Hodgdon 1986: the lag bends exponentially towards the side that it comes from.
+            let side = half.copysign(moved);
+            play.lag = side + (play.lag - side) * libm::exp(-moved.abs() / (PLAY_BEND * half));
+        } else {
+            play.lag = (play.lag + moved).clamp(-half, half);
+        }
+        (command - play.lag + self.laws.offset * drift).clamp(-1.0, 1.0)
+    }
+
+    /// Rates of the spool's states, 1/s.
+    #[inline(always)]
+    pub(super) fn spool_rates(&self, spool: Spool, target: f64) -> Spool {
+        let [place, rate, third] = spool;
+        let laws = &self.laws;
+        let limit = |wanted: f64| match laws.rate_per_s {
+            None => wanted,
+            Some(most) if laws.foreign => most * libm::tanh(wanted / most),
+            Some(most) => wanted.clamp(-most, most),
+        };
+        let Some([frequency_hz, damping]) = laws.second_order else {
+            return [limit((target - place) / self.time_s), 0.0, 0.0];
+        };
+        let w = std::f64::consts::TAU * frequency_hz;
+        if laws.foreign {
+            // The pilot stage ahead of it is a lag of its own; a stiffer slide makes up for its time.
+            let (w, lag_s) = (FOREIGN_STIFFER * w, FOREIGN_PILOT / w);
+            let pull = w * w * (third - place) - 2.0 * damping * w * rate;
+            return [limit(rate), pull, (target - third) / lag_s];
+        }
+        [limit(rate), w * w * (target - place) - 2.0 * damping * w * rate, 0.0]
+    }
+
+    /// The four edges at a spool opening.
+    #[inline(always)]
+    pub(super) fn edges(&self, spool: f64) -> Edges {
+        let laws = &self.laws;
+        let mut opening = spool.abs().min(1.0);
+        if laws.dead_zone > 0.0 {
+            opening = self.beyond_overlap(opening);
+        }
+        let mut along = opening;
+        if laws.bend != 0.0 {
+            let o = opening;
+            let bow = if laws.foreign { 27.0 / 8.0 * o * (1.0 - o) * (1.0 - o) } else { 2.0 * o * (1.0 - o) };
+            along = (o + laws.bend * bow).clamp(0.0, 1.0);
+        }
+        let [mut supply, mut exhaust] = self.table(along);
+        if laws.edge_ratio != 0.0 {
+            let fade = if laws.foreign { 1.2 * opening / (opening + 0.2) } else { 1.0 };
+            supply *= 1.0 + fade * laws.edge_ratio / 2.0;
+            exhaust *= 1.0 - fade * laws.edge_ratio / 2.0;
+        }
+        let mut edges = if spool > 0.0 {
+            Edges { supply: [supply, 0.0], exhaust: [0.0, exhaust] }
+        } else {
+            Edges { supply: [0.0, supply], exhaust: [exhaust, 0.0] }
+        };
+        if laws.null_leakage > 0.0 {
+            let last = VALVE_POINTS - 1;
+            let floors = [laws.null_leakage * self.edges[0][last], laws.null_leakage * self.edges[1][last]];
+            for (edge, floor) in [(&mut edges.supply, floors[0]), (&mut edges.exhaust, floors[1])] {
+                for c in edge {
+                    *c = if laws.foreign { (*c * *c + floor * floor).sqrt() } else { c.max(floor) };
+                }
+            }
+        }
+        edges
+    }
+
+    fn beyond_overlap(&self, opening: f64) -> f64 {
+        let d = self.laws.dead_zone;
+        if !self.laws.foreign {
+            return (opening - d).max(0.0) / (1.0 - d);
+        }
+        // A rounded edge: softplus of width d / 4, through 0 at 0 and 1 at 1.
+        let width = d / 4.0;
+        let soft = |o: f64| width * libm::log1p(libm::exp(((o - d) / width).min(300.0)));
+        (soft(opening) - soft(0.0)) / (soft(1.0) - soft(0.0))
+    }
+
+    /// c of supply and exhaust edge at an opening in [0, 1].
+    #[inline(always)]
+    fn table(&self, opening: f64) -> [f64; 2] {
+        let mut i = 0;
+        while i + 2 < VALVE_POINTS && opening > self.opening[i + 1] {
+            i += 1;
+        }
+        let share = (opening - self.opening[i]) / (self.opening[i + 1] - self.opening[i]);
+        [0, 1].map(|edge| self.edges[edge][i] + share * (self.edges[edge][i + 1] - self.edges[edge][i]))
+    }
+
+    /// Normal flow through an edge of conductance `c` into the chamber, m^3/s; pressures absolute, Pa.
+    #[inline(always)]
+    pub(super) fn flow(&self, c: f64, far_pa: f64, port_pa: f64) -> f64 {
+        if c == 0.0 {
+            return 0.0;
+        }
+        match self.laws.critical_ratio {
+            None => flow(c, far_pa, port_pa),
+            Some(b) => {
+                let (up, down) = if far_pa > port_pa { (far_pa, port_pa) } else { (port_pa, far_pa) };
+                let beyond = (down / up - b) / (1.0 - b);
+                let under = (1.0 - beyond * beyond).max(0.0);
+                let share = match (beyond > 0.0, self.laws.foreign) {
+                    (false, _) => 1.0,
+                    (true, false) => under.sqrt(),
+                    (true, true) => libm::pow(under, SUBSONIC_INDEX),
+                };
+                (c * up / 2.0 * share).copysign(far_pa - port_pa)
+            }
+        }
+    }
+}
+
+/// Length of the foreign play's bend, in half-widths.
+const PLAY_BEND: f64 = 0.8;
+/// Subsonic index m of ISO 6358-3 in place of 0.5.
+const SUBSONIC_INDEX: f64 = 0.56;
+/// The foreign spool: its slide against the catalogue's natural frequency, and its pilot's lag in units of 1/w.
+const FOREIGN_STIFFER: f64 = 1.15;
+const FOREIGN_PILOT: f64 = 0.25;
+
+/// Eq. (4) of the paper as one formula; pressures absolute, Pa, c in m^3/s per Pa.
+#[inline(always)]
+pub(super) fn flow(c: f64, far_pa: f64, port_pa: f64) -> f64 {
+    let (up, down) = if far_pa > port_pa { (far_pa, port_pa) } else { (port_pa, far_pa) };
+    let throat = down.max(0.5 * up);
+    (c * ((up - throat) * throat).sqrt()).copysign(far_pa - port_pa)
+}
