@@ -6,14 +6,16 @@ use plant::{Axis, RigParameters};
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
-use system_tests::record_maker::{Experiment, Hidden, Recipe, comparison, simulate, write};
+use system_tests::record_maker::{Experiment, Hidden, ROWS, Recipe, comparison, simulate, write};
 
 const USAGE: &str =
     "record_maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes]
     [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form] [--wrong parameter:NAME=FACTOR]...
     [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1]
 record_maker list
-record_maker compare";
+record_maker compare
+record_maker forms
+record_maker steps";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -28,8 +30,72 @@ fn main() -> Result<(), Box<dyn Error>> {
             Ok(())
         }
         Some("compare") => compare(),
+        Some("forms") => forms(),
+        Some("steps") => steps(),
         _ => Err(USAGE.into()),
     }
+}
+
+/// What halving the step changes, as Markdown.
+fn steps() -> Result<(), Box<dyn Error>> {
+    let rig = RigParameters::baseline();
+    println!("| step | record | position | force | pressure a | pressure b |\n|---|---|---|---|---|---|");
+    for (axis, both_axes) in [(Axis::Drive, false), (Axis::Drive, true)] {
+        for steps_per_ms in [12, 25, 50, 100, 200] {
+            let recipe = Recipe { axis, both_axes, ..Recipe::default() };
+            let halved = comparison::of_halved_step(&recipe, &rig, [ROWS, steps_per_ms])?;
+            let cells = halved[0].map(|rms| format!("{rms:.4}")).join(" | ");
+            let name = if both_axes { "linked, drive" } else { "drive" };
+            println!("| {:.1} us | {name} | {cells} |", 1000.0 / steps_per_ms as f64);
+        }
+    }
+    Ok(())
+}
+
+/// Both forms of all effects at both ends of their range, as Markdown.
+fn forms() -> Result<(), Box<dyn Error>> {
+    let rig = RigParameters::baseline();
+    let null = [false, true]
+        .map(|both_axes| simulate(&Recipe { both_axes, ..Recipe::default() }, &rig).expect("null"));
+    println!("| effect | end | catalogue | foreign | cosine |");
+    for sheet in SHEETS {
+        for end in [0, 1] {
+            let place = sheet.place.places()[0];
+            let both_axes = sheet.name.starts_with("coupling");
+            let numbers: Vec<f64> = sheet.keys.iter().map(|key| key.drawn[end]).collect();
+            let hidden = vec![Hidden { name: sheet.name, place, numbers }];
+            let recipe = Recipe { hidden, both_axes, ..Recipe::default() };
+            let made = simulate(&recipe, &rig);
+            let foreign = simulate(&Recipe { foreign_form: true, ..recipe }, &rig);
+            match (made, foreign) {
+                (Ok(made), Ok(foreign)) => {
+                    let null = &null[usize::from(both_axes)];
+                    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+                    for ((one, other), base) in made.rows.iter().zip(&foreign.rows).zip(&null.rows) {
+                        for signal in 0..4 {
+                            let noise = [2e-5, 0.5, 400.0, 400.0][signal];
+                            let zero = base.without_noise[0][signal];
+                            let a = (one.without_noise[0][signal] - zero) / noise;
+                            let b = (other.without_noise[0][signal] - zero) / noise;
+                            (aa, bb, ab) = (aa + a * a, bb + b * b, ab + a * b);
+                        }
+                    }
+                    let n = 80000.0_f64;
+                    println!(
+                        "| {} | {end} | {:.2} | {:.2} | {:.2} |",
+                        sheet.name,
+                        (aa / n).sqrt(),
+                        (bb / n).sqrt(),
+                        ab / (aa * bb).sqrt()
+                    );
+                }
+                (made, foreign) => {
+                    println!("| {} | {end} | {:?} | {:?}", sheet.name, made.err(), foreign.err())
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Null records of all experiments against the plant, as Markdown.

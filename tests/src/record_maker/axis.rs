@@ -73,6 +73,8 @@ const GAS_PER_HEAT: f64 = 287.0 / 718.0;
 const GAMMA: f64 = 1005.0 / 718.0;
 const GAS_CONSTANT: f64 = 287.0;
 const HEAT_CAPACITY: f64 = 718.0;
+/// Polytropic exponent of the foreign form: between isothermal and adiabatic, as measured ones are.
+const POLYTROPE: f64 = 1.28;
 /// Leakages are given from 6 bar to 1 bar absolute, Pa.
 const LEAKS_FROM_PA: f64 = 6e5;
 const LEAKS_TO_PA: f64 = 1e5;
@@ -242,7 +244,8 @@ impl Axis {
             let mid_m3 = self.dead_m3[chamber] + area * numbers.stroke_m / 2.0;
             let mass_kg = numbers.start_b_pa * mid_m3 / (GAS_CONSTANT * numbers.temperature_k);
             let relaxes_s = mass_kg * HEAT_CAPACITY / (h * wetted_m2(area, mid_m3));
-            return GAMMA * numbers.normal_pa * net - work - (gas - normal) / relaxes_s;
+            let work = (POLYTROPE - 1.0) * pressure * swept;
+            return POLYTROPE * numbers.normal_pa * net - work - (gas - normal) / relaxes_s;
         }
         let ratio = gas / normal;
         let carried = if net > 0.0 { 1.0 } else { ratio };

@@ -17,6 +17,9 @@ use std::path::PathBuf;
 /// Rms and largest error of a sampling instant, s.
 const JITTER_S: f64 = 1e-4;
 const MOST_JITTER_S: f64 = 4e-4;
+/// The experiment begins when the initial positioning is over, whatever a hidden effect does to standstill and error: all records
+/// of an experiment are driven at the same times.
+const UNSETTLED: [&str; 3] = ["still_m=0.1", "position_error_m=0.5", "force_error_n=2000"];
 /// Streams of random numbers: 0 to 7 are the sensors'.
 const JITTER_STREAM: u64 = 8;
 
@@ -27,13 +30,17 @@ const JITTER_STREAM: u64 = 8;
 /// # Errors
 /// [`MakeError`] when the recipe is none, or the run does not last.
 pub fn simulate(recipe: &Recipe, rig: &RigParameters) -> Result<Record, MakeError> {
-    run(recipe, rig, ROWS)
+    run(recipe, rig, [ROWS, STEPS_PER_MS])
 }
 
-/// The first `rows` of a record.
-pub(super) fn run(recipe: &Recipe, rig: &RigParameters, rows: usize) -> Result<Record, MakeError> {
+/// The first rows of a record, with so many steps in a millisecond.
+pub(super) fn run(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    [rows, steps_per_ms]: [usize; 2],
+) -> Result<Record, MakeError> {
     let (inputs, scene) = read(recipe, rig)?;
-    let made = Made::new(recipe, rig, &scene, STEPS_PER_MS)?;
+    let made = Made::new(recipe, rig, &scene, steps_per_ms)?;
     let mode = Mode { partner_needed: true, real_time: false, forever: false };
     let controllers =
         Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?;
@@ -56,18 +63,8 @@ pub(super) fn run(recipe: &Recipe, rig: &RigParameters, rows: usize) -> Result<R
 /// # Errors
 /// As [`simulate`].
 pub fn replay(recipe: &Recipe, rig: &RigParameters, valves: &[[f64; 2]]) -> Result<Record, MakeError> {
-    replay_with(recipe, rig, valves, STEPS_PER_MS)
-}
-
-/// The same with another number of steps in a millisecond.
-pub(super) fn replay_with(
-    recipe: &Recipe,
-    rig: &RigParameters,
-    valves: &[[f64; 2]],
-    steps_per_ms: usize,
-) -> Result<Record, MakeError> {
     let (_, scene) = read(recipe, rig)?;
-    let mut made = Made::new(recipe, rig, &scene, steps_per_ms)?;
+    let mut made = Made::new(recipe, rig, &scene, STEPS_PER_MS)?;
     let mut record = record(recipe, &scene, valves.len());
     for (cycle, valve) in valves.iter().enumerate() {
         made.sample(cycle as u64, *valve, &mut |_| {});
@@ -76,6 +73,29 @@ pub(super) fn replay_with(
         record.rows.push(row);
     }
     Ok(record)
+}
+
+/// The commands of a null record again with another number of steps in a millisecond, in windows of so many rows that each begin
+/// with the true state.
+///
+/// # Errors
+/// As [`simulate`].
+pub(super) fn replay_windows(
+    record: &Record,
+    rig: &RigParameters,
+    [window, steps_per_ms]: [usize; 2],
+) -> Result<Vec<Row>, MakeError> {
+    let (_, scene) = read(&record.recipe, rig)?;
+    let mut made = Made::new(&record.recipe, rig, &scene, steps_per_ms)?;
+    let mut rows = Vec::with_capacity(record.rows.len());
+    for (cycle, row) in record.rows.iter().enumerate() {
+        if cycle % window == 0 {
+            made.rig.set(&mut made.state, &row.axes);
+        }
+        made.sample(cycle as u64, row.valve, &mut |_| {});
+        rows.push(made.step(cycle as u64, row.valve));
+    }
+    Ok(rows)
 }
 
 fn record(recipe: &Recipe, scene: &Scene, rows: usize) -> Record {
@@ -113,6 +133,9 @@ fn experiment_file(recipe: &Recipe) -> Result<PathBuf, MakeError> {
 fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeError> {
     let experiment = experiment_file(recipe)?;
     let file = experiment.display().to_string();
+    let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
+    let set =
+        moved.flat_map(|axis| UNSETTLED.map(|what| format!("{}.settled.{what}", axis.name()))).collect();
     let files = FileArguments {
         rig: workspace().join("plant/rig.toml"),
         experiment,
@@ -120,7 +143,7 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
         programs: Some(workspace().join("controller/programs")),
         drive_program: None,
         load_program: None,
-        set: Vec::new(),
+        set,
         repeat: false,
     };
     let mut inputs = Inputs::read(&files)?;

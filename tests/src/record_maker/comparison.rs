@@ -9,7 +9,8 @@
 //! which one of both holds the piston and the other does not, or in which the piston was caught or let go since the last one, or
 //! the contact made or lost. They are counted.
 
-use super::{Record, Row};
+use super::closed_loop::{replay_windows, run};
+use super::{MakeError, Recipe, Record, Row};
 use plant::{Inputs, Plant, RigParameters, Setup, SetupError, State};
 
 /// Length of a window, rows.
@@ -141,17 +142,25 @@ fn state(record: &Record, rig: &RigParameters, row: &Row) -> Result<State, Setup
     Ok(state)
 }
 
-/// Compares two records of the same commands, the second made in parts that begin where the first one is; as
-/// [`against_plant`], for studies of the step.
-#[must_use]
-pub fn between(rows: &[Row], others: &[Row], rig: &RigParameters) -> [[f64; 4]; 2] {
+/// What halving the step changes: rms of the null record with so many steps in a millisecond against twice as many, in windows of
+/// equal start, in units of the noise; for drive and load and their signals.
+///
+/// # Errors
+/// As [`super::simulate`].
+pub fn of_halved_step(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    [rows, steps_per_ms]: [usize; 2],
+) -> Result<[[f64; 4]; 2], MakeError> {
+    let record = run(recipe, rig, [rows, steps_per_ms])?;
+    let others = replay_windows(&record, rig, [WINDOW, 2 * steps_per_ms])?;
     let noise = noises(rig);
     let rms = |i: usize, signal: usize| {
-        let squares = rows.iter().zip(others).map(|(row, other)| {
+        let squares = record.rows.iter().zip(&others).map(|(row, other)| {
             let difference = row.without_noise[i][signal] - other.without_noise[i][signal];
             (difference / noise[signal]).powi(2)
         });
-        (squares.sum::<f64>() / rows.len().max(1) as f64).sqrt()
+        (squares.sum::<f64>() / rows as f64).sqrt()
     };
-    [0, 1].map(|i| [0, 1, 2, 3].map(|signal| rms(i, signal)))
+    Ok([0, 1].map(|i| [0, 1, 2, 3].map(|signal| rms(i, signal))))
 }

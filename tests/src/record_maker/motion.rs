@@ -67,7 +67,7 @@ const ELASTIC_SHARE: f64 = 0.7;
 /// Bristles hold at least this much, N: without any they would have no deflection to relax to.
 const LEAST_N: f64 = 1e-3;
 /// The foreign asymmetry changes sides over this speed, m/s.
-const SIDES_M_PER_S: f64 = 2e-3;
+const SIDES_M_PER_S: f64 = 2e-2;
 /// Sum of gauge pressures at which both forms of pressure-dependent friction agree, Pa.
 const SEALS_AGREE_PA: f64 = 5e5;
 /// Rest after which both forms of the growth of break-away agree, s.

@@ -154,8 +154,8 @@ pub(super) enum Passage {
     Orifice(f64),
     /// A flow in proportion to the difference, m^3/s per Pa.
     Linear(f64),
-    /// A porous plug: in proportion to the difference of the squares, m^3/s per Pa^2.
-    Porous(f64),
+    /// Sintered bronze: as much as the orifice of this conductance when choked, but choked below [`SINTERED_RATIO`] alone.
+    Sintered(f64),
 }
 
 impl Node {
@@ -163,7 +163,7 @@ impl Node {
     pub(super) fn supply(numbers: &Numbers, [droop_pa, volume_m3]: [f64; 2], foreign: bool) -> Self {
         let (full, set_pa) = (numbers.full_flow_m3_per_s(), numbers.supply_pa);
         let passage = if foreign {
-            Passage::Linear(full / droop_pa)
+            Passage::Linear(full / (LINEAR_SHARE * droop_pa))
         } else {
             Passage::Orifice(full / (droop_pa * (set_pa - droop_pa)).sqrt())
         };
@@ -174,10 +174,7 @@ impl Node {
     pub(super) fn silencer(numbers: &Numbers, [kv_ratio, volume_m3]: [f64; 2], foreign: bool) -> Self {
         let c = kv_ratio * numbers.exhaust_edge_m3_per_s_pa[numbers.opening.len() - 1];
         let outside_pa = numbers.exhaust_pa;
-        // Sintered bronze instead of a hole; as much flow at half a bar.
-        let at_pa = outside_pa + SILENCERS_AGREE_PA;
-        let porous = flow(c, at_pa, outside_pa) / (at_pa * at_pa - outside_pa * outside_pa);
-        let passage = if foreign { Passage::Porous(porous) } else { Passage::Orifice(c) };
+        let passage = if foreign { Passage::Sintered(c) } else { Passage::Orifice(c) };
         Node { volume_m3, outside_pa, passage }
     }
 
@@ -187,10 +184,17 @@ impl Node {
         match self.passage {
             Passage::Orifice(c) => flow(c, self.outside_pa, node_pa),
             Passage::Linear(per_pa) => per_pa * (self.outside_pa - node_pa),
-            Passage::Porous(per_pa2) => per_pa2 * (self.outside_pa * self.outside_pa - node_pa * node_pa),
+            Passage::Sintered(c) => {
+                let (up, down) = (self.outside_pa.max(node_pa), self.outside_pa.min(node_pa));
+                let beyond = ((down / up - SINTERED_RATIO) / (1.0 - SINTERED_RATIO)).max(0.0);
+                let share = (1.0 - beyond * beyond).max(0.0).sqrt();
+                (c * up / 2.0 * share).copysign(self.outside_pa - node_pa)
+            }
         }
     }
 }
 
-/// Back pressure at which both forms of the silencer pass as much, Pa.
-const SILENCERS_AGREE_PA: f64 = 0.5e5;
+/// Critical pressure ratio of the foreign silencer.
+const SINTERED_RATIO: f64 = 0.2;
+/// The foreign regulator falls by this share of the droop at full flow: as much on average as an orifice, whose drop grows with q^2.
+const LINEAR_SHARE: f64 = 0.6;

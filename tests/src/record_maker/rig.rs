@@ -9,7 +9,8 @@
 //! It shares no code and no scheme with the plant, which goes by exact exponentials of 100 us and locates corners; here corners
 //! cost the length of a step. What both must agree on is rig-model.md. How far they agree stands in `tests/docs/record-maker.md`.
 
-use super::axis::{AIR, Air, Axis, EXHAUST, FLOW, LINE_LAG_SHARE, NORMAL, V, X, Y};
+use super::TrueAxis;
+use super::axis::{AIR, Air, Axis, EXHAUST, FLOW, LINE_LAG_SHARE, NORMAL, SPOOL, V, X, Y};
 use super::coupling::Coupling;
 use super::port::Node;
 use super::sensing::{CHANNELS, Sensing};
@@ -98,6 +99,18 @@ impl Rig {
             commands: [[0.0; COMMANDS]; 2],
             lines: [line(0), line(1)],
             steps: 0,
+        }
+    }
+
+    /// Puts the smooth states of the baseline where a record says they were.
+    pub(super) fn set(&self, state: &mut State, axes: &[TrueAxis; 2]) {
+        for (i, axis) in axes.iter().enumerate() {
+            let y = &mut state.y[i];
+            [y[X], y[V], y[SPOOL]] = [axis.extension_m, axis.rod_velocity_m_per_s, axis.spool];
+            y[AIR..AIR + 2].copy_from_slice(&axis.stored_air_j);
+            y[NORMAL..NORMAL + 2].copy_from_slice(&axis.stored_air_j);
+            y[FLOW..FLOW + 2].copy_from_slice(&axis.flow_m3_per_s);
+            state.direction[i] = if y[V] == 0.0 { 0.0 } else { y[V].signum() };
         }
     }
 

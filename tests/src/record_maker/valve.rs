@@ -140,7 +140,11 @@ impl Valve {
         }
         // A rounded edge: softplus of width d / 4, through 0 at 0 and 1 at 1.
         let width = d / 4.0;
-        let soft = |o: f64| width * libm::log1p(libm::exp(((o - d) / width).min(300.0)));
+        let soft = |o: f64| {
+            let over = (o - d) / width;
+            // Beyond 40 widths the edge's rounding is below a rounding.
+            if over > 40.0 { o - d } else { width * libm::log1p(libm::exp(over)) }
+        };
         (soft(opening) - soft(0.0)) / (soft(1.0) - soft(0.0))
     }
 
@@ -170,7 +174,7 @@ impl Valve {
                 let share = match (beyond > 0.0, self.laws.foreign) {
                     (false, _) => 1.0,
                     (true, false) => under.sqrt(),
-                    (true, true) => libm::pow(under, SUBSONIC_INDEX),
+                    (true, true) => libm::pow(under, 0.5 + SUBSONIC_SHIFT * (0.5 - b)),
                 };
                 (c * up / 2.0 * share).copysign(far_pa - port_pa)
             }
@@ -180,8 +184,8 @@ impl Valve {
 
 /// Length of the foreign play's bend, in half-widths.
 const PLAY_BEND: f64 = 0.8;
-/// Subsonic index m of ISO 6358-3 in place of 0.5.
-const SUBSONIC_INDEX: f64 = 0.56;
+/// The foreign flow has ISO 6358-3's subsonic index m for an exponent: 0.5, and this share of what b lies below 0.5.
+const SUBSONIC_SHIFT: f64 = 0.15;
 /// The foreign spool: its slide against the catalogue's natural frequency, and its pilot's lag in units of 1/w.
 const FOREIGN_STIFFER: f64 = 1.15;
 const FOREIGN_PILOT: f64 = 0.25;
