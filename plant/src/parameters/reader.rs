@@ -184,7 +184,10 @@ impl Entries {
         place: &str,
         numbers: &[(&str, f64)],
     ) -> Result<Self, ParameterError> {
-        let keys: String = numbers.iter().map(|(key, number)| format!("{key} = {number:?}\n")).collect();
+        // TOML writes NaN in small letters.
+        let written = |number: f64| if number.is_nan() { "nan".to_owned() } else { format!("{number:?}") };
+        let keys: String =
+            numbers.iter().map(|(key, number)| format!("{key} = {}\n", written(*number))).collect();
         let text = format!("[effects.{name}.{place}]\n{keys}");
         let in_file = Place { text: &text, file: &self.file };
         let root = DeTable::parse(&text).map_err(|error| ParameterError::Syntax {

@@ -175,6 +175,34 @@ pub(super) const PURE_PLANT: Rule = Rule {
     ],
 };
 
+/// An effect names its source and tests the properties it claims.
+pub(super) const EFFECTS: Rule = Rule {
+    name: "effects",
+    applies: |path| path.starts_with("plant/src/effects/") && is_rust(path),
+    check: |file| {
+        if !file.text.contains("const SHEET: Sheet = Sheet {") {
+            return Vec::new();
+        }
+        let asked = [
+            (
+                "//! Source: ",
+                "end the head of an effect with '//! Source: ' and where law and range come from",
+            ),
+            ("#[cfg(test)]", "test each property that the head of an effect claims"),
+        ];
+        let missing = asked.iter().filter(|(text, _)| !file.text.contains(text));
+        missing.map(|(_, advice)| Problem { line: 1, advice: (*advice).into() }).collect()
+    },
+    bad: &[
+        ("plant/src/effects/a.rs", "//! A.\nconst SHEET: Sheet = Sheet {};\n#[cfg(test)]\n", 1),
+        ("plant/src/effects/a.rs", "//! A.\n//! Source: b.\nconst SHEET: Sheet = Sheet {};\n", 1),
+    ],
+    good: &[
+        ("plant/src/effects/a.rs", "//! A.\n//! Source: b.\nconst SHEET: Sheet = Sheet {};\n#[cfg(test)]\n"),
+        ("plant/src/effects/a.rs", "//! Machinery.\n"),
+    ],
+};
+
 /// Units that a name may end with, before a statistic.
 const UNITS: &[&str] = &[
     "m", "mm", "m2", "m3", "s", "ms", "us", "ns", "n", "pa", "bar", "kg", "k", "j", "w", "hz", "rad", "deg",
@@ -202,6 +230,9 @@ const DIMENSIONLESS: &[&str] = &[
     "least",                 // of a parameter, whose unit is a field beside it
     "most",                  // the same
     "default",               // the same
+    "drawn",                 // of a key of an effect, whose unit is a field beside it
+    "neutral",               // the same
+    "numbers",               // of an effect, in the units of its keys
     "variables",             // of a program: names with their units, and values
     "before_value",          // of a set-point, position or force
     "after_value",           // the same
