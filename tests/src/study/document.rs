@@ -12,7 +12,7 @@ use std::path::Path;
 #[must_use]
 pub fn limit_table(limits: &Limits) -> String {
     let mut table = String::from(
-        "| effect | amplitude | limit | unit | drawn | at the most drawn, times the limit's signature | |\n|---|---|---|---|---|---|---|\n",
+        "| effect | amplitude | limit | unit | drawn | signature of the most drawn, over the limit's | |\n|---|---|---|---|---|---|---|\n",
     );
     for sheet in SHEETS {
         let key = &sheet.keys[0];
@@ -37,9 +37,13 @@ pub fn limit_table(limits: &Limits) -> String {
 }
 
 fn told_limit(limit: &Limit) -> String {
-    match (limit.limit_value, &limit.side) {
-        (Some(value), Some(side)) => format!("{side} {}", digits(value)),
-        (Some(value), None) => digits(value),
+    let neutral = || plant::effects::sheet(&limit.effect)?.keys[0].neutral;
+    match (limit.limit_value, neutral()) {
+        (Some(value), Some(neutral)) if neutral.is_finite() && neutral != 0.0 => {
+            let sign = if value > neutral { '+' } else { '-' };
+            format!("{neutral} {sign} {}", digits((value - neutral).abs()))
+        }
+        (Some(value), _) => digits(value),
         (None, _) if limit.excited => "always seen".to_owned(),
         (None, _) => "none".to_owned(),
     }

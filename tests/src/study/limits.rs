@@ -15,6 +15,9 @@
 //! | infinity | 1 / value |
 //! | none | no limit: the weakest of the drawn range is told in standard deviations |
 //!
+//! An effect that is seen at the weakest that a rig file takes (a stiffness or a coefficient that would have to be larger) has no limit
+//! either: it is always seen.
+//!
 //! Limits are computed from the plant and committed before any program is judged. Source: issue 5.
 
 use crate::study::draws::{axis_of, needs_both_axes};
@@ -97,6 +100,11 @@ impl Scale {
         ends.map(|end| self.excursion(end).unwrap_or(end))
     }
 
+    /// Excursion of the least that a file may hold.
+    fn least(self, key: &EffectKey) -> f64 {
+        if self == Scale::Infinite { 1.0 / key.max } else { 0.0 }
+    }
+
     fn two_sided(self, key: &EffectKey) -> bool {
         key.signed || matches!(self, Scale::About(..)) && Scale::of(key).len() > 1
     }
@@ -148,7 +156,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// How far the amplitude of an effect lies above its limit; `None` when it has none.
+    /// How far the amplitude of an effect lies above its limit: 0 when no amplitude is seen, `None` when every one is.
     #[must_use]
     pub fn ratio(&self, sheet: &Sheet, place: Place, amplitude: f64) -> Option<f64> {
         let key = &sheet.keys[0];
@@ -157,7 +165,10 @@ impl Limits {
             let limit = self.limits.iter().find(|limit| {
                 limit.effect == sheet.name && limit.place == place.to_string() && limit.side == side(scale)
             })?;
-            Some(own / scale.excursion(limit.limit_value?)?)
+            match limit.limit_value {
+                Some(limit_value) => Some(own / scale.excursion(limit_value)?),
+                None => (!limit.excited).then_some(0.0),
+            }
         })
     }
 }
@@ -227,7 +238,8 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
     let (limit_value, strength) = if scale == Scale::None {
         (None, weakest(key, strength_at)?)
     } else {
-        let found = search(scale.most(key), |excursion| strength_at(scale.value(excursion)))?;
+        let ends = Ends { least: scale.least(key), most: scale.most(key)[0], drawn: scale.most(key)[1] };
+        let found = search(&ends, |excursion| strength_at(scale.value(excursion)))?;
         (found.limit.map(|excursion| scale.value(excursion)), found.strength)
     };
     Ok(Limit {
@@ -255,42 +267,46 @@ fn weakest(
     })
 }
 
+/// Excursions between which a limit is looked for.
+struct Ends {
+    least: f64,
+    /// That a file may hold.
+    most: f64,
+    /// The most that is drawn.
+    drawn: f64,
+}
+
 struct Found {
     limit: Option<f64>,
     /// At the most that is drawn.
     strength: f64,
 }
 
-/// The excursion at which the strength passes 1, looked for from the most that is drawn: below it, or above it up to what a file takes.
-fn search<E>([most, drawn]: [f64; 2], strength_at: impl Fn(f64) -> Result<f64, E>) -> Result<Found, E> {
+/// The excursion at which the strength passes 1, looked for from the most that is drawn: down to the least, or up to the most.
+fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result<Found, E> {
+    let &Ends { least, most, drawn } = ends;
     let strength = strength_at(drawn)?;
-    let (mut low, mut high) = if strength >= 1.0 { (0.0, drawn) } else { (drawn, f64::INFINITY) };
-    let mut at = drawn;
-    let mut here = strength;
-    while low == 0.0 || high / low > PRECISION {
-        // Strength is nearly proportional to the excursion; in a bracket that is too wide the middle is safer.
-        let guess = if here > 0.0 { at / here } else { most };
-        let next = if low == 0.0 {
-            guess.clamp(at / 100.0, at / 1.1)
-        } else if high.is_infinite() {
-            guess.max(at * 1.1).min(most)
-        } else if guess > low * PRECISION.sqrt() && guess < high / PRECISION.sqrt() && high / low < 1.5 {
-            guess
-        } else {
-            (low * high).sqrt()
-        };
-        if next < drawn * LEAST_SHARE {
-            return Ok(Found { limit: Some(next), strength });
-        }
-        at = next;
-        here = strength_at(at)?;
+    let least = least.max(drawn * LEAST_SHARE);
+    let (beyond, mut low, mut high) =
+        if strength >= 1.0 { (least, least, drawn) } else { (most, drawn, most) };
+    let there = strength_at(beyond)?;
+    if (there >= 1.0) == (strength >= 1.0) {
+        return Ok(Found { limit: None, strength });
+    }
+    let mut next = drawn / strength;
+    while high / low > PRECISION {
+        // Strength is nearly proportional to the excursion; where that leads out of the bracket, or no further, its middle is safer.
+        let inside = next > low * PRECISION.sqrt() && next < high / PRECISION.sqrt();
+        let at = if inside { next } else { (low * high).sqrt() };
+        let here = strength_at(at)?;
         if here >= 1.0 {
             high = at;
-        } else if at >= most {
-            return Ok(Found { limit: None, strength });
         } else {
             low = at;
         }
+        // To the other side of the limit, so that the bracket closes from both ends.
+        let overshoot = if here >= 1.0 { 1.0 / PRECISION.sqrt() } else { PRECISION.sqrt() };
+        next = if here > 0.0 { at / here * overshoot } else { 0.0 };
     }
     Ok(Found { limit: Some(high), strength })
 }
@@ -321,7 +337,8 @@ mod tests {
 
     #[test]
     fn the_search_finds_where_the_strength_passes_one() {
-        let find = |law: fn(f64) -> f64| search([100.0, 10.0], |at| Ok::<_, ()>(law(at))).unwrap().limit;
+        let ends = Ends { least: 0.0, most: 100.0, drawn: 10.0 };
+        let find = |law: fn(f64) -> f64| search(&ends, |at| Ok::<_, ()>(law(at))).unwrap().limit;
         for law in [|at| at / 3.0, |at: f64| (at / 3.0).powi(2), |at: f64| (at / 3.0).sqrt()] {
             let found = find(law).unwrap();
             assert!((3.0..=3.0 * PRECISION * PRECISION).contains(&found), "{found}");
@@ -331,7 +348,7 @@ mod tests {
         assert!((50.0..=50.0 * PRECISION * PRECISION).contains(&above), "{above}");
         assert_eq!(find(|at| at / 500.0), None);
         assert_eq!(find(|_| 0.0), None);
-        // Seen at once however small.
-        assert!(find(|_| 7.0).unwrap() < 1e-4);
+        // Seen however small.
+        assert_eq!(find(|_| 7.0), None);
     }
 }

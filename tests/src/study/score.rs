@@ -269,12 +269,9 @@ fn case(
 fn over_limit(draw: &Draw, at: usize, classes: Option<&DrawClasses>, limits: Option<&Limits>) -> Option<f64> {
     let hidden = &draw.recipe.hidden[at];
     let sheet = plant::effects::sheet(hidden.name)?;
-    let by_amplitude = limits?.ratio(sheet, hidden.place, hidden.numbers[0]);
-    by_amplitude.or_else(|| {
-        // Without a neutral value there is no scale: what counts is the signature in this record.
-        let never = sheet.keys[0].neutral.is_some();
-        if never { Some(0.0) } else { Some(classes?.hidden.get(at)?.strength) }
-    })
+    // What is always seen has no limit: there its signature in this record counts.
+    let ratio = limits?.ratio(sheet, hidden.place, hidden.numbers[0]);
+    ratio.or_else(|| Some(classes?.hidden.get(at)?.strength))
 }
 
 #[cfg(test)]

@@ -127,7 +127,7 @@ impl Observer {
         for window in 0..windows {
             let start = seated(&plant, &self.course.points[window * WINDOW]);
             starts.push(start);
-            plant = restarted(plant, rig, &start);
+            plant.go_on_in(&start).expect("the states of a record are some that the rig can be in");
             self.read(&mut plant, window, &mut run);
         }
         (run, starts)
@@ -141,7 +141,7 @@ impl Observer {
         let mut phases = [Vec::with_capacity(WINDOW + 1), Vec::with_capacity(WINDOW + 1)];
         for inputs in &self.course.inputs[window * WINDOW..][..WINDOW] {
             let truth = plant.truth(inputs);
-            let shown = shown(&truth);
+            let shown = plant.shown(&truth);
             for i in measured() {
                 run.readings.extend(shown[i].iter().zip(self.noise).map(|(value, noise)| value / noise));
                 phases[i].push(phase(&truth, i));
@@ -171,8 +171,10 @@ impl Observer {
             for number in 0..POINT_NUMBERS {
                 let mut points = self.course.points[window * WINDOW];
                 points[axis] = points[axis].nudged(number);
-                let plant = self.plant(&self.course.rig, start);
-                let mut plant = self.plant(&self.course.rig, &seated(&plant, &points));
+                let mut plant = self.plant(&self.course.rig, start);
+                plant
+                    .go_on_in(&seated(&plant, &points))
+                    .expect("a nudge leaves the rig in a state of its own");
                 let mut nudged = Run::default();
                 self.read(&mut plant, window, &mut nudged);
                 sensitivities
@@ -255,16 +257,6 @@ fn seated(plant: &Plant, points: &[Point; 2]) -> State {
         own.stored_air_b_j = point.pressures_pa[1] * volume_b;
     }
     state
-}
-
-/// The plant in another state, with its memories.
-fn restarted(_plant: Plant, rig: &RigParameters, state: &State) -> Plant {
-    Plant::in_state(rig, state).expect("the states of a record are some that the rig can be in")
-}
-
-/// What the sensors of both axes show, before noise and rounding.
-fn shown(truth: &Truth) -> [[f64; CHANNELS]; 2] {
-    truth.axes.map(|axis| [axis.position_m, axis.sensor_force_n, axis.pressure_a_pa, axis.pressure_b_pa])
 }
 
 /// Length of a signature: standard deviations of the matched filter.
