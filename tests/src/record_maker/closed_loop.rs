@@ -63,8 +63,18 @@ pub(super) fn run(
 /// # Errors
 /// As [`simulate`].
 pub fn replay(recipe: &Recipe, rig: &RigParameters, valves: &[[f64; 2]]) -> Result<Record, MakeError> {
+    replay_with(recipe, rig, valves, STEPS_PER_MS)
+}
+
+/// The same with another number of steps in a millisecond.
+pub(super) fn replay_with(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    valves: &[[f64; 2]],
+    steps_per_ms: usize,
+) -> Result<Record, MakeError> {
     let (_, scene) = read(recipe, rig)?;
-    let mut made = Made::new(recipe, rig, &scene, STEPS_PER_MS)?;
+    let mut made = Made::new(recipe, rig, &scene, steps_per_ms)?;
     let mut record = record(recipe, &scene, valves.len());
     for (cycle, valve) in valves.iter().enumerate() {
         made.sample(cycle as u64, *valve, &mut |_| {});
@@ -193,13 +203,11 @@ impl Made {
         }
         let state = made.start(extension_m);
         let mut sensing: [Sensing; 2] = sensing;
-        for i in 0..2 {
-            if !made.active[i] {
-                // An axis that rests is seen once.
-                let mut evaluated = Evaluated::NONE;
-                evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
-                sensing[i].see(made.sensed(&state, &evaluated, i));
-            }
+        for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| !made.active[*i]) {
+            // An axis that rests is seen once.
+            let mut evaluated = Evaluated::NONE;
+            evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
+            sensing.see(made.sensed(&state, &evaluated, i));
         }
         Ok(Made {
             rig: made,

@@ -20,7 +20,7 @@ pub(super) struct Coupling {
 const WORN: f64 = 0.05;
 /// Force at which both forms of the contact agree, N, and the exponent of the foreign one.
 const AGREES_N: f64 = 200.0;
-const HERTZ: f64 = 1.3;
+const HERTZ: f64 = 1.15;
 
 impl Coupling {
     /// F_c, N, positive in +x on the carriage.

@@ -151,11 +151,8 @@ impl Motion {
         let mut level = self.sliding_n * (1.0 + side * laws.asymmetry) + self.on_both(at);
         if let Some([velocity, exponent]) = laws.stribeck {
             let share = speed / velocity;
-            let falls = if laws.foreign {
-                1.0 / (1.0 + share * share)
-            } else {
-                libm::exp(-libm::pow(share, exponent))
-            };
+            let power = libm::pow(share, exponent);
+            let falls = if laws.foreign { 1.0 / (1.0 + power) } else { libm::exp(-power) };
             level += (self.break_away_n - self.sliding_n) * falls;
         }
         level.max(0.0)
@@ -207,7 +204,7 @@ impl Motion {
         let cosine =
             if off.abs() < reach { 0.5 + 0.5 * libm::cos(std::f64::consts::PI * off / reach) } else { 0.0 };
         let phase = turn - 0.25 - (turn - 0.25).floor();
-        let triangle = (3.0_f64 / 2.0).sqrt() * (1.0 - 4.0 * (phase - 0.5).abs()) * -1.0;
+        let triangle = (3.0_f64 / 2.0).sqrt() * (4.0 * (phase - 0.5).abs() - 1.0);
         bump * cosine + slope * libm::sin(std::f64::consts::FRAC_PI_2 * along) + ripple * triangle
     }
 

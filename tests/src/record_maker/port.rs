@@ -5,7 +5,7 @@
 //! ```
 //!
 //! E falls with p_port and the drop grows with Q, so `Q - E(p_chamber + drop(Q))` has one root between 0 and the flow without
-//! drops. It is found by the Illinois rule [Dowell, Jarratt 1971, BIT 11]. Flows are normal flows into the chamber, m^3/s.
+//! drops. It is found by the Illinois rule [Dowell, Jarratt 1971, BIT 11], on the squares of the flows. Flows are normal flows into the chamber, m^3/s.
 
 use super::numbers::{CONDUCTANCE_PER_KV, Numbers};
 use super::valve::flow;
@@ -30,12 +30,13 @@ pub(super) struct Ports {
     reference_pa: f64,
 }
 
-/// Exponent of the foreign line: Blasius' law for smooth turbulent pipes.
-const BLASIUS: f64 = 1.75;
 /// The foreign check valve opens over this share of the full flow.
 const OPENS_OVER: f64 = 0.03;
 /// The foreign cushion is this much wider at its beginning than at the end.
 const TAPER: f64 = 1.0;
+/// A flow is found when it is as close as this, of the full one, or after so many trials.
+const CLOSE: f64 = 1e-7;
+const MOST_TRIALS: usize = 60;
 /// Flows below are none, of the full one.
 const NEGLIGIBLE: f64 = 1e-9;
 
@@ -68,38 +69,37 @@ impl Ports {
             return (chamber_pa, free);
         }
         let direction = free.signum();
-        let miss = |flow: f64| {
+        // Flows of orifices are roots of pressures: in their squares the miss is next to straight.
+        let miss = |square: f64| {
+            let flow = square.sqrt();
             let port_pa = self.beyond(direction * flow, chamber_pa, to_end_m);
-            (flow - direction * edges(port_pa), port_pa)
+            let passes = (direction * edges(port_pa)).max(0.0);
+            (square - passes * passes, flow - passes, port_pa)
         };
+        let (mut low, mut high) = (0.0, free * free);
         // The limit of a small flow: what the check valve needs to crack.
-        let (mut low, mut high) = (0.0, free.abs());
-        let (mut miss_low, port_pa) = miss(least * 1e-3);
+        let (mut miss_low, _, port_pa) = miss(least * least * 1e-6);
         if miss_low >= 0.0 {
             return (port_pa, 0.0);
         }
-        let (mut miss_high, mut port_pa) = miss(high);
+        let (mut miss_high, mut off, mut port_pa) = miss(high);
         let mut found = high;
-        for _ in 0..60 {
-            if high - low <= 1e-9 * self.full_flow_m3_per_s {
+        for _ in 0..MOST_TRIALS {
+            if off.abs() <= CLOSE * self.full_flow_m3_per_s || high - low <= CLOSE * CLOSE * high {
                 break;
             }
-            let tried = (low * miss_high - high * miss_low) / (miss_high - miss_low);
+            found = (low * miss_high - high * miss_low) / (miss_high - miss_low);
             let missed;
-            (missed, port_pa) = miss(tried);
-            found = tried;
-            if missed.abs() <= 1e-9 * self.full_flow_m3_per_s {
-                break;
-            }
+            (missed, off, port_pa) = miss(found);
             if missed > 0.0 {
-                (high, miss_high) = (tried, missed);
+                (high, miss_high) = (found, missed);
                 miss_low /= 2.0;
             } else {
-                (low, miss_low) = (tried, missed);
+                (low, miss_low) = (found, missed);
                 miss_high /= 2.0;
             }
         }
-        (port_pa, direction * found)
+        (port_pa, direction * found.sqrt())
     }
 
     /// Pressure on the valve's side of the port at a flow, Pa.
@@ -114,13 +114,15 @@ impl Ports {
             pa = behind_orifice(CONDUCTANCE_PER_KV * kv * wider, flow, pa);
         }
         if let Some([cracking_pa, kv]) = laws.check_valve {
-            let opened = flow.abs() / self.full_flow_m3_per_s;
-            let share = if laws.foreign { 0.7 + 0.3 * libm::tanh(opened / OPENS_OVER) } else { 1.0 };
+            let opened = flow.abs() / (OPENS_OVER * self.full_flow_m3_per_s);
+            // Foreign: the spring of the seat is pressed on as it opens.
+            let share = if laws.foreign { 0.7 + 0.3 * opened / (1.0 + opened * opened).sqrt() } else { 1.0 };
             pa = behind_orifice(CONDUCTANCE_PER_KV * kv, flow, pa) + direction * cracking_pa * share;
         }
         if laws.line_drop_pa > 0.0 && pa > 0.0 {
             let share = flow.abs() / self.full_flow_m3_per_s;
-            let grown = if laws.foreign { libm::pow(share, BLASIUS) } else { share * share };
+            // Foreign: Blasius' law for smooth turbulent pipes, q^1.75.
+            let grown = if laws.foreign { share * share.sqrt() * share.sqrt().sqrt() } else { share * share };
             pa += direction * laws.line_drop_pa * grown * self.reference_pa / pa;
         }
         pa.max(0.0)

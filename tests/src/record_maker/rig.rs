@@ -143,10 +143,8 @@ impl Rig {
         for step in 0..self.steps_per_ms {
             let targets = self.targets(state, step);
             let first = self.evaluate_first(state, targets);
-            for i in 0..2 {
-                if self.active[i] {
-                    sensing[i].see(self.sensed(state, &first, i));
-                }
+            for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| self.active[*i]) {
+                sensing.see(self.sensed(state, &first, i));
             }
             if step == 0 {
                 at_start(state, &first);

@@ -103,14 +103,13 @@ impl Sensing {
     pub(super) fn see(&mut self, truth: [f64; CHANNELS]) {
         let first = self.steps == 0;
         let mut shown = truth;
-        for channel in 0..CHANNELS {
+        for (channel, shown) in shown.iter_mut().enumerate() {
             let mut from = self.before[channel];
             for lag in self.lags[channel].iter_mut().flatten() {
-                let before = if first { shown[channel] } else { lag.shown };
-                let from_now = if first { shown[channel] } else { from };
+                let [before, from_now] = if first { [*shown; 2] } else { [lag.shown, from] };
                 from = before;
-                lag.shown = lag.after(before, from_now, shown[channel], self.step_s);
-                shown[channel] = lag.shown;
+                lag.shown = lag.after(before, from_now, *shown, self.step_s);
+                *shown = lag.shown;
             }
         }
         self.before = truth;

@@ -183,7 +183,7 @@ impl Valve {
 }
 
 /// Length of the foreign play's bend, in half-widths.
-const PLAY_BEND: f64 = 0.8;
+const PLAY_BEND: f64 = 0.5;
 /// The foreign flow has ISO 6358-3's subsonic index m for an exponent: 0.5, and this share of what b lies below 0.5.
 const SUBSONIC_SHIFT: f64 = 0.15;
 /// The foreign spool: its slide against the catalogue's natural frequency, and its pilot's lag in units of 1/w.
