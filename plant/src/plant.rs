@@ -55,6 +55,27 @@ impl Plant {
         Ok(Self::assemble(rig, *state, SUBSTEPS))
     }
 
+    /// Goes on in another state, as in the next window of a record; what effects remember stays.
+    ///
+    /// Delays, lags, plays, bristles and times at rest go on from the state before. A chamber keeps its temperature, so that its mass
+    /// follows the new pressure and volume.
+    ///
+    /// # Errors
+    /// [`SetupError`] if the state is none that the rig can be in; the plant is as before.
+    pub fn go_on_in(&mut self, state: &State) -> Result<(), SetupError> {
+        check_state(&self.rig, state)?;
+        if let Some(effects) = &mut self.effects {
+            effects.memory.keep_temperatures(&self.state, state);
+        }
+        let added_mass_kg = self.state.added_mass_kg;
+        self.state = State { added_mass_kg, ..*state };
+        if added_mass_kg == state.added_mass_kg {
+            Ok(())
+        } else {
+            self.set_added_mass_kg(state.added_mass_kg)
+        }
+    }
+
     /// The same plant with another number of substeps in a period, 1 to 1000: for studies of accuracy.
     ///
     /// # Panics

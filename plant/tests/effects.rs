@@ -138,3 +138,44 @@ fn a_neutral_effect_is_the_baseline() {
         }
     }
 }
+
+#[test]
+fn going_on_in_the_state_that_it_is_in_changes_nothing() {
+    for sheet in SHEETS {
+        let place = sheet.place.places()[0].to_string();
+        let key = &sheet.keys[0];
+        let rig =
+            RigParameters::baseline().with_effect(sheet.name, &place, &[(key.name, key.drawn[1])]).unwrap();
+        let mut straight = Plant::new(&rig, &Setup { linked: true, ..Setup::default() }).unwrap();
+        let mut again = straight.clone();
+        for k in 0..700 {
+            if k % 100 == 0 {
+                let state = *again.state();
+                again.go_on_in(&state).unwrap();
+            }
+            straight.step(&inputs(k));
+            again.step(&inputs(k));
+            assert_eq!(straight.state(), again.state(), "{} at {k} ms", sheet.name);
+        }
+        let shown = |plant: &Plant| plant.shown(&plant.truth(&inputs(700)));
+        assert_eq!(shown(&straight), shown(&again), "{}", sheet.name);
+    }
+}
+
+#[test]
+fn a_chamber_that_goes_on_at_another_pressure_keeps_its_temperature() {
+    let rig = RigParameters::baseline();
+    let rig = rig.with_effect("heat-exchange", "drive", &[("coefficient_w_per_m2_k", 10.0)]).unwrap();
+    let mut plant = Plant::new(&rig, &Setup::default()).unwrap();
+    let mut state = *plant.state();
+    state.axes[0].stored_air_a_j *= 1.5;
+    state.axes[0].stored_air_b_j *= 1.5;
+    plant.go_on_in(&state).unwrap();
+    // Air at the walls' temperature in a shut chamber has no heat to exchange.
+    plant.step(&Inputs::default());
+    assert!(
+        plant.terms(&Inputs::default()).values().iter().all(|watt| watt.abs() < 1e-6),
+        "{:?}",
+        plant.terms(&Inputs::default())
+    );
+}

@@ -11,6 +11,7 @@
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
 //!   record_maker  blind records for the study of the workflow, from a simulation of its own
+//!   study ─── the judge of the discrepancy workflow, for scripts/study
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
@@ -35,5 +36,6 @@ pub mod record_maker;
 pub mod records;
 pub mod scene;
 pub mod skip;
+pub mod study;
 pub mod tune;
 pub mod turn;

@@ -159,6 +159,14 @@ impl Memory {
         let commands = [0, 1].map(|i: usize| Commands::new(axes[i].spool));
         Memory { moving: Moving { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 }, commands, lines, channels }
     }
+
+    /// The masses that have, in the new state, the temperatures of the old one.
+    pub(crate) fn keep_temperatures(&mut self, old: &State, new: &State) {
+        for ((own, old), new) in self.moving.axes.iter_mut().zip(&old.axes).zip(&new.axes) {
+            own.normal_volume_m3[0] *= new.stored_air_a_j / old.stored_air_a_j;
+            own.normal_volume_m3[1] *= new.stored_air_b_j / old.stored_air_b_j;
+        }
+    }
 }
 
 #[cfg(test)]

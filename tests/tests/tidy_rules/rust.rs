@@ -238,6 +238,19 @@ const DIMENSIONLESS: &[&str] = &[
     "variables",             // of a program: names with their units, and values
     "before_value",          // of a set-point, position or force
     "after_value",           // the same
+    "share",                 // a rate, and the bound below
+    "at_most",               // a rate
+    "cosine",                // of two signatures
+    "strength",              // of a signature, over what an ideal observer needs
+    "noise_factor",          // on the noise of the sensors
+    "over_limit",            // amplitudes over their limits
+    "limit_value",           // of an effect, whose unit is a field beside it
+    "error_value",           // of a fitted number, whose unit is a field beside it
+    "closed_ratio",          // share of a gap
+    "claimed_closed_ratio",  // the same
+    "off_ratio",             // error over truth
+    "error_ratio",           // standard error over truth
+    "quantiles",             // of a spread, whose field has the unit
 ];
 
 /// A public number says its unit in its name.
