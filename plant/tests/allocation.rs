@@ -5,6 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use plant::effects::draw::{Among, as_toml, draw};
 use plant::{Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
 
 thread_local! {
@@ -53,6 +54,28 @@ fn a_period_allocates_nothing() {
     }
     assert_eq!(ALLOCATIONS.with(Cell::get), counted);
     assert!(sum > 0.0);
+}
+
+#[test]
+fn a_period_with_effects_and_their_terms_allocates_nothing() {
+    let effects = as_toml(&draw(1, 38, Among::Both).expect("there are so many"));
+    let rig = RigParameters::baseline().with_effects_of(&effects, "drawn.toml").expect("good");
+    let mut plant = Plant::new(&rig, &Setup { linked: true, ..Setup::default() }).expect("good");
+    let mut sensors = Sensors::new(&rig, 1);
+    let terms = plant.term_names().len();
+    let counted = ALLOCATIONS.with(Cell::get);
+    let mut told = 0;
+    for k in 0..1000 {
+        let u = if k / 200 % 2 == 0 { 0.5 } else { -0.5 };
+        let inputs = Inputs { valve: [u, -0.5 * u], ..Inputs::default() };
+        told += usize::from(sensors.sample(&plant, &inputs)[0].position.value.is_finite());
+        let values = plant.terms(&inputs);
+        told += values.values().iter().filter(|value| value.is_finite()).count();
+        plant.step(&inputs);
+    }
+    assert_eq!(ALLOCATIONS.with(Cell::get), counted);
+    assert!(terms >= 38);
+    assert_eq!(told, 1000 * (1 + terms));
 }
 
 #[test]
