@@ -77,23 +77,38 @@ install_valgrind() {
 install_python() {
     local stamp="$tools/venv/packages"
     [ "$(cat "$stamp" 2>/dev/null)" = "${python_packages[*]}" ] && return
-    command -v python3 >/dev/null || need_packages python3
-    rm -rf "$tools/venv"
-    make_venv && "$tools/venv/bin/python" -m pip install --quiet --disable-pip-version-check "${python_packages[@]}" &&
+    make_venv venv && "$tools/venv/bin/python" -m pip install --quiet --disable-pip-version-check "${python_packages[@]}" &&
         echo "${python_packages[*]}" >"$stamp"
 }
 
-# Debian's python3 comes without ensurepip; its pip wheel does as well.
+# make_venv NAME: an empty virtual environment $tools/NAME. Debian's python3 comes without ensurepip; its pip wheel does as well.
 make_venv() {
-    python3 -m venv "$tools/venv" 2>/dev/null && return
-    rm -rf "$tools/venv"
+    local venv="$tools/$1"
+    command -v python3 >/dev/null || need_packages python3
+    rm -rf "$venv"
+    python3 -m venv "$venv" 2>/dev/null && return
+    rm -rf "$venv"
     if [ "$(id -u)" = 0 ]; then
-        need_packages python3-venv && python3 -m venv "$tools/venv"
+        need_packages python3-venv && python3 -m venv "$venv"
     else
-        need_packages python3-pip-whl && python3 -m venv --without-pip "$tools/venv" &&
-            "$tools/venv/bin/python" "$(ls "$tools"/debian/usr/share/python-wheels/pip-*.whl)/pip" install --quiet pip
+        need_packages python3-pip-whl && python3 -m venv --without-pip "$venv" &&
+            "$venv/bin/python" "$(ls "$tools"/debian/usr/share/python-wheels/pip-*.whl)/pip" install --quiet pip
     fi
 }
+
+# install_requirements NAME FILE: a virtual environment with what the file pins; made anew when the file changes.
+install_requirements() {
+    local venv="$tools/$1" file=$2
+    cmp -s "$file" "$venv/requirements.txt" && return
+    make_venv "$1" && "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --requirement "$file" &&
+        cp "$file" "$venv/requirements.txt"
+}
+
+# The reference competitors of the study (tests/competitors): $tools/competitors/bin/python runs them.
+install_competitors() { install_requirements competitors "$(dirname "${BASH_SOURCE[0]}")/../tests/competitors/requirements.txt"; }
+
+# asammdf, which scripts/mdf4-to-csv reads MDF4 with.
+install_mdf4() { install_requirements mdf4 "$(dirname "${BASH_SOURCE[0]}")/../discrepancy/python/requirements.txt"; }
 
 install_gungraun() {
     [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return

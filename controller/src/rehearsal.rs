@@ -23,8 +23,8 @@ use protocol::bus::control::Role;
 use protocol::bus::{Bus, BusCounters, BusError, Received, SendError};
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors as SensorFrame, Tick,
-    ValveCommand,
+    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RIG_STATUS, RigStatus, Sensors as SensorFrame,
+    Tick, ValveCommand,
 };
 use protocol::periods;
 use std::time::Duration;
@@ -150,8 +150,9 @@ impl SimulatedRig for PeopledPlant {
     fn step(&mut self, cycle: u64, valve: [f64; 2]) -> CycleRecord {
         self.inputs.valve = valve;
         let truth = self.plant.truth(&self.inputs);
+        let terms = self.plant.terms(&self.inputs);
         self.plant.step(&self.inputs);
-        CycleRecord { cycle, valve, readings: self.readings, truth }
+        CycleRecord { cycle, valve, readings: self.readings, truth, terms }
     }
 }
 
@@ -263,7 +264,8 @@ impl<R: SimulatedRig> Rehearsal<R> {
                 load_force_saturated: load[1],
                 load_pressure_a_saturated: load[2],
                 load_pressure_b_saturated: load[3],
-                supply_pressure_pa: standing.supply_pressure_pa,
+                // As the emulator's sensor, which ends where the wire does.
+                supply_pressure_pa: standing.supply_pressure_pa.min(RIG_STATUS.signals[0].max),
                 linked: standing.linked,
                 emergency_stop: standing.emergency_stop,
                 check_valves_shut: standing.check_valves_shut,

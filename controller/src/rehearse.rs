@@ -30,6 +30,12 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(&arguments.files)?;
     let file = arguments.files.experiment.display().to_string();
     let scene = Scene::from_toml(&inputs.experiment_toml, &file, &inputs.rig).map_err(RunError::input)?;
+    if scene.sealed.is_some() {
+        return Err(RunError::Input(format!(
+            "{file}: rig.sealed: a rehearsal runs the plant inside the controller, which must not read a sealed file; use \
+             'emulator run' and 'controller run', or scripts/run without --rehearse"
+        )));
+    }
     let mut rehearsal = rehearsal(&inputs, &scene, arguments.seed, arguments.files.repeat)?;
     let interrupt =
         Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
@@ -40,7 +46,7 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     end_when_stuck();
     let started = Instant::now();
-    let mut files = Files::create(out, &scene).map_err(RunError::output)?;
+    let mut files = Files::create(out, &scene, &rehearsal.plant().term_names()).map_err(RunError::output)?;
     let cycles = (arguments.seconds * 1000.0).round() as u64;
     let (mut told, mut news) = (Vec::new(), Vec::new());
     let mut interrupted = false;
@@ -101,11 +107,11 @@ struct Files {
 }
 
 impl Files {
-    fn create(folder: &Path, scene: &Scene) -> std::io::Result<Self> {
+    fn create(folder: &Path, scene: &Scene, terms: &[String]) -> std::io::Result<Self> {
         let mut measurement = LineFile::create(&folder.join("measurement.csv"))?;
         let mut truth = LineFile::create(&folder.join("truth.csv"))?;
         tables::write_measurement_head(measurement.lines(), scene.linked, scene.added_mass_kg)?;
-        tables::write_truth_head(truth.lines())?;
+        tables::write_truth_head(truth.lines(), terms)?;
         Ok(Self { measurement, truth, axes: Tables::create(folder, &Axis::ALL)? })
     }
 

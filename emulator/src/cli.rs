@@ -31,6 +31,10 @@ pub enum Command {
     Run(Box<RunArguments>),
     /// Host an embedded bus alone, without a rig.
     Bus(BusArguments),
+    /// Draw effects that nobody knows, and write them into a file for 'emulator run --sealed'.
+    Seal(SealArguments),
+    /// List the effects that a rig file or a sealed file can switch on: names, places, numbers with unit and range, laws, sources.
+    Effects(EffectsArguments),
     /// Print the worst-case load of the bus and each frame's worst-case response time, computed from rig.dbc.
     BusLoad(BusLoadArguments),
 }
@@ -57,6 +61,10 @@ pub struct RunArguments {
     /// Experiment file, of which `[rig]` is read: initial state, hands, and what people do when.
     #[arg(long)]
     pub experiment: Option<PathBuf>,
+    /// File with effects that nobody but the rig knows, as 'emulator seal' draws it: what it switches on stands in truth.csv alone.
+    /// In place of the one that the experiment names.
+    #[arg(long, value_name = "FILE")]
+    pub sealed: Option<PathBuf>,
     /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
     #[arg(long, default_value_os_t = run_folder::new_folder())]
     pub out: PathBuf,
@@ -112,6 +120,42 @@ pub struct RunArguments {
     /// How long the bus may be gone before the run ends, in s.
     #[arg(long, default_value = "5", value_parser = seconds)]
     pub bus_grace: f64,
+}
+
+/// What to draw.
+#[derive(Args, Debug)]
+pub struct SealArguments {
+    /// Seed of the draw; whoever knows it can draw the same again.
+    #[arg(long)]
+    pub seed: u64,
+    /// How many different effects.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    pub effects: u8,
+    /// Axis that they are on; effects of the linkage are drawn for both alone.
+    #[arg(long, value_enum, default_value_t = SealedAxis::Both)]
+    pub axis: SealedAxis,
+    /// File to write; one that is there is left as it is.
+    #[arg(long, default_value = "sealed.toml")]
+    pub out: PathBuf,
+}
+
+/// Axes that an effect is drawn for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SealedAxis {
+    /// The drive axis, and the supply that feeds it.
+    Drive,
+    /// The load axis, and the supply that feeds it.
+    Load,
+    /// Either, and what they share.
+    Both,
+}
+
+/// How to list the effects.
+#[derive(Args, Debug)]
+pub struct EffectsArguments {
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// How to host a bus.

@@ -1,9 +1,12 @@
-//! What a run reads before it starts: rig file and experiment file, checked, with messages a person can act on.
+//! What a run reads before it starts: rig, experiment and sealed file, checked, with messages a person can act on.
+//!
+//! Sealed effects go into the plant and nowhere else: everything that describes the run is made of the rig file. What is wrong
+//! in a sealed file is told with line and key, because then no run begins.
 
 use crate::run::RunError;
 use crate::wire_limits;
 use plant::{Plant, RigParameters, Scene};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Everything that was read.
 pub struct Inputs {
@@ -13,18 +16,20 @@ pub struct Inputs {
     pub experiment_toml: Option<String>,
     /// Its `[rig]`: setup, hands, and what people do when.
     pub scene: Scene,
-    /// The rig's numbers.
+    /// The rig's numbers as the rig file has them, without what is sealed.
     pub rig: RigParameters,
-    /// The plant in its initial state.
+    /// Whether a sealed file was read.
+    pub sealed: bool,
+    /// The plant in its initial state, with what is sealed.
     pub plant: Plant,
 }
 
 impl Inputs {
-    /// Reads and checks both files.
+    /// Reads and checks the files; `sealed` takes the place of the file that the experiment names.
     ///
     /// # Errors
     /// [`RunError::Input`] with file, line, key, value and allowed range.
-    pub fn read(rig: &Path, experiment: Option<&Path>) -> Result<Self, RunError> {
+    pub fn read(rig: &Path, experiment: Option<&Path>, sealed: Option<&Path>) -> Result<Self, RunError> {
         let rig_toml = read(rig)?;
         let parameters = RigParameters::from_toml(&rig_toml, &rig.display().to_string())
             .map_err(|error| RunError::Input(error.to_string()))?;
@@ -38,13 +43,26 @@ impl Inputs {
                 .map_err(|error| RunError::Input(error.to_string()))?,
             _ => Scene::default(),
         };
+        let sealed = sealed.map(Path::to_path_buf).or_else(|| named_by(experiment, &scene));
+        let simulated = match &sealed {
+            Some(path) => parameters
+                .with_effects_of(&read(path)?, &path.display().to_string())
+                .map_err(|error| RunError::Input(error.to_string()))?,
+            None => parameters.clone(),
+        };
         // What the file says is checked; a default may not suit a rig of another size.
-        let plant = Plant::new(&parameters, &scene.setup()).map_err(|error| {
+        let plant = Plant::new(&simulated, &scene.setup()).map_err(|error| {
             let file = experiment.unwrap_or(Path::new("default setup"));
             RunError::Input(format!("{}: [rig] {error}", file.display()))
         })?;
-        Ok(Self { rig_toml, experiment_toml, scene, rig: parameters, plant })
+        Ok(Self { rig_toml, experiment_toml, scene, rig: parameters, sealed: sealed.is_some(), plant })
     }
+}
+
+/// The sealed file of an experiment, which lies beside it unless it says otherwise.
+fn named_by(experiment: Option<&Path>, scene: &Scene) -> Option<PathBuf> {
+    let folder = experiment.and_then(Path::parent).unwrap_or(Path::new(""));
+    scene.sealed.as_ref().map(|sealed| folder.join(sealed))
 }
 
 /// `file:line`, or the file alone.

@@ -7,28 +7,27 @@
 //! |---|---|
 //! | [`station`] | one cycle: sensors out, commands in, records, step |
 //! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
-//! | [`commands`], [`sources`], [`live_cycles`] | which command acts, who sends it, how old it is |
 //! | [`exchange`] | when sensors went out and the commands that answer them came |
 //! | [`telegrams`], [`wire_limits`] | the frames that the rig sends, and whether its numbers fit them |
 //! | [`recording`] | the queues out of the 1 ms path, the files, and the evidence of real time |
 //! | `finish` | histograms, summary, exit code |
 //! | [`console`] | what a person types |
+//! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
 //! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
 
 pub mod bus_load;
+pub mod catalogue;
 pub mod cli;
-pub mod commands;
 pub mod console;
 pub mod event;
 pub mod exchange;
 mod finish;
 pub mod host_thread;
 pub mod inputs;
-pub mod live_cycles;
 pub mod pace;
 pub mod recording;
 pub mod run;
-pub mod sources;
+pub mod seal;
 pub mod station;
 pub mod summary;
 pub mod telegrams;

@@ -4,6 +4,7 @@ use clap::Parser;
 use emulator::bus_load;
 use emulator::cli::{BusArguments, Cli, Command, DEFAULT_FIFO_PRIORITY};
 use emulator::run::{self, RunError};
+use emulator::{catalogue, seal};
 use protocol::bus::BusUrl;
 use protocol::bus::host::Host;
 use protocol::exit::Exit;
@@ -19,6 +20,8 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Bus(arguments) => host_bus(&arguments),
+        Command::Seal(arguments) => seal::seal(&arguments),
+        Command::Effects(arguments) => catalogue::print(&arguments),
         Command::BusLoad(arguments) => bus_load::print(&arguments),
     };
     let exit = result.unwrap_or_else(|error| {

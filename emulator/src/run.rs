@@ -88,7 +88,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
     }
     // Everything that can be refused is looked at before the folder is touched: it may hold an earlier run.
-    let inputs = Inputs::read(&arguments.rig, arguments.experiment.as_deref())?;
+    let inputs = Inputs::read(&arguments.rig, arguments.experiment.as_deref(), arguments.sealed.as_deref())?;
     let periodic = loop_config(arguments)?;
     let shared = watch_signals()?;
 
@@ -291,6 +291,7 @@ fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) ->
         epoch_offset_ns: started.epoch_offset_ns,
         linked: inputs.scene.linked,
         added_mass_kg: inputs.scene.added_mass_kg,
+        terms: inputs.plant.term_names(),
         evidence: started.unix_s.map(|started_unix_s| EvidenceSetup {
             full_timing: arguments.full_timing,
             flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
@@ -319,6 +320,7 @@ fn describe(
         rig_toml: inputs.rig_toml.clone(),
         experiment_toml: inputs.experiment_toml.clone(),
         rig_setup: inputs.scene.clone(),
+        sealed: inputs.sealed,
         realtime_granted: grants.granted().to_vec(),
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
         machine: Machine::read(env!("AIRBENCH_BUILD_COMMIT")),

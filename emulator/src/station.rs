@@ -10,11 +10,9 @@
 //! latched before, so a stall changes which inputs there are and never the physics. Nothing here allocates, locks, prints
 //! or blocks.
 
-use crate::commands::{Change, CommandCounters, CommandIntake};
 use crate::console::Command;
 use crate::event::{Event, EventKind};
 use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
-use crate::live_cycles::LiveCycles;
 use crate::recording::Recorder;
 use crate::telegrams::{self, CommandState, SaturatedSensors, TickCause};
 use crossbeam_channel::Receiver;
@@ -24,9 +22,11 @@ use plant::{Axis, AxisReadings, Inputs, People, Plant, Sensors};
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use protocol::candump::FrameRecord;
+use protocol::commands::{Change, CommandCounters, CommandIntake};
 use protocol::frames::{
     ChainStatus, DecodeError, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
 };
+use protocol::live_cycles::LiveCycles;
 use protocol::periods;
 use protocol::timing::CycleTiming;
 use realtime::Overrun;
@@ -299,6 +299,7 @@ impl Station {
             valve: self.inputs.valve,
             readings: self.readings,
             truth: self.plant.truth(&self.inputs),
+            terms: self.plant.terms(&self.inputs),
         });
         self.plant.step(&self.inputs);
     }

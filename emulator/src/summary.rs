@@ -3,13 +3,13 @@
 //! Keys that others read are those of bus.md. What only the controllers know (the position errors) stands as null until
 //! the controllers' own files are joined to it.
 
-use crate::commands::CommandCounters;
 use crate::event::Event;
 use crate::recording::evidence::{CommandAges, FlightFigures};
 use crate::station::FrameCounters;
 use plant::Scene;
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
+use protocol::commands::CommandCounters;
 use realtime::{ArrivalFigures, Machine, Percentiles, VitalTotals, WallClockStep};
 use serde::Serialize;
 
@@ -38,6 +38,8 @@ pub struct RunDescription {
     pub experiment_toml: Option<String>,
     /// Initial state of the rig as used, and what people do to it when.
     pub rig_setup: Scene,
+    /// Whether a sealed file was read, in which nobody but the rig looks; which effects it switches on stands in `truth.csv` alone.
+    pub sealed: bool,
     /// What the system granted for real time.
     pub realtime_granted: Vec<String>,
     /// What it refused, with the remedy.

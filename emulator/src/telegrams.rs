@@ -3,7 +3,9 @@
 use plant::scene::RigCall;
 use plant::{AxisReadings, Plant};
 use protocol::can::CanFrame;
-use protocol::frames::{ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RigStatus, Sensors, Tick};
+use protocol::frames::{
+    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RIG_STATUS, RigStatus, Sensors, Tick,
+};
 
 /// Sensors of one axis in `cycle`.
 #[must_use]
@@ -75,7 +77,8 @@ impl SaturatedSensors {
 #[must_use]
 pub fn status(plant: &Plant, [drive, load]: &[SaturatedSensors; 2], commands: CommandState) -> Frame {
     Frame::RigStatus(RigStatus {
-        supply_pressure_pa: plant.supply_pressure_pa(),
+        // A node that chambers feed back into may rise above the set pressure, and its sensor ends where the wire does.
+        supply_pressure_pa: plant.supply_pressure_pa().min(RIG_STATUS.signals[0].max),
         linked: plant.linked(),
         emergency_stop: plant.emergency_stop(),
         check_valves_shut: plant.check_valves_shut(),
@@ -121,6 +124,17 @@ mod tests {
         for added_mass_kg in [weights.min, weights.max] {
             assert!(plant.set_added_mass_kg(added_mass_kg).is_ok(), "{added_mass_kg} kg");
         }
+    }
+
+    #[test]
+    fn a_supply_beyond_its_sensors_range_is_sent_as_the_limit() {
+        assert_eq!(RIG_STATUS.signals[0].name, "supply_pressure");
+        let rig = RigParameters::baseline().with("supply.pressure_bar", &[11.0]).unwrap();
+        let plant = Plant::new(&rig, &Setup::default()).unwrap();
+        let quiet = CommandState { stale: [false; 2], two_sources: [false; 2] };
+        let Frame::RigStatus(sent) = status(&plant, &Default::default(), quiet) else { panic!("a status") };
+        assert_eq!(sent.supply_pressure_pa, RIG_STATUS.signals[0].max);
+        assert_eq!(encode(&Frame::RigStatus(sent)).data().len(), 4);
     }
 
     #[test]

@@ -17,8 +17,9 @@
 //!
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6.
 
+use crate::effects;
 use crate::lanes::{Mask, Pair};
-use crate::parameters::{CylinderParameters, GasParameters, SupplyParameters};
+use crate::parameters::RigParameters;
 
 /// How much of its air a chamber may carry beyond a bound before the instant of crossing matters: below 1 Pa.
 ///
@@ -55,11 +56,15 @@ pub(crate) struct Air {
 }
 
 impl Chambers {
-    pub(crate) fn new(cylinder: &CylinderParameters, supply: &SupplyParameters, gas: &GasParameters) -> Self {
+    /// The chambers of a rig, with the dead volumes that its effects put in place of the file's.
+    pub(crate) fn of(rig: &RigParameters) -> Self {
+        let dead_volume_m3 = effects::dead_volumes_m3(rig);
+        let (cylinder, supply, gas) = (rig.cylinder(), rig.supply(), rig.gas());
         let rod_area = cylinder.piston_area_m2 - cylinder.annulus_area_m2;
+        let dead_volume = Pair::new(dead_volume_m3[0], dead_volume_m3[1]);
         Chambers {
-            dead_volume: Pair::both(cylinder.dead_volume_m3),
-            full_volume_b: Pair::both(cylinder.dead_volume_m3 + cylinder.annulus_area_m2 * cylinder.stroke_m),
+            dead_volume,
+            full_volume_b: dead_volume + Pair::both(cylinder.annulus_area_m2 * cylinder.stroke_m),
             area_a: Pair::both(cylinder.piston_area_m2),
             area_b: Pair::both(cylinder.annulus_area_m2),
             atmospheric_force: Pair::both(supply.atmospheric_pressure_pa * rod_area),
@@ -76,6 +81,16 @@ impl Chambers {
             fed_air: Pair::both(self.normal_pa * (span_s - carried_s)),
             half_span_air: Pair::both(self.normal_pa * span_s / 2.0),
         }
+    }
+
+    /// Piston areas of chambers a and b, m^2.
+    pub(crate) fn areas_m2(&self) -> [f64; 2] {
+        [self.area_a.drive(), self.area_b.drive()]
+    }
+
+    /// p_N, Pa.
+    pub(crate) fn normal_pa(&self) -> f64 {
+        self.normal_pa
     }
 
     /// Volume of chamber a, m^3, at extensions in [0, L], m.
@@ -193,11 +208,9 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::RigParameters;
 
     fn chambers() -> Chambers {
-        let rig = RigParameters::baseline();
-        Chambers::new(rig.cylinder(), rig.supply(), rig.gas())
+        Chambers::of(&RigParameters::baseline())
     }
 
     #[test]

@@ -5,12 +5,27 @@
 //!
 //! Source: effects.md, the catalogue of physical effects; each file names its own.
 
-#![allow(dead_code, missing_docs)] // until the integrator calls them
-
+mod acting;
+mod actuation;
+mod air;
+pub mod draw;
+mod first_order;
+mod flows;
+mod friction;
+mod memory;
+mod node;
+mod readings;
+mod replaced;
 pub mod sheet;
+mod sums;
+mod terms;
 
 use crate::parameters::RigParameters;
+pub(crate) use acting::Effects;
+pub(crate) use replaced::{dead_volumes_m3, linkage};
 use sheet::{Effect, Element, Part, Place, PlaceKind, Sheet, Switched};
+pub(crate) use terms::Term;
+pub use terms::Terms;
 
 /// What an effect is kept in, by the kind of its place: of one axis, `Axis` once, `Chamber` for a and b, `Channel` for position,
 /// force, a and b.
@@ -40,6 +55,26 @@ macro_rules! put {
     };
 }
 
+macro_rules! is_in {
+    ($slot:expr, $element:expr, Chamber) => {
+        match $element {
+            Some(Element::B) => $slot[1].is_some(),
+            _ => $slot[0].is_some(),
+        }
+    };
+    ($slot:expr, $element:expr, Channel) => {
+        match $element {
+            Some(Element::Force) => $slot[1].is_some(),
+            Some(Element::A) => $slot[2].is_some(),
+            Some(Element::B) => $slot[3].is_some(),
+            _ => $slot[0].is_some(),
+        }
+    };
+    ($slot:expr, $element:expr, $kind:ident) => {
+        $slot.is_some()
+    };
+}
+
 macro_rules! catalogue {
     ($($module:ident: $type:ident, $kind:ident;)*) => {
         $(mod $module;)*
@@ -59,6 +94,14 @@ macro_rules! catalogue {
                 $(if switched.name == $type::SHEET.name {
                     put!(self.$module, switched.place, $type::new(numbers, rig), $kind);
                 })*
+            }
+
+            /// Whether the effect of this module is on, at this element where it is one of an element.
+            pub(crate) fn is_on(&self, module: &str, element: Option<Element>) -> bool {
+                match module {
+                    $(stringify!($module) => is_in!(self.$module, element, $kind),)*
+                    _ => false,
+                }
             }
         }
     };
@@ -159,3 +202,6 @@ impl PlaceKind {
         self.places().iter().map(Place::to_string).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

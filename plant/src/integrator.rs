@@ -18,6 +18,8 @@
 //! Why this scheme and this step: `docs/integration.md` has the measured table of error and cost for this and
 //! other schemes; `cargo run --release -p plant --example accuracy` makes it.
 
+pub(crate) mod laws;
+
 use crate::chamber::{Air, Chambers, FlowLag};
 use crate::lanes::{Mask, Pair};
 use crate::linkage::{Approach, Linkage};
@@ -25,7 +27,8 @@ use crate::motion::{Motion, MotionSpan, Place};
 use crate::parameters::RigParameters;
 use crate::state::{AxisState, State};
 use crate::supply::{Supply, SupplyDecay};
-use crate::valve::{Valve, edge_flow};
+use crate::valve::Valve;
+use laws::{At, Laws};
 
 /// One step of [`crate::Plant`], s.
 pub(crate) const PERIOD_S: f64 = 1e-3;
@@ -48,6 +51,8 @@ pub(crate) struct Integrator {
     pub(crate) motion: Motion,
     pub(crate) linkage: Linkage,
     pub(crate) supply: Supply,
+    atmospheric_pa: f64,
+    file_dead_volume_m3: f64,
     substeps: u32,
     coarse: Span,
     fine: Span,
@@ -55,13 +60,13 @@ pub(crate) struct Integrator {
 
 /// Everything that depends on the length of a step and on the parameters.
 #[derive(Debug, Clone)]
-struct Span {
-    span_s: f64,
-    spool_to_middle: Pair,
-    spool_to_end: Pair,
-    lag: FlowLag,
-    motion_to_middle: MotionSpan,
-    motion_to_end: MotionSpan,
+pub(crate) struct Span {
+    pub(crate) span_s: f64,
+    pub(crate) spool_to_middle: Pair,
+    pub(crate) spool_to_end: Pair,
+    pub(crate) lag: FlowLag,
+    pub(crate) motion_to_middle: MotionSpan,
+    pub(crate) motion_to_end: MotionSpan,
     supply_to_middle: SupplyDecay,
     supply_to_end: SupplyDecay,
 }
@@ -89,18 +94,19 @@ pub(crate) struct Held {
 
 /// The supply node over one step.
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    middle_pa: f64,
+pub(crate) struct Node {
+    pub(crate) middle_pa: f64,
     end_pa: f64,
-    shut: bool,
+    pub(crate) shut: bool,
 }
 
-/// What the air does at the midpoint of a step.
-struct Middle {
-    pneumatic: Pair,
-    edge_flow_a: Pair,
-    edge_flow_b: Pair,
-    per_volume: [Pair; 2],
+/// What the air does at the midpoint of a step; two values are those of chambers a and b.
+pub(crate) struct Middle {
+    pub(crate) extension: Pair,
+    pub(crate) pneumatic: Pair,
+    pub(crate) edge_flow: [Pair; 2],
+    pub(crate) pressure: [Pair; 2],
+    pub(crate) per_volume: [Pair; 2],
 }
 
 /// The forces on each piston, N, along its own extension; viscous friction is in the motion's exponentials.
@@ -120,7 +126,7 @@ impl Forces {
 
 impl Integrator {
     pub(crate) fn new(rig: &RigParameters, added_mass_kg: f64, substeps: u32) -> Self {
-        let chambers = Chambers::new(rig.cylinder(), rig.supply(), rig.gas());
+        let chambers = Chambers::of(rig);
         let motion = Motion::new(rig, added_mass_kg);
         let supply = Supply::new(rig.supply());
         let span = |span_s: f64| Span {
@@ -138,7 +144,9 @@ impl Integrator {
             coarse: span(coarse_s),
             fine: span(coarse_s / f64::from(PARTS)),
             valve: Valve::new(rig.valve()),
-            linkage: Linkage::new(rig.linkage()),
+            linkage: Linkage::of(rig),
+            file_dead_volume_m3: rig.cylinder().dead_volume_m3,
+            atmospheric_pa: rig.supply().atmospheric_pressure_pa,
             chambers,
             motion,
             supply,
@@ -146,28 +154,56 @@ impl Integrator {
         }
     }
 
-    /// Advances the state by one period.
-    pub(crate) fn advance(&self, state: &mut State, held: Held) {
+    /// Advances the state by one period under these laws.
+    pub(crate) fn advance<L: Laws>(&self, laws: &mut L, state: &mut State, held: Held) {
         let mut lanes = Lanes::load(state);
         let mut supply_pa = state.supply_pressure_pa;
-        for _ in 0..self.substeps {
+        for substep in 0..self.substeps {
+            let carried = laws.carried();
+            let local_s = f64::from(substep) * self.coarse.span_s;
             let node = self.node(&self.coarse, supply_pa, held.stopped);
-            let (next, corner) = self.smooth(&lanes, node, held);
+            let at = At { of: self, span: &self.coarse, from: &lanes, node, held, local_s };
+            let (next, handed_on, corner) = self.smooth(laws, at, carried);
             let valves_move =
                 self.supply.check_valves_shut(supply_pa) != self.supply.check_valves_shut(node.end_pa);
             if corner || valves_move {
-                for _ in 0..PARTS {
+                let mut carried = carried;
+                for part in 0..PARTS {
                     let node = self.node(&self.fine, supply_pa, held.stopped);
-                    lanes = self.careful(&lanes, node, held);
+                    let local_s = local_s + f64::from(part) * self.fine.span_s;
+                    let at = At { of: self, span: &self.fine, from: &lanes, node, held, local_s };
+                    (lanes, carried) = self.careful(laws, at, carried);
                     supply_pa = node.end_pa;
                 }
+                laws.keep(self, held, &lanes, carried);
             } else {
                 lanes = next;
                 supply_pa = node.end_pa;
+                laws.keep(self, held, &lanes, handed_on);
             }
         }
         lanes.store(state);
         state.supply_pressure_pa = supply_pa;
+    }
+
+    /// Length of a substep, s.
+    pub(crate) fn substep_s(&self) -> f64 {
+        self.coarse.span_s
+    }
+
+    /// The two lengths of step: a substep, and a part of one.
+    pub(crate) fn spans(&self) -> [&Span; 2] {
+        [&self.coarse, &self.fine]
+    }
+
+    /// Dead volume of the rig file, which an effect may have replaced in the chambers, m^3.
+    pub(crate) fn file_dead_volume_m3(&self) -> f64 {
+        self.file_dead_volume_m3
+    }
+
+    /// Pressure around the rods, Pa.
+    pub(crate) fn atmospheric_pa(&self) -> f64 {
+        self.atmospheric_pa
     }
 
     /// d of the linkage, m, from both extensions.
@@ -184,34 +220,55 @@ impl Integrator {
 
     /// A step that assumes no corner; the flag says that there may be one, and then the step counts for nothing.
     #[inline(always)]
-    fn smooth(&self, from: &Lanes, node: Node, held: Held) -> (Lanes, bool) {
-        let span = &self.coarse;
+    fn smooth<L: Laws>(&self, laws: &L, at: At<'_>, mut carried: L::Carried) -> (Lanes, L::Carried, bool) {
+        let (span, node, held) = (at.span, at.node, at.held);
+        let from = at.from.with_check_valves(node.shut);
+        let at = At { from: &from, ..at };
         let zero = Pair::both(0.0);
-        let from = from.with_check_valves(node.shut);
-        let middle = self.middle(span, &from, node, held);
+        let middle = laws.middle(at, &mut carried);
 
-        let moving = from.velocity.differs(zero);
+        let moving = laws.moving(at);
+        let hand = laws.outside(at, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
-            hand: held.hand,
-            sliding_friction: self.motion.sliding_friction(from.velocity, moving),
+            hand,
+            sliding_friction: laws.sliding(at, &middle, &carried, middle.pneumatic + hand, moving),
             contact: zero,
         };
+        let [to_middle, way] = laws.ways(at);
         if held.linked {
-            forces.contact =
-                Pair::both(self.linkage.midpoint_force(self.approach(span, &from, moving, &forces)));
+            let approach = self.approach(span, to_middle, &from, moving, &forces);
+            forces.contact = Pair::both(self.linkage.midpoint_force(approach));
         }
         let force = forces.sum();
-        let way = &span.motion_to_end;
-        let velocity = (way.keep * from.velocity + way.gain * force).where_true(moving);
-        let extension = from.extension + (way.drift * from.velocity + way.push * force).where_true(moving);
+        let mut velocity = (way.keep * from.velocity + way.gain * force).where_true(moving);
+        let mut extension =
+            from.extension + (way.drift * from.velocity + way.push * force).where_true(moving);
+        let mut sticks = !Mask::none();
+        if laws.on_bristles() != [false; 2] {
+            let unresisted = forces.pneumatic + forces.hand + forces.contact;
+            let place = |axis: usize, carried: &mut L::Carried| {
+                if !laws.on_bristles()[axis] {
+                    return Place {
+                        extension: extension.to_array()[axis],
+                        velocity: velocity.to_array()[axis],
+                    };
+                }
+                laws.advance(at, &middle, carried, axis, unresisted.to_array()[axis])
+            };
+            let (drive, load) = (place(0, &mut carried), place(1, &mut carried));
+            extension = Pair::new(drive.extension, load.extension);
+            velocity = Pair::new(drive.velocity, load.velocity);
+            sticks = Mask::new(laws.on_bristles().map(|on| !on));
+        }
 
         let growth =
             self.chambers.force_growth(&span.lag, middle.per_volume, [from.air_a.flow, from.air_b.flow]);
         let nudged_n = if held.linked && moving.any() { BREAK_AWAY_MARGIN_N } else { 0.0 };
         let margin = growth.abs() + Pair::both(nudged_n);
-        let leaves = !moving & self.motion.might_leave(from.extension, force, margin);
-        let turns = moving & (velocity * from.velocity).at_most(zero);
+        let break_away = laws.break_away(at, &middle, force);
+        let leaves = !moving & self.motion.might_leave(from.extension, force, margin, break_away);
+        let turns = moving & (velocity * from.velocity).at_most(zero) & sticks;
         let overruns = extension.less(zero) | Pair::both(self.motion.stroke_m()).less(extension);
         let touches =
             held.linked && self.linkage.made_contact(self.distance(from.extension), self.distance(extension));
@@ -219,48 +276,45 @@ impl Integrator {
         let stop = |air: Air, edge_flow: Pair, volume: Pair| {
             limits.stop(air, span.lag.advance(air, edge_flow), volume)
         };
-        let (air_a, fills_a) = stop(from.air_a, middle.edge_flow_a, self.chambers.volume_a(extension));
-        let (air_b, fills_b) = stop(from.air_b, middle.edge_flow_b, self.chambers.volume_b(extension));
-        let spool = held.command + (from.spool - held.command) * span.spool_to_end;
-        let next = Lanes { extension, velocity, spool, air_a, air_b };
-        (next, (leaves | turns | overruns | fills_a | fills_b).any() | touches)
+        let (air_a, fills_a) = stop(from.air_a, middle.edge_flow[0], self.chambers.volume_a(extension));
+        let (air_b, fills_b) = stop(from.air_b, middle.edge_flow[1], self.chambers.volume_b(extension));
+        let mut next = Lanes { extension, velocity, spool: laws.spool(at, &carried), air_a, air_b };
+        laws.air(at, &mut next, &middle, &mut carried);
+        (next, carried, (leaves | turns | overruns | fills_a | fills_b).any() | touches)
     }
 
     /// A short step that may meet any corner.
     #[cold]
-    fn careful(&self, from: &Lanes, node: Node, held: Held) -> Lanes {
-        let span = &self.fine;
-        let from = from.with_check_valves(node.shut);
-        let middle = self.middle(span, &from, node, held);
+    fn careful<L: Laws>(&self, laws: &L, at: At<'_>, mut carried: L::Carried) -> (Lanes, L::Carried) {
+        let (span, node, held) = (at.span, at.node, at.held);
+        let from = at.from.with_check_valves(node.shut);
+        let at = At { from: &from, ..at };
+        let middle = laws.middle(at, &mut carried);
         let zero = Pair::both(0.0);
-        let moving = from.velocity.differs(zero);
+        let moving = laws.moving(at);
+        let hand = laws.outside(at, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
-            hand: held.hand,
-            sliding_friction: self.motion.sliding_friction(from.velocity, moving),
+            hand,
+            sliding_friction: laws.sliding(at, &middle, &carried, middle.pneumatic + hand, moving),
             contact: zero,
         };
         if held.linked {
+            let [to_middle, _] = laws.ways(at);
             // First as if what rests stays; then again with what the contact sets in motion.
-            forces.contact = Pair::both(self.contact(self.approach(span, &from, moving, &forces)));
+            forces.contact = Pair::both(self.contact(self.approach(span, to_middle, &from, moving, &forces)));
             let resting_force = forces.pneumatic + forces.hand + forces.contact;
-            let starts = self.starting(&from, resting_force, moving);
+            let starts = self.starting(laws, at, &middle, resting_force, moving);
             if starts.any() {
                 forces.sliding_friction =
-                    forces.sliding_friction + self.motion.sliding_friction(resting_force, starts);
+                    forces.sliding_friction + laws.starting(at, &middle, resting_force, starts);
                 forces.contact = zero;
-                forces.contact =
-                    Pair::both(self.contact(self.approach(span, &from, moving | starts, &forces)));
+                let approach = self.approach(span, to_middle, &from, moving | starts, &forces);
+                forces.contact = Pair::both(self.contact(approach));
             }
         }
         let force = forces.pneumatic + forces.hand + forces.contact;
-        let place = |axis: usize| {
-            let start = Place {
-                extension: from.extension.to_array()[axis],
-                velocity: from.velocity.to_array()[axis],
-            };
-            self.motion.advance(axis, start, force.to_array()[axis], span.span_s)
-        };
+        let mut place = |axis: usize| laws.advance(at, &middle, &mut carried, axis, force.to_array()[axis]);
         let (drive, load) = (place(0), place(1));
         let extension = Pair::new(drive.extension, load.extension);
         let velocity = Pair::new(drive.velocity, load.velocity);
@@ -270,13 +324,15 @@ impl Integrator {
             let [before, after] = [from.extension, extension].map(|x| volume(&self.chambers, x));
             limits.hold(air, free, before, after)
         };
-        Lanes {
+        let mut next = Lanes {
             extension,
             velocity,
-            spool: held.command + (from.spool - held.command) * span.spool_to_end,
-            air_a: bounded(from.air_a, middle.edge_flow_a, Chambers::volume_a),
-            air_b: bounded(from.air_b, middle.edge_flow_b, Chambers::volume_b),
-        }
+            spool: laws.spool(at, &carried),
+            air_a: bounded(from.air_a, middle.edge_flow[0], Chambers::volume_a),
+            air_b: bounded(from.air_b, middle.edge_flow[1], Chambers::volume_b),
+        };
+        laws.air(at, &mut next, &middle, &mut carried);
+        (next, carried)
     }
 
     fn contact(&self, approach: Approach) -> f64 {
@@ -288,45 +344,33 @@ impl Integrator {
     }
 
     /// Which resting axes this force sets in motion.
-    fn starting(&self, from: &Lanes, force: Pair, moving: Mask) -> Mask {
-        let leaves = |axis: usize| {
-            let stays = self.motion.holds(from.extension.to_array()[axis], force.to_array()[axis]);
-            if stays { 0.0 } else { 1.0 }
-        };
-        Pair::new(leaves(0), leaves(1)).differs(Pair::both(0.0)) & !moving
+    fn starting<L: Laws>(&self, laws: &L, at: At<'_>, middle: &Middle, force: Pair, moving: Mask) -> Mask {
+        let leaves = |axis: usize| !laws.holds(at, middle, axis, force.to_array()[axis]);
+        Mask::new([leaves(0), leaves(1)]) & !moving
     }
 
-    /// Air at the step's midpoint; one evaluation of the valve and of both chambers.
+    /// The extensions at a step's midpoint, kept within the stroke: a step that overruns the end is discarded, but must not
+    /// meet a negative volume.
     #[inline(always)]
-    fn middle(&self, span: &Span, from: &Lanes, node: Node, held: Held) -> Middle {
-        let spool = held.command + (from.spool - held.command) * span.spool_to_middle;
-        let mut edges = self.valve.edges(spool, node.middle_pa, self.chambers.exhaust_pa());
-        if node.shut {
-            (edges.conductance_a, edges.conductance_b) = (Pair::both(0.0), Pair::both(0.0));
-        }
-        // Kept within the stroke: a step that overruns the end is discarded, but must not meet a negative volume.
+    pub(crate) fn ahead(&self, span: &Span, from: &Lanes) -> Pair {
         let ahead = from.extension + from.velocity * Pair::both(span.span_s / 2.0);
-        let extension = ahead.max(Pair::both(0.0)).min(Pair::both(self.motion.stroke_m()));
-        let per_volume_a = self.chambers.volume_a(extension).reciprocal();
-        let per_volume_b = self.chambers.volume_b(extension).reciprocal();
-        let pressure_a = span.lag.midpoint_air(from.air_a) * per_volume_a;
-        let pressure_b = span.lag.midpoint_air(from.air_b) * per_volume_b;
-        Middle {
-            pneumatic: self.chambers.pneumatic_force(pressure_a, pressure_b),
-            edge_flow_a: edge_flow(edges.conductance_a, edges.far_pressure_a, pressure_a),
-            edge_flow_b: edge_flow(edges.conductance_b, edges.far_pressure_b, pressure_b),
-            per_volume: [per_volume_a, per_volume_b],
-        }
+        ahead.max(Pair::both(0.0)).min(Pair::both(self.motion.stroke_m()))
     }
 
     #[inline(always)]
-    fn approach(&self, span: &Span, from: &Lanes, moving: Mask, forces: &Forces) -> Approach {
-        let way = &span.motion_to_middle;
-        let free = (way.keep * from.velocity + way.gain * forces.sum()).where_true(moving);
+    fn approach(
+        &self,
+        span: &Span,
+        to_middle: &MotionSpan,
+        from: &Lanes,
+        moving: Mask,
+        forces: &Forces,
+    ) -> Approach {
+        let free = (to_middle.keep * from.velocity + to_middle.gain * forces.sum()).where_true(moving);
         Approach {
             distance_m: self.distance(from.extension),
             free_speed_m_per_s: -free.sum(),
-            mobility: way.gain.where_true(moving).sum(),
+            mobility: to_middle.gain.where_true(moving).sum(),
             half_span_s: span.span_s / 2.0,
         }
     }
@@ -357,6 +401,12 @@ impl Lanes {
                 flow_b_m3_per_s: lane(self.air_b.flow),
             };
         }
+    }
+
+    /// One axis.
+    #[inline(always)]
+    pub(crate) fn place(&self, axis: usize) -> Place {
+        Place { extension: self.extension.to_array()[axis], velocity: self.velocity.to_array()[axis] }
     }
 
     /// With no flow left in the chambers while the check valves are shut.

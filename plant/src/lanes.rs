@@ -103,6 +103,19 @@ impl Pair {
 }
 
 impl Mask {
+    /// Yes or no for drive and load.
+    #[inline(always)]
+    pub(crate) fn new(yes: [bool; 2]) -> Self {
+        Pair::new(f64::from(u8::from(yes[0])), f64::from(u8::from(yes[1]))).differs(Pair::both(0.0))
+    }
+
+    /// No for both.
+    #[inline(always)]
+    pub(crate) fn none() -> Self {
+        let zero = Pair::both(0.0);
+        zero.less(zero)
+    }
+
     /// `yes` where true, `no` where false.
     #[inline(always)]
     pub(crate) fn choose(self, yes: Pair, no: Pair) -> Pair {

@@ -16,7 +16,8 @@
 //!
 //! where w is the relative speed at the midpoint. A sticking axis adds nothing to Y.
 
-use crate::parameters::LinkageParameters;
+use crate::effects;
+use crate::parameters::RigParameters;
 
 /// Gap and contact.
 #[derive(Debug, Clone)]
@@ -40,12 +41,19 @@ pub(crate) struct Approach {
 }
 
 impl Linkage {
-    pub(crate) fn new(parameters: &LinkageParameters) -> Self {
+    /// The linkage of a rig, with the numbers that its effects put in place of the file's.
+    pub(crate) fn of(rig: &RigParameters) -> Self {
+        let parameters = effects::linkage(rig);
         Linkage {
             half_gap_m: parameters.gap_m / 2.0,
             stiffness_n_per_m: parameters.stiffness_n_per_m,
             damping_n_s_per_m: parameters.damping_n_s_per_m,
         }
+    }
+
+    /// Half of the gap, m.
+    pub(crate) fn half_gap_m(&self) -> f64 {
+        self.half_gap_m
     }
 
     /// Whether the eye lies in the gap, so that it can be linked.
@@ -111,10 +119,9 @@ fn pushing(overlap: f64, force: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::RigParameters;
 
     fn linkage() -> Linkage {
-        Linkage::new(RigParameters::baseline().linkage())
+        Linkage::of(&RigParameters::baseline())
     }
 
     #[test]

@@ -28,12 +28,30 @@ use crate::parameters::{FrictionParameters, RigParameters};
 #[derive(Debug, Clone)]
 pub(crate) struct Motion {
     masses_kg: [f64; 2],
+    behind_sensor_kg: [f64; 2],
     stroke_m: f64,
-    friction: FrictionParameters,
+    levels: Levels,
+}
+
+/// How much friction an axis has in each direction: extending, retracting.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Levels {
+    /// Sliding friction, N, not below 0.
+    pub(crate) sliding_n: [f64; 2],
+    /// Break-away force, N, not below the sliding friction.
+    pub(crate) break_away_n: [f64; 2],
+    /// Viscous friction, N s/m.
+    pub(crate) viscous_n_s_per_m: [f64; 2],
+}
+
+/// Place of a direction in [`Levels`]: 0 extending, 1 retracting.
+#[inline(always)]
+pub(crate) fn side(direction: f64) -> usize {
+    usize::from(direction < 0.0)
 }
 
 /// E, G, D and W of the module's head for one span, one lane for each axis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct MotionSpan {
     pub(crate) keep: Pair,
     pub(crate) gain: Pair,
@@ -52,14 +70,26 @@ impl Motion {
     pub(crate) fn new(rig: &RigParameters, added_mass_kg: f64) -> Self {
         Motion {
             masses_kg: [rig.mass().drive_kg + added_mass_kg, rig.mass().load_kg],
+            behind_sensor_kg: [rig.mass().carriage_kg + added_mass_kg, 0.0],
             stroke_m: rig.cylinder().stroke_m,
-            friction: *rig.friction(),
+            levels: Levels::of(rig.friction()),
         }
     }
 
+    /// Friction of the baseline, the same for both axes and both directions.
+    pub(crate) fn levels(&self) -> &Levels {
+        &self.levels
+    }
+
+    /// The factors of a span with the baseline's viscous friction.
     pub(crate) fn span(&self, span_s: f64) -> MotionSpan {
-        let of = |mass| Factors::new(mass, self.friction.viscous_n_s_per_m, span_s);
-        let factors = self.masses_kg.map(of);
+        self.span_with([self.levels.viscous_n_s_per_m[0]; 2], span_s)
+    }
+
+    /// The factors of a span with the viscous friction of each axis, N s/m.
+    pub(crate) fn span_with(&self, viscous_n_s_per_m: [f64; 2], span_s: f64) -> MotionSpan {
+        let of = |axis: usize| Factors::new(self.masses_kg[axis], viscous_n_s_per_m[axis], span_s);
+        let factors = [of(0), of(1)];
         let pair = |pick: fn(&Factors) -> f64| Pair::new(pick(&factors[0]), pick(&factors[1]));
         MotionSpan {
             keep: pair(|f| f.keep),
@@ -73,56 +103,58 @@ impl Motion {
         self.masses_kg[axis]
     }
 
+    /// What an axis' force sensor pushes along, kg: the carriage with its weights.
+    pub(crate) fn behind_sensor_kg(&self, axis: usize) -> f64 {
+        self.behind_sensor_kg[axis]
+    }
+
     pub(crate) fn stroke_m(&self) -> f64 {
         self.stroke_m
     }
 
-    /// Sliding friction on moving axes, N, against the motion; 0 at rest.
-    #[inline(always)]
-    pub(crate) fn sliding_friction(&self, velocity: Pair, moving: Mask) -> Pair {
-        -Pair::both(self.friction.sliding_force_n).with_sign_of(velocity).where_true(moving)
-    }
-
-    /// Viscous friction, N, against the motion.
-    #[inline(always)]
-    pub(crate) fn viscous_friction(&self, velocity: Pair) -> Pair {
-        -(Pair::both(self.friction.viscous_n_s_per_m) * velocity)
-    }
-
     /// Whether a resting axis under this force stays, force in N without any friction.
     #[inline(always)]
-    pub(crate) fn holds(&self, extension: f64, force: f64) -> bool {
-        force.abs() <= self.friction.break_away_force_n
+    pub(crate) fn holds(&self, extension: f64, force: f64, levels: &Levels) -> bool {
+        force.abs() <= levels.break_away_n[side(force)]
             || extension <= 0.0 && force < 0.0
             || extension >= self.stroke_m && force > 0.0
     }
 
-    /// Whether resting axes might leave within the span, so that a step must look closer.
+    /// Whether resting axes might leave within the span, so that a step must look closer; `break_away` is that of the force's
+    /// direction, N.
     #[inline(always)]
-    pub(crate) fn might_leave(&self, extension: Pair, force: Pair, margin: Pair) -> Mask {
+    pub(crate) fn might_leave(&self, extension: Pair, force: Pair, margin: Pair, break_away: Pair) -> Mask {
         let zero = Pair::both(0.0);
         let pressed = extension.at_most(zero) & force.less(zero)
             | Pair::both(self.stroke_m).at_most(extension) & zero.less(force);
-        Pair::both(self.friction.break_away_force_n).less(force.abs() + margin) & !pressed
+        break_away.less(force.abs() + margin) & !pressed
     }
 
     /// Moves one axis through a span under a held force (N, without any friction), locating what happens inside.
     ///
     /// Never gives the force's work to friction: between two events the sliding friction opposes the motion.
-    pub(crate) fn advance(&self, axis: usize, from: Place, force: f64, span_s: f64) -> Place {
-        let (mass, viscous) = (self.masses_kg[axis], self.friction.viscous_n_s_per_m);
+    pub(crate) fn advance(
+        &self,
+        axis: usize,
+        from: Place,
+        force: f64,
+        levels: &Levels,
+        span_s: f64,
+    ) -> Place {
+        let mass = self.masses_kg[axis];
         let mut place = from;
         let mut left_s = span_s;
         // A held force turns the motion around at most once, so two legs do; the third is for rounding.
         for _ in 0..3 {
             let direction = if place.velocity != 0.0 {
                 place.velocity.signum()
-            } else if self.holds(place.extension, force) {
+            } else if self.holds(place.extension, force, levels) {
                 return place;
             } else {
                 force.signum()
             };
-            let driving = force - direction * self.friction.sliding_force_n;
+            let viscous = levels.viscous_n_s_per_m[side(direction)];
+            let driving = force - direction * levels.sliding_n[side(direction)];
             let next = Factors::new(mass, viscous, left_s).advance(place, driving);
             if next.velocity * direction > 0.0 {
                 return self.stop_at_ends(next);
@@ -139,7 +171,8 @@ impl Motion {
         place
     }
 
-    fn stop_at_ends(&self, place: Place) -> Place {
+    /// At an end of the stroke the piston stops dead.
+    pub(crate) fn stop_at_ends(&self, place: Place) -> Place {
         if place.extension < 0.0 {
             Place { extension: 0.0, velocity: 0.0 }
         } else if place.extension > self.stroke_m {
@@ -148,6 +181,22 @@ impl Motion {
             place
         }
     }
+}
+
+impl Levels {
+    pub(crate) fn of(friction: &FrictionParameters) -> Self {
+        Levels {
+            sliding_n: [friction.sliding_force_n; 2],
+            break_away_n: [friction.break_away_force_n; 2],
+            viscous_n_s_per_m: [friction.viscous_n_s_per_m; 2],
+        }
+    }
+}
+
+/// Sliding friction on moving axes, N, against the motion, of its level; 0 at rest.
+#[inline(always)]
+pub(crate) fn against(velocity: Pair, level: Pair, moving: Mask) -> Pair {
+    -level.with_sign_of(velocity).where_true(moving)
 }
 
 /// E, G, D and W of one axis and one span.
@@ -209,6 +258,11 @@ mod tests {
         Motion::new(&rig, 0.0)
     }
 
+    fn advance(viscous_n_per_mm_per_s: f64, axis: usize, from: Place, force: f64, span_s: f64) -> Place {
+        let motion = motion(viscous_n_per_mm_per_s);
+        motion.advance(axis, from, force, motion.levels(), span_s)
+    }
+
     fn at(velocity: f64) -> Place {
         Place { extension: 0.25, velocity }
     }
@@ -218,17 +272,17 @@ mod tests {
         // z from far below to far above the change from series to difference.
         for viscous in [0.0, 1e-6, 0.1, 1.1, 10.0] {
             let span = 0.01;
-            let whole = motion(viscous).advance(0, at(0.2), 500.0, span);
+            let whole = advance(viscous, 0, at(0.2), 500.0, span);
             let mut parts = at(0.2);
             for _ in 0..1000 {
-                parts = motion(viscous).advance(0, parts, 500.0, span / 1000.0);
+                parts = advance(viscous, 0, parts, 500.0, span / 1000.0);
             }
             // An exact solution does not depend on how it is cut: a thousand roundings of 0.25 m and 1 m/s.
             assert!((whole.extension - parts.extension).abs() < 1e-13, "b = {viscous}");
             assert!((whole.velocity - parts.velocity).abs() < 1e-12, "b = {viscous}");
         }
         // And one of the solutions, written down: b = 0, 474 N on 5 kg.
-        let end = motion(0.0).advance(0, at(0.2), 500.0, 0.01);
+        let end = advance(0.0, 0, at(0.2), 500.0, 0.01);
         assert!((end.velocity - (0.2 + 94.8 * 0.01)).abs() < 1e-15);
         assert!((end.extension - (0.25 + 0.002 + 47.4e-4)).abs() < 1e-15);
     }
@@ -240,7 +294,7 @@ mod tests {
         assert_eq!(form(0.0), 0.0);
         for ms in 0..20 {
             let t = f64::from(ms) * 1e-3;
-            let velocity = motion(1.1).advance(0, at(0.0), 576.0, t).velocity;
+            let velocity = advance(1.1, 0, at(0.0), 576.0, t).velocity;
             assert!((velocity - form(t)).abs() < 1e-14, "{ms} ms");
         }
     }
@@ -248,26 +302,26 @@ mod tests {
     #[test]
     fn a_decelerating_piston_stops_where_its_energy_is_spent_and_sticks() {
         // b = 0: m v^2 / 2 = F_sli s, 0.5 * 5 * 0.1^2 / 26 = 0.96 mm.
-        let stop = motion(0.0).advance(0, at(0.1), 0.0, 0.1);
+        let stop = advance(0.0, 0, at(0.1), 0.0, 0.1);
         assert_eq!(stop.velocity, 0.0);
         assert!((stop.extension - 0.25 - 0.5 * 5.0 * 0.01 / 26.0).abs() < 1e-15);
     }
 
     #[test]
     fn a_piston_turns_round_inside_a_span_if_the_force_exceeds_the_static_friction() {
-        let held = motion(1.1).advance(0, at(0.01), -34.9, 0.01);
+        let held = advance(1.1, 0, at(0.01), -34.9, 0.01);
         assert_eq!(held.velocity, 0.0);
-        let turned = motion(1.1).advance(0, at(0.01), -35.1, 0.01);
+        let turned = advance(1.1, 0, at(0.01), -35.1, 0.01);
         assert!(turned.velocity < 0.0);
     }
 
     #[test]
     fn an_end_of_the_stroke_stops_the_piston_dead() {
-        let stop = motion(1.1).advance(1, Place { extension: 0.4999, velocity: 1.0 }, 500.0, 1e-3);
+        let stop = advance(1.1, 1, Place { extension: 0.4999, velocity: 1.0 }, 500.0, 1e-3);
         assert_eq!(stop, Place { extension: 0.5, velocity: 0.0 });
-        assert_eq!(motion(1.1).advance(1, stop, 1e6, 1e-3), stop, "pressed");
-        assert_eq!(motion(1.1).advance(1, stop, -34.0, 1e-3), stop, "held");
-        assert!(motion(1.1).advance(1, stop, -36.0, 1e-3).extension < 0.5, "leaves");
+        assert_eq!(advance(1.1, 1, stop, 1e6, 1e-3), stop, "pressed");
+        assert_eq!(advance(1.1, 1, stop, -34.0, 1e-3), stop, "held");
+        assert!(advance(1.1, 1, stop, -36.0, 1e-3).extension < 0.5, "leaves");
     }
 
     proptest! {
@@ -280,7 +334,7 @@ mod tests {
         ) {
             // Over any span: kinetic energy gained is at most the force's work. Ends take energy as well.
             let start = at(velocity);
-            let end = motion(viscous).advance(0, start, force, span);
+            let end = advance(viscous, 0, start, force, span);
             let gained = 2.5 * (end.velocity * end.velocity - velocity * velocity);
             let work = force * (end.extension - start.extension);
             // Roundings of energies up to some hundred joule.

@@ -204,6 +204,15 @@ impl RigParameters {
         Self::from_entries(self.entries.with_effect(name, place, numbers)?)
     }
 
+    /// The same rig with the effects of a file besides its own; where both switch on one effect at one place, the file's counts.
+    /// `file` is only its name for messages.
+    ///
+    /// # Errors
+    /// [`ParameterError`] as from a rig file, also for any key besides `[effects.…]`.
+    pub fn with_effects_of(&self, text: &str, file: &str) -> Result<Self, ParameterError> {
+        Self::from_entries(self.entries.with_effects_of(text, file)?)
+    }
+
     /// The same rig with all effects off.
     #[must_use]
     pub fn without_effects(&self) -> Self {

@@ -5,18 +5,22 @@
 
 use std::sync::Arc;
 
+use crate::effects::{Effects, Term, Terms};
+use crate::integrator::laws::Baseline;
 use crate::integrator::{Held, Integrator, SUBSTEPS};
 use crate::lanes::Pair;
 use crate::parameters::RigParameters;
 use crate::setup::{Setup, SetupError, check_added_mass, check_state, start_state};
 use crate::state::{Inputs, State};
-use crate::truth::{Truth, hand_forces};
+use crate::truth::{Truth, hand_forces, supply_pressure_pa};
 
 /// The simulated rig; constant model and moving state.
 #[derive(Debug, Clone)]
 pub struct Plant {
     rig: Arc<RigParameters>,
     integrator: Integrator,
+    /// `None` for a rig that has none switched on.
+    effects: Option<Box<Effects>>,
     substeps: u32,
     state: State,
 }
@@ -51,6 +55,27 @@ impl Plant {
         Ok(Self::assemble(rig, *state, SUBSTEPS))
     }
 
+    /// Goes on in another state, as in the next window of a record; what effects remember stays.
+    ///
+    /// Delays, lags, plays, bristles and times at rest go on from the state before. A chamber keeps its temperature, so that its mass
+    /// follows the new pressure and volume.
+    ///
+    /// # Errors
+    /// [`SetupError`] if the state is none that the rig can be in; the plant is as before.
+    pub fn go_on_in(&mut self, state: &State) -> Result<(), SetupError> {
+        check_state(&self.rig, state)?;
+        if let Some(effects) = &mut self.effects {
+            effects.memory.keep_temperatures(&self.state, state);
+        }
+        let added_mass_kg = self.state.added_mass_kg;
+        self.state = State { added_mass_kg, ..*state };
+        if added_mass_kg == state.added_mass_kg {
+            Ok(())
+        } else {
+            self.set_added_mass_kg(state.added_mass_kg)
+        }
+    }
+
     /// The same plant with another number of substeps in a period, 1 to 1000: for studies of accuracy.
     ///
     /// # Panics
@@ -62,7 +87,8 @@ impl Plant {
 
     fn assemble(rig: &RigParameters, state: State, substeps: u32) -> Self {
         let integrator = Integrator::new(rig, state.added_mass_kg, substeps);
-        Plant { rig: Arc::new(rig.clone()), integrator, substeps, state }
+        let effects = Effects::of(rig, &integrator, &state);
+        Plant { rig: Arc::new(rig.clone()), integrator, effects, substeps, state }
     }
 
     /// Advances by exactly 1 ms with the inputs held.
@@ -89,12 +115,66 @@ impl Plant {
             stopped: self.state.emergency_stop,
             linked: self.state.linked,
         };
-        self.integrator.advance(&mut self.state, held);
+        if let Some(effects) = &mut self.effects {
+            effects.begin_period(command.to_array());
+            self.integrator.advance(effects.as_mut(), &mut self.state, held);
+        } else {
+            self.integrator.advance(&mut Baseline, &mut self.state, held);
+        }
     }
 
     /// True states and terms at this instant; of the inputs only the hand forces matter, since a spool lags.
     pub fn truth(&self, inputs: &Inputs) -> Truth {
-        Truth::at(&self.integrator, &self.rig, &self.state, inputs)
+        Truth::at(&self.integrator, self.effects.as_deref(), &self.state, inputs)
+    }
+
+    /// What the sensors would show at this instant without noise and steps: position, force, pressure a, pressure b of each axis.
+    pub fn shown(&self, truth: &Truth) -> [[f64; 4]; 2] {
+        let Some(effects) = &self.effects else {
+            return truth
+                .axes
+                .map(|axis| [axis.position_m, axis.sensor_force_n, axis.pressure_a_pa, axis.pressure_b_pa]);
+        };
+        std::array::from_fn(|i| {
+            let axis = &truth.axes[i];
+            let pressure = |chamber, truth| effects.pressure_reading(i, chamber, truth).sum(truth);
+            [
+                effects.position_reading(i, axis.position_m).sum(axis.position_m),
+                effects.force_reading(i, axis.sensor_force_n).sum(axis.sensor_force_n),
+                pressure(0, axis.pressure_a_pa),
+                pressure(1, axis.pressure_b_pa),
+            ]
+        })
+    }
+
+    /// Name and unit of each value of [`Plant::terms`], as columns of `truth.csv`.
+    pub fn term_names(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        self.each_term(&Inputs::default(), &mut |term| names.push(term.column()));
+        names
+    }
+
+    /// What each switched-on effect adds to its balance at this instant; none without effects.
+    pub fn terms(&self, inputs: &Inputs) -> Terms {
+        let mut terms = Terms::default();
+        self.each_term(inputs, &mut |term| terms.push(term.value));
+        terms
+    }
+
+    #[cfg(test)]
+    pub(crate) fn effects(&self) -> Option<&Effects> {
+        self.effects.as_deref()
+    }
+
+    #[cfg(test)]
+    pub(crate) fn integrator(&self) -> &Integrator {
+        &self.integrator
+    }
+
+    fn each_term(&self, inputs: &Inputs, tell: &mut dyn FnMut(Term)) {
+        if let Some(effects) = &self.effects {
+            effects.each_term(&self.integrator, &self.state, inputs, tell);
+        }
     }
 
     /// All that changes in the plant.
@@ -109,7 +189,7 @@ impl Plant {
 
     /// Absolute pressure of the supply node, Pa.
     pub fn supply_pressure_pa(&self) -> f64 {
-        self.state.supply_pressure_pa
+        supply_pressure_pa(self.effects.as_deref(), &self.state)
     }
 
     /// Discharges the supply; valve commands count as 0 until the release [rig-model.md, Emergency stop].
@@ -148,7 +228,7 @@ impl Plant {
             self.state.linked = true;
             Ok(())
         } else {
-            Err(LinkRefused { distance_m, half_gap_m: self.rig.linkage().gap_m / 2.0 })
+            Err(LinkRefused { distance_m, half_gap_m: self.integrator.linkage.half_gap_m() })
         }
     }
 
@@ -164,6 +244,9 @@ impl Plant {
     pub fn set_added_mass_kg(&mut self, kg: f64) -> Result<(), SetupError> {
         self.state.added_mass_kg = check_added_mass(&self.rig, kg)?;
         self.integrator = Integrator::new(&self.rig, kg, self.substeps);
+        if let Some(effects) = &mut self.effects {
+            effects.move_with(&self.integrator);
+        }
         Ok(())
     }
 }

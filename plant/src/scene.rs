@@ -8,6 +8,7 @@
 //! carriage_position_m = 0.1      # where the carriage stands at the start
 //! linked = false                 # whether the load's eye sits in it
 //! added_mass_kg = 0.0            # weights on it
+//! sealed = "my.sealed.toml"      # effects that nobody but the rig knows; beside this file, or an absolute path
 //!
 //! [[rig.hand]]                   # a push: constant in +x, with ramps at both ends
 //! on = "carriage"                # or "load-eye"
@@ -72,6 +73,9 @@ pub struct Scene {
     pub linked: bool,
     /// Weights on the carriage at the start, kg, 0 to the rig's limit.
     pub added_mass_kg: f64,
+    /// File with sealed effects, as the experiment names it; not read here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sealed: Option<String>,
     /// Hands; those that act at a time add up.
     pub hand: Vec<Hand>,
     /// What is done when, in the order of the file.
@@ -116,7 +120,8 @@ pub enum Action {
 impl Default for Scene {
     fn default() -> Self {
         let Setup { carriage_position_m, linked, added_mass_kg } = Setup::default();
-        Scene { carriage_position_m, linked, added_mass_kg, hand: Vec::new(), event: Vec::new() }
+        let (hand, event) = (Vec::new(), Vec::new());
+        Scene { carriage_position_m, linked, added_mass_kg, sealed: None, hand, event }
     }
 }
 

@@ -54,17 +54,17 @@ impl Sensors {
 
     /// Samples all sensors at this instant, drive and load; to be taken before the period's step.
     pub fn sample(&mut self, plant: &Plant, inputs: &Inputs) -> [AxisReadings; 2] {
-        let truth = plant.truth(inputs);
+        let shown = plant.shown(&plant.truth(inputs));
         let parameters = self.parameters;
         let offsets_m = [0.0, parameters.load_position_offset_m];
         std::array::from_fn(|i| {
-            let axis = &truth.axes[i];
+            let [position_m, force_n, a_pa, b_pa] = shown[i];
             let [position, force] = self.gaussian_pair();
             let [pressure_a, pressure_b] = self.gaussian_pair();
-            let position_m = axis.position_m + offsets_m[i] + parameters.position_noise_m * position;
-            let force_n = axis.sensor_force_n + parameters.force_noise_n * force;
-            let a_pa = axis.pressure_a_pa + parameters.pressure_noise_pa * pressure_a;
-            let b_pa = axis.pressure_b_pa + parameters.pressure_noise_pa * pressure_b;
+            let position_m = position_m + offsets_m[i] + parameters.position_noise_m * position;
+            let force_n = force_n + parameters.force_noise_n * force;
+            let a_pa = a_pa + parameters.pressure_noise_pa * pressure_a;
+            let b_pa = b_pa + parameters.pressure_noise_pa * pressure_b;
             let pressure =
                 |pa| quantise(pa, parameters.pressure_step_pa(), 0.0, parameters.pressure_counts());
             let most_force = parameters.force_counts();

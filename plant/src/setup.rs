@@ -79,7 +79,7 @@ pub(crate) fn start_state(rig: &RigParameters, setup: &Setup) -> Result<State, S
     let added_mass_kg = check_added_mass(rig, setup.added_mass_kg)?;
     let eye_m = if setup.linked { carriage_m } else { stroke_m };
 
-    let chambers = Chambers::new(rig.cylinder(), rig.supply(), rig.gas());
+    let chambers = Chambers::of(rig);
     let extension = Pair::new(carriage_m, stroke_m - eye_m);
     let pressure_b = Pair::both(rig.start().rod_side_pressure_pa);
     let pressure_a = chambers.balancing_pressure_a(pressure_b);

@@ -1,8 +1,10 @@
 //! Rows of `measurement.csv` (what sensors and valves show) and `truth.csv` (what only a simulation knows).
 //!
-//! Columns of the first are those of rig-model.md, no others. Numbers are written with the fewest digits that read back
+//! Columns of the first are those of rig-model.md, no others. The second has those of [`Truth`] and then one for each term that a
+//! switched-on effect adds to a balance ([`crate::Plant::term_names`]); without effects there is none. Numbers are written with the fewest digits that read back
 //! to the same bits. Whoever owns the plant, emulator or rehearsal, writes the same files.
 
+use crate::effects::Terms;
 use crate::sensors::AxisReadings;
 use crate::truth::Truth;
 use std::io::{self, Write};
@@ -18,6 +20,8 @@ pub struct CycleRecord {
     pub readings: [AxisReadings; 2],
     /// What only a simulation knows.
     pub truth: Truth,
+    /// What each switched-on effect adds to its balance: room for all of them, so that a record is copied and not allocated.
+    pub terms: Terms,
 }
 
 /// Columns of `measurement.csv` after `time_s`, for one axis; each is prefixed with `drive_` or `load_`.
@@ -49,12 +53,14 @@ pub fn write_measurement(out: &mut impl Write, record: &CycleRecord) -> io::Resu
     writeln!(out)
 }
 
-/// Writes the head of `truth.csv`.
+/// Writes the head of `truth.csv`; `terms` are the names of the plant's terms.
 ///
 /// # Errors
 /// What `out` says.
-pub fn write_truth_head(out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "time_s,{}", Truth::COLUMNS.join(","))
+pub fn write_truth_head(out: &mut impl Write, terms: &[String]) -> io::Result<()> {
+    write!(out, "time_s,{}", Truth::COLUMNS.join(","))?;
+    terms.iter().try_for_each(|term| write!(out, ",{term}"))?;
+    writeln!(out)
 }
 
 /// Writes one row of `truth.csv`.
@@ -64,7 +70,8 @@ pub fn write_truth_head(out: &mut impl Write) -> io::Result<()> {
 pub fn write_truth(out: &mut impl Write, record: &CycleRecord) -> io::Result<()> {
     write_time(out, record.cycle)?;
     // Debug, for tiny numbers with an exponent: Display would spell out their zeros.
-    record.truth.values().iter().try_for_each(|value| write!(out, ",{value:?}"))?;
+    let values = record.truth.values();
+    values.iter().chain(record.terms.values()).try_for_each(|value| write!(out, ",{value:?}"))?;
     writeln!(out)
 }
 

@@ -3,23 +3,25 @@
 //! This is also where the terms of the model can be read one by one, in the order in which they are summed:
 //!
 //! ```text
-//! m dv/dt = pneumatic + hand + contact + viscous friction + sliding friction + holding force
+//! m dv/dt = pneumatic + hand + contact + viscous friction + sliding friction + holding force + effect force
 //! ```
 //!
 //! each along the axis' own extension, N. The holding force is what keeps a resting piston at rest: static
-//! friction, and the end of the stroke where the piston is pressed against it. All forces are those at the instant: what
-//! the force sensors are sampled from.
+//! friction, and the end of the stroke where the piston is pressed against it. The effect force is the sum of what switched-on
+//! effects add beside friction; what each of them adds to which balance is in [`crate::effects::Terms`]. All forces are those at
+//! the instant: what the force sensors are sampled from.
 //!
 //! Source: rig-model.md, One axis, Masses and linkage.
 
+use crate::effects::Effects;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::Pair;
-use crate::parameters::RigParameters;
+use crate::motion::side;
 use crate::state::{Inputs, State};
 use crate::valve::edge_flow;
 
 /// Columns of one axis.
-const AXIS_COLUMNS: usize = 19;
+const AXIS_COLUMNS: usize = 20;
 /// Columns of both axes and of the rig.
 const COLUMNS: usize = 2 * AXIS_COLUMNS + 4;
 
@@ -77,6 +79,8 @@ pub struct AxisTruth {
     pub sliding_friction_n: f64,
     /// Static friction and end stop of a resting axis, N.
     pub holding_force_n: f64,
+    /// What effects add to the forces beside friction, N; 0 without effects.
+    pub effect_force_n: f64,
     /// What the force sensor between rod and carriage would show without noise, N, compression positive.
     pub sensor_force_n: f64,
 }
@@ -89,12 +93,12 @@ impl Truth {
         "drive_pressure_a_Pa", "drive_pressure_b_Pa", "drive_stored_air_a_J", "drive_stored_air_b_J",
         "drive_flow_a_m3_per_s", "drive_flow_b_m3_per_s", "drive_edge_flow_a_m3_per_s", "drive_edge_flow_b_m3_per_s",
         "drive_pneumatic_force_N", "drive_hand_force_N", "drive_contact_force_N", "drive_viscous_friction_N",
-        "drive_sliding_friction_N", "drive_holding_force_N", "drive_sensor_force_N",
+        "drive_sliding_friction_N", "drive_holding_force_N", "drive_effect_force_N", "drive_sensor_force_N",
         "load_position_m", "load_rod_velocity_m_per_s", "load_rod_acceleration_m_per_s2", "load_spool",
         "load_pressure_a_Pa", "load_pressure_b_Pa", "load_stored_air_a_J", "load_stored_air_b_J",
         "load_flow_a_m3_per_s", "load_flow_b_m3_per_s", "load_edge_flow_a_m3_per_s", "load_edge_flow_b_m3_per_s",
         "load_pneumatic_force_N", "load_hand_force_N", "load_contact_force_N", "load_viscous_friction_N",
-        "load_sliding_friction_N", "load_holding_force_N", "load_sensor_force_N",
+        "load_sliding_friction_N", "load_holding_force_N", "load_effect_force_N", "load_sensor_force_N",
         "supply_pressure_Pa", "linkage_distance_m", "linkage_contact_force_N", "check_valves_shut",
     ];
 
@@ -113,79 +117,197 @@ impl Truth {
     }
 
     /// Evaluates every law once at the state.
-    pub(crate) fn at(integrator: &Integrator, rig: &RigParameters, state: &State, inputs: &Inputs) -> Self {
-        let (chambers, motion) = (&integrator.chambers, &integrator.motion);
+    pub(crate) fn at(
+        integrator: &Integrator,
+        effects: Option<&Effects>,
+        state: &State,
+        inputs: &Inputs,
+    ) -> Self {
         let lanes = Lanes::load(state);
         let check_valves_shut = integrator.supply.check_valves_shut(state.supply_pressure_pa);
-
-        // The air.
-        let pressure_a = lanes.air_a.stored * chambers.volume_a(lanes.extension).reciprocal();
-        let pressure_b = lanes.air_b.stored * chambers.volume_b(lanes.extension).reciprocal();
-        let edges = integrator.valve.edges(lanes.spool, state.supply_pressure_pa, chambers.exhaust_pa());
-        let open = Pair::both(if check_valves_shut { 0.0 } else { 1.0 });
-        let edge_flow_a = edge_flow(edges.conductance_a * open, edges.far_pressure_a, pressure_a);
-        let edge_flow_b = edge_flow(edges.conductance_b * open, edges.far_pressure_b, pressure_b);
-
-        // The forces, each by its own law.
-        let linkage_distance_m = integrator.distance(lanes.extension);
-        let approach_m_per_s = -lanes.velocity.sum();
-        let contact_force_n =
-            if state.linked { integrator.linkage.force(linkage_distance_m, approach_m_per_s) } else { 0.0 };
-        let zero = Pair::both(0.0);
-        let moving = lanes.velocity.differs(zero);
-        let pneumatic = chambers.pneumatic_force(pressure_a, pressure_b).to_array();
-        let hand = hand_forces(inputs).to_array();
-        let viscous = motion.viscous_friction(lanes.velocity).to_array();
-        let sliding = motion.sliding_friction(lanes.velocity, moving).to_array();
+        let supply_pressure_pa = supply_pressure_pa(effects, state);
+        let air = AirAt::of(integrator, &lanes);
+        let edge_flow = edge_flows(integrator, effects, state, &lanes, &air);
+        let forces = Forces::at(integrator, effects, &lanes, hand_forces(inputs), state.linked);
 
         let axis = |i: usize| {
-            let own = &state.axes[i];
-            let mut sliding_friction_n = sliding[i];
-            let mut holding_force_n = 0.0;
-            if own.rod_velocity_m_per_s == 0.0 {
-                let force = pneumatic[i] + hand[i] + contact_force_n;
-                if motion.holds(own.extension_m, force) {
-                    holding_force_n = -force;
-                } else {
-                    sliding_friction_n = -rig.friction().sliding_force_n * force.signum();
-                }
-            }
-            let sum =
-                pneumatic[i] + hand[i] + contact_force_n + viscous[i] + sliding_friction_n + holding_force_n;
-            let rod_acceleration_m_per_s2 = sum / motion.mass_kg(i);
-            // What pushes the rod back in; behind the drive's sensor there is the carriage to be moved, too.
-            let behind_kg = [rig.mass().carriage_kg + state.added_mass_kg, 0.0][i];
-            let rest_m = [0.0, motion.stroke_m()][i];
-            let sign = [1.0, -1.0][i];
+            let (own, axis) = (&state.axes[i], &forces.axes[i]);
+            let rest_m = [0.0, integrator.motion.stroke_m()][i];
             AxisTruth {
-                position_m: rest_m + sign * own.extension_m,
+                position_m: rest_m + [1.0, -1.0][i] * own.extension_m,
                 rod_velocity_m_per_s: own.rod_velocity_m_per_s,
-                rod_acceleration_m_per_s2,
+                rod_acceleration_m_per_s2: axis.sum() / integrator.motion.mass_kg(i),
                 spool: own.spool,
-                pressure_a_pa: pressure_a.to_array()[i],
-                pressure_b_pa: pressure_b.to_array()[i],
+                pressure_a_pa: air.pressure[0].to_array()[i],
+                pressure_b_pa: air.pressure[1].to_array()[i],
                 stored_air_a_j: own.stored_air_a_j,
                 stored_air_b_j: own.stored_air_b_j,
                 flow_a_m3_per_s: own.flow_a_m3_per_s,
                 flow_b_m3_per_s: own.flow_b_m3_per_s,
-                edge_flow_a_m3_per_s: edge_flow_a.to_array()[i],
-                edge_flow_b_m3_per_s: edge_flow_b.to_array()[i],
-                pneumatic_force_n: pneumatic[i],
-                hand_force_n: hand[i],
-                contact_force_n,
-                viscous_friction_n: viscous[i],
-                sliding_friction_n,
-                holding_force_n,
-                sensor_force_n: behind_kg * rod_acceleration_m_per_s2 - contact_force_n - hand[i],
+                edge_flow_a_m3_per_s: edge_flow[0].to_array()[i],
+                edge_flow_b_m3_per_s: edge_flow[1].to_array()[i],
+                pneumatic_force_n: axis.pneumatic_n,
+                hand_force_n: axis.hand_n,
+                contact_force_n: forces.contact_n,
+                viscous_friction_n: axis.viscous_n,
+                sliding_friction_n: axis.sliding_n,
+                holding_force_n: axis.holding_n,
+                effect_force_n: axis.effect_n,
+                sensor_force_n: forces.sensor_n(integrator, i),
             }
         };
         Truth {
             axes: [axis(0), axis(1)],
-            supply_pressure_pa: state.supply_pressure_pa,
-            linkage_distance_m,
-            contact_force_n,
+            supply_pressure_pa,
+            linkage_distance_m: forces.distance_m,
+            contact_force_n: forces.contact_n,
             check_valves_shut,
         }
+    }
+}
+
+/// Absolute pressure behind the supply edges, Pa.
+pub(crate) fn supply_pressure_pa(effects: Option<&Effects>, state: &State) -> f64 {
+    effects.map_or(state.supply_pressure_pa, |effects| {
+        effects.supply_side(&effects.memory.moving).sum(state.supply_pressure_pa)
+    })
+}
+
+/// The air of both chambers at an instant.
+pub(crate) struct AirAt {
+    pub(crate) volume: [Pair; 2],
+    pub(crate) pressure: [Pair; 2],
+}
+
+impl AirAt {
+    pub(crate) fn of(integrator: &Integrator, lanes: &Lanes) -> Self {
+        let chambers = &integrator.chambers;
+        let volume = [chambers.volume_a(lanes.extension), chambers.volume_b(lanes.extension)];
+        let [a, b] = lanes.air();
+        AirAt { volume, pressure: [a.stored * volume[0].reciprocal(), b.stored * volume[1].reciprocal()] }
+    }
+
+    /// Pressures of the chambers of one axis, Pa.
+    pub(crate) fn of_axis_pa(&self, axis: usize) -> [f64; 2] {
+        self.pressure.map(|pair| pair.to_array()[axis])
+    }
+}
+
+fn edge_flows(
+    integrator: &Integrator,
+    effects: Option<&Effects>,
+    state: &State,
+    lanes: &Lanes,
+    air: &AirAt,
+) -> [Pair; 2] {
+    if let Some(effects) = effects {
+        let [drive, load] = [0, 1].map(|axis| effects.ports_at(integrator, axis, state, air).flow_m3_per_s);
+        return [Pair::new(drive[0], load[0]), Pair::new(drive[1], load[1])];
+    }
+    let exhaust_pa = integrator.chambers.exhaust_pa();
+    let edges = integrator.valve.edges(lanes.spool, state.supply_pressure_pa, exhaust_pa);
+    let shut = integrator.supply.check_valves_shut(state.supply_pressure_pa);
+    let open = Pair::both(if shut { 0.0 } else { 1.0 });
+    [
+        edge_flow(edges.conductance_a * open, edges.far_pressure_a, air.pressure[0]),
+        edge_flow(edges.conductance_b * open, edges.far_pressure_b, air.pressure[1]),
+    ]
+}
+
+/// Every force at an instant.
+pub(crate) struct Forces {
+    axes: [AxisForces; 2],
+    contact_n: f64,
+    distance_m: f64,
+}
+
+/// Forces on one piston along its own extension, N.
+struct AxisForces {
+    pneumatic_n: f64,
+    hand_n: f64,
+    contact_n: f64,
+    viscous_n: f64,
+    sliding_n: f64,
+    holding_n: f64,
+    effect_n: f64,
+}
+
+impl AxisForces {
+    fn sum(&self) -> f64 {
+        self.pneumatic_n
+            + self.hand_n
+            + self.contact_n
+            + self.viscous_n
+            + self.sliding_n
+            + self.holding_n
+            + self.effect_n
+    }
+}
+
+impl Forces {
+    /// Each force by its own law.
+    pub(crate) fn at(
+        integrator: &Integrator,
+        effects: Option<&Effects>,
+        lanes: &Lanes,
+        hand: Pair,
+        linked: bool,
+    ) -> Self {
+        let motion = &integrator.motion;
+        let distance_m = integrator.distance(lanes.extension);
+        let approach_m_per_s = -lanes.velocity.sum();
+        let contact_n = if linked { integrator.linkage.force(distance_m, approach_m_per_s) } else { 0.0 };
+        let air = AirAt::of(integrator, lanes);
+        let pneumatic = integrator.chambers.pneumatic_force(air.pressure[0], air.pressure[1]).to_array();
+
+        let axis = |i: usize| {
+            let place = lanes.place(i);
+            let hand_n = hand.to_array()[i];
+            let effect_n = effects.map_or(0.0, |effects| effects.force(i, place.extension).sum(0.0));
+            let force = pneumatic[i] + hand_n + contact_n + effect_n;
+            let rubbing = effects.map(|effects| (effects, effects.rubbing_at(integrator, i, place, &air)));
+            let levels = rubbing.as_ref().map_or(*motion.levels(), |(effects, rubbing)| {
+                effects.levels(integrator, i, rubbing, place.velocity.abs())
+            });
+            let viscous_n = -(levels.viscous_n_s_per_m[side(place.velocity)] * place.velocity);
+            let mut sliding_n = 0.0;
+            let mut holding_n = 0.0;
+            let bristles = rubbing
+                .and_then(|(effects, rubbing)| effects.bristles(integrator, i, &rubbing, place, force));
+            if let Some(bristles) = bristles {
+                sliding_n = bristles.sum(0.0);
+            } else if place.velocity != 0.0 {
+                sliding_n = -levels.sliding_n[side(place.velocity)] * place.velocity.signum();
+            } else if motion.holds(place.extension, force, &levels) {
+                holding_n = -force;
+            } else {
+                sliding_n = -levels.sliding_n[side(force)] * force.signum();
+            }
+            AxisForces {
+                pneumatic_n: pneumatic[i],
+                hand_n,
+                contact_n,
+                viscous_n,
+                sliding_n,
+                holding_n,
+                effect_n,
+            }
+        };
+        Forces { axes: [axis(0), axis(1)], contact_n, distance_m }
+    }
+
+    /// Force on a piston without any friction, N.
+    pub(crate) fn unresisted_n(&self, axis: usize) -> f64 {
+        let own = &self.axes[axis];
+        own.pneumatic_n + own.hand_n + own.contact_n + own.effect_n
+    }
+
+    /// What the force sensor of an axis would show, N: what pushes its rod back in; behind the drive's there is the carriage to be
+    /// moved, too.
+    pub(crate) fn sensor_n(&self, integrator: &Integrator, axis: usize) -> f64 {
+        let own = &self.axes[axis];
+        let acceleration = own.sum() / integrator.motion.mass_kg(axis);
+        integrator.motion.behind_sensor_kg(axis) * acceleration - self.contact_n - own.hand_n
     }
 }
 
@@ -210,6 +332,7 @@ impl AxisTruth {
             self.viscous_friction_n,
             self.sliding_friction_n,
             self.holding_force_n,
+            self.effect_force_n,
             self.sensor_force_n,
         ]
     }

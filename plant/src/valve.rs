@@ -23,7 +23,7 @@ use crate::parameters::table::VALVE_POINTS;
 const HINGES: usize = VALVE_POINTS - 1;
 
 /// From bar and m^3/h to Pa and m^3/s: Q_N in m^3/s per K_V in m^3/h and Pa [Neugebauer 2011, eq. 4].
-const FLOW_PER_KV: f64 = 25.9 / 1e5 / 3600.0;
+pub(crate) const FLOW_PER_KV: f64 = 25.9 / 1e5 / 3600.0;
 
 /// Largest count of the signed 12-bit valve command.
 const COMMAND_COUNTS: f64 = 2047.0;
@@ -70,6 +70,15 @@ impl Valve {
         }
     }
 
+    /// Conductance of supply and exhaust edge at an opening |s| of 0 to 1, m^3/s per Pa.
+    pub(crate) fn conductances(&self, opening: f64) -> [f64; 2] {
+        let sum = |hinges: &[Pair; HINGES]| {
+            let beyond = |i: usize| (opening - self.point[i].drive()).max(0.0);
+            (0..HINGES).map(|i| hinges[i].drive() * beyond(i)).sum()
+        };
+        [sum(&self.supply_hinge), sum(&self.exhaust_hinge)]
+    }
+
     /// Which edge each chamber sees and how far it is open, for spools in [-1, 1].
     ///
     /// s > 0: supply to a, b to exhaust; s < 0: supply to b, a to exhaust.
@@ -104,6 +113,14 @@ pub(crate) fn edge_flow(conductance: Pair, far_pa: Pair, chamber_pa: Pair) -> Pa
     let throat = downstream.max(upstream * Pair::both(0.5));
     let root = ((upstream - throat) * throat).sqrt();
     (conductance * root).with_sign_of(far_pa - chamber_pa)
+}
+
+/// [`edge_flow`] of one edge of one axis.
+#[inline(always)]
+pub(crate) fn single_edge_flow(conductance: f64, far_pa: f64, chamber_pa: f64) -> f64 {
+    let upstream = far_pa.max(chamber_pa);
+    let throat = far_pa.min(chamber_pa).max(upstream * 0.5);
+    (conductance * ((upstream - throat) * throat).sqrt()).copysign(far_pa - chamber_pa)
 }
 
 #[cfg(test)]

@@ -31,11 +31,10 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-#[test]
-fn a_period_allocates_nothing() {
-    let rig = RigParameters::baseline();
-    let mut plant = Plant::new(&rig, &Setup { linked: true, ..Setup::default() }).expect("good");
-    let mut sensors = Sensors::new(&rig, 1);
+/// Periods of a rig with everything in them that can happen; looks at truth, terms and sensors in each.
+fn periods_allocate_nothing(rig: &RigParameters) {
+    let mut plant = Plant::new(rig, &Setup { linked: true, ..Setup::default() }).expect("good");
+    let mut sensors = Sensors::new(rig, 1);
     let counted = ALLOCATIONS.with(Cell::get);
     assert!(counted > 0, "the counter counts");
     let mut sum = 0.0;
@@ -49,10 +48,28 @@ fn a_period_allocates_nothing() {
         let u = if k / 300 % 2 == 0 { 1.0 } else { -1.0 };
         let inputs = Inputs { valve: [u, -0.5 * u], ..Inputs::default() };
         sum += sensors.sample(&plant, &inputs)[0].position.value + plant.truth(&inputs).values()[0];
+        sum += plant.terms(&inputs).values().iter().map(|value| value.abs()).sum::<f64>();
         plant.step(&inputs);
     }
     assert_eq!(ALLOCATIONS.with(Cell::get), counted);
     assert!(sum > 0.0);
+}
+
+#[test]
+fn a_period_allocates_nothing() {
+    periods_allocate_nothing(&RigParameters::baseline());
+}
+
+#[test]
+fn a_period_with_all_effects_allocates_nothing() {
+    let mut rig = RigParameters::baseline();
+    for sheet in plant::effects::SHEETS {
+        for place in sheet.place.names() {
+            let numbers: Vec<_> = sheet.keys.iter().map(|key| (key.name, key.drawn[1])).collect();
+            rig = rig.with_effect(sheet.name, &place, &numbers).expect("drawn numbers are allowed");
+        }
+    }
+    periods_allocate_nothing(&rig);
 }
 
 #[test]

@@ -7,9 +7,11 @@
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
+//!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
 //!   record_maker  blind records for the study of the workflow, from a simulation of its own
+//!   study ─── the judge of the discrepancy workflow, for scripts/study
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
@@ -24,6 +26,7 @@ pub mod bus_cycles;
 pub mod disturb;
 pub mod events;
 pub mod guest;
+pub mod hidden;
 pub mod launch;
 pub mod load;
 pub mod own;
@@ -33,5 +36,6 @@ pub mod record_maker;
 pub mod records;
 pub mod scene;
 pub mod skip;
+pub mod study;
 pub mod tune;
 pub mod turn;

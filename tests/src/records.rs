@@ -91,6 +91,12 @@ impl Table {
         self.rows.iter().map(|row| row[index]).collect()
     }
 
+    /// Names of the columns.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.columns
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -1,9 +1,9 @@
 //! The rig on the machine's clock: one cycle each millisecond.
 
 use super::{CYCLE, End, Paced, Ride};
-use crate::commands::STALE_AFTER_CYCLES;
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
+use protocol::commands::STALE_AFTER_CYCLES;
 use protocol::timing::{CycleTiming, Vitals};
 use realtime::{Clock, PeriodicConfig, PeriodicLoop, VitalCounts, VitalsReader};
 use std::time::{Duration, Instant};

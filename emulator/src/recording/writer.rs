@@ -43,6 +43,8 @@ pub struct WriterSetup {
     pub linked: bool,
     /// Weights on the carriage, for the same line.
     pub added_mass_kg: f64,
+    /// Names of the plant's terms, the last columns of `truth.csv` and of no other file.
+    pub terms: Vec<String>,
     /// What to keep of time; `None` in lockstep.
     pub evidence: Option<EvidenceSetup>,
 }
@@ -87,7 +89,7 @@ impl Writer {
         let (bus_log, mut measurement, mut truth) =
             (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
         tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
-        tables::write_truth_head(truth.lines())?;
+        tables::write_truth_head(truth.lines(), &setup.terms)?;
         let log = Log { interface: setup.interface.clone(), epoch_offset_ns: setup.epoch_offset_ns };
         let evidence = setup.evidence.as_ref();
         let evidence =

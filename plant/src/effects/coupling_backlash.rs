@@ -1,4 +1,18 @@
-//! coupling-backlash: the gap of the eye differs from the file.
+//! coupling-backlash: the gap of the load's eye differs from the file.
+//!
+//! ```text
+//! e = d -+ s/2 outside the gap, 0 inside, with s in place of linkage.gap_mm           term = s - gap
+//! ```
+//!
+//! s gap in all, both sides together, m, >= 0; gap that of the file, m; d distance of the rods. The term is what the gap has
+//! above the file's, m, either sign: it replaces the number, it does not add a second gap.
+//!
+//! Valid as the baseline's contact is: rigid sides, no wear within a run. Linking needs |d| <= s/2. No regularisation.
+//!
+//! Properties: baseline and term together are the effect's own gap, whatever the file says; the file's number changes
+//! nothing.
+//!
+//! Source: rig-model.md, Masses and linkage, for the contact; range: effects.md, textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -7,7 +21,7 @@ use crate::parameters::table::Unit;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CouplingBacklash {
-    /// Gap in all, in place of linkage.gap_mm.
+    /// s, gap in all, in place of linkage.gap_mm.
     pub(crate) gap_m: f64,
 }
 
@@ -17,9 +31,8 @@ impl Effect for CouplingBacklash {
         group: Group::Motion,
         place: PlaceKind::Linkage,
         law: "the gap of the eye differs from the file",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "rig-model.md, Masses and linkage; range: effects.md, textbook prior",
+        keys: &[EffectKey {
             name: "gap_mm",
             unit: Unit::Millimetre,
             min: 0.0,
@@ -28,12 +41,40 @@ impl Effect for CouplingBacklash {
             signed: false,
             default: None,
             neutral: Some(0.2),
-            meaning: "gap in all, in place of linkage.gap_mm",
-        },
-        ],
+            meaning: "s, gap in all, in place of linkage.gap_mm",
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         CouplingBacklash { gap_m: numbers[0] }
+    }
+}
+
+impl CouplingBacklash {
+    /// What the gap has above the file's, both m.
+    pub(crate) fn term(&self, baseline: f64) -> f64 {
+        self.gap_m - baseline
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn it_replaces_the_gap_of_any_file() {
+        for file_m in [0.0, 2e-4, 5e-3] {
+            let effect = CouplingBacklash { gap_m: 1e-3 };
+            // One rounding of 5 mm.
+            assert!((file_m + effect.term(file_m) - 1e-3).abs() < 1e-18);
+        }
+    }
+
+    #[test]
+    fn the_neutral_value_is_the_shipped_files_and_changes_nothing() {
+        let rig = RigParameters::baseline();
+        let key = CouplingBacklash::SHEET.keys[0];
+        let neutral = key.unit.to_si(key.neutral.expect("has one"));
+        assert_eq!(neutral, rig.linkage().gap_m);
+        assert_eq!(CouplingBacklash::new(&[neutral], &rig).term(rig.linkage().gap_m), 0.0);
     }
 }

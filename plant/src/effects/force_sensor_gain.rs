@@ -1,4 +1,16 @@
 //! force-sensor-gain: the force sensor reads too much by a share.
+//!
+//! ```text
+//! term = g F
+//! ```
+//!
+//! g error of the gain, share, either sign, positive reads too much: F shown = (1 + g) F; F truth, N. F is signed: the error
+//! flips with it. Valid for a wrong calibration; curvature is not in it. The truth does not feel it, a controller does. No
+//! regularisation.
+//!
+//! Properties: proportional to the truth, 0 with it; 0 changes nothing.
+//!
+//! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -7,7 +19,7 @@ use crate::parameters::table::Unit;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceSensorGain {
-    /// What it reads too much, of the force.
+    /// g, what it reads too much, of the force.
     pub(crate) gain: f64,
 }
 
@@ -17,9 +29,8 @@ impl Effect for ForceSensorGain {
         group: Group::Sensor,
         place: PlaceKind::Axis,
         law: "the force sensor reads too much by a share",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "gain error of a transducer; range: effects.md, textbook prior",
+        keys: &[EffectKey {
             name: "gain_percent",
             unit: Unit::Percent,
             min: -30.0,
@@ -28,12 +39,40 @@ impl Effect for ForceSensorGain {
             signed: true,
             default: None,
             neutral: Some(0.0),
-            meaning: "what it reads too much, of the force",
-        },
-        ],
+            meaning: "g, what it reads too much, of the force",
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         ForceSensorGain { gain: numbers[0] }
+    }
+}
+
+impl ForceSensorGain {
+    /// What the reading has above the truth, both N.
+    pub(crate) fn term(&self, truth: f64) -> f64 {
+        self.gain * truth
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    fn gain(gain: f64) -> ForceSensorGain {
+        ForceSensorGain::new(&[gain], &RigParameters::baseline())
+    }
+
+    #[test]
+    fn it_is_proportional_to_the_truth() {
+        // Powers of two: no rounding.
+        assert_eq!(gain(0.015625).term(-300.0), -300.0 / 64.0);
+        assert_eq!(gain(0.015625).term(2.0 * -300.0), 2.0 * gain(0.015625).term(-300.0));
+        assert_eq!(gain(-0.015625).term(-300.0), -gain(0.015625).term(-300.0));
+        assert_eq!(gain(0.25).term(0.0), 0.0);
+    }
+
+    #[test]
+    fn zero_changes_nothing() {
+        assert_eq!(gain(0.0).term(-300.0).abs(), 0.0);
     }
 }

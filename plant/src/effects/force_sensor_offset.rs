@@ -1,4 +1,16 @@
 //! force-sensor-offset: the force sensor reads too much by a constant.
+//!
+//! ```text
+//! term = o
+//! ```
+//!
+//! o offset, N, either sign, positive reads too much: F shown = F + o. Valid for a zero that has drifted or a preload of the
+//! mounting. The reading is saturated at the ends of its range after that, as without the offset. The truth does not feel it,
+//! a controller does. No regularisation.
+//!
+//! Properties: a constant of either sign; 0 changes nothing.
+//!
+//! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -7,7 +19,7 @@ use crate::parameters::table::Unit;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ForceSensorOffset {
-    /// What it reads too much.
+    /// o, what it reads too much.
     pub(crate) offset_n: f64,
 }
 
@@ -17,9 +29,8 @@ impl Effect for ForceSensorOffset {
         group: Group::Sensor,
         place: PlaceKind::Axis,
         law: "the force sensor reads too much by a constant",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "zero error of a transducer; range: effects.md, textbook prior",
+        keys: &[EffectKey {
             name: "offset_n",
             unit: Unit::Newton,
             min: -100.0,
@@ -28,12 +39,29 @@ impl Effect for ForceSensorOffset {
             signed: true,
             default: None,
             neutral: Some(0.0),
-            meaning: "what it reads too much",
-        },
-        ],
+            meaning: "o, what it reads too much",
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         ForceSensorOffset { offset_n: numbers[0] }
+    }
+}
+
+impl ForceSensorOffset {
+    /// What the reading has above the truth, N.
+    pub(crate) fn term(&self) -> f64 {
+        self.offset_n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn it_is_a_constant_of_either_sign() {
+        for offset in [12.0, 0.0, -(12.0)] {
+            assert_eq!(ForceSensorOffset::new(&[offset], &RigParameters::baseline()).term(), offset);
+        }
     }
 }

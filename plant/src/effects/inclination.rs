@@ -1,4 +1,18 @@
 //! inclination: a constant force along x: gravity on an inclined axis, a hanging load.
+//!
+//! ```text
+//! term = F_g            (m g sin of the angle, for an axis that is not level)
+//! ```
+//!
+//! F_g force in +x of the rig, N, either sign: on the drive along its extension, on the load against it (the load faces the
+//! drive). Acts always, at rest too, whatever position and velocity. No regularisation.
+//!
+//! It does not grow with added weights: the file holds a force, not an angle, because only the force can be told from a
+//! record.
+//!
+//! Properties: a constant of either sign; 0 changes nothing.
+//!
+//! Source: Newton's second law; range: effects.md, textbook prior (5 kg at 45 degrees are 35 N, added weights more).
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -7,7 +21,7 @@ use crate::parameters::table::Unit;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Inclination {
-    /// Force in +x of the rig.
+    /// F_g, force in +x of the rig.
     pub(crate) force_n: f64,
 }
 
@@ -17,9 +31,8 @@ impl Effect for Inclination {
         group: Group::Motion,
         place: PlaceKind::Axis,
         law: "a constant force along x: gravity on an inclined axis, a hanging load",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "gravity along the axis; range: effects.md, textbook prior",
+        keys: &[EffectKey {
             name: "force_n",
             unit: Unit::Newton,
             min: -200.0,
@@ -28,12 +41,29 @@ impl Effect for Inclination {
             signed: true,
             default: None,
             neutral: Some(0.0),
-            meaning: "force in +x of the rig",
-        },
-        ],
+            meaning: "F_g, force in +x of the rig",
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         Inclination { force_n: numbers[0] }
+    }
+}
+
+impl Inclination {
+    /// Force in +x of the rig, N.
+    pub(crate) fn term(&self) -> f64 {
+        self.force_n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn it_is_a_constant_of_either_sign() {
+        for force in [-50.0, 0.0, 12.5] {
+            assert_eq!(Inclination::new(&[force], &RigParameters::baseline()).term(), force);
+        }
     }
 }

@@ -1,5 +1,23 @@
 //! position-sensor-lag: the position sensor is a first-order lag.
+//!
+//! ```text
+//! tau dx_shown/dt = x - x_shown                 term = x_shown - x
+//! ```
+//!
+//! x what the sensor sees, m; x_shown what it shows before gain, offset, noise and rounding, m; tau time constant, s, >= 0.
+//! The term is what the reading has above the truth, m, either sign.
+//!
+//! Valid for the filter of a transducer or of its amplifier; a second pole or a travelling wave is not in it. The truth does
+//! not feel it. Exact for a truth that goes in a straight line over the span, so no span is too long and tau = 0 shows the
+//! truth. No regularisation.
+//!
+//! Properties: a step is followed exponentially, a ramp one tau late; it rests where the truth rests; it shows nothing that
+//! was not true before or is now; how a span is cut does not matter (tests of first_order.rs, the formula shared by the
+//! lags).
+//!
+//! Source: first-order lag, filter of the transducer; range 0.5 to 8 ms: effects.md, textbook prior.
 
+use super::first_order;
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
@@ -7,7 +25,7 @@ use crate::parameters::table::Unit;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorLag {
-    /// Time constant.
+    /// tau, time constant.
     pub(crate) time_constant_s: f64,
 }
 
@@ -17,9 +35,8 @@ impl Effect for PositionSensorLag {
         group: Group::Sensor,
         place: PlaceKind::Axis,
         law: "the position sensor is a first-order lag",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "first-order lag, filter of the transducer; range: effects.md, textbook prior",
+        keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,
             min: 0.0,
@@ -28,12 +45,41 @@ impl Effect for PositionSensorLag {
             signed: false,
             default: None,
             neutral: Some(0.0),
-            meaning: "time constant",
-        },
-        ],
+            meaning: "tau, time constant of the position sensor",
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         PositionSensorLag { time_constant_s: numbers[0] }
+    }
+}
+
+impl PositionSensorLag {
+    /// What it shows at the end of a span, s, over which the truth goes in a straight line; all in m.
+    pub(crate) fn advance(&self, shown: f64, truth_from: f64, truth_to: f64, span_s: f64) -> f64 {
+        first_order::advance(self.time_constant_s, shown, truth_from, truth_to, span_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    fn lag(time_constant_s: f64) -> PositionSensorLag {
+        PositionSensorLag::new(&[time_constant_s], &RigParameters::baseline())
+    }
+
+    #[test]
+    fn a_time_constant_leaves_one_part_in_e_of_a_step() {
+        let left = 0.1 - lag(0.004).advance(0.0, 0.1, 0.1, 0.004);
+        let step = 0.1 - 0.0;
+        // Roundings of the numbers of the step.
+        assert!((left - step / std::f64::consts::E).abs() < 1e-15 * 0.1);
+    }
+
+    #[test]
+    fn it_rests_where_the_truth_rests_and_without_a_time_constant_shows_it() {
+        let truth = 0.1;
+        assert_eq!(lag(0.004).advance(truth, truth, truth, 1e-3), truth);
+        assert_eq!(lag(0.0).advance(0.0, 0.1, 0.1, 1e-4), truth);
     }
 }

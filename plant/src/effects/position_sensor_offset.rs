@@ -1,4 +1,16 @@
 //! position-sensor-offset: the position sensor reads too much by a constant.
+//!
+//! ```text
+//! term = o
+//! ```
+//!
+//! o offset, m, either sign, positive reads too much: x shown = x + o. On the load it comes beside the +0.8 mm of the rig
+//! file. Valid for a shifted mounting. The reading is saturated at the ends of its range after that, as without the offset.
+//! The truth does not feel it, a controller does. No regularisation.
+//!
+//! Properties: a constant of either sign; 0 changes nothing.
+//!
+//! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -7,7 +19,7 @@ use crate::parameters::table::Unit;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionSensorOffset {
-    /// What it reads too much, beside the load sensor's own offset.
+    /// o, what it reads too much, beside the load sensor's own offset.
     pub(crate) offset_m: f64,
 }
 
@@ -17,9 +29,8 @@ impl Effect for PositionSensorOffset {
         group: Group::Sensor,
         place: PlaceKind::Axis,
         law: "the position sensor reads too much by a constant",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "zero error of a transducer; range: effects.md, textbook prior",
+        keys: &[EffectKey {
             name: "offset_mm",
             unit: Unit::Millimetre,
             min: -10.0,
@@ -28,12 +39,29 @@ impl Effect for PositionSensorOffset {
             signed: true,
             default: None,
             neutral: Some(0.0),
-            meaning: "what it reads too much, beside the load sensor's own offset",
-        },
-        ],
+            meaning: "o, what it reads too much, beside the load sensor's own offset",
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         PositionSensorOffset { offset_m: numbers[0] }
+    }
+}
+
+impl PositionSensorOffset {
+    /// What the reading has above the truth, m.
+    pub(crate) fn term(&self) -> f64 {
+        self.offset_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn it_is_a_constant_of_either_sign() {
+        for offset in [-0.8e-3, 0.0, -(-0.8e-3)] {
+            assert_eq!(PositionSensorOffset::new(&[offset], &RigParameters::baseline()).term(), offset);
+        }
     }
 }

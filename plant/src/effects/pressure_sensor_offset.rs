@@ -1,4 +1,16 @@
 //! pressure-sensor-offset: the pressure sensor reads too much by a constant.
+//!
+//! ```text
+//! term = o
+//! ```
+//!
+//! o offset, Pa, either sign, positive reads too much: p shown = p + o. Valid for a zero that has drifted; absolute pressure.
+//! The reading is saturated at the ends of its range after that, as without the offset. The truth does not feel it, a
+//! controller does. No regularisation.
+//!
+//! Properties: a constant of either sign; 0 changes nothing.
+//!
+//! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
@@ -7,7 +19,7 @@ use crate::parameters::table::Unit;
 /// The numbers of this effect at one place, in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressureSensorOffset {
-    /// What it reads too much.
+    /// o, what it reads too much.
     pub(crate) offset_pa: f64,
 }
 
@@ -17,9 +29,8 @@ impl Effect for PressureSensorOffset {
         group: Group::Sensor,
         place: PlaceKind::Chamber,
         law: "the pressure sensor reads too much by a constant",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "zero error of a transducer; range: effects.md, textbook prior",
+        keys: &[EffectKey {
             name: "offset_mbar",
             unit: Unit::Millibar,
             min: -500.0,
@@ -28,12 +39,29 @@ impl Effect for PressureSensorOffset {
             signed: true,
             default: None,
             neutral: Some(0.0),
-            meaning: "what it reads too much",
-        },
-        ],
+            meaning: "o, what it reads too much",
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         PressureSensorOffset { offset_pa: numbers[0] }
+    }
+}
+
+impl PressureSensorOffset {
+    /// What the reading has above the truth, Pa.
+    pub(crate) fn term(&self) -> f64 {
+        self.offset_pa
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn it_is_a_constant_of_either_sign() {
+        for offset in [-3e3, 0.0, -(-3e3)] {
+            assert_eq!(PressureSensorOffset::new(&[offset], &RigParameters::baseline()).term(), offset);
+        }
     }
 }

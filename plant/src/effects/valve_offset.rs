@@ -1,13 +1,25 @@
 //! valve-offset: the spool's null lies beside the command's.
+//!
+//! ```text
+//! target = u + u_0
+//! ```
+//!
+//! u command, in [-1, 1]; u_0 null offset, share of full command, in [-0.1, 0.1], positive extends. Valid for a wrong
+//! electrical or mechanical null; it neither drifts nor depends on pressure or temperature. The target is kept within [-1,
+//! 1], since the spool has stops: at full command the offset is not seen. No regularisation: a constant.
+//!
+//! Properties: the same for every state and time; u_0 = 0 adds nothing.
+//!
+//! Source: null bias, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The numbers of this effect at one place, in SI.
+/// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ValveOffset {
-    /// U_0, of full command.
+    /// u_0, share of full command.
     pub(crate) offset: f64,
 }
 
@@ -17,9 +29,8 @@ impl Effect for ValveOffset {
         group: Group::Flow,
         place: PlaceKind::Axis,
         law: "the spool's null lies beside the command's",
-        source: "effects.md, textbook prior",
-        keys: &[
-        EffectKey {
+        source: "null bias, Merritt 1967 ch. 7; range: textbook prior",
+        keys: &[EffectKey {
             name: "offset_percent",
             unit: Unit::Percent,
             min: -10.0,
@@ -29,11 +40,30 @@ impl Effect for ValveOffset {
             default: None,
             neutral: Some(0.0),
             meaning: "u_0, of full command",
-        },
-        ],
+        }],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
         ValveOffset { offset: numbers[0] }
+    }
+}
+
+impl ValveOffset {
+    /// What is added to the command for the spool's target, share of full command.
+    pub(crate) fn term(&self) -> f64 {
+        self.offset
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_a_constant_in_shares_of_full_command_and_nothing_at_zero() {
+        let rig = RigParameters::baseline();
+        let percent = ValveOffset::SHEET.keys[0].unit;
+        assert_eq!(ValveOffset::new(&[percent.to_si(-2.5)], &rig).term(), -0.025);
+        assert_eq!(ValveOffset::new(&[percent.to_si(0.0)], &rig).term(), 0.0);
     }
 }

@@ -115,11 +115,7 @@ impl Entries {
     /// Reads the whole file; unknown, missing, mistyped and out-of-range keys are errors.
     pub(super) fn read(text: &str, file: &str) -> Result<Self, ParameterError> {
         let place = Place { text, file };
-        let root = DeTable::parse(text).map_err(|error| ParameterError::Syntax {
-            file: file.to_owned(),
-            line: place.line(error.span().map_or(0, |span| span.start)),
-            message: error.message().to_owned(),
-        })?;
+        let root = place.parse()?;
         place.refuse_unknown(root.get_ref())?;
         let mut entries = BTreeMap::new();
         for key in KEYS {
@@ -184,14 +180,27 @@ impl Entries {
         place: &str,
         numbers: &[(&str, f64)],
     ) -> Result<Self, ParameterError> {
-        let keys: String = numbers.iter().map(|(key, number)| format!("{key} = {number:?}\n")).collect();
+        // TOML writes NaN in small letters.
+        let written = |number: f64| if number.is_nan() { "nan".to_owned() } else { format!("{number:?}") };
+        let keys: String =
+            numbers.iter().map(|(key, number)| format!("{key} = {}\n", written(*number))).collect();
         let text = format!("[effects.{name}.{place}]\n{keys}");
-        let in_file = Place { text: &text, file: &self.file };
-        let root = DeTable::parse(&text).map_err(|error| ParameterError::Syntax {
-            file: self.file.clone(),
-            line: 1,
-            message: error.message().to_owned(),
-        })?;
+        self.with_effects_of(&text, &self.file)
+    }
+
+    /// The same rig with the effects of a file that holds nothing else; they replace those of the same name and place.
+    pub(super) fn with_effects_of(&self, text: &str, file: &str) -> Result<Self, ParameterError> {
+        let in_file = Place { text, file };
+        let root = in_file.parse()?;
+        if let Some((name, value)) = root.get_ref().iter().find(|(name, _)| name.get_ref() != "effects") {
+            return Err(ParameterError::UnknownKey {
+                file: file.to_owned(),
+                line: in_file.line(name.span().start),
+                key: name.get_ref().to_string(),
+                value: in_file.written(value),
+                known: "effects".to_owned(),
+            });
+        }
         let mut changed = self.clone();
         for effect in switched::read(root.get_ref(), &in_file)? {
             changed.effects.retain(|old| old.name != effect.name || old.place != effect.place);
@@ -206,6 +215,16 @@ impl Entries {
 pub(super) struct Place<'t> {
     text: &'t str,
     pub(super) file: &'t str,
+}
+
+impl<'t> Place<'t> {
+    fn parse(&self) -> Result<Spanned<DeTable<'t>>, ParameterError> {
+        DeTable::parse(self.text).map_err(|error| ParameterError::Syntax {
+            file: self.file.to_owned(),
+            line: self.line(error.span().map_or(0, |span| span.start)),
+            message: error.message().to_owned(),
+        })
+    }
 }
 
 impl Place<'_> {

@@ -29,6 +29,10 @@ pub(super) fn read(root: &DeTable<'_>, text: &Text<'_>) -> Result<Vec<Switched>,
         let sheet = sheet(name.get_ref())
             .ok_or_else(|| unknown(text, name.span().start, &path, value, names.clone()))?;
         let places = value.get_ref().as_table().ok_or_else(|| wrong(text, &path, value, &at(sheet)))?;
+        // A table without a place would switch on nothing, and the file would not say so.
+        if places.is_empty() {
+            return Err(wrong(text, &path, value, &at(sheet)));
+        }
         for (first, value) in places {
             let path = format!("{path}.{}", first.get_ref());
             let bad = |path: &str, value| unknown(text, first.span().start, path, value, at(sheet));
@@ -38,6 +42,10 @@ pub(super) fn read(root: &DeTable<'_>, text: &Text<'_>) -> Result<Vec<Switched>,
                 let numbers = read_numbers(sheet, inner, &path, line, text)?;
                 effects.push(Switched { name: sheet.name, place, numbers });
                 continue;
+            }
+            let part = format!("{}.", first.get_ref());
+            if inner.is_empty() || !sheet.place.names().iter().any(|name| name.starts_with(&part)) {
+                return Err(bad(&path, value));
             }
             for (second, value) in inner {
                 let place = sheet.place_named(&format!("{}.{}", first.get_ref(), second.get_ref()));

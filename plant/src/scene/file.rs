@@ -66,6 +66,7 @@ struct RigTable {
     carriage_position_m: Option<Spanned<f64>>,
     linked: Option<bool>,
     added_mass_kg: Option<Spanned<f64>>,
+    sealed: Option<String>,
     hand: Vec<HandTable>,
     event: Vec<EventTable>,
 }
@@ -144,7 +145,7 @@ pub(super) fn read(text: &str, file: &str, rig: &RigParameters) -> Result<Scene,
         line: check.line(error.span().map_or(0, |span| span.start)),
         message: error.to_string().trim_end().to_owned(),
     })?;
-    let RigTable { carriage_position_m, linked, added_mass_kg, hand, event } = table.rig;
+    let RigTable { carriage_position_m, linked, added_mass_kg, sealed, hand, event } = table.rig;
     let default = Scene::default();
     let position = check.place("rig.carriage_position_m");
     let mass = check.weights("rig.added_mass_kg");
@@ -152,6 +153,7 @@ pub(super) fn read(text: &str, file: &str, rig: &RigParameters) -> Result<Scene,
         carriage_position_m: check.or(position, carriage_position_m.as_ref(), default.carriage_position_m)?,
         linked: linked.unwrap_or(default.linked),
         added_mass_kg: check.or(mass, added_mass_kg.as_ref(), default.added_mass_kg)?,
+        sealed,
         hand: hand.iter().map(|table| check.hand(table)).collect::<Result<_, _>>()?,
         event: event.iter().map(|table| check.event(table)).collect::<Result<_, _>>()?,
     })

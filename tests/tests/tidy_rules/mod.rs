@@ -44,6 +44,7 @@ pub(crate) const RULES: &[&Rule] = &[
     &rust::CRATE_EDGES,
     &rust::NOMINAL_NUMBERS_ONLY,
     &rust::PURE_PLANT,
+    &rust::EFFECTS,
     &rust::UNITS_IN_NAMES,
     &rust::LINE_LENGTH,
     &text::FILE_LENGTH,

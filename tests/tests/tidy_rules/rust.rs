@@ -30,6 +30,7 @@ const FORBIDDEN_EDGES: &[(&str, &[&str])] = &[
     ("plant", &["protocol", "realtime", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
     ("emulator", &["controller", "bench", "discrepancy", "system-tests"]),
     ("controller", &["emulator", "bench", "discrepancy", "system-tests"]),
+    ("discrepancy", &["emulator", "controller", "bench", "system-tests"]),
 ];
 
 /// House-style: who knows whom.
@@ -65,6 +66,7 @@ pub(super) const CRATE_EDGES: Rule = Rule {
         ("realtime/Cargo.toml", "[dependencies.plant]\nworkspace = true\n", 1),
         ("emulator/Cargo.toml", "[dependencies]\nclap = \"1\"\nbench.workspace = true\n", 3),
         ("controller/Cargo.toml", "[dependencies]\nrig = { package = \"emulator\", version = \"1\" }\n", 2),
+        ("discrepancy/Cargo.toml", "[dependencies]\nbench.workspace = true\n", 2),
     ],
     good: &[
         ("protocol/Cargo.toml", "[package]\nname = \"protocol\"\n[dependencies]\nplantuml = \"1\"\n"),
@@ -175,6 +177,34 @@ pub(super) const PURE_PLANT: Rule = Rule {
     ],
 };
 
+/// An effect names its source and tests the properties it claims.
+pub(super) const EFFECTS: Rule = Rule {
+    name: "effects",
+    applies: |path| path.starts_with("plant/src/effects/") && is_rust(path),
+    check: |file| {
+        if !file.text.contains("const SHEET: Sheet = Sheet {") {
+            return Vec::new();
+        }
+        let asked = [
+            (
+                "//! Source: ",
+                "end the head of an effect with '//! Source: ' and where law and range come from",
+            ),
+            ("#[cfg(test)]", "test each property that the head of an effect claims"),
+        ];
+        let missing = asked.iter().filter(|(text, _)| !file.text.contains(text));
+        missing.map(|(_, advice)| Problem { line: 1, advice: (*advice).into() }).collect()
+    },
+    bad: &[
+        ("plant/src/effects/a.rs", "//! A.\nconst SHEET: Sheet = Sheet {};\n#[cfg(test)]\n", 1),
+        ("plant/src/effects/a.rs", "//! A.\n//! Source: b.\nconst SHEET: Sheet = Sheet {};\n", 1),
+    ],
+    good: &[
+        ("plant/src/effects/a.rs", "//! A.\n//! Source: b.\nconst SHEET: Sheet = Sheet {};\n#[cfg(test)]\n"),
+        ("plant/src/effects/a.rs", "//! Machinery.\n"),
+    ],
+};
+
 /// Units that a name may end with, before a statistic.
 const UNITS: &[&str] = &[
     "m", "mm", "m2", "m3", "s", "ms", "us", "ns", "n", "pa", "bar", "kg", "k", "j", "w", "hz", "rad", "deg",
@@ -202,9 +232,25 @@ const DIMENSIONLESS: &[&str] = &[
     "least",                 // of a parameter, whose unit is a field beside it
     "most",                  // the same
     "default",               // the same
+    "drawn",                 // of a key of an effect, whose unit is a field beside it
+    "neutral",               // the same
+    "numbers",               // of an effect, in the units of its keys
     "variables",             // of a program: names with their units, and values
     "before_value",          // of a set-point, position or force
     "after_value",           // the same
+    "share",                 // a rate, and the bound below
+    "at_most",               // a rate
+    "cosine",                // of two signatures
+    "strength",              // of a signature, over what an ideal observer needs
+    "noise_factor",          // on the noise of the sensors
+    "over_limit",            // amplitudes over their limits
+    "limit_value",           // of an effect, whose unit is a field beside it
+    "error_value",           // of a fitted number, whose unit is a field beside it
+    "closed_ratio",          // share of a gap
+    "claimed_closed_ratio",  // the same
+    "off_ratio",             // error over truth
+    "error_ratio",           // standard error over truth
+    "quantiles",             // of a spread, whose field has the unit
 ];
 
 /// A public number says its unit in its name.

@@ -13,7 +13,7 @@
 //! Cycles are those that were sent: what a late rig skipped is no silence of a sender. Four breaks within 20 cycles latch the
 //! fault; it goes when none was seen for 20 cycles, which is what one sender falling silent brings about (bus.md, Frames).
 
-use protocol::frames::ALIVE_RANGE;
+use crate::frames::ALIVE_RANGE;
 
 /// Cycles that a break is remembered, and that a fault lasts without one.
 pub const SILENCE_CYCLES: u64 = 20;

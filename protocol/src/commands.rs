@@ -5,9 +5,9 @@
 //! sent; a command that two senders dispute; a command grown older than 20 cycles, for which the valve shuts until a
 //! fresh one comes.
 
+use crate::frames::ValveCommand;
 use crate::live_cycles::LiveCycles;
 use crate::sources::{SourceWatch, Step};
-use protocol::frames::ValveCommand;
 use serde::Serialize;
 
 /// Age in cycles beyond which a command is stale (bus.md, Time).

@@ -10,7 +10,7 @@
 //!   echo 9 at cycle 13: age 1            echo 11: never sent
 //! ```
 
-use protocol::frames::ECHO_RANGE;
+use crate::frames::ECHO_RANGE;
 
 /// The last [`ECHO_RANGE`] cycles, and which of them were sent.
 pub struct LiveCycles {

@@ -1,0 +1,239 @@
+//! One reader of records, for study and workflow alike.
+//!
+//! ```text
+//!   measurement.csv ───────────────┐
+//!   bus.log (candump -L) ──────────┼──► Record: time and channels in SI, absent values as None,
+//!   foreign CSV + mapping (TOML) ──┘            set-up of the rig, file and line of each row, warnings
+//! ```
+//!
+//! A record is what was measured and nothing else: a sample that is not there is `None`, never NaN and never made up. Whether the
+//! record is fit for use (holes, clipping, stuck channels, units that cannot be) is not decided here; what the reader noticed
+//! stands in [`Record::warnings`].
+//!
+//! Forms and keys: `discrepancy/docs/records.md`. Sources: rig-model.md, Measurement file; bus.md, Time and Frames.
+
+pub mod channel;
+pub mod error;
+pub mod mapping;
+
+mod acting;
+mod bus_log;
+mod cycles;
+mod foreign;
+mod measurement;
+mod table;
+
+pub use channel::{Channel, Quantity, Signal};
+pub use error::ReadError;
+pub use mapping::{Mapping, MappingError};
+
+use plant::Axis;
+use std::path::{Path, PathBuf};
+
+/// How a record is read; the default reads everything that rig and rehearsal write.
+#[derive(Clone, Debug, Default)]
+pub struct ReadOptions {
+    /// What happens to columns that no record has.
+    pub unknown: Unknown,
+    /// The mapping file of a foreign CSV.
+    pub mapping: Option<PathBuf>,
+    /// Who wrote the log, if it is one.
+    pub logged_by: LoggedBy,
+}
+
+/// What happens to columns and comments that rig-model.md does not list.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unknown {
+    /// Left out, with a warning.
+    #[default]
+    Ignored,
+    /// An error: the blind study takes nothing that could tell what is hidden.
+    Refused,
+}
+
+/// Who wrote a log: whether a frame that is not in it did not reach the rig either.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LoggedBy {
+    /// The rig, as `bus.log` of a run: what is not there did not come, and the last command went on acting.
+    #[default]
+    Rig,
+    /// Another peer: where the counter of commands jumps, nobody knows which one acted.
+    Listener,
+}
+
+/// Which form a record had.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// `measurement.csv`.
+    Measurement,
+    /// `bus.log`.
+    BusLog,
+    /// Somebody else's CSV.
+    Foreign,
+}
+
+/// How the rig was set up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RigSetup {
+    /// Whether the load's eye sat in the carriage.
+    pub linked: bool,
+    /// Weights on the carriage, kg.
+    pub added_mass_kg: f64,
+}
+
+/// Something that a person should know of a record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// Line in the file, from 1; `None` when it is about the file as a whole.
+    pub line: Option<u64>,
+    /// What, and what follows from it.
+    pub text: String,
+}
+
+/// A record: rows of samples in SI.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    file: PathBuf,
+    form: Form,
+    setup: RigSetup,
+    nominal_period_s: Option<f64>,
+    time_s: Vec<f64>,
+    lines: Vec<u64>,
+    columns: Vec<Option<Vec<Option<f64>>>>,
+    warnings: Vec<Warning>,
+}
+
+/// Reads a record: a foreign one with `options.mapping`, a log when the file's name ends with `.log`, else a `measurement.csv`.
+///
+/// # Errors
+/// [`ReadError`] with file, line, column, value and what is allowed.
+pub fn read(file: &Path, options: &ReadOptions) -> Result<Record, ReadError> {
+    if let Some(path) = &options.mapping {
+        return foreign::read(file, &Mapping::read(path)?);
+    }
+    if file.extension().is_some_and(|extension| extension == "log") {
+        return bus_log::read(file, options.logged_by);
+    }
+    measurement::read(file, options.unknown)
+}
+
+/// Reads a foreign CSV with a mapping that is already there.
+///
+/// # Errors
+/// [`ReadError`] with file, line, column, value and what is allowed.
+pub fn read_mapped(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> {
+    foreign::read(file, mapping)
+}
+
+impl Record {
+    fn new(file: &Path, form: Form, setup: RigSetup) -> Self {
+        Self {
+            file: file.into(),
+            form,
+            setup,
+            nominal_period_s: None,
+            time_s: Vec::new(),
+            lines: Vec::new(),
+            columns: vec![None; Channel::COUNT],
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Gives the record a channel; rows pushed from now on have a place for it.
+    fn add(&mut self, channel: Channel) {
+        self.columns[channel.index()] = Some(Vec::new());
+    }
+
+    fn push_row(&mut self, line: u64, time_s: f64) {
+        self.lines.push(line);
+        self.time_s.push(time_s);
+        self.columns.iter_mut().flatten().for_each(|column| column.push(None));
+    }
+
+    /// Puts a value into the last row.
+    fn put(&mut self, channel: Channel, value: f64) {
+        let last = self.columns[channel.index()].as_mut().and_then(|column| column.last_mut());
+        *last.expect("the channel was added and a row pushed") = Some(value);
+    }
+
+    fn warn(&mut self, line: impl Into<Option<u64>>, text: impl Into<String>) {
+        self.warnings.push(Warning { line: line.into(), text: text.into() });
+    }
+
+    /// The file it was read from.
+    #[must_use]
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// The form it had.
+    #[must_use]
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// How the rig was set up.
+    #[must_use]
+    pub fn setup(&self) -> RigSetup {
+        self.setup
+    }
+
+    /// The period in which samples were meant to be taken, s; `None` for a record that has none.
+    #[must_use]
+    pub fn nominal_period_s(&self) -> Option<f64> {
+        self.nominal_period_s
+    }
+
+    /// How many rows there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// Time of each row, s, as recorded: with holes, and unsorted where the file is.
+    #[must_use]
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    /// Line of the file that a row comes from, from 1. In a log that of its sensors, or of the last frame before where none came.
+    #[must_use]
+    pub fn line(&self, row: usize) -> u64 {
+        self.lines[row]
+    }
+
+    /// The values of a channel, one for each row, `None` where there is none; `None` when the record lacks the channel.
+    #[must_use]
+    pub fn channel(&self, channel: Channel) -> Option<&[Option<f64>]> {
+        self.columns[channel.index()].as_deref()
+    }
+
+    /// The value of a channel in a row.
+    #[must_use]
+    pub fn value(&self, channel: Channel, row: usize) -> Option<f64> {
+        self.channel(channel)?.get(row).copied().flatten()
+    }
+
+    /// The channels that the record has.
+    pub fn channels(&self) -> impl Iterator<Item = Channel> {
+        Channel::ALL.into_iter().filter(|channel| self.channel(*channel).is_some())
+    }
+
+    /// Whether the record has any channel of the axis.
+    #[must_use]
+    pub fn has_axis(&self, axis: Axis) -> bool {
+        self.channels().any(|channel| matches!(channel, Channel::Of(own, _) if own == axis))
+    }
+
+    /// What the reader noticed.
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+}

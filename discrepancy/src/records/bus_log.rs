@@ -1,0 +1,317 @@
+//! Reads a log of the bus (`candump -L`) by `rig.dbc`: a row for each cycle, with the command that acts over it.
+//!
+//! ```text
+//!   frames ──► cycles.rs: of which cycle ──► acting.rs: which command acts ──► rows
+//! ```
+//!
+//! Sensors that are not in the log are absent in their row; so are those of cycles that the rig skipped. The valve of such a row
+//! is known all the same where the contract says what acts. Nothing is made up. One thing a log cannot tell: a frame that the
+//! kernel stamped and held up for a while before the rig's socket had it, on a machine without room for its own work.
+//!
+//! Source: bus.md, Time and Frames.
+
+use super::acting::Acting;
+use super::cycles::{self, Cycles, Logged};
+use super::measurement::PERIOD_S;
+use super::{Channel, Form, LoggedBy, ReadError, Record, RigSetup, Signal};
+use plant::Axis;
+use protocol::candump;
+use protocol::frames::{DecodeError, Frame, RigStatus, Sensors};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const CYCLE_NS: u64 = 1_000_000;
+/// Cycles over which the begin of cycles is estimated from stamps.
+const BLOCK: u64 = 1000;
+/// Commands that arrive so shortly before an estimated begin may have come after the true one: the rig samples meanwhile.
+const MARGIN_NS: u64 = 100_000;
+
+pub(super) fn read(file: &Path, logged_by: LoggedBy) -> Result<Record, ReadError> {
+    let text = std::fs::read_to_string(file)
+        .map_err(|error| ReadError::Open { file: file.into(), reason: error.to_string() })?;
+    let mut record = Record::new(file, Form::BusLog, RigSetup::default());
+    record.nominal_period_s = Some(PERIOD_S);
+    let log = frames(file, &text, &mut record)?;
+    let cycles = cycles::find(file, &log)?;
+    let Some(first) = cycles.of.iter().flatten().min().copied() else {
+        return Err(ReadError::NoSensors { file: file.into(), frames: log.len() });
+    };
+    if cycles.guessed {
+        record.warn(None, "no tick in the log: the time of the first row is a guess within 16 ms");
+    }
+    let begins = Begins::of(file, &log, &cycles, logged_by);
+    rows(file, &log, &cycles, first, &begins, logged_by, &mut record)?;
+    Ok(record)
+}
+
+/// The frames that `rig.dbc` knows; the others are counted.
+fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, ReadError> {
+    let mut log = Vec::new();
+    let (mut unknown, mut malformed) = (Vec::new(), Vec::new());
+    let cut = text.rfind('\n').map_or(0, |end| end + 1);
+    let whole = if candump::read_line(&text[cut..]).is_some() { text } else { &text[..cut] };
+    for (line, text) in (1..).zip(whole.lines()).filter(|(_, text)| !text.trim().is_empty()) {
+        let Some(read) = candump::read_line(text) else {
+            return Err(ReadError::LogLine {
+                file: file.into(),
+                line,
+                text: text.chars().take(80).collect(),
+            });
+        };
+        match Frame::decode(&read.frame) {
+            Ok(frame) => log.push(Logged { line, stamp_ns: read.stamp_ns, frame }),
+            Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
+                unknown.push(line)
+            }
+            Err(_) => malformed.push(line),
+        }
+    }
+    if whole.len() < text.len() {
+        record.warn(
+            whole.lines().count() as u64 + 1,
+            "the last line is cut, and left out: its writer was killed",
+        );
+    }
+    for (lines, what) in [(unknown, "that rig.dbc does not know"), (malformed, "that rig.dbc does not allow")]
+    {
+        if let Some(first) = lines.first() {
+            record.warn(*first, format!("{} frames {what} are left out", lines.len()));
+        }
+    }
+    Ok(log)
+}
+
+/// When cycles begin, by the log's clock.
+enum Begins {
+    /// The run's summary says when cycle 0 began.
+    Told { zero_ns: u64 },
+    /// From the sensors that left soonest, by blocks of cycles.
+    Estimated { blocks: BTreeMap<u64, u64> },
+}
+
+impl Begins {
+    fn of(file: &Path, log: &[Logged], cycles: &Cycles, logged_by: LoggedBy) -> Self {
+        let told = (logged_by == LoggedBy::Rig).then(|| told_zero_ns(file)).flatten();
+        let mut blocks: BTreeMap<u64, u64> = BTreeMap::new();
+        for (logged, cycle) in log.iter().zip(&cycles.of) {
+            let Some(cycle) = cycle else { continue };
+            let zero_ns = logged.stamp_ns.saturating_sub(cycle * CYCLE_NS);
+            let block = blocks.entry(cycle / BLOCK).or_insert(zero_ns);
+            *block = zero_ns.min(*block);
+        }
+        // A summary of another run would put the sensors before their cycle, or far behind it.
+        let fits = |zero_ns: &u64| {
+            blocks.values().all(|block| *block + 1000 >= *zero_ns && block - zero_ns.min(block) < CYCLE_NS)
+        };
+        told.filter(fits).map_or(Self::Estimated { blocks }, |zero_ns| Self::Told { zero_ns })
+    }
+
+    fn begin_ns(&self, cycle: u64) -> u64 {
+        let zero_ns = match self {
+            Self::Told { zero_ns } => *zero_ns,
+            Self::Estimated { blocks } => {
+                let block = cycle / BLOCK;
+                let near =
+                    blocks.range(block.saturating_sub(1)..=block + 1).map(|(_, zero_ns)| *zero_ns).min();
+                // A block without sensors takes the last one that has them.
+                near.or_else(|| blocks.range(..block).next_back().map(|(_, zero_ns)| *zero_ns)).unwrap_or(0)
+            }
+        };
+        zero_ns + cycle * CYCLE_NS
+    }
+}
+
+/// When cycle 0 began, from `summary.json` beside a run's `bus.log`.
+fn told_zero_ns(file: &Path) -> Option<u64> {
+    let text = std::fs::read_to_string(file.parent()?.join("summary.json")).ok()?;
+    let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
+    let zero_s = summary.get("bus_log_cycle_zero_s")?.as_f64()?;
+    Some((zero_s * 1e9).round() as u64)
+}
+
+fn rows(
+    file: &Path,
+    log: &[Logged],
+    cycles: &Cycles,
+    first: u64,
+    begins: &Begins,
+    logged_by: LoggedBy,
+    record: &mut Record,
+) -> Result<(), ReadError> {
+    let mut sent: BTreeMap<u64, Row> = BTreeMap::new();
+    let mut statuses = Statuses::default();
+    let mut newest = first;
+    for (logged, cycle) in log.iter().zip(&cycles.of) {
+        match (logged.frame, cycle) {
+            (Frame::DriveSensors(sensors), Some(cycle)) => {
+                newest = newest.max(*cycle);
+                sent.entry(*cycle).or_default().take(file, 0, sensors, logged.line, *cycle)?;
+            }
+            (Frame::LoadSensors(sensors), Some(cycle)) => {
+                newest = newest.max(*cycle);
+                sent.entry(*cycle).or_default().take(file, 1, sensors, logged.line, *cycle)?;
+            }
+            (Frame::RigStatus(status), _) => {
+                sent.entry(newest).or_default().supply_pressure_pa = Some(status.supply_pressure_pa);
+                statuses.take(logged.line, &status, record);
+            }
+            (Frame::Weights(weights), _) => {
+                if newest > first {
+                    record
+                        .warn(logged.line, "weights were put on or taken off within the log: split it there");
+                }
+                record.setup.added_mass_kg = weights.added_mass_kg;
+            }
+            _ => {}
+        }
+    }
+    let last = *sent.keys().next_back().unwrap_or(&first);
+    let axes = Axis::ALL.map(|axis| sent.values().any(|row| row.sensors[axis.index()].is_some()));
+    for axis in Axis::ALL.into_iter().filter(|axis| axes[axis.index()]) {
+        Signal::ALL
+            .map(|signal| Channel::Of(axis, signal))
+            .into_iter()
+            .filter(|channel| !channel.foreign_only())
+            .for_each(|channel| record.add(channel));
+    }
+    record.add(Channel::SupplyPressure);
+    let mut acting = Acting::new(first, logged_by);
+    let mut frames = log.iter().zip(&cycles.of).peekable();
+    let mut line = log.first().map_or(1, |logged| logged.line);
+    let mut lost = [0_u64; 2];
+    for cycle in first..=last {
+        let row = sent.remove(&cycle).unwrap_or_default();
+        line = row.line.unwrap_or(line);
+        // Everything up to the sensors of this cycle, and what arrived before it began.
+        let begin_ns = begins.begin_ns(cycle);
+        while let Some((logged, _)) =
+            frames.next_if(|(logged, of)| of.map_or(logged.stamp_ns < begin_ns + CYCLE_NS, |of| of <= cycle))
+        {
+            acting.note(*logged);
+        }
+        let skipped = cycles.skipped.contains(&cycle) && row.line.is_none();
+        let valves = if skipped { acting.skip(cycle) } else { acting.latch(cycle, begin_ns) };
+        record.push_row(line, cycle as f64 * 1e-3);
+        for axis in Axis::ALL.into_iter().filter(|axis| axes[axis.index()]) {
+            lost[axis.index()] += u64::from(!skipped && row.sensors[axis.index()].is_none());
+            put_row(record, axis, valves[axis.index()], row.sensors[axis.index()].as_ref());
+        }
+        if let Some(pressure_pa) = row.supply_pressure_pa {
+            record.put(Channel::SupplyPressure, pressure_pa);
+        }
+    }
+    tell(record, log, begins, cycles, lost, &acting);
+    Ok(())
+}
+
+/// What is known of one cycle.
+#[derive(Default)]
+struct Row {
+    line: Option<u64>,
+    sensors: [Option<Sensors>; 2],
+    supply_pressure_pa: Option<f64>,
+}
+
+impl Row {
+    fn take(
+        &mut self,
+        file: &Path,
+        axis: usize,
+        sensors: Sensors,
+        line: u64,
+        cycle: u64,
+    ) -> Result<(), ReadError> {
+        self.line.get_or_insert(line);
+        match self.sensors[axis].replace(sensors) {
+            Some(before) if before != sensors => Err(ReadError::TwoRigs { file: file.into(), line, cycle }),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn put_row(record: &mut Record, axis: Axis, valve: Option<f64>, sensors: Option<&Sensors>) {
+    if let Some(opening) = valve {
+        record.put(Channel::Of(axis, Signal::Valve), opening);
+    }
+    let Some(sensors) = sensors else { return };
+    for (signal, value) in [
+        (Signal::Position, sensors.position_m),
+        (Signal::Force, sensors.force_n),
+        (Signal::PressureA, sensors.pressure_a_pa),
+        (Signal::PressureB, sensors.pressure_b_pa),
+    ] {
+        record.put(Channel::Of(axis, signal), value);
+    }
+}
+
+/// What the rig said of itself, as far as a reader must tell it.
+#[derive(Default)]
+struct Statuses {
+    linked: Option<bool>,
+    saturated: bool,
+}
+
+impl Statuses {
+    fn take(&mut self, line: u64, status: &RigStatus, record: &mut Record) {
+        match self.linked.replace(status.linked) {
+            None => record.setup.linked = status.linked,
+            Some(before) if before != status.linked => {
+                record.warn(line, "the rods were linked or parted within the log: split it there");
+            }
+            Some(_) => {}
+        }
+        let flags = [
+            status.drive_position_saturated,
+            status.drive_force_saturated,
+            status.drive_pressure_a_saturated,
+            status.drive_pressure_b_saturated,
+            status.load_position_saturated,
+            status.load_force_saturated,
+            status.load_pressure_a_saturated,
+            status.load_pressure_b_saturated,
+        ];
+        if flags.contains(&true) && !std::mem::replace(&mut self.saturated, true) {
+            record.warn(line, "the rig says here for the first time that a sensor saturated");
+        }
+    }
+}
+
+fn tell(
+    record: &mut Record,
+    log: &[Logged],
+    begins: &Begins,
+    cycles: &Cycles,
+    lost: [u64; 2],
+    acting: &Acting,
+) {
+    for axis in Axis::ALL.into_iter().filter(|axis| record.has_axis(*axis)).collect::<Vec<_>>() {
+        let name = axis.name();
+        let (commands, quarrels) = acting.counted()[axis.index()];
+        if lost[axis.index()] > 0 {
+            record.warn(None, format!("{} frames of {name} sensors are not in the log", lost[axis.index()]));
+        }
+        if commands > 0 {
+            record.warn(None, format!("{commands} {name} commands are not in the log, by their counters"));
+        }
+        if quarrels > 0 {
+            record.warn(None, format!("two senders of {name} commands: its valve was shut meanwhile"));
+        }
+    }
+    if !cycles.skipped.is_empty() {
+        record.warn(None, format!("the rig skipped {} cycles: they have no sensors", cycles.skipped.len()));
+    }
+    if matches!(begins, Begins::Estimated { .. }) {
+        let close = log.iter().filter(|logged| {
+            let command = matches!(logged.frame, Frame::DriveValveCommand(_) | Frame::LoadValveCommand(_));
+            let zero_ns = begins.begin_ns(0);
+            let into_cycle = logged.stamp_ns.saturating_sub(zero_ns) % CYCLE_NS;
+            command && into_cycle >= CYCLE_NS - MARGIN_NS
+        });
+        let close = close.count();
+        if close > 0 {
+            let text =
+                "commands came within 0.1 ms before a cycle whose begin is estimated: they may act one later";
+            record.warn(None, format!("{close} {text}"));
+        }
+    }
+}

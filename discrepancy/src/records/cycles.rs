@@ -1,0 +1,188 @@
+//! The cycle of each frame of a log, from the sensors' low 4 bits, the ticks' full numbers and the stamps.
+//!
+//! A frame of sensors is of that cycle, out of those with its low bits, that the stamps come closest to; they may be off by 8 ms
+//! from one frame to the next before that is wrong, so that another computer's clock or a hole of a minute does no harm. The
+//! first tick gives all numbers before it their full value, each later one confirms them.
+//!
+//! ```text
+//!   sensors ..7   ..8   tick 8   ..9   ..A         tick 8 says that ..8 is cycle 8, and so is the shift of all before
+//! ```
+
+use super::ReadError;
+use protocol::frames::{ALIVE_RANGE, Frame, Tick};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+const CYCLE_NS: i64 = 1_000_000;
+const ROUND: i64 = ALIVE_RANGE as i64;
+/// The tick counts skipped cycles modulo this.
+const SKIPPED_RANGE: u64 = 1 << 16;
+
+/// A frame of a log that `rig.dbc` knows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Logged {
+    pub(super) line: u64,
+    pub(super) stamp_ns: u64,
+    pub(super) frame: Frame,
+}
+
+/// What is known of a log's cycles.
+pub(super) struct Cycles {
+    /// The cycle of each frame of sensors, in the order of the log; `None` for other frames.
+    pub(super) of: Vec<Option<u64>>,
+    /// Cycles that the rig says it computed without sending them.
+    pub(super) skipped: BTreeSet<u64>,
+    /// Whether no tick told the full numbers.
+    pub(super) guessed: bool,
+}
+
+/// Finds the cycles of a log.
+pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
+    let mut numbers: Vec<Option<i64>> = vec![None; log.len()];
+    let mut known: Option<(i64, u64)> = None;
+    let mut anchored = false;
+    let mut skipped = SkippedCycles::default();
+    for (place, logged) in log.iter().enumerate() {
+        let expected = known.map(|(cycle, stamp_ns)| {
+            let passed_ns = logged.stamp_ns.cast_signed() - stamp_ns.cast_signed();
+            cycle + (passed_ns + CYCLE_NS / 2).div_euclid(CYCLE_NS)
+        });
+        match logged.frame {
+            Frame::DriveSensors(sensors) | Frame::LoadSensors(sensors) => {
+                let low = i64::from(sensors.alive);
+                let cycle = expected.map_or(low, |expected| nearest(expected, low));
+                numbers[place] = Some(cycle);
+                if known.is_none_or(|(newest, _)| cycle >= newest) {
+                    known = Some((cycle, logged.stamp_ns));
+                }
+            }
+            Frame::Tick(tick) => {
+                let wrapped =
+                    |near: i64| near + i64::from(tick.cycle.wrapping_sub(near as u32).cast_signed());
+                let cycle = match known {
+                    Some((newest, _)) if anchored => {
+                        let cycle = wrapped(newest);
+                        if cycle < newest - ROUND {
+                            return Err(ReadError::Restarted {
+                                file: file.into(),
+                                line: logged.line,
+                                cycle: u64::from(tick.cycle),
+                                before: newest.cast_unsigned(),
+                            });
+                        }
+                        cycle
+                    }
+                    _ => {
+                        let cycle = i64::from(tick.cycle);
+                        // Counted from the log's first frame until now: all move by whole rounds.
+                        let meant =
+                            expected.map_or(cycle, |expected| nearest(expected, cycle.rem_euclid(ROUND)));
+                        numbers.iter_mut().flatten().for_each(|number| *number += cycle - meant);
+                        anchored = true;
+                        cycle
+                    }
+                };
+                known = Some((cycle, logged.stamp_ns));
+                skipped.take(&tick, cycle, &numbers[..place]);
+            }
+            _ => {}
+        }
+    }
+    // Before cycle 0 there is none; only a log without a tick could say so.
+    let of = numbers.into_iter().map(|number| number.map(|cycle| cycle.max(0).cast_unsigned())).collect();
+    Ok(Cycles { of, skipped: skipped.cycles, guessed: !anchored })
+}
+
+/// The number with these low bits that is nearest to `expected`.
+fn nearest(expected: i64, low: i64) -> i64 {
+    let ahead = (low - expected).rem_euclid(ROUND);
+    expected + if ahead > ROUND / 2 { ahead - ROUND } else { ahead }
+}
+
+/// Which cycles were skipped: those just before a tick that says so.
+#[derive(Default)]
+struct SkippedCycles {
+    counted: Option<u64>,
+    cycles: BTreeSet<u64>,
+}
+
+impl SkippedCycles {
+    fn take(&mut self, tick: &Tick, cycle: i64, before: &[Option<i64>]) {
+        let now = u64::from(tick.skipped);
+        // What was skipped before the log began lies outside of it.
+        let more = self.counted.map_or(0, |counted| (SKIPPED_RANGE + now - counted) % SKIPPED_RANGE);
+        self.counted = Some(now);
+        if more == 0 {
+            return;
+        }
+        let recent = before.iter().rev().flatten().take(4 * more as usize + 64);
+        let sent: BTreeSet<i64> = recent.copied().collect();
+        let mut left = more;
+        let mut candidate = cycle - 1;
+        // A tick that came in time belongs to sensors; after a lost one the hole lies further back.
+        while left > 0 && candidate >= 0 && candidate >= cycle - 2 * more as i64 - 2 * ROUND {
+            if !sent.contains(&candidate) {
+                self.cycles.insert(candidate.cast_unsigned());
+                left -= 1;
+            }
+            candidate -= 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::frames::Sensors;
+
+    fn sensors(cycle: u64, stamp_ns: u64) -> Logged {
+        let alive = (cycle % ALIVE_RANGE) as u8;
+        let sensors =
+            Sensors { position_m: 0.1, force_n: 0.0, pressure_a_pa: 1e5, pressure_b_pa: 1e5, alive };
+        Logged { line: 1, stamp_ns, frame: Frame::DriveSensors(sensors) }
+    }
+
+    fn tick(cycle: u64, skipped: u16, stamp_ns: u64) -> Logged {
+        let catch_up = false;
+        let tick = Tick { cycle: cycle as u32, skipped, catch_up, lockstep: false, ending: false };
+        Logged { line: 2, stamp_ns, frame: Frame::Tick(tick) }
+    }
+
+    fn found(log: &[Logged]) -> Vec<u64> {
+        find(Path::new("a.log"), log).unwrap().of.into_iter().flatten().collect()
+    }
+
+    #[test]
+    fn a_log_that_begins_in_the_midst_gets_its_numbers_from_the_first_tick() {
+        let mut log: Vec<_> = (1003..1010).map(|cycle| sensors(cycle, cycle * 1_000_000)).collect();
+        log.push(tick(1009, 0, 1_009_050_000));
+        log.extend((1010..1100).map(|cycle| sensors(cycle, cycle * 1_000_000)));
+        assert_eq!(found(&log), (1003..1100).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_hole_of_a_minute_and_a_clock_that_drifts_cost_nothing() {
+        // 100 ppm: 6 ms in a minute.
+        let stamp = |cycle: u64| cycle * 1_000_100;
+        let mut log = vec![sensors(0, stamp(0)), tick(0, 0, stamp(0))];
+        log.extend([1, 2, 60_003, 60_004, 60_020].map(|cycle| sensors(cycle, stamp(cycle))));
+        assert_eq!(found(&log), [0, 1, 2, 60_003, 60_004, 60_020]);
+    }
+
+    #[test]
+    fn skipped_cycles_are_those_before_the_tick_that_counts_them() {
+        let mut log: Vec<_> = [0, 1, 2].map(|cycle| sensors(cycle, cycle * 1_000_000)).into();
+        log.insert(1, tick(0, 0, 0));
+        log.push(tick(6, 3, 6_200_000));
+        log.push(sensors(6, 6_210_000));
+        let cycles = find(Path::new("a.log"), &log).unwrap();
+        assert_eq!(cycles.skipped.into_iter().collect::<Vec<_>>(), [3, 4, 5]);
+    }
+
+    #[test]
+    fn a_rig_that_starts_anew_is_told_with_its_line() {
+        let log = [sensors(500, 0), tick(500, 0, 0), sensors(0, 5_000_000_000), tick(0, 0, 5_000_000_000)];
+        let message = find(Path::new("a.log"), &log).err().unwrap().to_string();
+        assert!(message.contains("a.log:2: the rig starts anew (cycle 0 after 5"), "{message}");
+    }
+}

@@ -1,0 +1,126 @@
+//! `emulator seal`: draws effects and writes them into a file that nobody but a rig should read.
+//!
+//! The file appears at once and for its owner alone, and never in place of another: a sealed rig that runs were made with cannot be
+//! drawn again by accident. What was drawn is told nowhere else, and neither is the seed, which is as good as the file.
+
+use crate::cli::{SealArguments, SealedAxis};
+use crate::run::RunError;
+use plant::effects::draw::{Among, as_toml, draw};
+use protocol::exit::Exit;
+use std::fs::OpenOptions;
+use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+/// For the owner alone.
+const MODE: u32 = 0o600;
+
+/// Draws and writes what the command line asks for.
+///
+/// # Errors
+/// [`RunError::Input`] when so many effects do not exist, or the file does already; [`RunError::Output`] when it cannot be written.
+pub fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
+    let SealArguments { seed, effects, axis, out } = arguments;
+    let drawn = draw(*seed, usize::from(*effects), among(*axis))
+        .map_err(|error| RunError::Input(format!("--effects {effects}: {error}")))?;
+    let text = format!("{}{}", head(arguments), as_toml(&drawn));
+    match write_new(out, text.as_bytes()) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            let file = out.display();
+            return Err(RunError::Input(format!(
+                "--out {file}: the file is there already; move it away or choose another name"
+            )));
+        }
+        Err(error) => return Err(RunError::output(out, &error)),
+    }
+    // Whoever closed the pipe does not want to know.
+    let _ = writeln!(io::stdout(), "{}", out.display());
+    Ok(Exit::Good)
+}
+
+fn among(axis: SealedAxis) -> Among {
+    match axis {
+        SealedAxis::Drive => Among::Drive,
+        SealedAxis::Load => Among::Load,
+        SealedAxis::Both => Among::Both,
+    }
+}
+
+fn head(arguments: &SealArguments) -> String {
+    let SealArguments { seed, effects, axis, .. } = arguments;
+    let axis = format!("{axis:?}").to_lowercase();
+    let version = env!("CARGO_PKG_VERSION");
+    format!(
+        "# SEALED: do not read on. This file says what a rig has that nobody is meant to know before it is found from a run:\n\
+         #     emulator run --sealed FILE …\n\
+         # Compare what you found with it afterwards, or with truth.csv of the run.\n\
+         # Made by 'emulator seal --seed {seed} --effects {effects} --axis {axis}' of airbench {version}.\n\n"
+    )
+}
+
+/// Writes under a temporary name beside the file, then gives it the name unless somebody has it.
+fn write_new(path: &Path, text: &[u8]) -> io::Result<()> {
+    let temporary = temporary(path);
+    let mut file = OpenOptions::new().write(true).create_new(true).mode(MODE).open(&temporary)?;
+    let written = file
+        .write_all(text)
+        .and_then(|()| file.sync_all())
+        // Unlike renaming, a link takes nobody's place.
+        .and_then(|()| std::fs::hard_link(&temporary, path));
+    let _ = std::fs::remove_file(&temporary);
+    written
+}
+
+fn temporary(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::RigParameters;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn arguments(out: PathBuf, seed: u64) -> SealArguments {
+        SealArguments { seed, effects: 3, axis: SealedAxis::Both, out }
+    }
+
+    #[test]
+    fn a_seal_is_for_its_owner_alone_and_a_rig_takes_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.toml");
+        assert!(seal(&arguments(path.clone(), 7)).is_ok());
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, MODE);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("# SEALED: do not read on."), "{text}");
+        let rig = RigParameters::baseline().with_effects_of(&text, "a.toml").unwrap();
+        assert_eq!(rig.effects(), draw(7, 3, Among::Both).unwrap());
+        // Nothing else is left in the folder.
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_seal_that_is_there_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.toml");
+        std::fs::write(&path, "mine").unwrap();
+        let error = seal(&arguments(path.clone(), 7)).unwrap_err();
+        assert!(error.to_string().contains("is there already; move it away"), "{error}");
+        assert_eq!(error.exit(), Exit::BadInput);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_had_is_refused_with_what_can() {
+        let folder = tempfile::tempdir().unwrap();
+        let too_many = SealArguments { effects: 40, ..arguments(folder.path().join("a.toml"), 7) };
+        let error = seal(&too_many).unwrap_err().to_string();
+        assert_eq!(error, "--effects 40: 40 different effects were asked for; allowed are 0 to 38 here");
+        let nowhere = seal(&arguments(folder.path().join("no/folder/a.toml"), 7)).unwrap_err();
+        assert!(matches!(nowhere, RunError::Output { .. }), "{nowhere}");
+    }
+}

@@ -1,0 +1,349 @@
+//! Effects at work: the laws of a step with everything that a rig has switched on.
+//!
+//! Works axis by axis and chamber by chamber, in the order of the balances in `sums.rs`: command, spool, edges, pressures behind
+//! them, port, flow, line, chamber, friction, force. What is delayed or stored is remembered in `memory.rs`. Midpoints of states
+//! that effects add are half a step ahead along their last rate, so that the scheme keeps its second order.
+//!
+//! Laws: the file of each effect. Scheme: the head of `integrator.rs`.
+
+use super::AxisEffects;
+use super::air::HeatAt;
+use super::flows::PortsAt;
+use super::memory::{Memory, Moving};
+use super::presliding::Bristle;
+use super::replaced::linkage_terms;
+use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
+use crate::integrator::laws::{At, Laws};
+use crate::integrator::{Held, Integrator, Lanes, Middle};
+use crate::lanes::{Mask, Pair};
+use crate::motion::{MotionSpan, Place, side};
+use crate::parameters::{LinkageParameters, RigParameters};
+use crate::state::State;
+use crate::truth::Forces;
+
+/// What a rig has switched on, and what it remembers.
+#[derive(Debug, Clone)]
+pub(crate) struct Effects {
+    pub(crate) on: [AxisEffects; 2],
+    pub(crate) memory: Memory,
+    /// Factors of the motion: for the two lengths of step and the directions of drive and load, to the middle and to the end.
+    pub(super) ways: [[[[MotionSpan; 2]; 2]; 2]; 2],
+    pub(super) substep_s: f64,
+    pub(super) stroke_m: f64,
+    pub(super) temperature_k: f64,
+    pub(super) spool_time_constant_s: f64,
+    file_linkage: LinkageParameters,
+}
+
+/// Below this speed an axis on bristles counts as resting: far below what moves it a sensor's step in a second. A guess.
+const CREEP_M_PER_S: f64 = 1e-6;
+
+/// Sign of +x of the rig in each axis' own extension.
+pub(crate) const ALONG_X: [f64; 2] = [1.0, -1.0];
+
+impl Effects {
+    /// The effects of a rig at rest in a state; `None` if the rig has none switched on.
+    pub(crate) fn of(rig: &RigParameters, of: &Integrator, state: &State) -> Option<Box<Self>> {
+        if rig.effects().is_empty() {
+            return None;
+        }
+        let on = AxisEffects::of(rig);
+        let mut effects = Box::new(Effects {
+            memory: Memory::at_rest(&on, of, state),
+            on,
+            ways: [[[[of.spans()[0].motion_to_end; 2]; 2]; 2]; 2],
+            substep_s: of.substep_s(),
+            stroke_m: rig.cylinder().stroke_m,
+            temperature_k: rig.gas().temperature_k,
+            spool_time_constant_s: rig.valve().spool_time_constant_s,
+            file_linkage: *rig.linkage(),
+        });
+        effects.move_with(of);
+        Some(effects)
+    }
+
+    /// Terms of the linkage's numbers.
+    pub(crate) fn linkage_terms(&self) -> (Gap, Stiffness, Damping) {
+        linkage_terms(&self.on[0], &self.file_linkage)
+    }
+
+    /// Takes over the masses of an integrator; to be called when they change.
+    pub(crate) fn move_with(&mut self, of: &Integrator) {
+        const DIRECTIONS: [f64; 2] = [1.0, -1.0];
+        let viscous = |axis: usize, direction| self.viscous(of, axis, direction);
+        let ways = of.spans().map(|span| {
+            DIRECTIONS.map(|drive| {
+                DIRECTIONS.map(|load| {
+                    let viscous = [viscous(0, drive), viscous(1, load)];
+                    [span.span_s / 2.0, span.span_s].map(|span_s| of.motion.span_with(viscous, span_s))
+                })
+            })
+        });
+        self.ways = ways;
+    }
+
+    /// Remembers the commands of a period that begins.
+    pub(crate) fn begin_period(&mut self, command: [f64; 2]) {
+        self.memory
+            .commands
+            .iter_mut()
+            .zip(command)
+            .for_each(|(commands, command)| commands.begin_period(command));
+    }
+
+    /// Forces on one piston beside air, hand, contact and friction, by its extension.
+    pub(crate) fn force(&self, axis: usize, extension_m: f64) -> Force {
+        let on = &self.on[axis];
+        let position_m = if axis == 0 { extension_m } else { self.stroke_m - extension_m };
+        Force {
+            inclination: on.inclination.map_or(0.0, |effect| ALONG_X[axis] * effect.term()),
+            position_dependent_force: on
+                .position_dependent_force
+                .map_or(0.0, |effect| ALONG_X[axis] * effect.term(position_m)),
+            end_cushion: on.end_cushion.map_or(0.0, |effect| effect.stop_force(extension_m, self.stroke_m)),
+        }
+    }
+}
+
+impl Laws for Effects {
+    type Carried = Moving;
+
+    fn carried(&self) -> Moving {
+        self.memory.moving
+    }
+
+    fn middle(&self, at: At<'_>, carried: &mut Moving) -> Middle {
+        let At { of, span, from, node, .. } = at;
+        let half_s = span.span_s / 2.0;
+        // From the beginning of the substep that this step is a part of; both are sums of equal parts, with roundings.
+        let substeps = at.local_s / self.substep_s;
+        let ahead_s = (substeps - (substeps + 1e-9).floor()) * self.substep_s + half_s;
+        let extension = of.ahead(span, from);
+        let volume = [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
+        let volume_from = [of.chambers.volume_a(from.extension), of.chambers.volume_b(from.extension)];
+        let supply = SupplySide { supply_droop: carried.droop_pa + carried.droop_pa_per_s * half_s };
+        let (mut pressure_pa, mut flow, mut drawn) = ([[0.0; 2]; 2], [[0.0; 2]; 2], 0.0);
+        for axis in 0..2 {
+            let lane = |pair: Pair| pair.to_array()[axis];
+            let own = &mut carried.axes[axis];
+            let spool = self.spool_over(axis, own, at, lane(from.spool), at.local_s);
+            own.spool = self.spool_over(axis, own, at, spool, at.local_s + half_s);
+            let exhaust =
+                ExhaustSide { silencer_back_pressure: own.silencer_pa + own.silencer_pa_per_s * half_s };
+            for chamber in 0..2 {
+                let air = from.air()[chamber];
+                let worked = lane(volume[chamber]) / lane(volume_from[chamber]) - 1.0;
+                let stored = lane(span.lag.midpoint_air(air)) + own.air_rate_w[chamber] * half_s
+                    - self.work_share(axis) * lane(air.stored) * worked;
+                pressure_pa[chamber][axis] = stored / lane(volume[chamber]);
+            }
+            let ports = self.ports(
+                of,
+                axis,
+                &PortsAt {
+                    spool,
+                    supply_pa: supply.sum(node.middle_pa),
+                    exhaust_pa: exhaust.sum(of.chambers.exhaust_pa()),
+                    pressure_pa: [pressure_pa[0][axis], pressure_pa[1][axis]],
+                    extension_m: lane(extension),
+                    shut: node.shut,
+                },
+            );
+            drawn += ports.drawn_m3_per_s;
+            own.port_flow_m3_per_s = ports.flow_m3_per_s;
+            for (chamber, flow) in flow.iter_mut().enumerate() {
+                let port = ports.flow_m3_per_s[chamber];
+                flow[axis] = self.line(axis, chamber, port, ahead_s).sum(port);
+            }
+            if let Some(effect) = self.on[axis].silencer_back_pressure {
+                let outside_pa = of.chambers.exhaust_pa();
+                let before_pa = own.silencer_pa;
+                let after_pa =
+                    effect.advance(outside_pa + before_pa, outside_pa, ports.exhausted_m3_per_s, span.span_s);
+                own.silencer_pa = after_pa - outside_pa;
+                own.silencer_pa_per_s = (own.silencer_pa - before_pa) / span.span_s;
+            }
+        }
+        if let Some(effect) = self.on[0].supply_droop {
+            let before_pa = carried.droop_pa;
+            let after_pa = effect.advance(node.middle_pa + before_pa, node.middle_pa, drawn, span.span_s);
+            carried.droop_pa = after_pa - node.middle_pa;
+            carried.droop_pa_per_s = (carried.droop_pa - before_pa) / span.span_s;
+        }
+        let pressure = pressure_pa.map(|lanes| Pair::new(lanes[0], lanes[1]));
+        Middle {
+            extension,
+            pneumatic: of.chambers.pneumatic_force(pressure[0], pressure[1]),
+            edge_flow: flow.map(|lanes| Pair::new(lanes[0], lanes[1])),
+            pressure,
+            per_volume: volume.map(Pair::reciprocal),
+        }
+    }
+
+    fn outside(&self, at: At<'_>, middle: &Middle) -> Pair {
+        let [drive, load] = [0, 1].map(|axis| self.force(axis, middle.extension.to_array()[axis]).sum(0.0));
+        at.held.hand + Pair::new(drive, load)
+    }
+
+    fn moving(&self, at: At<'_>) -> Mask {
+        at.from.velocity.differs(Pair::both(0.0)) | Mask::new(self.on_bristles())
+    }
+
+    fn on_bristles(&self) -> [bool; 2] {
+        [self.on[0].presliding.is_some(), self.on[1].presliding.is_some()]
+    }
+
+    fn sliding(&self, at: At<'_>, middle: &Middle, carried: &Moving, push: Pair, moving: Mask) -> Pair {
+        let of = at.of;
+        let [drive, load] = [0, 1].map(|axis| {
+            let own = &carried.axes[axis];
+            let velocity = at.from.velocity.to_array()[axis];
+            let push = push.to_array()[axis];
+            let rubbing = self.rubbing(of, axis, middle, own);
+            if let Some(effect) = self.on[axis].presliding {
+                let bristle = Bristle { velocity_m_per_s: velocity, deflection_m: own.deflection_m };
+                return effect.force(bristle, self.under(of, axis, &rubbing, velocity, push));
+            }
+            if velocity == 0.0 {
+                return 0.0;
+            }
+            let speed = self.middle_speed(of, axis, &rubbing, velocity, push, at.span.span_s);
+            -velocity.signum() * self.levels(of, axis, &rubbing, speed).sliding_n[side(velocity)]
+        });
+        Pair::new(drive, load).where_true(moving)
+    }
+
+    fn starting(&self, at: At<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair {
+        let of = at.of;
+        let [drive, load] = [0, 1].map(|axis| {
+            let own = &self.memory.moving.axes[axis];
+            let force = force.to_array()[axis];
+            let rubbing = self.rubbing(of, axis, middle, own);
+            -force.signum() * self.levels(of, axis, &rubbing, 0.0).sliding_n[side(force)]
+        });
+        Pair::new(drive, load).where_true(starts)
+    }
+
+    fn break_away(&self, at: At<'_>, middle: &Middle, force: Pair) -> Pair {
+        let of = at.of;
+        let [drive, load] = [0, 1].map(|axis| {
+            let own = &self.memory.moving.axes[axis];
+            let rubbing = self.rubbing(of, axis, middle, own);
+            self.levels(of, axis, &rubbing, 0.0).break_away_n[side(force.to_array()[axis])]
+        });
+        Pair::new(drive, load)
+    }
+
+    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2] {
+        let [drive, load] = at.from.velocity.to_array().map(side);
+        let [to_middle, to_end] = &self.ways[usize::from(at.span.span_s < self.substep_s)][drive][load];
+        [to_middle, to_end]
+    }
+
+    fn holds(&self, at: At<'_>, middle: &Middle, axis: usize, force: f64) -> bool {
+        let rubbing = self.rubbing(at.of, axis, middle, &self.memory.moving.axes[axis]);
+        let levels = self.levels(at.of, axis, &rubbing, 0.0);
+        at.of.motion.holds(at.from.place(axis).extension, force, &levels)
+    }
+
+    fn advance(&self, at: At<'_>, middle: &Middle, carried: &mut Moving, axis: usize, force: f64) -> Place {
+        let (of, start) = (at.of, at.from.place(axis));
+        let own = &mut carried.axes[axis];
+        let rubbing = self.rubbing(of, axis, middle, own);
+        let span_s = at.span.span_s;
+        let Some(effect) = self.on[axis].presliding else {
+            let speed = self.middle_speed(of, axis, &rubbing, start.velocity, force, span_s);
+            return of.motion.advance(axis, start, force, &self.levels(of, axis, &rubbing, speed), span_s);
+        };
+        let bristle = Bristle { velocity_m_per_s: start.velocity, deflection_m: own.deflection_m };
+        let under = self.under(of, axis, &rubbing, start.velocity, force);
+        let (way_m, bristle) = effect.advance(bristle, under, span_s);
+        own.deflection_m = bristle.deflection_m;
+        of.motion
+            .stop_at_ends(Place { extension: start.extension + way_m, velocity: bristle.velocity_m_per_s })
+    }
+
+    fn air(&self, at: At<'_>, to: &mut Lanes, middle: &Middle, carried: &mut Moving) {
+        let (of, from) = (at.of, at.from);
+        let span_s = at.span.span_s;
+        let normal_pa = of.chambers.normal_pa();
+        let volumes = |extension| [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
+        let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
+        let mut stored = to.air().map(|air| air.stored.to_array());
+        for axis in [0, 1] {
+            if !self.adds_air(axis) {
+                continue;
+            }
+            let lane = |pair: Pair| pair.to_array()[axis];
+            let pressure_pa = middle.pressure.map(lane);
+            let leakage = self.leakage(of, axis, pressure_pa).map(|terms| terms.sum(0.0));
+            let own = &mut carried.axes[axis];
+            for chamber in 0..2 {
+                // What lag and bounds have let in, as a mean flow over the step.
+                let valve = (stored[chamber][axis] - lane(from.air()[chamber].stored)) / (normal_pa * span_s);
+                let flow_m3_per_s = valve + leakage[chamber];
+                let volume_m3 = 1.0 / lane(middle.per_volume[chamber]);
+                let rate = self.air_rate(
+                    of,
+                    axis,
+                    chamber,
+                    HeatAt {
+                        stored_j: pressure_pa[chamber] * volume_m3,
+                        volume_m3,
+                        normal_volume_m3: own.normal_volume_m3[chamber] + flow_m3_per_s * span_s / 2.0,
+                        flow_m3_per_s,
+                    },
+                    span_s,
+                );
+                let swept_m3 = lane(volume_to[chamber]) - lane(volume_from[chamber]);
+                own.air_rate_w[chamber] = normal_pa * leakage[chamber] + rate.sum(0.0);
+                own.normal_volume_m3[chamber] += flow_m3_per_s * span_s;
+                stored[chamber][axis] += own.air_rate_w[chamber] * span_s
+                    - self.work_share(axis) * pressure_pa[chamber] * swept_m3;
+            }
+        }
+        let [a, b] = stored.map(|lanes| Pair::new(lanes[0], lanes[1]));
+        (to.air_a.stored, to.air_b.stored) = (a, b);
+    }
+
+    fn spool(&self, _: At<'_>, carried: &Moving) -> Pair {
+        Pair::new(carried.axes[0].spool, carried.axes[1].spool)
+    }
+
+    fn keep(&mut self, of: &Integrator, held: Held, lanes: &Lanes, carried: Moving) {
+        let span_s = self.substep_s;
+        self.memory.moving = carried;
+        for axis in 0..2 {
+            let lane = |pair: Pair| pair.to_array()[axis];
+            // Bristles never come to rest to the bit.
+            let creep = if self.on_bristles()[axis] { CREEP_M_PER_S } else { 0.0 };
+            let own = &mut self.memory.moving.axes[axis];
+            own.rest_s = if lane(lanes.velocity).abs() <= creep { own.rest_s + span_s } else { 0.0 };
+            for (line, flow) in self.memory.lines[axis].iter_mut().zip(own.port_flow_m3_per_s) {
+                line.iter_mut().for_each(|line| line.push(flow));
+            }
+            let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
+            let [a, b] =
+                [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber]));
+            let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
+            let on = &self.on[axis];
+            for (i, truth) in [x, a, b].into_iter().enumerate() {
+                let (shown, seen) = (own.shown[i], own.seen[i]);
+                own.shown[i] = match i {
+                    0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
+                    _ => on.pressure_sensor_lag[i - 1]
+                        .map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
+                };
+                own.seen[i] = truth;
+            }
+            for (channel, truth) in [(0, x), (2, a), (3, b)] {
+                self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
+            }
+            if self.memory.channels[axis][1].is_some() {
+                let forces = Forces::at(of, Some(self), lanes, held.hand, held.linked);
+                let force = forces.sensor_n(of, axis);
+                self.memory.channels[axis][1].iter_mut().for_each(|history| history.push(force));
+            }
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The air with effects: what enters a chamber beside the valve's flow, what heat does to it, and what a line delays.
+
+use super::acting::Effects;
+use super::flows::{Ports, PortsAt};
+use super::heat_exchange::{ChamberHeat, wetted_m2};
+use super::memory::Moving;
+use super::sums::{AirRate, ExhaustSide, Leakage, LineFlow, SupplySide};
+use crate::integrator::Integrator;
+use crate::state::State;
+use crate::truth::AirAt;
+
+pub(crate) struct HeatAt {
+    pub(crate) stored_j: f64,
+    pub(crate) volume_m3: f64,
+    pub(crate) normal_volume_m3: f64,
+    pub(crate) flow_m3_per_s: f64,
+}
+
+impl Effects {
+    /// Pressure that effects add behind the supply edges.
+    pub(crate) fn supply_side(&self, moving: &Moving) -> SupplySide {
+        SupplySide { supply_droop: moving.droop_pa }
+    }
+
+    /// Ports of an axis at an instant.
+    pub(crate) fn ports_at(&self, of: &Integrator, axis: usize, state: &State, air: &AirAt) -> Ports {
+        let moving = &self.memory.moving;
+        let exhaust = ExhaustSide { silencer_back_pressure: moving.axes[axis].silencer_pa };
+        self.ports(
+            of,
+            axis,
+            &PortsAt {
+                spool: state.axes[axis].spool,
+                supply_pa: self.supply_side(moving).sum(state.supply_pressure_pa),
+                exhaust_pa: exhaust.sum(of.chambers.exhaust_pa()),
+                pressure_pa: air.of_axis_pa(axis),
+                extension_m: state.axes[axis].extension_m,
+                shut: of.supply.check_valves_shut(state.supply_pressure_pa),
+            },
+        )
+    }
+
+    /// Flows into the chambers of an axis beside the valve's, by their pressures.
+    pub(crate) fn leakage(&self, of: &Integrator, axis: usize, pressure_pa: [f64; 2]) -> [Leakage; 2] {
+        let on = &self.on[axis];
+        let across = on.piston_leakage.map_or(0.0, |effect| effect.flow(pressure_pa[0], pressure_pa[1]));
+        let out = |chamber: usize| {
+            on.rod_leakage[chamber]
+                .map_or(0.0, |effect| -effect.flow(pressure_pa[chamber], of.atmospheric_pa()))
+        };
+        [
+            Leakage { piston_leakage: -across, rod_leakage: out(0) },
+            Leakage { piston_leakage: across, rod_leakage: out(1) },
+        ]
+    }
+
+    /// What heat adds to the rate of a chamber's stored air, but for the piston's work; `span_s` is 0 for an instant.
+    ///
+    /// Where the gas takes the wall's temperature within a span x times as long as its relaxation, the exchange is damped by
+    /// 1 / (1 + x^2/4): second order where it is slow, and never more than the whole difference where it is fast.
+    pub(crate) fn air_rate(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        chamber: usize,
+        heat: HeatAt,
+        span_s: f64,
+    ) -> AirRate {
+        let heat_exchange = self.on[axis].heat_exchange.map_or(0.0, |effect| {
+            let inside = ChamberHeat {
+                flow_m3_per_s: heat.flow_m3_per_s,
+                temperature_k: self.temperature_k * heat.stored_j
+                    / (of.chambers.normal_pa() * heat.normal_volume_m3),
+                wetted_m2: wetted_m2(of.chambers.areas_m2()[chamber], heat.volume_m3),
+            };
+            let carried = effect.thermal_rate_w(ChamberHeat { wetted_m2: 0.0, ..inside });
+            let exchanged = effect.thermal_rate_w(inside) - carried;
+            let x = span_s / effect.relaxation_s(heat.stored_j, inside);
+            carried + exchanged / (1.0 + x * x / 4.0)
+        });
+        AirRate { heat_exchange }
+    }
+
+    /// Share of the piston's work p dV that the stored air loses; 0 in the isothermal baseline.
+    pub(crate) fn work_share(&self, axis: usize) -> f64 {
+        self.on[axis].heat_exchange.map_or(0.0, |effect| effect.work_share())
+    }
+
+    pub(super) fn adds_air(&self, axis: usize) -> bool {
+        let on = &self.on[axis];
+        on.heat_exchange.is_some()
+            || on.piston_leakage.is_some()
+            || on.rod_leakage.iter().any(Option::is_some)
+    }
+
+    /// What enters the line of a chamber, `ahead_s` after the newest substep's beginning.
+    pub(crate) fn line(&self, axis: usize, chamber: usize, port: f64, ahead_s: f64) -> LineFlow {
+        let line = self.on[axis].line_delay.zip(self.memory.lines[axis][chamber].as_ref());
+        let line_delay = line.map_or(0.0, |(effect, history)| {
+            // The newest entry is of the last substep's midpoint; between it and now there is a straight line.
+            let back_s = effect.delay_s() - ahead_s - self.substep_s / 2.0;
+            let delayed = if back_s >= 0.0 {
+                history.before(back_s / self.substep_s)
+            } else {
+                let share = effect.delay_s() / (ahead_s + self.substep_s / 2.0);
+                port + (history.before(0.0) - port) * share
+            };
+            effect.term(delayed, port)
+        });
+        LineFlow { line_delay }
+    }
+}

@@ -1,0 +1,174 @@
+//! Friction with effects: the levels of one axis in both directions, each the sum of its named terms.
+
+use super::acting::Effects;
+use super::memory::AxisMoving;
+use super::presliding::{Bristle, Under};
+use super::sums::{BreakAwayLevel, Bristles, SlidingLevel, Viscous};
+use crate::integrator::{Integrator, Middle};
+use crate::motion::{Levels, Place, side};
+use crate::truth::AirAt;
+
+/// What the levels depend on beside the speed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rubbing {
+    pub(crate) extension_m: f64,
+    /// Gauge pressures of chambers a and b, Pa.
+    pub(crate) gauge_pa: [f64; 2],
+    /// Time at rest, s.
+    pub(crate) rest_s: f64,
+}
+
+/// Place of a direction in [`Levels`] as a sign.
+const DIRECTIONS: [f64; 2] = [1.0, -1.0];
+
+impl Effects {
+    /// Terms of the sliding level in a direction (1 extending, -1 retracting) at a speed.
+    pub(crate) fn sliding_level(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        at: &Rubbing,
+        speed: f64,
+        direction: f64,
+    ) -> SlidingLevel {
+        let on = &self.on[axis];
+        let file = of.motion.levels().sliding_n[0];
+        SlidingLevel {
+            stribeck_friction: on.stribeck_friction.map_or(0.0, |effect| effect.term(speed)),
+            friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
+            pressure_dependent_friction: on
+                .pressure_dependent_friction
+                .map_or(0.0, |effect| effect.term(at.gauge_pa[0], at.gauge_pa[1])),
+            position_dependent_friction: on
+                .position_dependent_friction
+                .map_or(0.0, |effect| effect.term(at.extension_m)),
+        }
+    }
+
+    /// Terms of the break-away level in a direction.
+    pub(crate) fn break_away_level(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        at: &Rubbing,
+        direction: f64,
+    ) -> BreakAwayLevel {
+        let on = &self.on[axis];
+        let file = of.motion.levels().break_away_n[0];
+        let sliding = self.sliding_level(of, axis, at, 0.0, direction);
+        BreakAwayLevel {
+            friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
+            pressure_dependent_friction: sliding.pressure_dependent_friction,
+            position_dependent_friction: sliding.position_dependent_friction,
+            rest_time_dependent_break_away: on
+                .rest_time_dependent_break_away
+                .map_or(0.0, |effect| effect.term(at.rest_s)),
+        }
+    }
+
+    /// Terms of the viscous friction in a direction.
+    pub(crate) fn viscous_term(&self, of: &Integrator, axis: usize, direction: f64) -> Viscous {
+        let file = of.motion.levels().viscous_n_s_per_m[0];
+        Viscous {
+            friction_asymmetry: self.on[axis]
+                .friction_asymmetry
+                .map_or(0.0, |effect| effect.term(file, direction)),
+        }
+    }
+
+    /// Viscous friction in a direction, N s/m.
+    pub(crate) fn viscous(&self, of: &Integrator, axis: usize, direction: f64) -> f64 {
+        self.viscous_term(of, axis, direction).sum(of.motion.levels().viscous_n_s_per_m[0]).max(0.0)
+    }
+
+    /// All levels of an axis at a speed, both directions; none below 0, none easier to break away than to slide.
+    pub(crate) fn levels(&self, of: &Integrator, axis: usize, at: &Rubbing, speed: f64) -> Levels {
+        let file = *of.motion.levels();
+        let sliding = |speed, direction| {
+            self.sliding_level(of, axis, at, speed, direction).sum(file.sliding_n[0]).max(0.0)
+        };
+        Levels {
+            sliding_n: DIRECTIONS.map(|direction| sliding(speed, direction)),
+            break_away_n: DIRECTIONS.map(|direction| {
+                let level = self.break_away_level(of, axis, at, direction).sum(file.break_away_n[0]);
+                level.max(sliding(0.0, direction))
+            }),
+            viscous_n_s_per_m: DIRECTIONS.map(|direction| self.viscous(of, axis, direction)),
+        }
+    }
+
+    /// What friction depends on at an instant.
+    pub(crate) fn rubbing_at(&self, of: &Integrator, axis: usize, place: Place, air: &AirAt) -> Rubbing {
+        Rubbing {
+            extension_m: place.extension,
+            gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa()),
+            rest_s: self.memory.moving.axes[axis].rest_s,
+        }
+    }
+
+    /// Friction of the bristles at an instant, along the own extension; `None` for an axis without them.
+    pub(crate) fn bristles(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        rubbing: &Rubbing,
+        place: Place,
+        force_n: f64,
+    ) -> Option<Bristles> {
+        let effect = self.on[axis].presliding?;
+        let deflection_m = self.memory.moving.axes[axis].deflection_m;
+        let bristle = Bristle { velocity_m_per_s: place.velocity, deflection_m };
+        let under = self.under(of, axis, rubbing, place.velocity, force_n);
+        Some(Bristles { presliding: effect.force(bristle, under) })
+    }
+
+    /// Where a bristled axis stands: all that its friction depends on.
+    pub(crate) fn under(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        rubbing: &Rubbing,
+        velocity: f64,
+        force_n: f64,
+    ) -> Under {
+        let levels = self.levels(of, axis, rubbing, velocity.abs());
+        let direction = side(if velocity == 0.0 { force_n } else { velocity });
+        Under {
+            force_n,
+            mass_kg: of.motion.mass_kg(axis),
+            viscous_n_s_per_m: levels.viscous_n_s_per_m[direction],
+            sliding_n: levels.sliding_n[direction],
+            break_away_n: levels.break_away_n[direction],
+        }
+    }
+
+    pub(super) fn rubbing(&self, of: &Integrator, axis: usize, middle: &Middle, own: &AxisMoving) -> Rubbing {
+        let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
+        Rubbing {
+            extension_m: middle.extension.to_array()[axis],
+            gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa()),
+            rest_s: own.rest_s,
+        }
+    }
+
+    /// The speed of a moving axis in the middle of a step, m/s, by its force at the beginning; 0 if it would turn.
+    pub(super) fn middle_speed(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        rubbing: &Rubbing,
+        velocity: f64,
+        push: f64,
+        span_s: f64,
+    ) -> f64 {
+        if self.on[axis].stribeck_friction.is_none() {
+            return velocity.abs();
+        }
+        let levels = self.levels(of, axis, rubbing, velocity.abs());
+        let direction = if velocity == 0.0 { push.signum() } else { velocity.signum() };
+        let friction =
+            levels.sliding_n[side(direction)] + levels.viscous_n_s_per_m[side(direction)] * velocity.abs();
+        let acceleration = (push * direction - friction) / of.motion.mass_kg(axis);
+        (velocity.abs() + acceleration * span_s / 2.0).max(0.0)
+    }
+}

@@ -1,0 +1,49 @@
+//! Readings with effects: what each sensor shows before noise and steps, as the truth and its named terms.
+
+use super::acting::Effects;
+use super::sums::{ForceReading, PositionReading, PressureReading};
+
+impl Effects {
+    /// What skew adds to a channel (position, force, a, b) that would show this now.
+    fn skew(&self, axis: usize, channel: usize, now: f64) -> f64 {
+        let history = self.on[axis].time_skew[channel].zip(self.memory.channels[axis][channel].as_ref());
+        history.map_or(0.0, |(effect, history)| {
+            effect.term(history.before(effect.delay_s / self.substep_s), now)
+        })
+    }
+
+    /// Terms of the position reading of an axis, by its true position, m.
+    pub(crate) fn position_reading(&self, axis: usize, truth: f64) -> PositionReading {
+        let on = &self.on[axis];
+        PositionReading {
+            time_skew: self.skew(axis, 0, truth),
+            position_sensor_lag: on
+                .position_sensor_lag
+                .map_or(0.0, |_| self.memory.moving.axes[axis].shown[0] - truth),
+            position_sensor_gain: on.position_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
+            position_sensor_offset: on.position_sensor_offset.map_or(0.0, |effect| effect.term()),
+        }
+    }
+
+    /// Terms of the force reading of an axis, by what its sensor should show, N.
+    pub(crate) fn force_reading(&self, axis: usize, truth: f64) -> ForceReading {
+        let on = &self.on[axis];
+        ForceReading {
+            time_skew: self.skew(axis, 1, truth),
+            force_sensor_gain: on.force_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
+            force_sensor_offset: on.force_sensor_offset.map_or(0.0, |effect| effect.term()),
+        }
+    }
+
+    /// Terms of the pressure reading of a chamber, by its true pressure, Pa.
+    pub(crate) fn pressure_reading(&self, axis: usize, chamber: usize, truth: f64) -> PressureReading {
+        let on = &self.on[axis];
+        PressureReading {
+            time_skew: self.skew(axis, 2 + chamber, truth),
+            pressure_sensor_lag: on.pressure_sensor_lag[chamber]
+                .map_or(0.0, |_| self.memory.moving.axes[axis].shown[1 + chamber] - truth),
+            pressure_sensor_gain: on.pressure_sensor_gain[chamber].map_or(0.0, |effect| effect.term(truth)),
+            pressure_sensor_offset: on.pressure_sensor_offset[chamber].map_or(0.0, |effect| effect.term()),
+        }
+    }
+}

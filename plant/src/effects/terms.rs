@@ -1,0 +1,192 @@
+//! The list of all terms at an instant: what each switched-on effect adds to which balance, for `truth.csv` and for tests.
+//!
+//! The balances are told in the order of `sums.rs`, axis by axis, then those of linkage and supply. A term of an effect that
+//! is off is not told.
+
+use super::acting::Effects;
+use super::air::HeatAt;
+use super::sheet::{Element, Part};
+use super::sums::Balance;
+use super::sums::{Damping, DeadSpace, ExhaustSide, Gap, Stiffness};
+use crate::integrator::{Integrator, Lanes};
+use crate::lanes::Pair;
+use crate::motion::side;
+use crate::state::{Inputs, State};
+use crate::truth::{AirAt, Forces, hand_forces};
+
+/// Terms that a rig with everything switched on has, and some room.
+const MOST_TERMS: usize = 160;
+
+/// Values of all terms of a rig at an instant, in the order of [`crate::Plant::term_names`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Terms {
+    count: usize,
+    values: [f64; MOST_TERMS],
+}
+
+impl Default for Terms {
+    fn default() -> Self {
+        Terms { count: 0, values: [0.0; MOST_TERMS] }
+    }
+}
+
+impl Terms {
+    /// The values.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values[..self.count]
+    }
+
+    pub(crate) fn push(&mut self, value: f64) {
+        self.values[self.count] = value;
+        self.count += 1;
+    }
+}
+
+/// One term at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Term {
+    pub(crate) part: Part,
+    /// Chamber, channel or edge it belongs to.
+    pub(crate) element: Option<&'static str>,
+    pub(crate) balance: &'static str,
+    /// Name of the effect, with underscores.
+    pub(crate) effect: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) value: f64,
+}
+
+impl Term {
+    /// Column of `truth.csv`, as `drive_leakage_piston_leakage_a_m3_per_s`.
+    pub(crate) fn column(&self) -> String {
+        let element = self.element.map(|element| format!("_{element}")).unwrap_or_default();
+        format!("{}_{}_{}{element}_{}", self.part.name(), self.balance, self.effect, self.unit)
+    }
+}
+
+/// Chambers by name, as they are counted.
+const CHAMBERS: [(&str, Element); 2] = [("a", Element::A), ("b", Element::B)];
+
+/// A list that is being told.
+struct Teller<'t> {
+    effects: &'t Effects,
+    part: Part,
+    tell: &'t mut dyn FnMut(Term),
+}
+
+impl Teller<'_> {
+    /// Tells the terms of a balance whose effects are on.
+    fn balance<B: Balance>(&mut self, balance: &B, name: Option<&'static str>, element: Option<Element>) {
+        let on = &self.effects.on[usize::from(self.part == Part::Load)];
+        balance.each(&mut |effect, value| {
+            if on.is_on(effect, element) {
+                let (part, element) = (self.part, name);
+                (self.tell)(Term { part, element, balance: B::NAME, effect, unit: B::UNIT, value });
+            }
+        });
+    }
+}
+
+impl Effects {
+    /// Tells every term of the rig at an instant.
+    pub(crate) fn each_term(
+        &self,
+        of: &Integrator,
+        state: &State,
+        inputs: &Inputs,
+        tell: &mut dyn FnMut(Term),
+    ) {
+        let lanes = Lanes::load(state);
+        let air = AirAt::of(of, &lanes);
+        let forces = Forces::at(of, Some(self), &lanes, hand_forces(inputs), state.linked);
+        for (axis, part) in [Part::Drive, Part::Load].into_iter().enumerate() {
+            let mut teller = Teller { effects: self, part, tell };
+            let own = &self.memory.moving.axes[axis];
+            let lane = |pair: Pair| pair.to_array()[axis];
+            let place = lanes.place(axis);
+
+            // From the command to the flows.
+            let command = if state.emergency_stop { 0.0 } else { inputs.valve[axis] };
+            let arriving = self.arriving(axis, command, 0.0);
+            let target = self.target(axis, own, arriving.sum(command));
+            let sent = target.sum(arriving.sum(command)).clamp(-1.0, 1.0);
+            let (rate, limited) = self.spool_rate(axis, own, state.axes[axis].spool, sent);
+            teller.balance(&arriving, None, None);
+            teller.balance(&target, None, None);
+            teller.balance(&rate, None, None);
+            teller.balance(&limited, None, None);
+            let ports = self.ports_at(of, axis, state, &air);
+            teller.balance(&ports.opening, None, None);
+            for (edge, name) in ["supply", "exhaust"].into_iter().enumerate() {
+                teller.balance(&ports.characteristic[edge], Some(name), None);
+            }
+            teller.balance(&ExhaustSide { silencer_back_pressure: own.silencer_pa }, None, None);
+
+            // The chambers.
+            let leakage = self.leakage(of, axis, air.of_axis_pa(axis));
+            let flows = lanes.air().map(|air| lane(air.flow));
+            for (chamber, (name, element)) in CHAMBERS.into_iter().enumerate() {
+                let (at, element) = (Some(name), Some(element));
+                let edges = [["supply_a", "exhaust_a"], ["supply_b", "exhaust_b"]];
+                for (edge, name) in ports.edges[chamber].iter().zip(edges[chamber]) {
+                    teller.balance(edge, Some(name), element);
+                }
+                teller.balance(&ports.port[chamber], at, element);
+                teller.balance(&ports.port_flow[chamber], at, element);
+                teller.balance(&self.line(axis, chamber, ports.flow_m3_per_s[chamber], 0.0), at, element);
+                teller.balance(&leakage[chamber], at, element);
+                let heat = HeatAt {
+                    stored_j: lane(lanes.air()[chamber].stored),
+                    volume_m3: lane(air.volume[chamber]),
+                    normal_volume_m3: own.normal_volume_m3[chamber],
+                    flow_m3_per_s: flows[chamber] + leakage[chamber].sum(0.0),
+                };
+                // With the piston's work, which the step takes from the volume swept.
+                let mut rate = self.air_rate(of, axis, chamber, heat, 0.0);
+                let area_m2 = [1.0, -1.0][chamber] * of.chambers.areas_m2()[chamber];
+                rate.heat_exchange -=
+                    self.work_share(axis) * air.of_axis_pa(axis)[chamber] * area_m2 * place.velocity;
+                teller.balance(&rate, at, element);
+                let file = of.file_dead_volume_m3();
+                let dead_volume = self.on[axis].dead_volume.map_or(0.0, |effect| effect.term(file));
+                teller.balance(&DeadSpace { dead_volume }, at, element);
+            }
+
+            // Friction in the direction of the motion, or of the force on a resting piston.
+            let rubbing = self.rubbing_at(of, axis, place, &air);
+            let force = forces.unresisted_n(axis);
+            let direction = if side(if place.velocity == 0.0 { force } else { place.velocity }) == 0 {
+                1.0
+            } else {
+                -1.0
+            };
+            teller.balance(
+                &self.sliding_level(of, axis, &rubbing, place.velocity.abs(), direction),
+                None,
+                None,
+            );
+            teller.balance(&self.break_away_level(of, axis, &rubbing, direction), None, None);
+            teller.balance(&self.viscous_term(of, axis, direction), None, None);
+            let bristles = self.bristles(of, axis, &rubbing, place, force).unwrap_or_default();
+            teller.balance(&bristles, None, None);
+            teller.balance(&self.force(axis, place.extension), None, None);
+
+            // What the sensors make of it.
+            let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m() - place.extension };
+            let (position, force) = (Some(Element::Position), Some(Element::Force));
+            teller.balance(&self.position_reading(axis, position_m), Some("position"), position);
+            teller.balance(&self.force_reading(axis, forces.sensor_n(of, axis)), Some("force"), force);
+            for (chamber, (name, element)) in CHAMBERS.into_iter().enumerate() {
+                let reading = self.pressure_reading(axis, chamber, air.of_axis_pa(axis)[chamber]);
+                teller.balance(&reading, Some(name), Some(element));
+            }
+        }
+        let (gap, stiffness, damping) = self.linkage_terms();
+        let mut teller = Teller { effects: self, part: Part::Linkage, tell };
+        teller.balance::<Gap>(&gap, None, None);
+        teller.balance::<Stiffness>(&stiffness, None, None);
+        teller.balance::<Damping>(&damping, None, None);
+        let mut teller = Teller { effects: self, part: Part::Supply, tell };
+        teller.balance(&self.supply_side(&self.memory.moving), None, None);
+    }
+}

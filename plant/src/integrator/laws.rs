@@ -1,0 +1,179 @@
+//! What a step moves by: the laws of the baseline, or the same with effects beside them.
+//!
+//! The integrator is written once, over [`Laws`]. With [`Baseline`] the compiler finds every question answered by a constant or
+//! by the baseline's own formula, so a rig without effects pays nothing for their being possible; a hash of bits and a count
+//! of instructions hold that down. `effects/acting.rs` is the other answer.
+
+use super::{Held, Integrator, Lanes, Middle, Node, Span};
+use crate::chamber::Air;
+use crate::lanes::{Mask, Pair};
+use crate::motion::{MotionSpan, Place, against};
+use crate::valve::edge_flow;
+
+/// A step to be made: whose, how long, from where, and what is held over it.
+#[derive(Clone, Copy)]
+pub(crate) struct At<'s> {
+    pub(crate) of: &'s Integrator,
+    pub(crate) span: &'s Span,
+    pub(crate) from: &'s Lanes,
+    pub(crate) node: Node,
+    pub(crate) held: Held,
+    /// Time from the period's beginning to the step's, s.
+    pub(crate) local_s: f64,
+}
+
+/// The laws of a rig; pairs hold a value for each axis, forces are along its own extension.
+pub(crate) trait Laws {
+    /// What a step hands on beside the lanes; a step that is discarded leaves none.
+    type Carried: Copy;
+
+    /// What the last step handed on.
+    fn carried(&self) -> Self::Carried;
+
+    /// Air and flows at the midpoint of a step.
+    fn middle(&self, at: At<'_>, carried: &mut Self::Carried) -> Middle;
+
+    /// Forces from outside on each piston, N: the hand's and what else there is.
+    fn outside(&self, at: At<'_>, middle: &Middle) -> Pair;
+
+    /// Which axes move, for the laws of friction.
+    fn moving(&self, at: At<'_>) -> Mask;
+
+    /// Which axes rest and slide on bristles: they neither stick nor break away.
+    fn on_bristles(&self) -> [bool; 2];
+
+    /// Friction on moving axes but for the viscous one, N, signed; `push` is the force without it.
+    fn sliding(&self, at: At<'_>, middle: &Middle, carried: &Self::Carried, push: Pair, moving: Mask)
+    -> Pair;
+
+    /// Friction on axes that this force sets in motion, N, signed.
+    fn starting(&self, at: At<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair;
+
+    /// Break-away force in the direction of a force, N.
+    fn break_away(&self, at: At<'_>, middle: &Middle, force: Pair) -> Pair;
+
+    /// Factors of the motion to the middle and to the end of a step.
+    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2];
+
+    /// Whether a resting axis stays under this force, N without any friction.
+    fn holds(&self, at: At<'_>, middle: &Middle, axis: usize, force: f64) -> bool;
+
+    /// Moves one axis through a step under a held force, N without any friction.
+    fn advance(
+        &self,
+        at: At<'_>,
+        middle: &Middle,
+        carried: &mut Self::Carried,
+        axis: usize,
+        force: f64,
+    ) -> Place;
+
+    /// The air of both chambers after a step, given what lag and bounds left of it.
+    fn air(&self, at: At<'_>, to: &mut Lanes, middle: &Middle, carried: &mut Self::Carried);
+
+    /// The spools at the step's end.
+    fn spool(&self, at: At<'_>, carried: &Self::Carried) -> Pair;
+
+    /// A substep counts: what it handed on is kept.
+    fn keep(&mut self, of: &Integrator, held: Held, to: &Lanes, carried: Self::Carried);
+}
+
+/// The laws of rig-model.md.
+pub(crate) struct Baseline;
+
+impl Laws for Baseline {
+    type Carried = ();
+
+    #[inline(always)]
+    fn carried(&self) {}
+
+    #[inline(always)]
+    fn middle(&self, at: At<'_>, (): &mut ()) -> Middle {
+        let At { of, span, from, node, held, .. } = at;
+        let spool = held.command + (from.spool - held.command) * span.spool_to_middle;
+        let mut edges = of.valve.edges(spool, node.middle_pa, of.chambers.exhaust_pa());
+        if node.shut {
+            (edges.conductance_a, edges.conductance_b) = (Pair::both(0.0), Pair::both(0.0));
+        }
+        let extension = of.ahead(span, from);
+        let per_volume_a = of.chambers.volume_a(extension).reciprocal();
+        let per_volume_b = of.chambers.volume_b(extension).reciprocal();
+        let pressure_a = span.lag.midpoint_air(from.air_a) * per_volume_a;
+        let pressure_b = span.lag.midpoint_air(from.air_b) * per_volume_b;
+        Middle {
+            extension,
+            pneumatic: of.chambers.pneumatic_force(pressure_a, pressure_b),
+            edge_flow: [
+                edge_flow(edges.conductance_a, edges.far_pressure_a, pressure_a),
+                edge_flow(edges.conductance_b, edges.far_pressure_b, pressure_b),
+            ],
+            pressure: [pressure_a, pressure_b],
+            per_volume: [per_volume_a, per_volume_b],
+        }
+    }
+
+    #[inline(always)]
+    fn outside(&self, at: At<'_>, _: &Middle) -> Pair {
+        at.held.hand
+    }
+
+    #[inline(always)]
+    fn moving(&self, at: At<'_>) -> Mask {
+        at.from.velocity.differs(Pair::both(0.0))
+    }
+
+    #[inline(always)]
+    fn on_bristles(&self) -> [bool; 2] {
+        [false; 2]
+    }
+
+    #[inline(always)]
+    fn sliding(&self, at: At<'_>, _: &Middle, (): &(), _: Pair, moving: Mask) -> Pair {
+        against(at.from.velocity, Pair::both(at.of.motion.levels().sliding_n[0]), moving)
+    }
+
+    #[inline(always)]
+    fn starting(&self, at: At<'_>, _: &Middle, force: Pair, starts: Mask) -> Pair {
+        against(force, Pair::both(at.of.motion.levels().sliding_n[0]), starts)
+    }
+
+    #[inline(always)]
+    fn break_away(&self, at: At<'_>, _: &Middle, _: Pair) -> Pair {
+        Pair::both(at.of.motion.levels().break_away_n[0])
+    }
+
+    #[inline(always)]
+    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2] {
+        [&at.span.motion_to_middle, &at.span.motion_to_end]
+    }
+
+    #[inline(always)]
+    fn holds(&self, at: At<'_>, _: &Middle, axis: usize, force: f64) -> bool {
+        at.of.motion.holds(at.from.place(axis).extension, force, at.of.motion.levels())
+    }
+
+    #[inline(always)]
+    fn advance(&self, at: At<'_>, _: &Middle, (): &mut (), axis: usize, force: f64) -> Place {
+        let motion = &at.of.motion;
+        motion.advance(axis, at.from.place(axis), force, motion.levels(), at.span.span_s)
+    }
+
+    #[inline(always)]
+    fn air(&self, _: At<'_>, _: &mut Lanes, _: &Middle, (): &mut ()) {}
+
+    #[inline(always)]
+    fn spool(&self, at: At<'_>, (): &()) -> Pair {
+        at.held.command + (at.from.spool - at.held.command) * at.span.spool_to_end
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, _: &Integrator, _: Held, _: &Lanes, (): ()) {}
+}
+
+/// Air of both chambers in one place, for laws that treat them alike.
+impl Lanes {
+    #[inline(always)]
+    pub(crate) fn air(&self) -> [Air; 2] {
+        [self.air_a, self.air_b]
+    }
+}

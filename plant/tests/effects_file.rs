@@ -1,0 +1,316 @@
+//! Effects in the rig file: each is switched on by name and place, and every way to get that wrong is named.
+
+use plant::RigParameters;
+use plant::effects::SHEETS;
+use plant::effects::sheet::{EffectKey, Place, Sheet, Switched};
+
+/// The shipped file with lines at its end; they start at [`first_line`].
+fn with(lines: &str) -> String {
+    format!("{}{lines}\n", RigParameters::BASELINE_TOML)
+}
+
+fn first_line() -> usize {
+    RigParameters::BASELINE_TOML.lines().count() + 1
+}
+
+/// What switches an effect on.
+fn table(sheet: &Sheet, place: Place, numbers: &[f64]) -> String {
+    let keys = sheet.keys.iter().zip(numbers).map(|(key, number)| format!("{} = {number:?}\n", key.name));
+    format!("[effects.{}.{place}]\n{}", sheet.name, keys.collect::<String>())
+}
+
+/// A value inside the range, another one for each key.
+fn inside(key: &EffectKey) -> f64 {
+    key.min + 0.37 * (key.max - key.min)
+}
+
+fn read(text: &str) -> Vec<Switched> {
+    RigParameters::from_toml(text, "rig.toml").unwrap_or_else(|error| panic!("{error}")).effects().to_vec()
+}
+
+fn refused(text: &str) -> String {
+    match RigParameters::from_toml(text, "my-rig.toml") {
+        Ok(rig) => panic!("taken as {:?}", rig.effects()),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn the_shipped_rig_has_no_effect() {
+    assert_eq!(RigParameters::baseline().effects(), []);
+}
+
+#[test]
+fn each_of_the_38_effects_is_switched_on_at_each_place_of_its_kind() {
+    assert_eq!(SHEETS.len(), 38);
+    for sheet in SHEETS {
+        for place in sheet.place.places() {
+            let numbers: Vec<f64> = sheet.keys.iter().map(inside).collect();
+            let effects = read(&with(&table(sheet, *place, &numbers)));
+            assert_eq!(effects, [Switched { name: sheet.name, place: *place, numbers }]);
+        }
+    }
+}
+
+#[test]
+fn the_sheets_fit_their_own_ranges_and_no_two_have_one_name() {
+    for (i, sheet) in SHEETS.iter().enumerate() {
+        assert!(SHEETS[..i].iter().all(|other| other.name != sheet.name), "{}", sheet.name);
+        assert!(
+            !sheet.keys.is_empty() && !sheet.law.is_empty() && !sheet.source.is_empty(),
+            "{}",
+            sheet.name
+        );
+        for key in sheet.keys {
+            let what = format!("{}.{}", sheet.name, key.name);
+            let allowed = key.min..=key.max;
+            assert!(key.min.is_finite() && key.max.is_finite() && key.min < key.max, "{what}");
+            assert!(key.drawn[0] < key.drawn[1] && key.drawn.iter().all(|d| allowed.contains(d)), "{what}");
+            assert!(!key.signed || key.drawn.iter().all(|d| allowed.contains(&-d)), "{what}");
+            assert!(key.default.is_none_or(|default| allowed.contains(&default)), "{what}");
+            assert!(!key.meaning.is_empty(), "{what}");
+        }
+    }
+}
+
+#[test]
+fn both_ends_of_each_range_are_taken_and_what_lies_just_outside_is_refused() {
+    for sheet in SHEETS {
+        let place = sheet.place.places()[0];
+        for (i, key) in sheet.keys.iter().enumerate() {
+            let mut numbers: Vec<f64> = sheet.keys.iter().map(inside).collect();
+            for end in [key.min, key.max] {
+                numbers[i] = end;
+                assert_eq!(read(&with(&table(sheet, place, &numbers)))[0].numbers, numbers);
+            }
+            let beyond = 1e-6 * (key.max - key.min);
+            for (value, written) in [
+                (key.min - beyond, format!("{:?}", key.min - beyond)),
+                (key.max + beyond, format!("{:?}", key.max + beyond)),
+                (f64::INFINITY, "inf".to_owned()),
+                (f64::NEG_INFINITY, "-inf".to_owned()),
+            ] {
+                numbers[i] = value;
+                assert_eq!(
+                    refused(&with(&table(sheet, place, &numbers))),
+                    format!(
+                        "my-rig.toml:{}: effects.{}.{place}.{} = {written} is out of range; allowed: {}",
+                        first_line() + 1 + i,
+                        sheet.name,
+                        key.name,
+                        key.range()
+                    )
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_key_with_a_default_may_be_left_out_and_any_other_is_asked_for() {
+    for sheet in SHEETS {
+        let place = sheet.place.places()[0];
+        for (left_out, key) in sheet.keys.iter().enumerate() {
+            let numbers: Vec<f64> = sheet.keys.iter().map(inside).collect();
+            let mut lines: Vec<String> = table(sheet, place, &numbers).lines().map(str::to_owned).collect();
+            lines.remove(1 + left_out);
+            let text = with(&lines.join("\n"));
+            if let Some(default) = key.default {
+                assert_eq!(read(&text)[0].numbers[left_out], default);
+            } else {
+                assert_eq!(
+                    refused(&text),
+                    format!(
+                        "my-rig.toml:{}: key effects.{}.{place}.{} is missing from the table that starts here; allowed: {}",
+                        first_line(),
+                        sheet.name,
+                        key.name,
+                        key.range()
+                    )
+                );
+            }
+        }
+    }
+}
+
+/// Lines at the end of the shipped file, on which of them the mistake is, and the message.
+const CASES: &[(&str, usize, &str)] = &[
+    (
+        "[effects.piston-leak.drive]\nleakage_nl_per_min = 2.5",
+        0,
+        "unknown key effects.piston-leak = piston-leak; known here: critical-pressure-ratio, valve-characteristic, ",
+    ),
+    ("[effects.Piston-Leakage.drive]\nleakage_nl_per_min = 2.5", 0, "unknown key effects.Piston-Leakage = "),
+    (
+        "[effects]\npiston-leakage = 2.5",
+        1,
+        "effects.piston-leakage = 2.5 is of the wrong type; allowed: drive, load",
+    ),
+    (
+        "[[effects.rod-leakage]]",
+        0,
+        "effects.rod-leakage = [[effects.rod-leakage]] is of the wrong type; allowed: drive.a, drive.b, load.a, load.b",
+    ),
+    (
+        "[effects.piston-leakage]\nleakage_nl_per_min = 2.5",
+        1,
+        "unknown key effects.piston-leakage.leakage_nl_per_min = 2.5; known here: drive, load",
+    ),
+    (
+        "[effects.piston-leakage]\ndrive = 2.5",
+        1,
+        "unknown key effects.piston-leakage.drive = 2.5; known here: drive, load",
+    ),
+    (
+        "[effects.piston-leakage.left]\nleakage_nl_per_min = 2.5",
+        0,
+        "unknown key effects.piston-leakage.left = [effects.piston-leakage.left]; known here: drive, load",
+    ),
+    ("[effects.piston-leakage.left]", 0, "unknown key effects.piston-leakage.left = "),
+    (
+        "[effects.rod-leakage.drive]",
+        0,
+        "unknown key effects.rod-leakage.drive = [effects.rod-leakage.drive]; known here: drive.a, drive.b, load.a, load.b",
+    ),
+    (
+        "[effects.rod-leakage]",
+        0,
+        "effects.rod-leakage = [effects.rod-leakage] is of the wrong type; allowed: drive.a, ",
+    ),
+    (
+        "[effects.piston-leakage.drive.a]\nleakage_nl_per_min = 2.5",
+        0,
+        "unknown key effects.piston-leakage.drive.a = [effects.piston-leakage.drive.a]; known here: leakage_nl_per_min",
+    ),
+    (
+        "[effects.rod-leakage.drive.position]\nleakage_nl_per_min = 2.5",
+        0,
+        "unknown key effects.rod-leakage.drive.position = [effects.rod-leakage.drive.position]; \
+         known here: drive.a, drive.b, load.a, load.b",
+    ),
+    (
+        "[effects.rod-leakage.linkage.a]\nleakage_nl_per_min = 2.5",
+        0,
+        "unknown key effects.rod-leakage.linkage = linkage; known here: drive.a, drive.b, load.a, load.b",
+    ),
+    (
+        "[effects.rod-leakage.drive]\nb = 2.5",
+        0,
+        "unknown key effects.rod-leakage.drive.b = 2.5; known here: drive.a, drive.b, load.a, load.b",
+    ),
+    ("[effects.coupling-backlash.drive]\ngap_mm = 1.0", 0, "unknown key effects.coupling-backlash.drive"),
+    (
+        "[effects.piston-leakage.drive]",
+        0,
+        "key effects.piston-leakage.drive.leakage_nl_per_min is missing from the table that starts here; \
+         allowed: 0 to 50 Nl/min",
+    ),
+    (
+        "[effects.piston-leakage.drive]\nleakage_nl_per_min = 2.5\nleakage_bar = 3",
+        2,
+        "unknown key effects.piston-leakage.drive.leakage_bar = 3; known here: leakage_nl_per_min",
+    ),
+    (
+        "[effects.piston-leakage.drive]\nleakage_nl_per_min = 51",
+        1,
+        "effects.piston-leakage.drive.leakage_nl_per_min = 51 is out of range; allowed: 0 to 50 Nl/min",
+    ),
+    (
+        "[effects.piston-leakage.drive]\nleakage_nl_per_min = nan",
+        1,
+        "effects.piston-leakage.drive.leakage_nl_per_min = nan is out of range; allowed: 0 to 50 Nl/min",
+    ),
+    (
+        "[effects.piston-leakage.drive]\nleakage_nl_per_min = \"2\"",
+        1,
+        "effects.piston-leakage.drive.leakage_nl_per_min = \"2\" is of the wrong type; allowed: 0 to 50 Nl/min",
+    ),
+    (
+        "[effects.piston-leakage.drive]\nleakage_nl_per_min = [2.0]",
+        1,
+        "effects.piston-leakage.drive.leakage_nl_per_min = [2.0] is of the wrong type; allowed: 0 to 50 Nl/min",
+    ),
+    (
+        "[effects.piston-leakage.drive]\nleakage_nl_per_min = true",
+        1,
+        "effects.piston-leakage.drive.leakage_nl_per_min = true is of the wrong type; allowed: 0 to 50 Nl/min",
+    ),
+    (
+        "[effects.pressure-sensor-offset.drive.a]\noffset_mbar = 1e9",
+        1,
+        "effects.pressure-sensor-offset.drive.a.offset_mbar = 1e9 is out of range; allowed: ",
+    ),
+    (
+        "[effects.piston-leakage.drive]\nleakage_nl_per_min = 1\n[effects.piston-leakage.drive]\nleakage_nl_per_min = 1",
+        2,
+        "not TOML: ",
+    ),
+];
+
+#[test]
+fn every_mistake_is_named_with_file_line_key_value_and_what_is_allowed() {
+    for (lines, at, message) in CASES {
+        let error = refused(&with(lines));
+        let wanted = format!("my-rig.toml:{}: {message}", first_line() + at);
+        assert!(error.starts_with(&wanted), "\n   got {error}\nwanted {wanted}");
+    }
+    let error = refused(&format!("effects = 3\n{}", RigParameters::BASELINE_TOML));
+    assert_eq!(error, "my-rig.toml:1: effects = 3 is of the wrong type; allowed: tables");
+}
+
+#[test]
+fn an_effect_switched_on_by_a_call_is_that_of_a_file() {
+    let baseline = RigParameters::baseline();
+    for sheet in SHEETS {
+        for place in sheet.place.places() {
+            let numbers: Vec<f64> = sheet.keys.iter().map(inside).collect();
+            let named: Vec<(&str, f64)> =
+                sheet.keys.iter().map(|key| key.name).zip(numbers.clone()).collect();
+            let called = baseline.with_effect(sheet.name, &place.to_string(), &named).expect("in range");
+            let text = with(&table(sheet, *place, &numbers));
+            assert_eq!(called, RigParameters::from_toml(&text, "rig.toml").expect("in range"));
+            assert_eq!(called.without_effect(sheet.name, *place), baseline);
+        }
+    }
+    let error = baseline.with_effect("piston-leakage", "drive", &[("leakage_nl_per_min", 51.0)]);
+    let wanted =
+        "effects.piston-leakage.drive.leakage_nl_per_min = 51.0 is out of range; allowed: 0 to 50 Nl/min";
+    assert!(error.expect_err("out of range").to_string().ends_with(wanted));
+    let error = baseline.with_effect("piston-leakage", "drive", &[("leakage_nl_per_min", f64::NAN)]);
+    assert!(error.expect_err("no number").to_string().contains("leakage_nl_per_min = nan is out of range"));
+}
+
+#[test]
+fn switching_on_again_replaces_the_numbers_and_leaves_other_places() {
+    let with = |rig: &RigParameters, place, number| {
+        rig.with_effect("rod-leakage", place, &[("leakage_nl_per_min", number)]).expect("in range")
+    };
+    let rig = with(&with(&with(&RigParameters::baseline(), "load.b", 3.0), "drive.a", 1.0), "load.b", 2.0);
+    let found: Vec<(String, f64)> =
+        rig.effects().iter().map(|effect| (effect.place.to_string(), effect.numbers[0])).collect();
+    assert_eq!(found, [("drive.a".to_owned(), 1.0), ("load.b".to_owned(), 2.0)]);
+    assert_eq!(rig.without_effects(), RigParameters::baseline());
+}
+
+#[test]
+fn all_effects_together_stand_in_the_catalogues_order_whatever_the_files() {
+    let text: String = SHEETS
+        .iter()
+        .rev()
+        .flat_map(|sheet| sheet.place.places().iter().rev().map(move |place| (sheet, *place)))
+        .map(|(sheet, place)| table(sheet, place, &sheet.keys.iter().map(inside).collect::<Vec<_>>()))
+        .collect();
+    let effects = read(&with(&text));
+    let row = |effect: &Switched| SHEETS.iter().position(|sheet| sheet.name == effect.name);
+    let order: Vec<(Option<usize>, Place)> =
+        effects.iter().map(|effect| (row(effect), effect.place)).collect();
+    assert!(order.is_sorted(), "{order:?}");
+    assert_eq!(effects.len(), SHEETS.iter().map(|sheet| sheet.place.places().len()).sum::<usize>());
+}
+
+#[test]
+fn inline_and_dotted_tables_say_the_same() {
+    let usual = "[effects.rod-leakage.drive.a]\nleakage_nl_per_min = 2\n[effects.rod-leakage.load.b]\nleakage_nl_per_min = 3";
+    let short = "[effects.rod-leakage]\ndrive.a.leakage_nl_per_min = 2\nload.b = { leakage_nl_per_min = 3 }";
+    assert_eq!(read(&with(usual)), read(&with(short)));
+}

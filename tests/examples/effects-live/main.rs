@@ -1,0 +1,57 @@
+//! Prints, as Markdown, what effects cost the rig's loop in real time: `scripts/effects-live`.
+#![allow(clippy::print_stdout)] // This is what it is for.
+
+use plant::effects::sheet::Switched;
+use system_tests::hidden::{Extreme, LIVELY, Live, drawn, everything, live};
+use system_tests::scene::Scene;
+
+/// Each slice, s.
+const SECONDS: u32 = 10;
+/// Slices of each kind, in turns; percentiles are those of the middle one.
+const ROUNDS: usize = 5;
+
+fn main() {
+    let kinds: [(&str, Vec<Switched>); 5] = [
+        ("none", Vec::new()),
+        ("piston-leakage", drawn_of("piston-leakage")),
+        ("ten, seed 7", drawn(7, 10)),
+        ("all 38 at all places, largest drawn", everything(Extreme::Drawn)),
+        ("all 38 at all places, ends of their ranges", everything(Extreme::Mixed)),
+    ];
+    let mut slices: Vec<Vec<Live>> = vec![Vec::new(); kinds.len()];
+    for _ in 0..ROUNDS {
+        for (slices, (_, effects)) in slices.iter_mut().zip(&kinds) {
+            slices.push(live(&Scene::new(LIVELY), effects, SECONDS));
+        }
+    }
+    println!(
+        "| effects | cycles | missed | own work longer than the period | step p50 / p99, us | sample and send p50 / p99, us | \
+         whole cycle p50 / p99, us |\n|---|---:|---:|---:|---:|---:|---:|"
+    );
+    for (slices, (name, _)) in slices.iter().zip(&kinds) {
+        let sum = |of: fn(&Live) -> u64| slices.iter().map(of).sum::<u64>();
+        let middle = |of: fn(&Live) -> u64| {
+            let mut values: Vec<u64> = slices.iter().map(of).collect();
+            values.sort_unstable();
+            values[values.len() / 2] as f64 / 1e3
+        };
+        println!(
+            "| {name} | {} | {} | {} | {:.1} / {:.1} | {:.1} / {:.1} | {:.1} / {:.1} |",
+            sum(|live| live.cycles),
+            sum(|live| live.missed),
+            sum(|live| live.overworked),
+            middle(|live| live.step_ns_p50),
+            middle(|live| live.step_ns_p99),
+            middle(|live| live.send_ns_p50),
+            middle(|live| live.send_ns_p99),
+            middle(|live| live.execution_ns_p50),
+            middle(|live| live.execution_ns_p99),
+        );
+    }
+}
+
+/// The first seed's draw of this effect alone.
+fn drawn_of(name: &str) -> Vec<Switched> {
+    let found = (0..).map(|seed| drawn(seed, 1)).find(|effects| effects[0].name == name);
+    found.expect("every effect comes up")
+}

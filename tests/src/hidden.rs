@@ -1,0 +1,181 @@
+//! Effects for whole-system tests: every one, some drawn, at the ends of their ranges; and an experiment in which each has work to do.
+
+use crate::launch::Pace;
+use crate::records::{Table, count, json};
+use crate::scene::Scene;
+use plant::Truth;
+use plant::effects::SHEETS;
+use plant::effects::draw::{Among, as_toml, draw};
+use plant::effects::sheet::{EffectKey, Sheet, Switched};
+use std::path::{Path, PathBuf};
+
+/// Period of the rig's loop.
+const PERIOD_NS: f64 = 1e6;
+/// Columns of truth.csv that are no terms.
+const STATES: [&str; Truth::COLUMNS.len()] = Truth::COLUMNS;
+
+/// Both axes linked and on their way together, then each for itself: to and fro, for `--repeat`. Nothing is judged.
+pub const LIVELY: &str = r#"title = "lively"
+[rig]
+carriage_position_m = 0.2
+linked = true
+[[rig.event]]
+at_s = 0.9
+do = "unlink"
+[run]
+settling_s = 0.0
+[drive]
+program = "program.toml"
+start_m = 0.2
+set-point = [
+    { law = "bestehorn", to_m = 0.3, duration_s = 0.4 },
+    { law = "bestehorn", to_m = 0.2, duration_s = 0.4 },
+]
+[load]
+program = "program.toml"
+start_m = 0.2
+set-point = [
+    { law = "bestehorn", to_m = 0.3, duration_s = 0.4 },
+    { law = "bestehorn", to_m = 0.2, duration_s = 0.4 },
+]
+"#;
+
+/// Which end of its range each number has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extreme {
+    /// Each the largest that a file may hold.
+    Most,
+    /// Each the smallest.
+    Least,
+    /// Now this, now that, from key to key and place to place.
+    Mixed,
+    /// The largest that is drawn: far, but of this world.
+    Drawn,
+}
+
+/// Every effect at each of its places, at the end of its range.
+#[must_use]
+pub fn everything(extreme: Extreme) -> Vec<Switched> {
+    let mut turn = false;
+    let mut number = |key: &EffectKey| {
+        turn = !turn;
+        match extreme {
+            Extreme::Most => key.max,
+            Extreme::Least => key.min,
+            Extreme::Mixed if turn => key.max,
+            Extreme::Mixed => key.min,
+            Extreme::Drawn => key.drawn[1],
+        }
+    };
+    let mut effects = Vec::new();
+    for sheet in SHEETS {
+        for place in sheet.place.places() {
+            let numbers = sheet.keys.iter().map(&mut number).collect();
+            effects.push(Switched { name: sheet.name, place: *place, numbers });
+        }
+    }
+    effects
+}
+
+/// Each effect once: at the largest number that is drawn of its amplitude, its other keys at their defaults.
+#[must_use]
+pub fn each_alone() -> Vec<Switched> {
+    let alone = |sheet: &Sheet| Switched {
+        name: sheet.name,
+        place: sheet.place.places()[0],
+        numbers: sheet
+            .keys
+            .iter()
+            .enumerate()
+            .map(|(i, key)| key.default.filter(|_| i > 0).unwrap_or(key.drawn[1]))
+            .collect(),
+    };
+    SHEETS.iter().map(alone).collect()
+}
+
+/// So many different effects, drawn from this seed.
+///
+/// # Panics
+/// When there are not so many.
+#[must_use]
+pub fn drawn(seed: u64, count: usize) -> Vec<Switched> {
+    draw(seed, count, Among::Both).expect("the catalogue has so many")
+}
+
+/// The shipped rig file with these effects, as `rig-effects.toml` of the scene.
+pub fn rig_with(scene: &Scene, effects: &[Switched]) -> PathBuf {
+    let rig = std::fs::read_to_string(scene.path("rig.toml")).expect("the rig file is there");
+    scene.write("rig-effects.toml", &format!("{rig}\n{}", as_toml(effects)))
+}
+
+/// What a run of both programs in real time showed of the rig's loop.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Live {
+    /// Cycles in all.
+    pub cycles: u64,
+    /// Cycles computed late and not sent.
+    pub missed: u64,
+    /// Cycles whose own work, without the time that another thread had the CPU, was longer than the period.
+    pub overworked: u64,
+    /// Stage that computes: the step of the plant, its truth and its terms.
+    pub step_ns_p50: u64,
+    /// The same.
+    pub step_ns_p99: u64,
+    /// Stage that samples the sensors and sends.
+    pub send_ns_p50: u64,
+    /// The same.
+    pub send_ns_p99: u64,
+    /// Everything of a cycle.
+    pub execution_ns_p50: u64,
+    /// The same.
+    pub execution_ns_p99: u64,
+}
+
+/// Runs emulator and controllers in real time with these effects; the run lies in the folder `run` of the scene.
+///
+/// # Panics
+/// When a program does not end well, or a file is not as it must be.
+#[must_use]
+pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> Live {
+    let rig = rig_with(scene, effects);
+    let folder = scene.path("run");
+    let options = format!("--seconds {seconds} --full-timing --no-flight");
+    let emulator = scene.emulator(Pace::Real).rig(&rig).out(&folder).with(&options).start();
+    let controller = scene.controller(Pace::Real).out(&folder).with("--repeat").start();
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
+    let summary = json(&folder.join("summary.json"));
+    let figure = |name: &str| count(&summary, name);
+    let rows = Table::read(&folder.join("emulator-timing.csv"));
+    let [woke, done, others] = ["woke_ns", "done_ns", "run_delay_ns"].map(|column| rows.column(column));
+    // The first second touches memory for the first time.
+    let work_ns = (1000..rows.len()).map(|row| done[row] - woke[row] - others[row]);
+    Live {
+        cycles: figure("/cycles"),
+        missed: figure("/skipped"),
+        overworked: work_ns.filter(|ns| *ns > PERIOD_NS).count() as u64,
+        step_ns_p50: figure("/step_ns/p50"),
+        step_ns_p99: figure("/step_ns/p99"),
+        send_ns_p50: figure("/send_ns/p50"),
+        send_ns_p99: figure("/send_ns/p99"),
+        execution_ns_p50: figure("/execution_ns/p50"),
+        execution_ns_p99: figure("/execution_ns/p99"),
+    }
+}
+
+/// Holds that everything in a truth.csv is finite and every pressure positive, from the first row to the last.
+///
+/// # Panics
+/// With the column and row that is not.
+pub fn expect_physical(truth: &Path) {
+    let table = Table::read(truth);
+    assert!(table.len() > 100, "{}: {} rows", truth.display(), table.len());
+    for name in table.names() {
+        // Terms may have either sign; states that are pressures may not.
+        let pressure = STATES.contains(&name.as_str()) && name.contains("_pressure_");
+        for (row, value) in table.column(name).iter().enumerate() {
+            let good = value.is_finite() && (!pressure || *value > 0.0);
+            assert!(good, "{}: {name} = {value} in row {row}", truth.display());
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! The study: judges a program that names missing effects, on records whose truth it never sees.
+//!
+//! ```text
+//! seed, shape ──► draws ──► records/ (what the program gets)          limits.json, classes.json: computed from the plant alone,
+//!                   │  └──► truth/   (what it never gets)             committed before any program is judged
+//!                   ▼                                                            │
+//!                 run: PROGRAM close … on copies in an empty folder ──► runs/ ───┴──► score: score.json and one page
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`draws`] | which effects, how strong, where, under which difficulties: a pure function of seed and shape |
+//! | [`folder`] | the files of a study's folder; each is whole or absent |
+//! | [`program`] | one start of the program under study: time limit, wall time, memory |
+//! | [`campaign`] | all draws that are not done yet, several at once |
+//! | [`report`] | `report.json`, read as strictly as it is promised |
+//! | [`judge`] | one case: what was hidden against what was named |
+//! | [`interval`] | what so many of so many prove |
+//! | [`score`] | all cases: rates, confusion matrix, parameters, time |
+//! | [`page`] | the score as one page |
+//! | [`course`], [`signature`] | true states of a record; what an effect changes in windows that start from them |
+//! | [`limits`] | amplitude from which an ideal observer sees an effect |
+//! | [`classes`] | which effects leave the same signature in a record |
+//! | [`compute`] | both, for all places and draws |
+//! | [`document`] | both as tables of a page |
+//!
+//! The commands: `scripts/study --help`; what they found: `tests/docs/study.md`.
+
+pub mod campaign;
+pub mod classes;
+pub mod compute;
+pub mod course;
+pub mod document;
+pub mod draws;
+pub mod folder;
+pub mod interval;
+pub mod judge;
+pub mod limits;
+pub mod page;
+pub mod program;
+pub mod report;
+pub mod score;
+pub mod signature;
+
+/// Version of every JSON file of the study.
+pub const SCHEMA_VERSION: u32 = 1;

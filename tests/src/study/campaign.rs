@@ -1,0 +1,383 @@
+//! Runs what is missing: makes a draw's records, lets the program loose on copies, keeps what it wrote.
+//!
+//! Several draws at once; each is done when its folder has its name, so a study may be killed at any instant and is started again
+//! with the same command. A program that crashes, hangs or writes nonsense is a result. A disk that fills up is none: the
+//! study stops before it, since a report that found no room would tell nothing about the program.
+
+use crate::record_maker::{Experiment, Recipe};
+use crate::study::SCHEMA_VERSION;
+use crate::study::draws::Draw;
+use crate::study::folder::{FolderError, Study, make_whole, read};
+use crate::study::program::{Identity, Interrupted, Program, Taken};
+use plant::RigParameters;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::fs::{self, File};
+use std::io::{self, BufRead, BufReader};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Names of the folders of a draw's records.
+pub const EXPERIMENTS: [(Experiment, &str); 3] = [
+    (Experiment::Train, "train"),
+    (Experiment::HeldOut(0), "held-out-0"),
+    (Experiment::HeldOut(1), "held-out-1"),
+];
+
+/// Columns of measurement.csv [rig-model.md, Measurement file]; another one could tell what is hidden.
+const COLUMNS: [&str; 12] = [
+    "time_s",
+    "drive_valve",
+    "drive_position_m",
+    "drive_force_N",
+    "drive_pressure_a_Pa",
+    "drive_pressure_b_Pa",
+    "load_valve",
+    "load_position_m",
+    "load_force_N",
+    "load_pressure_a_Pa",
+    "load_pressure_b_Pa",
+    "supply_pressure_Pa",
+];
+
+/// Largest report that is kept.
+const LARGEST_REPORT: u64 = 64 << 20;
+/// Most that is kept of what a program says.
+const MOST_SAID: u64 = 1 << 20;
+
+/// Makes a record: measurement into the first folder, truth into the second; says why it cannot.
+pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
+
+/// Makes a record with the record maker.
+///
+/// # Errors
+/// What it says.
+pub fn make_record(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    measurement: &Path,
+    truth: &Path,
+) -> Result<(), String> {
+    crate::record_maker::make(recipe, rig, measurement, truth).map_err(|error| error.to_string())
+}
+
+/// How a campaign runs.
+pub struct Campaign<'a> {
+    /// Study and folder.
+    pub study: &'a Study,
+    /// The program under study; without one, only records are made.
+    pub program: Option<&'a Program>,
+    /// What its results are called.
+    pub label: &'a str,
+    /// Makes records.
+    pub make: Make<'a>,
+    /// Numbers of draws that are run again; nothing: all that are missing.
+    pub only: &'a [usize],
+    /// Draws that run at once.
+    pub jobs: usize,
+    /// Whether truth.csv is kept, 17 MB each.
+    pub keep_truth: bool,
+    /// Whether records are deleted once a program has seen them.
+    pub drop_records: bool,
+    /// Free space below which it stops, MiB.
+    pub least_free_mib: u64,
+    /// Set to stop.
+    pub stop: &'a AtomicBool,
+    /// Told a line for each draw.
+    pub say: &'a (dyn Fn(&str) + Sync),
+}
+
+/// How a campaign ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CampaignEnd {
+    /// All draws are done.
+    Complete,
+    /// It was told to stop; so many are missing.
+    Stopped(usize),
+}
+
+/// Why a campaign cannot go on; what is done stays.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// The study's own files.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file could not be copied or read.
+    #[error("draw {number}: {error}")]
+    Files {
+        /// Which draw.
+        number: usize,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// A record could not be made.
+    #[error("draw {number}: its record cannot be made: {reason}")]
+    Make {
+        /// Which draw.
+        number: usize,
+        /// What the maker says.
+        reason: String,
+    },
+    /// A record has a column that the measurement file does not have.
+    #[error(
+        "draw {number}: column '{column}' of its record is none of rig-model.md: it could tell what is hidden"
+    )]
+    Column {
+        /// Which draw.
+        number: usize,
+        /// Which column.
+        column: String,
+    },
+    /// The disk is nearly full.
+    #[error(
+        "{free_mib} MiB are left on the disk, {least_free_mib} are wanted: free some and start again, nothing is lost"
+    )]
+    Disk {
+        /// What is left.
+        free_mib: u64,
+        /// What is wanted.
+        least_free_mib: u64,
+    },
+}
+
+/// What a run leaves as `result.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunResult {
+    /// Of [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Number of the draw.
+    pub number: usize,
+    /// Which program.
+    pub program: Identity,
+    /// How it ended, time, memory.
+    pub taken: Taken,
+}
+
+impl Campaign<'_> {
+    /// Runs all draws that are not done.
+    ///
+    /// # Errors
+    /// [`CampaignError`] with the first draw that could not be run; those that ran at the same time are finished first.
+    pub fn run(&self) -> Result<CampaignEnd, CampaignError> {
+        let wanted = |draw: &&Draw| {
+            if self.only.is_empty() { !self.is_done(draw) } else { self.only.contains(&draw.number) }
+        };
+        let missing: Vec<&Draw> = self.study.draws.iter().filter(wanted).collect();
+        self.check_program()?;
+        let (all, began) = (self.study.draws.len(), Instant::now());
+        (self.say)(&format!("{} of {all} draws are to be done, {} at once", missing.len(), self.jobs));
+        let queue = Mutex::new(missing.iter());
+        let finished = Mutex::new(0);
+        let failed = Mutex::new(None);
+        let worker = || {
+            while !self.stop.load(Ordering::Relaxed) && failed.lock().expect("no holder panics").is_none() {
+                let Some(draw) = queue.lock().expect("no holder panics").next() else { return };
+                match self.one(draw) {
+                    Err(error) => *failed.lock().expect("no holder panics") = Some(error),
+                    Ok(None) => {}
+                    Ok(Some(told)) => {
+                        let mut finished = finished.lock().expect("no holder panics");
+                        *finished += 1;
+                        let left = time_left(began.elapsed(), *finished, missing.len());
+                        (self.say)(&format!(
+                            "{finished}/{} draw {}: {told}; {left} left",
+                            missing.len(),
+                            draw.number
+                        ));
+                    }
+                }
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..self.jobs.max(1) {
+                scope.spawn(worker);
+            }
+        });
+        if let Some(error) = failed.into_inner().expect("no holder panics") {
+            return Err(error);
+        }
+        match missing.len() - finished.into_inner().expect("no holder panics") {
+            0 => Ok(CampaignEnd::Complete),
+            left => Ok(CampaignEnd::Stopped(left)),
+        }
+    }
+
+    fn is_done(&self, draw: &Draw) -> bool {
+        match self.program {
+            Some(_) => self.study.run(self.label, draw.number).exists(),
+            None => self.study.records(draw.number).exists(),
+        }
+    }
+
+    /// Results of another program under the same label are never mixed with its own.
+    fn check_program(&self) -> Result<(), CampaignError> {
+        let Some(program) = self.program else { return Ok(()) };
+        for draw in self.study.draws.iter().filter(|draw| self.is_done(draw)) {
+            let path = self.study.run(self.label, draw.number).join("result.json");
+            let result = read_result(&path)?;
+            if result.program != *program.identity() {
+                let what = format!(
+                    "is of another program ({:?}) than this one ({:?}): give another --label",
+                    result.program,
+                    program.identity()
+                );
+                return Err(FolderError::content(&path, what).into());
+            }
+        }
+        Ok(())
+    }
+
+    /// One draw; `None` when the study was told to stop in its midst.
+    fn one(&self, draw: &Draw) -> Result<Option<String>, CampaignError> {
+        self.check_disk()?;
+        let began = Instant::now();
+        if !self.study.records(draw.number).exists() {
+            self.make_records(draw)?;
+        }
+        let made_s = began.elapsed().as_secs_f64();
+        let Some(program) = self.program else { return Ok(Some(format!("records {made_s:.1} s"))) };
+        let number = draw.number;
+        let ran = make_whole(&self.study.run(self.label, number), |folder| {
+            self.let_loose(draw, program, folder)
+                .map_err(CampaignEndOr::Error)?
+                .ok_or(CampaignEndOr::Interrupted)
+        });
+        let taken = match ran {
+            Ok(taken) => taken,
+            Err(CampaignEndOr::Interrupted) => return Ok(None),
+            Err(CampaignEndOr::Error(error)) => return Err(error),
+        };
+        if self.drop_records {
+            fs::remove_dir_all(self.study.records(number))
+                .map_err(|error| CampaignError::Files { number, error })?;
+        }
+        let Taken { ended, wall_s, memory_kib } = taken;
+        Ok(Some(format!("records {made_s:.1} s, program {ended:?} {wall_s:.1} s {} MiB", memory_kib >> 10)))
+    }
+
+    fn check_disk(&self) -> Result<(), CampaignError> {
+        // A system that does not tell is no reason to stop.
+        let Ok(told) = rustix::fs::statvfs(&self.study.root) else { return Ok(()) };
+        let free_mib = told.f_bavail.saturating_mul(told.f_frsize) >> 20;
+        let least_free_mib = self.least_free_mib;
+        if free_mib < least_free_mib { Err(CampaignError::Disk { free_mib, least_free_mib }) } else { Ok(()) }
+    }
+
+    /// The truth first: records without it would be of no use, the other way round they are made again.
+    fn make_records(&self, draw: &Draw) -> Result<(), CampaignError> {
+        let (number, rig) = (draw.number, RigParameters::baseline());
+        make_whole(&self.study.records(number), |records| {
+            make_whole(&self.study.truth(number), |truth| {
+                for (experiment, name) in EXPERIMENTS {
+                    let (record, truth) = (records.join(name), truth.join(name));
+                    let folders = fs::create_dir_all(&record).and_then(|()| fs::create_dir_all(&truth));
+                    folders.map_err(|error| CampaignError::Files { number, error })?;
+                    (self.make)(&draw.recipe(experiment), &rig, &record, &truth)
+                        .map_err(|reason| CampaignError::Make { number, reason })?;
+                    if !self.keep_truth {
+                        // It follows from the recipe.
+                        let _ = fs::remove_file(truth.join("truth.csv"));
+                    }
+                }
+                Ok(())
+            })
+        })
+    }
+
+    fn let_loose(
+        &self,
+        draw: &Draw,
+        program: &Program,
+        folder: &Path,
+    ) -> Result<Option<Taken>, CampaignError> {
+        let number = draw.number;
+        let files = |error| CampaignError::Files { number, error };
+        let empty = tempfile::tempdir().map_err(files)?;
+        let records = self.study.records(number);
+        let test = EXPERIMENTS
+            .iter()
+            .find(|(experiment, _)| *experiment == draw.test())
+            .map_or("train", |found| found.1);
+        fs::write(empty.path().join("rig.toml"), RigParameters::BASELINE_TOML).map_err(files)?;
+        for (name, copy) in [("train", "train.csv"), (test, "test.csv")] {
+            let record = records.join(name).join("measurement.csv");
+            if let Some(column) = foreign_column(&record).map_err(files)? {
+                return Err(CampaignError::Column { number, column });
+            }
+            fs::copy(record, empty.path().join(copy)).map_err(files)?;
+        }
+        let said = folder.join("stderr.txt");
+        let taken = match program.run(empty.path(), File::create(&said).map_err(files)?, self.stop) {
+            Ok(taken) => taken,
+            Err(Interrupted) => return Ok(None),
+        };
+        let told = fs::metadata(&said).map_err(files)?.len();
+        if told > MOST_SAID {
+            File::options()
+                .write(true)
+                .open(&said)
+                .and_then(|file| file.set_len(MOST_SAID))
+                .map_err(files)?;
+        }
+        let report = empty.path().join("out/report.json");
+        // What cannot be copied was not written, or is no file: the judge says so.
+        if fs::metadata(&report).is_ok_and(|report| report.is_file() && report.len() <= LARGEST_REPORT) {
+            fs::copy(&report, folder.join("report.json")).map_err(files)?;
+        }
+        let result =
+            RunResult { schema_version: SCHEMA_VERSION, number, program: program.identity().clone(), taken };
+        fs::write(folder.join("result.json"), format!("{:#}\n", json!(result))).map_err(files)?;
+        Ok(Some(taken))
+    }
+}
+
+/// Why a run's folder is not finished.
+enum CampaignEndOr {
+    Interrupted,
+    Error(CampaignError),
+}
+
+impl From<FolderError> for CampaignEndOr {
+    fn from(error: FolderError) -> Self {
+        CampaignEndOr::Error(error.into())
+    }
+}
+
+/// The result of a run.
+///
+/// # Errors
+/// [`FolderError`] when it is none of this version.
+pub fn read_result(path: &Path) -> Result<RunResult, FolderError> {
+    serde_json::from_str::<RunResult>(&read(path)?)
+        .map_err(|error| error.to_string())
+        .and_then(|result| {
+            let good = result.schema_version == SCHEMA_VERSION;
+            if good { Ok(result) } else { Err(format!("schema version {}", result.schema_version)) }
+        })
+        .map_err(|what| FolderError::content(path, format!("is no result of this version: {what}")))
+}
+
+/// A column of a record that a blind record does not have.
+fn foreign_column(record: &Path) -> io::Result<Option<String>> {
+    let mut lines = BufReader::new(File::open(record)?).lines();
+    let head = loop {
+        match lines.next().transpose()? {
+            Some(line) if line.starts_with("# linked=") => {}
+            line => break line.unwrap_or_default(),
+        }
+    };
+    let mut columns = head.split(',').map(str::trim);
+    Ok(columns.find(|column| !COLUMNS.contains(column)).map(str::to_owned))
+}
+
+/// Time left in words, as the draws so far took.
+fn time_left(passed: Duration, finished: usize, all: usize) -> String {
+    let left_s = passed.as_secs_f64() / finished as f64 * (all - finished) as f64;
+    if left_s < 90.0 { format!("{left_s:.0} s") } else { format!("{:.0} min", left_s / 60.0) }
+}
+
+#[cfg(test)]
+mod tests;

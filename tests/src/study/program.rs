@@ -1,0 +1,210 @@
+//! One start of the program under study: its command line, its limits, and how it ended.
+//!
+//! The program runs in a process group of its own in a folder that holds nothing but `rig.toml`, `train.csv` and `test.csv`:
+//!
+//! ```text
+//! PROGRAM close --rig rig.toml --train train.csv --test test.csv --out out [ARGUMENTS]
+//! ```
+//!
+//! When it has ended, or has used up its time, what is left of the group is killed. Memory is the kernel's largest resident set of
+//! the program and of the children it waited for; the kernel starts counting at what the study itself had at the time.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use rustix::process::{Pid, Signal, kill_process_group};
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File};
+use std::io;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::{Duration, Instant};
+use wait4::Wait4;
+
+/// How often a running program is looked at.
+const POLL: Duration = Duration::from_millis(20);
+
+/// The program under study.
+#[derive(Debug, Clone)]
+pub struct Program {
+    /// The executable, absolute.
+    pub path: PathBuf,
+    /// More arguments for it.
+    pub arguments: Vec<String>,
+    /// Longest time it may take.
+    pub limit: Duration,
+    identity: Identity,
+}
+
+/// Which program it was: results of different ones are never mixed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// File name of the executable.
+    pub name: String,
+    /// CRC-32 of its bytes.
+    pub crc32: u32,
+    /// More arguments it got.
+    pub arguments: Vec<String>,
+}
+
+/// How a program ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ended {
+    /// By itself, with this code.
+    Exited(i32),
+    /// By this signal.
+    Signalled(i32),
+    /// It was killed at its time limit.
+    TimedOut,
+    /// The system did not start it.
+    NotStarted,
+}
+
+/// What one start took.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Taken {
+    /// How it ended.
+    pub ended: Ended,
+    /// Wall time, s.
+    pub wall_s: f64,
+    /// Largest resident set, KiB.
+    pub memory_kib: u64,
+}
+
+/// The study was told to stop while the program ran; it was killed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Interrupted;
+
+impl Program {
+    /// A program that exists.
+    ///
+    /// # Errors
+    /// What the system says of its file.
+    pub fn new(path: &Path, arguments: Vec<String>, limit: Duration) -> io::Result<Self> {
+        let path = path.canonicalize()?;
+        let crc32 = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&fs::read(&path)?);
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let identity = Identity { name, crc32, arguments: arguments.clone() };
+        Ok(Program { path, arguments, limit, identity })
+    }
+
+    /// Which program it is.
+    #[must_use]
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// Runs it in a folder; what it says goes to a file.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when `stop` is set before it has ended.
+    pub fn run(&self, folder: &Path, said: File, stop: &AtomicBool) -> Result<Taken, Interrupted> {
+        let began = Instant::now();
+        let taken = |ended, memory_kib| Taken { ended, wall_s: began.elapsed().as_secs_f64(), memory_kib };
+        let started = Command::new(&self.path)
+            .args([
+                "close",
+                "--rig",
+                "rig.toml",
+                "--train",
+                "train.csv",
+                "--test",
+                "test.csv",
+                "--out",
+                "out",
+            ])
+            .args(&self.arguments)
+            .current_dir(folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(said)
+            .process_group(0)
+            .spawn();
+        let Ok(child) = started else { return Ok(taken(Ended::NotStarted, 0)) };
+        let group = Pid::from_child(&child);
+        let kill = || {
+            // Nobody left to kill is what is wanted.
+            let _ = kill_process_group(group, Signal::KILL);
+        };
+        let (tell, told) = mpsc::channel();
+        let waiter = std::thread::spawn(move || tell.send(child.wait4()));
+        let mut end = None;
+        let used = loop {
+            match told.recv_timeout(POLL) {
+                Ok(used) => break used.ok(),
+                Err(RecvTimeoutError::Disconnected) => break None,
+                Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
+                    end = Some(Err(Interrupted));
+                    kill();
+                }
+                Err(RecvTimeoutError::Timeout) if began.elapsed() > self.limit && end.is_none() => {
+                    end = Some(Ok(Ended::TimedOut));
+                    kill();
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+        };
+        kill();
+        let _ = waiter.join();
+        let memory_kib = used.map_or(0, |used| used.rusage.maxrss >> 10);
+        let ended = end.unwrap_or_else(|| Ok(used.map_or(Ended::NotStarted, |used| how(used.status))))?;
+        Ok(taken(ended, memory_kib))
+    }
+}
+
+fn how(status: ExitStatus) -> Ended {
+    status.code().map_or_else(|| Ended::Signalled(status.signal().unwrap_or(0)), Ended::Exited)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn script(folder: &Path, text: &str, limit: Duration) -> Program {
+        let path = folder.join("program");
+        fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        Program::new(&path, vec![], limit).unwrap()
+    }
+
+    fn run(text: &str, limit: Duration, stop: bool) -> Result<Taken, Interrupted> {
+        let folder = tempfile::tempdir().unwrap();
+        let program = script(folder.path(), text, limit);
+        let said = File::create(folder.path().join("said")).unwrap();
+        program.run(folder.path(), said, &AtomicBool::new(stop))
+    }
+
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    #[test]
+    fn a_program_ends_by_itself_by_a_signal_or_at_its_limit() {
+        assert_eq!(run("exit 3", PATIENCE, false).unwrap().ended, Ended::Exited(3));
+        assert_eq!(run("kill -SEGV $$", PATIENCE, false).unwrap().ended, Ended::Signalled(11));
+        let hung = run("sleep 1000 & sleep 1000", Duration::from_millis(50), false).unwrap();
+        assert_eq!(hung.ended, Ended::TimedOut);
+        assert!(hung.wall_s < 60.0, "{hung:?}");
+    }
+
+    #[test]
+    fn a_study_that_is_told_to_stop_kills_its_program() {
+        assert_eq!(run("sleep 1000", PATIENCE, true), Err(Interrupted));
+    }
+
+    #[test]
+    fn memory_is_that_of_the_program() {
+        // The shell alone is larger than nothing; what the study had is the least the kernel tells.
+        assert!(run("true", PATIENCE, false).unwrap().memory_kib > 100);
+    }
+
+    #[test]
+    fn another_executable_is_another_program() {
+        let folder = tempfile::tempdir().unwrap();
+        let one = script(folder.path(), "exit 0", PATIENCE).identity().clone();
+        let two = script(folder.path(), "exit 1", PATIENCE).identity().clone();
+        assert_ne!(one, two);
+    }
+}

@@ -1,0 +1,221 @@
+//! `report.json` of a program under study, read as strictly as it is promised.
+//!
+//! What cannot be read is a result like any other: the program wrote no good report. So is a name that the catalogue does not
+//! have, a place that the effect cannot be at, a number that is none, a verdict that its own list contradicts. Fields that the
+//! study does not judge are not looked at.
+//!
+//! Source: the schema in issue 6, Output.
+
+use plant::effects::sheet::{Place, Sheet};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// What a program says in the end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nothing is missing.
+    NothingMissing,
+    /// Only numbers of the baseline are off.
+    ParametersOnly,
+    /// Effects are missing, and these are they.
+    Named,
+    /// Effects are missing, and several explain the record alike.
+    Ambiguous,
+    /// Something is missing that the catalogue does not have.
+    OutsideCatalogue,
+    /// The record cannot be used.
+    BadData,
+}
+
+/// A good report.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What is missing, the best first.
+    pub named: Vec<Named>,
+    /// Numbers of the baseline that were off.
+    pub parameters: Vec<Parameter>,
+    /// The gap to the measurement, for each signal.
+    pub gap: BTreeMap<String, Gap>,
+}
+
+/// An effect at a place.
+#[derive(Debug, Clone)]
+pub struct Named {
+    /// Its sheet.
+    pub sheet: &'static Sheet,
+    /// Where it is.
+    pub place: Place,
+    /// Its numbers.
+    pub parameters: Vec<Parameter>,
+    /// What explains the record as well.
+    pub alternatives: Vec<Named>,
+}
+
+/// A number with its error.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Parameter {
+    /// Key of the effect's sheet, or name of a parameter of the baseline.
+    pub name: String,
+    /// In its unit.
+    pub value: f64,
+    /// The unit.
+    pub unit: String,
+    /// Its standard error, in its unit; some programs have none.
+    #[serde(rename = "standard_error")]
+    pub error_value: Option<f64>,
+}
+
+/// The gap of one signal; all in one unit, which is the program's choice.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Gap {
+    /// Share of the gap to the noise floor that was closed, as the program claims.
+    #[serde(rename = "closed")]
+    pub closed_ratio: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct RawReport {
+    verdict: Verdict,
+    #[serde(default)]
+    named: Vec<RawNamed>,
+    #[serde(default)]
+    parameters: Vec<Parameter>,
+    #[serde(default)]
+    gap: Option<BTreeMap<String, Gap>>,
+}
+
+#[derive(Deserialize)]
+struct RawNamed {
+    effect: String,
+    #[serde(rename = "where")]
+    place: RawPlace,
+    #[serde(default)]
+    parameters: Vec<Parameter>,
+    #[serde(default)]
+    alternatives: Vec<RawNamed>,
+}
+
+#[derive(Deserialize)]
+struct RawPlace {
+    axis: String,
+    element: Option<String>,
+}
+
+/// Reads a report; says what is wrong with it.
+///
+/// # Errors
+/// A sentence for the list of errors.
+pub fn read(path: &Path) -> Result<Report, String> {
+    let bytes = fs::read(path).map_err(|_| "wrote no report.json".to_owned())?;
+    parse(&bytes)
+}
+
+/// Reads the text of a report.
+///
+/// # Errors
+/// A sentence for the list of errors.
+pub fn parse(bytes: &[u8]) -> Result<Report, String> {
+    let raw: RawReport = serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
+    let named = raw.named.into_iter().map(known).collect::<Result<Vec<_>, _>>()?;
+    let says_names = matches!(raw.verdict, Verdict::Named | Verdict::Ambiguous);
+    if says_names && named.is_empty() {
+        return Err(format!("verdict {:?} without a name", raw.verdict));
+    }
+    let says_none =
+        matches!(raw.verdict, Verdict::NothingMissing | Verdict::ParametersOnly | Verdict::BadData);
+    if says_none && !named.is_empty() {
+        return Err(format!("verdict {:?} with names", raw.verdict));
+    }
+    if raw.verdict == Verdict::ParametersOnly && raw.parameters.is_empty() {
+        return Err("verdict ParametersOnly without a parameter".to_owned());
+    }
+    let gap = raw.gap.unwrap_or_default();
+    Ok(Report { verdict: raw.verdict, named, parameters: raw.parameters, gap })
+}
+
+fn known(raw: RawNamed) -> Result<Named, String> {
+    let sheet = plant::effects::sheet(&raw.effect)
+        .ok_or_else(|| format!("names '{}', which is not in the catalogue", raw.effect))?;
+    let place = match &raw.place.element {
+        Some(element) => format!("{}.{element}", raw.place.axis),
+        None => raw.place.axis.clone(),
+    };
+    let place = sheet.place_named(&place).ok_or_else(|| format!("{} cannot be at '{place}'", sheet.name))?;
+    let alternatives = raw.alternatives.into_iter().map(known).collect::<Result<_, _>>()?;
+    Ok(Named { sheet, place, parameters: raw.parameters, alternatives })
+}
+
+impl Report {
+    /// Smallest share of the gap that the program claims to have closed, over the signals it tells one for.
+    #[must_use]
+    pub fn claimed_closed(&self) -> Option<f64> {
+        self.gap.values().filter_map(|gap| gap.closed_ratio).reduce(f64::min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(entry: &str) -> String {
+        format!(r#"{{"schema_version": 1, "verdict": "named", "named": [{entry}], "next": null}}"#)
+    }
+
+    #[test]
+    fn a_good_report_is_read() {
+        let entry = r#"{"effect": "rod-leakage", "where": {"axis": "drive", "element": "b"},
+            "parameters": [{"name": "leakage_nl_per_min", "value": 2.5, "unit": "Nl/min", "standard_error": 0.1}],
+            "share_explained": 0.9,
+            "alternatives": [{"effect": "valve-offset", "where": {"axis": "drive", "element": null}}]}"#;
+        let report = parse(named(entry).as_bytes()).unwrap();
+        assert_eq!(report.verdict, Verdict::Named);
+        assert_eq!(report.named[0].sheet.name, "rod-leakage");
+        assert_eq!(report.named[0].place.to_string(), "drive.b");
+        assert_eq!(report.named[0].parameters[0].value, 2.5);
+        assert_eq!(report.named[0].alternatives[0].sheet.name, "valve-offset");
+    }
+
+    #[test]
+    fn what_is_no_report_says_why() {
+        let entry = |effect, axis, element| {
+            named(&format!(
+                r#"{{"effect": "{effect}", "where": {{"axis": "{axis}", "element": {element}}}}}"#
+            ))
+        };
+        let nan = named(
+            r#"{"effect": "inclination", "where": {"axis": "drive", "element": null},
+            "parameters": [{"name": "force_n", "value": NaN, "unit": "N", "standard_error": 1}]}"#,
+        );
+        for (text, reason) in [
+            ("", "EOF"),
+            ("{\"verdict\": \"named\", \"named\": [", "EOF"),
+            (r#"{"verdict": "perhaps"}"#, "perhaps"),
+            (r#"{"named": []}"#, "verdict"),
+            (&named(""), "without a name"),
+            (r#"{"verdict": "parameters-only"}"#, "without a parameter"),
+            (&entry("phlogiston", "drive", "null"), "phlogiston"),
+            (&entry("inclination", "drive", "\"a\""), "cannot be at 'drive.a'"),
+            (&entry("rod-leakage", "nowhere", "\"a\""), "cannot be at"),
+            (
+                &entry("inclination", "drive", "null").replace("\"named\",", "\"nothing-missing\","),
+                "with names",
+            ),
+            (&nan, "report.json"),
+        ] {
+            let error = parse(text.as_bytes()).unwrap_err();
+            assert!(error.contains(reason), "'{error}' does not tell '{reason}'");
+        }
+    }
+
+    #[test]
+    fn the_claim_is_the_worst_signal() {
+        let text = r#"{"verdict": "nothing-missing", "gap": {"p": {"before": 3, "after": 1, "floor": 1, "closed": 1.0},
+            "x": {"before": 2, "after": 1.5, "floor": 1, "closed": 0.5}, "f": {"closed": null}}}"#;
+        assert_eq!(parse(text.as_bytes()).unwrap().claimed_closed(), Some(0.5));
+    }
+}

@@ -1,0 +1,161 @@
+//! Studies put together by hand: what is counted where, and which shards go together.
+
+use super::*;
+use crate::study::folder::{Plan, make_whole};
+use crate::study::program::{Ended, Taken};
+use serde_json::json;
+use std::fs;
+use std::path::Path;
+
+const SHAPE: Shape = Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, noise_factor: 1.0 };
+
+fn identity(name: &str) -> Identity {
+    Identity { name: name.to_owned(), crc32: 7, arguments: vec![] }
+}
+
+/// A study whose program always tells the truth.
+fn study(root: &Path, shard: &str, program: &str) -> Study {
+    let plan = Plan { shard: shard.parse().unwrap(), ..Plan::new(3, SHAPE) };
+    let study = Study::begin(root, &plan).unwrap();
+    for draw in &study.draws {
+        let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
+        let result = RunResult { schema_version: 1, number: draw.number, program: identity(program), taken };
+        make_whole(&study.run("truth", draw.number), |folder| {
+            fs::write(folder.join("result.json"), json!(result).to_string()).unwrap();
+            fs::write(folder.join("report.json"), truth_of(draw).to_string()).unwrap();
+            Ok::<_, FolderError>(())
+        })
+        .unwrap();
+    }
+    study
+}
+
+fn truth_of(draw: &Draw) -> Value {
+    let named: Vec<_> = draw
+        .recipe
+        .hidden
+        .iter()
+        .map(|hidden| {
+            let sheet = plant::effects::sheet(hidden.name).unwrap();
+            let parameters: Vec<_> = sheet
+                .keys
+                .iter()
+                .zip(&hidden.numbers)
+                .map(|(key, number)| {
+                    json!({"name": key.name, "value": number, "unit": key.unit.name(), "standard_error": number.abs() / 10.0})
+                })
+                .collect();
+            let place = hidden.place.to_string();
+            let (axis, element) = place.split_once('.').map_or((place.as_str(), None), |(axis, element)| (axis, Some(element)));
+            json!({"effect": hidden.name, "where": {"axis": axis, "element": element}, "parameters": parameters})
+        })
+        .collect();
+    let parameters: Vec<_> = draw
+        .recipe
+        .wrong_parameters
+        .iter()
+        .map(|(name, factor)| json!({"name": name, "value": factor, "unit": "", "standard_error": 0.01}))
+        .collect();
+    let verdict = match (named.is_empty(), parameters.is_empty()) {
+        (false, _) => "named",
+        (true, false) => "parameters-only",
+        (true, true) => "nothing-missing",
+    };
+    json!({"schema_version": 1, "verdict": verdict, "named": named, "parameters": parameters,
+        "gap": {"p": {"before": 4.0, "after": 1.0, "floor": 1.0, "closed": 1.0}}})
+}
+
+const UNKNOWN: Known<'_> = Known { limits: None, classes: None };
+
+#[test]
+fn whoever_tells_the_truth_has_all_points() {
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path(), "0/1", "oracle");
+    let score = score(&[folder.path().to_owned()], "truth", UNKNOWN).unwrap();
+    assert_eq!(score.cases.len(), 38 + 2 + 4 + 1 + 1);
+    assert_eq!(score.without_classes, 40);
+    let all = &score.tables.splits[0];
+    for rate in [all.class_right, all.top, all.alone, all.where_right] {
+        assert_eq!((rate.count, rate.of), (38, 38));
+    }
+    let rate =
+        |name: &str| score.tables.headline.iter().find(|line| line.name.starts_with(name)).unwrap().rate;
+    assert_eq!((rate("nothing hidden").count, rate("nothing hidden").of), (0, 2));
+    assert_eq!(rate("a parameter off: reported").count, 4);
+    assert_eq!(rate("no good report").count, 0);
+    let foreign = score.cases.iter().filter(|case| case.kind == Kind::Single && case.foreign_form).count();
+    assert_eq!(score.tables.numbers.covered.count, 38 - foreign);
+    // Reading JSON may round the last digit.
+    assert!(score.tables.numbers.off_ratio.quantiles.unwrap()[3] < 1e-15);
+    assert_eq!(score.tables.claimed_closed_ratio.quantiles.unwrap()[0], 1.0);
+    assert_eq!(score.tables.confusion[3].called[&score.tables.confusion[3].truth], [1, 1, 1]);
+
+    let page = crate::study::page::page(&score);
+    for part in ["oracle", "scripts/study run", "color-mix", "valve-hysteresis", "claimed"] {
+        assert!(page.contains(part), "{part}");
+    }
+    // Nothing from elsewhere.
+    assert!(!page.contains("http") && !page.contains("src="));
+    json!(score);
+}
+
+#[test]
+fn amplitudes_stand_in_the_bin_of_their_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = study(folder.path(), "0/1", "oracle");
+    let draw = study.draws.iter().find(|draw| draw.recipe.hidden[0].name == "inclination").unwrap();
+    let hidden = &draw.recipe.hidden[0];
+    let limits = |limit_value| Limits {
+        schema_version: 1,
+        window_ms: 100,
+        seed: 1,
+        limits: vec![crate::study::limits::Limit {
+            effect: "inclination".to_owned(),
+            place: hidden.place.to_string(),
+            key: "force_n".to_owned(),
+            unit: "N".to_owned(),
+            side: None,
+            limit_value,
+            strength: 1.0,
+            excited: limit_value.is_some(),
+        }],
+    };
+    let over = |limit| {
+        let limits = limits(limit);
+        let known = Known { limits: Some(&limits), classes: None };
+        let score = score(&[folder.path().to_owned()], "truth", known).unwrap();
+        score.cases[draw.number].over_limit[0]
+    };
+    let ratio = over(Some(hidden.numbers[0].abs() / 5.0)).unwrap();
+    assert!((ratio - 5.0).abs() < 1e-12, "{ratio}");
+    // Not excited by any amplitude: below every limit.
+    assert_eq!(over(None), Some(0.0));
+}
+
+#[test]
+fn shards_are_scored_together_when_each_is_there_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let shard = |name: &str, shard: &str, program: &str| {
+        let root = folder.path().join(name);
+        study(&root, shard, program);
+        root
+    };
+    let [a, b, c] = [shard("a", "0/3", "p"), shard("b", "1/3", "p"), shard("c", "2/3", "p")];
+    let again = shard("again", "1/3", "p");
+    let other = shard("other", "1/2", "p");
+    let foreign = shard("foreign", "2/3", "q");
+    let of = |folders: &[&PathBuf]| {
+        let folders: Vec<PathBuf> = folders.iter().map(|folder| (*folder).clone()).collect();
+        score(&folders, "truth", UNKNOWN)
+    };
+    let whole = of(&[&c, &a, &b]).unwrap();
+    assert!(whole.cases.iter().enumerate().all(|(at, case)| case.number == at));
+    assert_eq!(whole.tables.splits[0].top.count, 38);
+    assert!(matches!(of(&[&a, &b]), Err(ScoreError::MissingShards { parts: 3, .. })));
+    assert!(matches!(of(&[&a, &b, &again]), Err(ScoreError::Doubled { .. })));
+    assert!(matches!(of(&[&a, &other, &c]), Err(ScoreError::Mixed { .. })));
+    assert!(matches!(of(&[&a, &b, &foreign]), Err(ScoreError::Programs { .. })));
+    assert!(matches!(of(&[]), Err(ScoreError::Nothing)));
+    fs::remove_dir_all(b.join("runs/truth/0001")).unwrap();
+    assert!(matches!(of(&[&a, &b, &c]), Err(ScoreError::MissingRuns { count: 1, first: 1, .. })));
+}
