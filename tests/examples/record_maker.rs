@@ -1,4 +1,4 @@
-//! Makes one record of the study by hand: `record_maker make --effect piston-leakage --place drive --value 2.5 --out A --truth B`.
+//! Makes one record of the study by hand, and the tables of docs/record-maker.md; without arguments it says how.
 #![allow(clippy::print_stdout)] // This is what it is for.
 
 use plant::effects::SHEETS;
@@ -15,7 +15,8 @@ const USAGE: &str =
 record_maker list
 record_maker compare
 record_maker forms
-record_maker steps";
+record_maker steps
+record_maker agree";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -32,8 +33,37 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("compare") => compare(),
         Some("forms") => forms(),
         Some("steps") => steps(),
+        Some("agree") => agree(),
         _ => Err(USAGE.into()),
     }
+}
+
+/// Each effect in the record maker against the same effect in the plant, as Markdown: a free run of 6 s, in units of the noise.
+fn agree() -> Result<(), Box<dyn Error>> {
+    const ROWS_COMPARED: usize = 6000;
+    let rig = RigParameters::baseline();
+    println!("| effect | end | without it: x, F, p_a, p_b | with it |\n|---|---|---|---|");
+    for sheet in SHEETS {
+        for end in [0, 1] {
+            let place = sheet.place.places()[0];
+            let both_axes = sheet.name.starts_with("coupling");
+            let numbers: Vec<f64> = sheet.keys.iter().map(|key| key.drawn[end]).collect();
+            let keys: Vec<_> =
+                sheet.keys.iter().zip(&numbers).map(|(key, number)| (key.name, *number)).collect();
+            let with_it = rig.with_effect(sheet.name, &place.to_string(), &keys)?;
+            let hidden = vec![Hidden { name: sheet.name, place, numbers }];
+            let record = simulate(&Recipe { hidden, both_axes, ..Recipe::default() }, &rig)?;
+            let cells = [&rig, &with_it].map(|rig| {
+                let rms = comparison::with_effects(&record, rig, ROWS_COMPARED);
+                rms.map_or_else(
+                    |error| error.to_string(),
+                    |rms| rms[0].map(|rms| format!("{rms:.2}")).join(", "),
+                )
+            });
+            println!("| {} | {end} | {} | {} |", sheet.name, cells[0], cells[1]);
+        }
+    }
+    Ok(())
 }
 
 /// What halving the step changes, as Markdown.
@@ -57,7 +87,7 @@ fn forms() -> Result<(), Box<dyn Error>> {
     let rig = RigParameters::baseline();
     let null = [false, true]
         .map(|both_axes| simulate(&Recipe { both_axes, ..Recipe::default() }, &rig).expect("null"));
-    println!("| effect | end | catalogue | foreign | cosine |");
+    println!("| effect | end | catalogue | foreign | cosine |\n|---|---|---|---|---|");
     for sheet in SHEETS {
         for end in [0, 1] {
             let place = sheet.place.places()[0];
@@ -90,7 +120,7 @@ fn forms() -> Result<(), Box<dyn Error>> {
                     );
                 }
                 (made, foreign) => {
-                    println!("| {} | {end} | {:?} | {:?}", sheet.name, made.err(), foreign.err())
+                    println!("| {} | {end} | {:?} | {:?} |", sheet.name, made.err(), foreign.err())
                 }
             }
         }
@@ -114,12 +144,12 @@ fn compare() -> Result<(), Box<dyn Error>> {
                     let difference = &windows[axis.index()][signal];
                     let [half, most, nearly, worst] =
                         [50.0, 90.0, 99.0, 100.0].map(|p| difference.percentile(p));
+                    let [left_out, all] = difference.left_out;
                     println!(
-                        "| {linked}{} {experiment:?} | {name} | {:.3} | {half:.4} | {most:.3} | {nearly:.3} | {worst:.2} | {} of {} | {:.2} |",
+                        "| {linked}{} {experiment:?} | {name} | {:.3} | {half:.4} | {most:.3} | {nearly:.3} | {worst:.2} | \
+                         {left_out} of {all} | {:.2} |",
                         axis.name(),
                         difference.rms(),
-                        difference.left_out[0],
-                        difference.left_out[1],
                         free[axis.index()][signal].rms(),
                     );
                 }

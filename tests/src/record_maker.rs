@@ -7,8 +7,9 @@
 //! ```
 //!
 //! The one who names the effect must not be helped by the one who hides it: integrator, step, friction, random numbers and (on
-//! demand) the laws' own forms are other ones than the plant's. Of `plant` it takes the nominal numbers, the data sheets of the
-//! effects and the types of tables and scenes. What it is and how far its null record lies from the plant: `docs/record-maker.md`.
+//! demand) the laws' own forms are other ones than the plant's. Of `plant` it takes the nominal numbers, the data sheets of
+//! the effects and the types of tables and scenes. What it is, and how far its null record lies from the plant:
+//! `docs/record-maker.md`.
 //!
 //! | file | holds |
 //! |---|---|

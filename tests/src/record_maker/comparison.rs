@@ -5,13 +5,13 @@
 //!   free run  plant set once, at the first row                                              the same, for information
 //! ```
 //!
-//! As rig-model.md has it (Accuracy), single samples of the force at stick and contact events are left out of its figure: those in
-//! which one of both holds the piston and the other does not, or in which the piston was caught or let go since the last one, or
-//! the contact made or lost. They are counted.
+//! As rig-model.md has it (Accuracy), single samples of the force at stick and contact events are left out of its figure: those
+//! in which one of both holds the piston and the other does not, or before which the piston was caught or let go, or the contact
+//! made or lost. They are counted.
 
 use super::closed_loop::{replay_windows, run};
 use super::{MakeError, Recipe, Record, Row};
-use plant::{Inputs, Plant, RigParameters, Setup, SetupError, State};
+use plant::{Inputs, Plant, RigParameters, Sensors, Setup, SetupError, State};
 
 /// Length of a window, rows.
 pub const WINDOW: usize = 100;
@@ -140,6 +140,41 @@ fn state(record: &Record, rig: &RigParameters, row: &Row) -> Result<State, Setup
     }
     state.supply_pressure_pa = row.supply_pressure_pa;
     Ok(state)
+}
+
+/// What the plant of a rig with the record's effects shows beside what the record's sensors show, from the first row on: rms of the
+/// first `rows` in units of the noise, for drive and load and their signals. One free run, since a record does not hold what
+/// effects remember; rounding of the plant's sensors is in it, 0.1 to 0.4 of a count.
+///
+/// # Errors
+/// When the first state is none that the plant can be in, or the rig's noise cannot be left out.
+pub fn with_effects(
+    record: &Record,
+    rig: &RigParameters,
+    rows: usize,
+) -> Result<[[f64; 4]; 2], Box<dyn std::error::Error>> {
+    let noise = noises(rig);
+    let silent = rig
+        .with("sensors.position_noise_um", &[0.0])?
+        .with("sensors.force_noise_n", &[0.0])?
+        .with("sensors.pressure_noise_pa", &[0.0])?;
+    let mut plant = Plant::in_state(&silent, &state(record, &silent, &record.rows[0])?)?;
+    let mut sensors = Sensors::new(&silent, 1);
+    let mut squares = [[0.0; 4]; 2];
+    for row in &record.rows[..rows] {
+        let inputs = Inputs { valve: row.valve, ..Inputs::default() };
+        let readings = sensors.sample(&plant, &inputs);
+        for i in 0..2 {
+            let [position, force] = [readings[i].position.value, readings[i].force.value];
+            let shown = [position, force, readings[i].pressure_a.value, readings[i].pressure_b.value];
+            for signal in 0..4 {
+                let difference = (row.without_noise[i][signal] - shown[signal]) / noise[signal];
+                squares[i][signal] += difference * difference;
+            }
+        }
+        plant.step(&inputs);
+    }
+    Ok(squares.map(|axis| axis.map(|sum| (sum / rows as f64).sqrt())))
 }
 
 /// What halving the step changes: rms of the null record with so many steps in a millisecond against twice as many, in windows of

@@ -1,11 +1,13 @@
 //! Between valve and chamber: line resistance, check valve and cushion in series, and the flow that fits them all.
 //!
 //! ```text
-//!   far side ── edges ── p_port ── line ── check valve ── cushion ── p_chamber          Q = E(p_port), p_port = p_chamber + drop(Q)
+//!   far side ── edges ── p_port ── line ── check valve ── cushion ── p_chamber
+//!   Q = E(p_port)        p_port = p_chamber + drop(Q)
 //! ```
 //!
 //! E falls with p_port and the drop grows with Q, so `Q - E(p_chamber + drop(Q))` has one root between 0 and the flow without
-//! drops. It is found by the Illinois rule [Dowell, Jarratt 1971, BIT 11], on the squares of the flows. Flows are normal flows into the chamber, m^3/s.
+//! drops. It is found by the Illinois rule [Dowell, Jarratt 1971, BIT 11], on the squares of the flows. Flows are normal flows
+//! into the chamber, m^3/s.
 
 use super::numbers::{CONDUCTANCE_PER_KV, Numbers};
 use super::valve::flow;
@@ -198,5 +200,6 @@ impl Node {
 
 /// Critical pressure ratio of the foreign silencer.
 const SINTERED_RATIO: f64 = 0.2;
-/// The foreign regulator falls by this share of the droop at full flow: as much on average as an orifice, whose drop grows with q^2.
+/// The foreign regulator falls by this share of the droop at full flow: as much on average as an orifice, whose drop grows with
+/// the square of the flow.
 const LINEAR_SHARE: f64 = 0.6;

@@ -1,4 +1,4 @@
-//! Claims of the record maker: the same bytes again, all effects in both forms, sticking, convergence, and what leaks of the truth.
+//! Claims of the record maker: the same bytes again, all effects in both forms, sticking, convergence, no truth in a measurement.
 
 use super::closed_loop::{replay_with, run};
 use super::files::measurement_csv;
@@ -159,8 +159,8 @@ fn halving_the_step_changes_next_to_nothing() {
 
 #[test]
 fn halving_the_step_changes_next_to_nothing_with_the_stiffest_effects() {
-    // Up to where a chamber meets the supply's pressure: whether the lagged flow is stopped a step sooner or later there moves the
-    // pressures of any rig for some milliseconds.
+    // Up to where a chamber meets the supply's pressure: whether the lagged flow is stopped a step sooner or later there moves
+    // the pressures of any rig for some milliseconds.
     let valves = commands(800);
     let stiff = [
         ("presliding", 1),

@@ -1,7 +1,7 @@
 //! The valve of the record maker: command to spool, spool to four edges, an edge and two pressures to a flow.
 //!
 //! ```text
-//!   command (late, shifted, with play) ─► target ─► spool, rate ─► opening (overlap) ─► c of: supply-a a-exhaust supply-b b-exhaust
+//!   command (late, shifted, with play) ─► target ─► spool, rate ─► opening (overlap) ─► c of both supply and both exhaust edges
 //! ```
 //!
 //! Each law has the catalogue's form and another one that means the same (`foreign`); the table of both stands in
