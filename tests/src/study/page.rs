@@ -1,7 +1,7 @@
 //! The score as one page: opens offline, needs no script, asks for nothing from elsewhere.
 //!
-//! Markup that an XML parser reads too, with the stylesheet of all pages of airbench (light, dark, print). The shade of a cell of the
-//! confusion matrix is its share of the row; its number and the frame of what is right say the same without colour.
+//! Markup that an XML parser reads too, with the stylesheet of all pages of airbench (light, dark, print). The shade of a cell
+//! of the confusion matrix is its share of the row; its number and the frame of what is right say the same without colour.
 
 use crate::study::interval::Rate;
 use crate::study::score::tables::{BESIDE, ConfusionRow, Split, Spread};
@@ -39,8 +39,8 @@ pub fn page(score: &Score) -> String {
         &format!(
             "<header>\n<h1>{}</h1>\n<p class=\"lead\">{}</p>\n</header>\n<nav aria-label=\"Contents\">\n\
              <ul class=\"contents\">\n{contents}</ul>\n</nav>\n<main>\n{body}</main>\n\
-             <footer class=\"page-foot\">\n<p>Schema version {}. The same for programs is in the score's JSON file beside this page.\
-             </p>\n</footer>\n",
+             <footer class=\"page-foot\">\n<p>Schema version {}. The same for programs is in the \
+             score's JSON file beside this page.</p>\n</footer>\n",
             escaped(&title),
             escaped(&lead(score)),
             score.schema_version
@@ -57,9 +57,9 @@ fn lead(score: &Score) -> String {
         ),
     };
     format!(
-        "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, {} of each wrong parameter, {} pairs, \
-         {} triples; seed {}, noise times {}, {} shard(s). Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; 'at most' is \
-         the exact one-sided bound, 95 %.{classes}",
+        "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, {} of each wrong parameter, \
+         {} pairs, {} triples; seed {}, noise times {}, {} shard(s). Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; \
+         'at most' is the exact one-sided bound, 95 %.{classes}",
         score.cases.len(),
         shape.each,
         SHEETS.len(),
@@ -199,7 +199,8 @@ fn numbers(score: &Score) -> String {
         ("all numbers, another functional form", &numbers.foreign_covered),
     ];
     format!(
-        "{}<p>Covered by value ± 2 standard errors; wanted are 90 to 98 %. {} right names came without an amplitude and its error.</p>\n{}",
+        "{}<p>Covered by value ± 2 standard errors; wanted are 90 to 98 %. {} right names came without an amplitude and its \
+         error.</p>\n{}",
         table(&["what", "cases", "least", "median", "90 %", "largest"], spreads),
         numbers.untold,
         table(&["numbers", "covered"], covered.map(|(name, rate)| vec![name.to_owned(), told(rate)]))
