@@ -133,20 +133,33 @@ fn splits(head: &str, splits: &[Split]) -> String {
 }
 
 fn confusion(score: &Score) -> String {
-    let mut heads = vec!["hidden".to_owned()];
-    heads.extend((1..=SHEETS.len()).map(|number| number.to_string()));
-    heads.extend(BESIDE.iter().map(|name| (*name).to_owned()));
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-    let names: Vec<&str> = SHEETS.iter().map(|sheet| sheet.name).chain(BESIDE).collect();
-    let rows = score.tables.confusion.iter().enumerate().map(|(at, row)| {
-        let head = format!("{} {}", at + 1, escaped(&row.truth));
-        std::iter::once(head).chain(names.iter().map(|name| cell(row, name))).collect()
-    });
-    format!(
+    const TIGHT: &str = "style=\"padding:.1rem .15rem;text-align:center\"";
+    let numbered = (1..).map(|number: usize| number.to_string()).zip(SHEETS.iter().map(|sheet| sheet.name));
+    let beside = BESIDE.iter().map(|name| ((*name).to_owned(), *name));
+    let columns: Vec<(String, &str)> = numbered.chain(beside).collect();
+    let mut text = String::from(
         "<p>One effect hidden: rows are the truth, columns the first name, numbered as the rows. A framed number is of the true \
-         effect's class in those records; n/m: n of m at the right place.</p>\n{}",
-        table(&heads, rows)
-    )
+         effect's class in those records; n/m: n of m at the right place.</p>\n<div class=\"scroll\" tabindex=\"0\">\n\
+         <table style=\"font-size:.78rem\">\n<thead><tr><th scope=\"col\">hidden</th>",
+    );
+    for (head, name) in &columns {
+        let _ = write!(text, "<th scope=\"col\" {TIGHT} title=\"{name}\">{head}</th>");
+    }
+    text.push_str("</tr></thead>\n<tbody>\n");
+    for (at, row) in score.tables.confusion.iter().enumerate() {
+        let truth = escaped(&row.truth);
+        let _ = write!(
+            text,
+            "<tr><th scope=\"row\" style=\"padding:.1rem .4rem;white-space:nowrap\">{} {truth}</th>",
+            at + 1
+        );
+        for (_, name) in &columns {
+            let _ = write!(text, "<td {TIGHT}>{}</td>", cell(row, name));
+        }
+        text.push_str("</tr>\n");
+    }
+    text.push_str("</tbody>\n</table>\n</div>\n");
+    text
 }
 
 /// A cell: how often, framed when right, shaded by its share of the row.
