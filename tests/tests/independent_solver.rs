@@ -1,8 +1,9 @@
 //! The plant with smooth effects against equations written anew and solved by others.
 //!
-//! The bound is the baseline's of rig-model.md, Accuracy: a fifth of the sensors' noise, as rms over a window of 100 to 200 ms with
-//! equal start, of what is true and of what is shown. The differences are far below (`plant/docs/effects-accuracy.md`), so a tenth
-//! of that is asked, and that each effect shows a hundred times as much as is left of it.
+//! The bound is the baseline's of rig-model.md, Accuracy: a fifth of the sensors' noise, as rms over a window of 100 to 200
+//! ms with equal start, of what is true and of what is shown. The differences are far below
+//! (`plant/docs/effects-accuracy.md`), so a tenth of that is asked, and that each effect shows a hundred times as much as is
+//! left of it.
 
 mod independent;
 

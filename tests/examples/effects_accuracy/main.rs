@@ -1,7 +1,7 @@
 //! Makes the tables of `plant/docs/effects-accuracy.md`: the plant with smooth effects against an independent solver.
 //!
-//! `cargo run --release -p system-tests --example effects_accuracy -- --write` puts them into the page; without `--write` they are
-//! printed. What is compared, and in which motions: `tests/tests/independent/mod.rs`.
+//! `cargo run --release -p system-tests --example effects_accuracy -- --write` puts them into the page; without
+//! `--write` they are printed. What is compared, and in which motions: `tests/tests/independent/mod.rs`.
 
 #![allow(clippy::print_stdout)]
 
@@ -22,7 +22,8 @@ const MARKS: [&str; 2] = ["<!-- effects-accuracy: begin -->", "<!-- effects-accu
 /// Substeps of a period: the plant's own, halved, quartered.
 const SUBSTEPS: [u32; 3] = [10, 20, 40];
 
-const HEAD: &str = "x | F | p | shown x | shown F | shown p | v, mm/s | behind edges | bristles | worst at 50 us | at 25 us | changes by";
+const HEAD: &str = "x | F | p | shown x | shown F | shown p | v, mm/s | behind edges | bristles | worst at 50 us \
+                    | at 25 us | changes by";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
