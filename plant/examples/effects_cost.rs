@@ -2,10 +2,11 @@
 //!
 //! `cargo run --release -p plant --example effects_cost -- --write` puts it into the page; without `--write` it is printed.
 //!
-//! The motion is that of the benchmark: a thousand periods in the middle of the linked motion under load steps, with the baseline's
-//! commands, each effect at all its places at the geometric middle of its drawn range. Times are those of short parts of a pass, each at
-//! the best of passes that take turns through all rigs, so that what else runs on the machine meets them alike. Instructions are the difference of two runs of this
-//! program under valgrind, with and without the thousand periods.
+//! The motion is that of the benchmark: a thousand periods in the middle of the linked motion under load steps, with the
+//! baseline's commands, each effect at all its places at the geometric middle of its drawn range. Times are those of short
+//! parts of a pass, each at the best of passes that take turns through all rigs, so that what else runs on the machine meets
+//! them alike. Instructions are the difference of two runs of this program under valgrind, with and without the thousand
+//! periods.
 
 #![allow(clippy::print_stdout)]
 

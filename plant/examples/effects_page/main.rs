@@ -1,4 +1,5 @@
-//! Makes `docs/effects.md` and its pictures: what each effect of the catalogue is, and what it changes in a step and a slow stroke.
+//! Makes `docs/effects.md` and its pictures: what each effect of the catalogue is, and what it changes in a step and a slow
+//! stroke.
 //!
 //! `cargo run --release -p plant --example effects_page`
 //!
@@ -26,27 +27,27 @@ const SIGNALS: [&str; 4] = ["p_a/&#963;", "p_b/&#963;", "x/&#963;", "F/&#963;"];
 const HEAD: &str = "\
 # What each effect changes
 
-The catalogue's effects, each alone on the drive at the geometric middle of the range that sealed rigs and studies draw from, against
-the baseline. Laws, keys and ranges are those of `src/effects/`; the page and its pictures are made by
+The catalogue's effects, each alone on the drive at the geometric middle of the range that sealed rigs and studies draw
+from, against the baseline. Laws, keys and ranges are those of `src/effects/`; the page and its pictures are made by
 
     cargo run --release -p plant --example effects_page
 
-**Step**: 1 s of rest, then both valves open to 0.6 for 250 ms and shut again; the same commands with and without the effect, so that no
-controller hides the difference. The piston coasts and stays where the trapped air holds it.
-**Slow stroke**: 300 mm there and back at 60 mm/s with rests, followed by a proportional controller (8 openings per metre) on what the
-position sensor shows: what a run of the rig would show. Effects of the linkage and the force sensor's gain are run linked, the load
-pressing and pulling with 150 N in turns of 1.1 s.
+**Step**: 1 s of rest, then both valves open to 0.6 for 250 ms and shut again; the same commands with and without the
+effect, so that no controller hides the difference. The piston coasts and stays where the trapped air holds it. **Slow
+stroke**: 300 mm there and back at 60 mm/s with rests, followed by a proportional controller (8 openings per metre) on what
+the position sensor shows: what a run of the rig would show. Effects of the linkage and the force sensor's gain are run
+linked, the load pressing and pulling with 150 N in turns of 1.1 s.
 
 Differences are of what the drive's sensors show without noise, in units of the sensor's noise with its rounding: SIGMA.
 
-In a picture the upper panel is the baseline's position; below it are the differences of pressure a, pressure b, position and force over
-time, each on a scale of its own, whose ends stand at its left; the grey band is the noise.
+In a picture the upper panel is the baseline's position; below it are the differences of pressure a, pressure b, position
+and force over time, each on a scale of its own, whose ends stand at its left; the grey band is the noise.
 ";
 
 /// What the table's numbers are.
 const TABLE_HEAD: &str = "\
-Largest mean over 10 ms, so that a break-away that comes a few milliseconds sooner or later does not count as a force of 6 N. A step of
-the force by that much is in most pictures: it is the friction that falls from 35 to 26 N as the piston breaks away.
+Largest mean over 10 ms, so that a break-away that comes a few milliseconds sooner or later does not count as a force of 6 N.
+A needle of that size is in most pictures: the friction falls from 35 to 26 N as the piston breaks away.
 ";
 
 fn main() -> std::io::Result<()> {

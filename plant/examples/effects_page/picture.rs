@@ -1,7 +1,8 @@
 //! One picture of an effect: two columns of small multiples, step and slow stroke, as a plain SVG.
 //!
-//! Black lines on white; what lies within the noise is a grey band. Each panel has its own scale, written at its left: the largest
-//! difference in units of noise. A pixel's column shows the least and the largest value in it, so that no peak is lost.
+//! Black lines on white; what lies within the noise is a grey band. Each panel has its own scale, written at its left: the
+//! largest difference in units of noise. A pixel's column shows the least and the largest value in it, so that no peak is
+//! lost.
 
 use std::fmt::Write;
 
