@@ -58,7 +58,7 @@ pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<
     let mut play = start.axes.map(|axis| axis.spool);
     for leg in edges.windows(2) {
         let middle = 0.5 * (leg[0] + leg[1]);
-        for axis in 0..2 {
+        for axis in [0, 1] {
             let n = &numbers.axes[axis];
             let sent_at = middle - n.dead_time;
             let command = if sent_at < 0.0 {
