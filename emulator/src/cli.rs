@@ -33,7 +33,8 @@ pub enum Command {
     Bus(BusArguments),
     /// Draw effects that nobody knows, and write them into a file for 'emulator run --sealed'.
     Seal(SealArguments),
-    /// List the effects that a rig file or a sealed file can switch on: names, places, numbers with unit and range, laws, sources.
+    /// List the effects that a rig file or a sealed file can switch on: names, places, numbers with unit and range, laws,
+    /// sources.
     Effects(EffectsArguments),
     /// Print the worst-case load of the bus and each frame's worst-case response time, computed from rig.dbc.
     BusLoad(BusLoadArguments),
@@ -61,8 +62,8 @@ pub struct RunArguments {
     /// Experiment file, of which `[rig]` is read: initial state, hands, and what people do when.
     #[arg(long)]
     pub experiment: Option<PathBuf>,
-    /// File with effects that nobody but the rig knows, as 'emulator seal' draws it: what it switches on stands in truth.csv alone.
-    /// In place of the one that the experiment names.
+    /// File with effects that nobody but the rig knows, as 'emulator seal' draws it: what it switches on stands in truth.csv
+    /// alone. In place of the one that the experiment names.
     #[arg(long, value_name = "FILE")]
     pub sealed: Option<PathBuf>,
     /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.

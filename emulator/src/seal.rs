@@ -1,6 +1,7 @@
 //! `emulator seal`: draws effects and writes them into a file that nobody but a rig should read.
 //!
-//! The file appears at once and for its owner alone, and never in place of another: a sealed rig that runs were made with cannot be
+//! The file appears at once and for its owner alone, and never in place of another: a sealed rig that runs were made with
+//! cannot be
 //! drawn again by accident. What was drawn is told nowhere else, and neither is the seed, which is as good as the file.
 
 use crate::cli::{SealArguments, SealedAxis};
@@ -18,7 +19,8 @@ const MODE: u32 = 0o600;
 /// Draws and writes what the command line asks for.
 ///
 /// # Errors
-/// [`RunError::Input`] when so many effects do not exist, or the file does already; [`RunError::Output`] when it cannot be written.
+/// [`RunError::Input`] when so many effects do not exist, or the file does already; [`RunError::Output`] when it cannot be
+/// written.
 pub fn seal(arguments: &SealArguments) -> Result<Exit, RunError> {
     let SealArguments { seed, effects, axis, out } = arguments;
     let drawn = draw(*seed, usize::from(*effects), among(*axis))

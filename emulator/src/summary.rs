@@ -38,7 +38,8 @@ pub struct RunDescription {
     pub experiment_toml: Option<String>,
     /// Initial state of the rig as used, and what people do to it when.
     pub rig_setup: Scene,
-    /// Whether a sealed file was read, in which nobody but the rig looks; which effects it switches on stands in `truth.csv` alone.
+    /// Whether a sealed file was read, in which nobody but the rig looks; which effects it switches on stands in `truth.csv`
+    /// alone.
     pub sealed: bool,
     /// What the system granted for real time.
     pub realtime_granted: Vec<String>,

@@ -57,8 +57,8 @@ impl Plant {
 
     /// Goes on in another state, as in the next window of a record; what effects remember stays.
     ///
-    /// Delays, lags, plays, bristles and times at rest go on from the state before. A chamber keeps its temperature, so that its mass
-    /// follows the new pressure and volume.
+    /// Delays, lags, plays, bristles and times at rest go on from the state before. A chamber keeps its temperature, so that
+    /// its mass follows the new pressure and volume.
     ///
     /// # Errors
     /// [`SetupError`] if the state is none that the rig can be in; the plant is as before.

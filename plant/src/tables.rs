@@ -1,7 +1,8 @@
 //! Rows of `measurement.csv` (what sensors and valves show) and `truth.csv` (what only a simulation knows).
 //!
 //! Columns of the first are those of rig-model.md, no others. The second has those of [`Truth`] and then one for each term that a
-//! switched-on effect adds to a balance ([`crate::Plant::term_names`]); without effects there is none. Numbers are written with the fewest digits that read back
+//! switched-on effect adds to a balance ([`crate::Plant::term_names`]); without effects there is none. Numbers are written
+//! with the fewest digits that read back
 //! to the same bits. Whoever owns the plant, emulator or rehearsal, writes the same files.
 
 use crate::effects::Terms;

@@ -302,8 +302,8 @@ impl Forces {
         own.pneumatic_n + own.hand_n + own.contact_n + own.effect_n
     }
 
-    /// What the force sensor of an axis would show, N: what pushes its rod back in; behind the drive's there is the carriage to be
-    /// moved, too.
+    /// What the force sensor of an axis would show, N: what pushes its rod back in; behind the drive's there is the carriage
+    /// to be moved, too.
     pub(crate) fn sensor_n(&self, integrator: &Integrator, axis: usize) -> f64 {
         let own = &self.axes[axis];
         let acceleration = own.sum() / integrator.motion.mass_kg(axis);

@@ -31,8 +31,8 @@ pub fn write_line(
 
 /// Reads one line, stamps and all, from whatever interface it is; `None` when it is none.
 ///
-/// Seconds may have any number of digits and fractions up to nine, as tools other than ours write them; a direction after the data
-/// (`candump -x`) is passed over.
+/// Seconds may have any number of digits and fractions up to nine, as tools other than ours write them; a direction after
+/// the data (`candump -x`) is passed over.
 #[must_use]
 pub fn read_line(line: &str) -> Option<FrameRecord> {
     let (stamp, rest) = line.trim_end().strip_prefix('(')?.split_once(") ")?;

@@ -1,4 +1,5 @@
-//! Effects for whole-system tests: every one, some drawn, at the ends of their ranges; and an experiment in which each has work to do.
+//! Effects for whole-system tests: every one, some drawn, at the ends of their ranges; and an experiment in which each has
+//! work to do.
 
 use crate::launch::Pace;
 use crate::records::{Table, count, json};

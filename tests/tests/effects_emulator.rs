@@ -1,8 +1,8 @@
-//! Every effect in the emulator, alone and with others, in lockstep and in real time: finite, positive pressures, and no cycle missed
-//! that would not be missed without it.
+//! Every effect in the emulator, alone and with others, in lockstep and in real time: finite, positive pressures, and no
+//! cycle missed that would not be missed without it.
 //!
-//! Nothing is judged of the control: a controller that knows nothing of an extreme effect may well miss its target. That the sum of a
-//! balance changes by exactly an effect's term is held in `plant`.
+//! Nothing is judged of the control: a controller that knows nothing of an extreme effect may well miss its target. That the
+//! sum of a balance changes by exactly an effect's term is held in `plant`.
 
 use plant::effects::sheet::Switched;
 use std::sync::Mutex;
@@ -84,8 +84,8 @@ fn in_turns(effects: &[Switched]) -> [Live; 2] {
 /// Effects that cost too much for the period would do so in every cycle, or in each one of a kind that comes again and again: a
 /// movement that begins, a flow that turns. What happens besides is the machine's: it stands still, for both alike but not at the
 /// same moment. So of the cycles that were missed only those count in which the rig's own thread worked longer than the period
-/// while no other thread had its CPU, and with effects there may be one in a hundred cycles more than without: a machine that stands
-/// still so often cannot be measured, and effects that are too slow reach far more.
+/// while no other thread had its CPU, and with effects there may be one in a hundred cycles more than without: a machine
+/// that stands still so often cannot be measured, and effects that are too slow reach far more.
 #[track_caller]
 fn expect_no_cycle_missed_for_them([without, with]: [Live; 2]) {
     let (cycles, allowed) = (with.cycles, without.overworked + with.cycles / 100);

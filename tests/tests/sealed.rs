@@ -1,7 +1,7 @@
 //! Sealed rigs: what a sealed file switches on stands in truth.csv, and nothing else that leaves a run tells it.
 //!
-//! Each run with a sealed file is held against one with an empty one: a word that is a key of the rig file as well, as `gap_mm`, may
-//! stand where it stood before, and nowhere besides.
+//! Each run with a sealed file is held against one with an empty one: a word that is a key of the rig file as well, as
+//! `gap_mm`, may stand where it stood before, and nowhere besides.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! A draw depends on its seed alone, to the bit on every machine: PCG-64 and libm's functions. It is not the noise of the
-//! sensors: equal seeds share nothing. An amplitude within a fifth of the value at which the rig is the baseline (a dead volume, a
-//! gap and a stiffness have one inside their drawn range) would hide nothing and is drawn again.
+//! sensors: equal seeds share nothing. An amplitude within a fifth of the value at which the rig is the baseline (a dead
+//! volume, a gap and a stiffness have one inside their drawn range) would hide nothing and is drawn again.
 //!
 //! Source: effects.md, ranges; which distribution is a choice: amplitudes of unknown size are drawn by their order of magnitude.
 

@@ -235,6 +235,10 @@ const DIMENSIONLESS: &[&str] = &[
     "drawn",                 // of a key of an effect, whose unit is a field beside it
     "neutral",               // the same
     "numbers",               // of an effect, in the units of its keys
+    "wrong_parameters",      // names and factors
+    "noise",                 // share of the specified
+    "without_noise",         // readings, in the units of their sensors
+    "windows",               // in units of noise
     "variables",             // of a program: names with their units, and values
     "before_value",          // of a set-point, position or force
     "after_value",           // the same
