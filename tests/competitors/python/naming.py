@@ -36,6 +36,15 @@ def clustered_errors(regression, chosen, coefficients):
     return np.sqrt(np.maximum(np.diag(sandwich), np.diag(bread)))
 
 
+# Standard errors, clustered, that a column must be away from nothing.
+SURE = 3.5
+
+
+def stands(regression, chosen, coefficients):
+    """Whether each column stands by clustered errors."""
+    return bool(np.all(np.abs(coefficients) > SURE * clustered_errors(regression, chosen, coefficients)))
+
+
 def entry(one, value, error):
     parameters = [{"name": one.key, "value": value, "unit": one.unit, "standard_error": error}]
     return {"effect": one.effect, "where": {"axis": one.place, "element": one.element}, "parameters": parameters}

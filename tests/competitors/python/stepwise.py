@@ -8,13 +8,11 @@ the least size that its effect can have.
 
 import numpy as np
 
-from naming import Choice, clustered_errors, fit
+from naming import Choice, fit, stands
 
 MOST = 4
 # Differences of BIC below which two explanations count as alike (Kass and Raftery 1995: 10 is very strong evidence).
 ALIKE = 10.0
-# Standard errors, clustered, that a column must be away from nothing.
-SURE = 3.5
 
 
 def select(regression):
@@ -82,9 +80,7 @@ class Problem:
         """Whether each column stands by clustered errors."""
         if not chosen:
             return True
-        coefficients = fit(self.regression, chosen)
-        errors = clustered_errors(self.regression, chosen, coefficients)
-        return bool(np.all(np.abs(coefficients) > SURE * errors))
+        return stands(self.regression, chosen, fit(self.regression, chosen))
 
     def alternatives(self, chosen, best):
         out = {}
