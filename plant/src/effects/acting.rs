@@ -59,6 +59,10 @@ impl Effects {
             file_linkage: *rig.linkage(),
         });
         effects.move_with(of);
+        let forces = Forces::at(of, Some(&effects), &Lanes::load(state), Pair::both(0.0), state.linked);
+        for (axis, channels) in effects.memory.channels.iter_mut().enumerate() {
+            channels[1].iter_mut().for_each(|history| history.fill(forces.sensor_n(of, axis)));
+        }
         Some(effects)
     }
 
@@ -202,7 +206,7 @@ impl Laws for Effects {
             let rubbing = self.rubbing(of, axis, middle, own);
             if let Some(effect) = self.on[axis].presliding {
                 let bristle = Bristle { velocity_m_per_s: velocity, deflection_m: own.deflection_m };
-                return effect.force(bristle, self.under(of, axis, &rubbing, velocity, push));
+                return effect.force(bristle, self.under(of, axis, &rubbing, velocity, velocity.abs(), push));
             }
             if velocity == 0.0 {
                 return 0.0;
@@ -256,7 +260,8 @@ impl Laws for Effects {
             return of.motion.advance(axis, start, force, &self.levels(of, axis, &rubbing, speed), span_s);
         };
         let bristle = Bristle { velocity_m_per_s: start.velocity, deflection_m: own.deflection_m };
-        let under = self.under(of, axis, &rubbing, start.velocity, force);
+        let speed = self.middle_speed(of, axis, &rubbing, start.velocity, force, span_s);
+        let under = self.under(of, axis, &rubbing, start.velocity, speed, force);
         let (way_m, bristle) = effect.advance(bristle, under, span_s);
         own.deflection_m = bristle.deflection_m;
         of.motion
@@ -339,10 +344,11 @@ impl Laws for Effects {
             for (channel, truth) in [(0, x), (2, a), (3, b)] {
                 self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
             }
-            if self.memory.channels[axis][1].is_some() {
-                let forces = Forces::at(of, Some(self), lanes, held.hand, held.linked);
-                let force = forces.sensor_n(of, axis);
-                self.memory.channels[axis][1].iter_mut().for_each(|history| history.push(force));
+        }
+        if self.memory.channels.iter().any(|axis| axis[1].is_some()) {
+            let forces = Forces::at(of, Some(self), lanes, held.hand, held.linked);
+            for (axis, channels) in self.memory.channels.iter_mut().enumerate() {
+                channels[1].iter_mut().for_each(|history| history.push(forces.sensor_n(of, axis)));
             }
         }
     }

@@ -95,20 +95,43 @@ impl Effects {
             }
             let to_end_m = if chamber == 0 { at.extension_m } else { of.motion.stroke_m() - at.extension_m };
             let (flow, port) = self.through(axis, &pipes, at.pressure_pa[chamber], to_end_m);
-            let port_pa = port.sum(at.pressure_pa[chamber]);
+            let port_pa = if flow == 0.0 {
+                self.shut_port_pa(axis, &pipes, at.pressure_pa[chamber])
+            } else {
+                port.sum(at.pressure_pa[chamber])
+            };
             let [supplied, vented] = [0, 1].map(|edge| self.edge(axis, &pipes, edge, port_pa));
             ports.flow_m3_per_s[chamber] = flow;
             ports.port[chamber] = port;
-            if flow != 0.0 {
-                ports.drawn_m3_per_s += supplied.0.sum(supplied.1);
-                ports.exhausted_m3_per_s -= vented.0.sum(vented.1);
-                ports.port_flow[chamber] = PortFlow {
-                    critical_pressure_ratio: supplied.0.critical_pressure_ratio
-                        + vented.0.critical_pressure_ratio,
-                };
-            }
+            ports.drawn_m3_per_s += supplied.0.sum(supplied.1);
+            ports.exhausted_m3_per_s -= vented.0.sum(vented.1);
+            ports.port_flow[chamber] = PortFlow {
+                critical_pressure_ratio: supplied.0.critical_pressure_ratio
+                    + vented.0.critical_pressure_ratio,
+            };
         }
         ports
+    }
+
+    /// Pressure at a port through which nothing passes, Pa: where leakage from the supply leaves for the exhaust.
+    fn shut_port_pa(&self, axis: usize, pipes: &Pipes, chamber_pa: f64) -> f64 {
+        if pipes.conductance.contains(&0.0) {
+            // One edge at most: the port takes the pressure behind it, and then that edge passes nothing either.
+            return (0..2)
+                .find(|edge| pipes.conductance[*edge] > 0.0)
+                .map_or(chamber_pa, |edge| pipes.far_pa[edge]);
+        }
+        let [mut high, mut low] = pipes.far_pa;
+        for _ in 0..SEARCH_STEPS {
+            let middle = 0.5 * (low + high);
+            let [supplied, vented] = [0, 1].map(|edge| self.edge(axis, pipes, edge, middle));
+            if supplied.0.sum(supplied.1) + vented.0.sum(vented.1) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
     }
 
     /// Flow of an edge by eq. (4), and what effects add to it.

@@ -118,20 +118,21 @@ impl Effects {
         let effect = self.on[axis].presliding?;
         let deflection_m = self.memory.moving.axes[axis].deflection_m;
         let bristle = Bristle { velocity_m_per_s: place.velocity, deflection_m };
-        let under = self.under(of, axis, rubbing, place.velocity, force_n);
+        let under = self.under(of, axis, rubbing, place.velocity, place.velocity.abs(), force_n);
         Some(Bristles { presliding: effect.force(bristle, under) })
     }
 
-    /// Where a bristled axis stands: all that its friction depends on.
+    /// Where a bristled axis stands: all that its friction depends on, its levels those at a speed.
     pub(crate) fn under(
         &self,
         of: &Integrator,
         axis: usize,
         rubbing: &Rubbing,
         velocity: f64,
+        speed: f64,
         force_n: f64,
     ) -> Under {
-        let levels = self.levels(of, axis, rubbing, velocity.abs());
+        let levels = self.levels(of, axis, rubbing, speed);
         let direction = side(if velocity == 0.0 { force_n } else { velocity });
         Under {
             force_n,

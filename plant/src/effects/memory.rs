@@ -85,6 +85,11 @@ impl History {
         History { values: vec![value; steps.ceil() as usize + 2], newest: 0 }
     }
 
+    /// Forgets all for one value.
+    pub(crate) fn fill(&mut self, value: f64) {
+        self.values.fill(value);
+    }
+
     /// Adds the newest value.
     pub(crate) fn push(&mut self, value: f64) {
         self.newest = (self.newest + 1) % self.values.len();

@@ -2,8 +2,9 @@
 
 The states are the stored air of both chambers and the momentum; their rates less the baseline's are the targets, stacked, so that
 an effect has one coefficient in all equations. Columns are scaled to unit rms in units of noise: the threshold is on what a term
-contributes. Threshold and ridge are the sparsest of a grid whose error on the last third of the record is within one standard
-error of the best (Hastie, Tibshirani, Friedman 2009, 7.10).
+contributes. Threshold and ridge are the sparsest of a grid that is no worse than the best on the last third of the record by more
+than 2.5 standard errors of the difference, stretch by stretch (after the one-standard-error rule of Hastie, Tibshirani, Friedman
+2009, 7.10).
 """
 
 import warnings
@@ -19,6 +20,8 @@ THRESHOLDS = np.geomspace(0.01, 1.0, 13)
 RIDGES = (1e-4, 1e-3, 1e-2)
 MODELS, INCLUDED = 30, 0.8
 MOST = 4
+# Standard errors by which a fuller model must be better on what it did not see.
+SURE = 2.5
 # A term goes when the fit loses less than this share of what it loses with the strongest one, or less than 6 sigma.
 LEAST_LOSS, LEAST_GAIN = 0.05, 36.0
 
@@ -70,8 +73,9 @@ def tuned(regression, columns):
             left = regression.y[test] - columns[test] @ coefficients
             tried.append((np.count_nonzero(coefficients), (threshold, ridge), errors(left)))
     best = min(tried, key=lambda entry: entry[2].mean())[2]
-    margin = best.std() / np.sqrt(len(best))
-    good = [entry for entry in tried if entry[2].mean() <= best.mean() + margin]
+    # In pairs: what differs is told apart from how much the stretches of a record differ among themselves.
+    worse = [entry[2] - best for entry in tried]
+    good = [entry for entry, more in zip(tried, worse, strict=True) if more.mean() <= SURE * more.std() / np.sqrt(len(more))]
     return min(good, key=lambda entry: (entry[0], entry[2].mean()))[1]
 
 
@@ -116,13 +120,7 @@ def inclusion_of_effects(regression, live, coefficients):
 def chosen_from(regression, live, coefficients, score):
     """The terms that are left when those which matter least go one by one, as for a user who wants names and not thirty terms."""
     order = [place for place in np.argsort(-score) if coefficients[place] != 0.0]
-    chosen, seen = [], set()
-    for place in order:
-        one = regression.candidates[live[place]]
-        key = (one.effect, one.place, one.element, one.key)
-        if key not in seen:
-            seen.add(key)
-            chosen.append(int(live[place]))
+    chosen = best_columns(regression, live, coefficients, order)
     last = []
     while chosen:
         fitted = fit(regression, chosen)
@@ -137,6 +135,32 @@ def chosen_from(regression, live, coefficients, score):
     scores = {int(live[place]): float(score[place]) for place in order}
     alternatives = {chosen[0]: [p for p in last[:2] if not regression.candidates[p].is_parameter]} if chosen else {}
     return Choice(chosen, fitted, alternatives, scores)
+
+
+def best_columns(regression, live, coefficients, order):
+    """For each number of an effect that has terms: the one of its columns that explains best what the other terms leave to it."""
+    keys = [key_of(regression.candidates[place]) for place in live]
+    columns = regression.columns[:, live]
+    scaled_back = coefficients / (np.sqrt((columns**2).mean(axis=0)) + 1e-300)
+    left = regression.y - columns @ scaled_back
+    chosen, seen = [], set()
+    for key in (keys[place] for place in order):
+        if key in seen:
+            continue
+        seen.add(key)
+        own = [place for place, other in enumerate(keys) if other == key]
+        part = left + columns[:, own] @ scaled_back[own]
+        strength = (columns[:, own] ** 2).sum(axis=0)
+        single = columns[:, own].T @ part / strength
+        fitting = [n for n, place in enumerate(own) if regression.candidates[live[place]].plausible(single[n])]
+        if fitting:
+            best = max(fitting, key=lambda n: single[n] ** 2 * strength[n])
+            chosen.append(int(live[own[best]]))
+    return chosen
+
+
+def key_of(one):
+    return one.effect, one.place, one.element, one.key
 
 
 def drop_losses(regression, chosen, fitted):

@@ -160,7 +160,8 @@ impl Campaign<'_> {
     /// Runs all draws that are not done.
     ///
     /// # Errors
-    /// [`CampaignError`] with the first draw that could not be run; those that ran at the same time are finished first.
+    /// [`CampaignError`] with the first draw that could not be run; those that ran at the same time are finished first. A draw
+    /// whose record cannot be made is told in the end, after all others are done.
     pub fn run(&self) -> Result<CampaignEnd, CampaignError> {
         let wanted = |draw: &&Draw| {
             if self.only.is_empty() { !self.is_done(draw) } else { self.only.contains(&draw.number) }
@@ -172,10 +173,16 @@ impl Campaign<'_> {
         let queue = Mutex::new(missing.iter());
         let finished = Mutex::new(0);
         let failed = Mutex::new(None);
+        let unmade = Mutex::new(None);
         let worker = || {
             while !self.stop.load(Ordering::Relaxed) && failed.lock().expect("no holder panics").is_none() {
                 let Some(draw) = queue.lock().expect("no holder panics").next() else { return };
                 match self.one(draw) {
+                    Err(error @ CampaignError::Make { .. }) => {
+                        // Of this draw alone; the others need not wait for it.
+                        (self.say)(&error.to_string());
+                        unmade.lock().expect("no holder panics").get_or_insert(error);
+                    }
                     Err(error) => *failed.lock().expect("no holder panics") = Some(error),
                     Ok(None) => {}
                     Ok(Some(told)) => {
@@ -196,8 +203,10 @@ impl Campaign<'_> {
                 scope.spawn(worker);
             }
         });
-        if let Some(error) = failed.into_inner().expect("no holder panics") {
-            return Err(error);
+        for error in [failed, unmade] {
+            if let Some(error) = error.into_inner().expect("no holder panics") {
+                return Err(error);
+            }
         }
         match missing.len() - finished.into_inner().expect("no holder panics") {
             0 => Ok(CampaignEnd::Complete),

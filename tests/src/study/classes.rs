@@ -4,9 +4,10 @@
 //! cosine = |M J_true . M J_other| / (|M J_true| |M J_other|)         above 0.95 the two count as one class in this record
 //! ```
 //!
-//! J_true is the hidden effect at its drawn numbers, in the catalogue's form; J_other each other effect, and the same one at other
-//! places of the measured axes, at the geometric mean of its drawn range with the shapes' defaults. The windows start from the
-//! truth of the very record ([`super::signature`]). Union is by draw: what is alike in one record need not be in another.
+//! J_true is the hidden effect at its drawn numbers, in the catalogue's form; J_other each other effect, and the same one at
+//! other places of the measured axes, at the geometric mean of its drawn range with the shapes' defaults. The windows start
+//! from the truth of the very record ([`super::signature`]). Union is by draw: what is alike in one record need not be in
+//! another.
 //!
 //! Parameters of the baseline are compared too, by 5 %. A wrong parameter is no missing effect, so such a twin is told but is not
 //! in the class.

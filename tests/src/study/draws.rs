@@ -1,7 +1,7 @@
 //! Which effects, how strong, where, under which difficulties: a pure function of a study's seed and shape.
 //!
-//! Each draw has a generator of its own, seeded with the study's seed, the kind of draw and its number within the kind: a study with
-//! more draws keeps those of a smaller one, and a shard needs no other shard.
+//! Each draw has a generator of its own, seeded with the study's seed, the kind of draw and its number within the kind: a study
+//! with more draws keeps those of a smaller one, and a shard needs no other shard.
 //!
 //! - Amplitude: log-uniform over the `drawn` range of the effect's sheet, either sign where the sheet says so. Each number
 //!   that only shapes the effect: one half its default, one half uniform over its `drawn` range.

@@ -168,6 +168,7 @@ fn name(number: usize) -> String {
 #[must_use]
 pub fn draw_as_json(draw: &Draw) -> Value {
     let Recipe { seed, axis, both_axes, hidden, foreign_form, wrong_parameters, .. } = &draw.recipe;
+    let wrong = |(name, factor): &(String, f64)| json!({"name": name, "factor": factor});
     json!({
         "number": draw.number,
         "kind": draw.kind,
@@ -176,7 +177,7 @@ pub fn draw_as_json(draw: &Draw) -> Value {
         "both_axes": both_axes,
         "hidden": hidden.iter().map(hidden_as_json).collect::<Vec<_>>(),
         "foreign_form": foreign_form,
-        "wrong_parameters": wrong_parameters.iter().map(|(name, factor)| json!({"name": name, "factor": factor})).collect::<Vec<_>>(),
+        "wrong_parameters": wrong_parameters.iter().map(wrong).collect::<Vec<_>>(),
         "coloured_noise": draw.recipe.coloured_noise,
         "jitter": draw.recipe.jitter,
         "noise_factor": draw.recipe.noise,

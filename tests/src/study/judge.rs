@@ -1,10 +1,11 @@
 //! One case: what was hidden against what was named.
 //!
-//! An effect's *class* are all (effect, place) whose signature in this very record is more than 0.95 alike ([`super::classes`]), and
-//! itself. The rules, from issue 6:
+//! An effect's *class* are all (effect, place) whose signature in this very record is more than 0.95 alike
+//! ([`super::classes`]), and itself. The rules, from issue 6:
 //!
-//! - A name is *right* when it is of the class, and at most two names stand beside those that are. Said as `ambiguous`, it is right only where the class has more than one effect, when one
-//!   of its alternatives or itself is of the class, and at most two of them lie beyond it.
+//! - A name is *right* when it is of the class, and at most two names stand beside those that are. Said as `ambiguous`, it is
+//!   right only where the class has more than one effect, when one of its alternatives or itself is of the class, and at most
+//!   two of them lie beyond it.
 //! - It is right *alone* when it is the only one, has no alternatives, and is the effect itself.
 //! - `where` is right when the name's place is that of the truth, or effect and place are of the class.
 //! - With several effects hidden, each name can stand for one class only; names that stand for none are too many.

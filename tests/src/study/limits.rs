@@ -1,12 +1,13 @@
-//! Detection limits: the amplitude from which an ideal observer, who knows which effect it is, sees it in 90 % of records at 1 % false
-//! alarms.
+//! Detection limits: the amplitude from which an ideal observer, who knows which effect it is, sees it in 90 % of records at 1
+//! % false alarms.
 //!
 //! ```text
 //! |M J(a)| = z_0.99 + z_0.90 = 3.608         one side;  z_0.995 + z_0.90 = 3.857 where the effect may have either sign
 //! ```
 //!
-//! |M J| is the observer's [`super::signature`] in the train record with nothing hidden; shapes have their defaults. The amplitude
-//! is found on a logarithmic scale of the *excursion*, the distance from the value at which the rig is the baseline:
+//! `|M J|` is the observer's [`super::signature`] in the train record with nothing hidden; shapes have their defaults. The
+//! amplitude is found on a logarithmic scale of the *excursion*, the distance from the value at which the rig is the
+//! baseline:
 //!
 //! | neutral value | excursion |
 //! |---|---|
@@ -15,8 +16,8 @@
 //! | infinity | 1 / value |
 //! | none | no limit: the weakest of the drawn range is told in standard deviations |
 //!
-//! An effect that is seen at the weakest that a rig file takes (a stiffness or a coefficient that would have to be larger) has no limit
-//! either: it is always seen.
+//! An effect that is seen at the weakest that a rig file takes (a stiffness or a coefficient that would have to be larger) has
+//! no limit either: it is always seen.
 //!
 //! Limits are computed from the plant and committed before any program is judged. Source: issue 5.
 
@@ -295,7 +296,8 @@ fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result
     }
     let mut next = drawn / strength;
     while high / low > PRECISION {
-        // Strength is nearly proportional to the excursion; where that leads out of the bracket, or no further, its middle is safer.
+        // Strength is nearly proportional to the excursion; where that leads out of the bracket, or no further, its middle is
+        // safer.
         let inside = next > low * PRECISION.sqrt() && next < high / PRECISION.sqrt();
         let at = if inside { next } else { (low * high).sqrt() };
         let here = strength_at(at)?;

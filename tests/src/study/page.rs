@@ -1,7 +1,7 @@
 //! The score as one page: opens offline, needs no script, asks for nothing from elsewhere.
 //!
-//! Markup that an XML parser reads too, with the stylesheet of all pages of airbench (light, dark, print). The shade of a cell of the
-//! confusion matrix is its share of the row; its number and the frame of what is right say the same without colour.
+//! Markup that an XML parser reads too, with the stylesheet of all pages of airbench (light, dark, print). The shade of a cell
+//! of the confusion matrix is its share of the row; its number and the frame of what is right say the same without colour.
 
 use crate::study::interval::Rate;
 use crate::study::score::tables::{BESIDE, ConfusionRow, Split, Spread};
@@ -39,8 +39,8 @@ pub fn page(score: &Score) -> String {
         &format!(
             "<header>\n<h1>{}</h1>\n<p class=\"lead\">{}</p>\n</header>\n<nav aria-label=\"Contents\">\n\
              <ul class=\"contents\">\n{contents}</ul>\n</nav>\n<main>\n{body}</main>\n\
-             <footer class=\"page-foot\">\n<p>Schema version {}. The same for programs is in the score's JSON file beside this page.\
-             </p>\n</footer>\n",
+             <footer class=\"page-foot\">\n<p>Schema version {}. The same for programs is in the \
+             score's JSON file beside this page.</p>\n</footer>\n",
             escaped(&title),
             escaped(&lead(score)),
             score.schema_version
@@ -57,9 +57,9 @@ fn lead(score: &Score) -> String {
         ),
     };
     format!(
-        "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, {} of each wrong parameter, {} pairs, \
-         {} triples; seed {}, noise times {}, {} shard(s). Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; 'at most' is \
-         the exact one-sided bound, 95 %.{classes}",
+        "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, {} of each wrong parameter, \
+         {} pairs, {} triples; seed {}, noise times {}, {} shard(s). Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; \
+         'at most' is the exact one-sided bound, 95 %.{classes}",
         score.cases.len(),
         shape.each,
         SHEETS.len(),
@@ -133,20 +133,33 @@ fn splits(head: &str, splits: &[Split]) -> String {
 }
 
 fn confusion(score: &Score) -> String {
-    let mut heads = vec!["hidden".to_owned()];
-    heads.extend((1..=SHEETS.len()).map(|number| number.to_string()));
-    heads.extend(BESIDE.iter().map(|name| (*name).to_owned()));
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-    let names: Vec<&str> = SHEETS.iter().map(|sheet| sheet.name).chain(BESIDE).collect();
-    let rows = score.tables.confusion.iter().enumerate().map(|(at, row)| {
-        let head = format!("{} {}", at + 1, escaped(&row.truth));
-        std::iter::once(head).chain(names.iter().map(|name| cell(row, name))).collect()
-    });
-    format!(
+    const TIGHT: &str = "style=\"padding:.1rem .15rem;text-align:center\"";
+    let numbered = (1..).map(|number: usize| number.to_string()).zip(SHEETS.iter().map(|sheet| sheet.name));
+    let beside = BESIDE.iter().map(|name| ((*name).to_owned(), *name));
+    let columns: Vec<(String, &str)> = numbered.chain(beside).collect();
+    let mut text = String::from(
         "<p>One effect hidden: rows are the truth, columns the first name, numbered as the rows. A framed number is of the true \
-         effect's class in those records; n/m: n of m at the right place.</p>\n{}",
-        table(&heads, rows)
-    )
+         effect's class in those records; n/m: n of m at the right place.</p>\n<div class=\"scroll\" tabindex=\"0\">\n\
+         <table style=\"font-size:.78rem\">\n<thead><tr><th scope=\"col\">hidden</th>",
+    );
+    for (head, name) in &columns {
+        let _ = write!(text, "<th scope=\"col\" {TIGHT} title=\"{name}\">{head}</th>");
+    }
+    text.push_str("</tr></thead>\n<tbody>\n");
+    for (at, row) in score.tables.confusion.iter().enumerate() {
+        let truth = escaped(&row.truth);
+        let _ = write!(
+            text,
+            "<tr><th scope=\"row\" style=\"padding:.1rem .4rem;white-space:nowrap\">{} {truth}</th>",
+            at + 1
+        );
+        for (_, name) in &columns {
+            let _ = write!(text, "<td {TIGHT}>{}</td>", cell(row, name));
+        }
+        text.push_str("</tr>\n");
+    }
+    text.push_str("</tbody>\n</table>\n</div>\n");
+    text
 }
 
 /// A cell: how often, framed when right, shaded by its share of the row.
@@ -199,7 +212,8 @@ fn numbers(score: &Score) -> String {
         ("all numbers, another functional form", &numbers.foreign_covered),
     ];
     format!(
-        "{}<p>Covered by value ± 2 standard errors; wanted are 90 to 98 %. {} right names came without an amplitude and its error.</p>\n{}",
+        "{}<p>Covered by value ± 2 standard errors; wanted are 90 to 98 %. {} right names came without an amplitude and its \
+         error.</p>\n{}",
         table(&["what", "cases", "least", "median", "90 %", "largest"], spreads),
         numbers.untold,
         table(&["numbers", "covered"], covered.map(|(name, rate)| vec![name.to_owned(), told(rate)]))

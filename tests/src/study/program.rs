@@ -6,8 +6,8 @@
 //! PROGRAM close --rig rig.toml --train train.csv --test test.csv --out out [ARGUMENTS]
 //! ```
 //!
-//! When it has ended, or has used up its time, what is left of the group is killed. Memory is the kernel's largest resident set of
-//! the program and of the children it waited for; the kernel starts counting at what the study itself had at the time.
+//! When it has ended, or has used up its time, what is left of the group is killed. Memory is the kernel's largest resident set
+//! of the program and of the children it waited for; the kernel starts counting at what the study itself had at the time.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use rustix::process::{Pid, Signal, kill_process_group};

@@ -6,29 +6,29 @@
 //! |M J|                  how many standard deviations the matched filter of the effect lies from nothing
 //! ```
 //!
-//! Every window starts at the true x, v, p_a, p_b of the record, and with the same inputs; what else moves (spool, lagged flow, the
-//! effects' memories) goes on from the window before, of each plant its own. The observer does not know the true initial state: what
-//! a change of it could explain is projected out, window by window.
+//! Every window starts at the true x, v, p_a, p_b of the record, and with the same inputs; what else moves (spool, lagged flow,
+//! the effects' memories) goes on from the window before, of each plant its own. The observer does not know the true initial
+//! state: what a change of it could explain is projected out, window by window.
 //!
 //! That holds for the sensors' effects too, without an exception. A constant offset of the position is a change of x at the
-//! start as far as the readings of x go; what is left of it is what only the true x would do to the rest: volumes and with them the
-//! rates of the pressures, cushions and stops, the gap of the linkage against the other axis. An offset of a pressure is left in the
-//! flow (which depends on the absolute pressure) and in the force balance; one of the force sensor is left whole, since no initial
-//! state shifts a force. At rest with shut valves an offset is truly invisible, and no sum over such windows brings it back.
-//! Windows know nothing of each other: the creep of a leak over seconds counts only for what it is within each 100 ms, and
-//! an observer of longer windows sees such effects below these limits.
+//! start as far as the readings of x go; what is left of it is what only the true x would do to the rest: volumes and with them
+//! the rates of the pressures, cushions and stops, the gap of the linkage against the other axis. An offset of a pressure is
+//! left in the flow (which depends on the absolute pressure) and in the force balance; one of the force sensor is left whole,
+//! since no initial state shifts a force. At rest with shut valves an offset is truly invisible, and no sum over such windows
+//! brings it back. Windows know nothing of each other: the creep of a leak over seconds counts only for what it is within each
+//! 100 ms, and an observer of longer windows sees such effects below these limits.
 //!
-//! Noise: that of the sensor and of its rounding together, sqrt(sigma^2 + step^2/12). The readings are the plant's own, before noise
-//! and rounding. The first window is left out: memories fill in it [rig-model.md: a record is judged after 0.1 s].
+//! Noise: that of the sensor and of its rounding together, sqrt(sigma^2 + step^2/12). The readings are the plant's own, before
+//! noise and rounding. The first window is left out: memories fill in it [rig-model.md: a record is judged after 0.1 s].
 //!
-//! Where a piston stops, breaks away or turns, and where the linkage makes contact, the force jumps. Which side of a sample such an
-//! event falls on is decided by microseconds; a difference of hundreds of newtons in one sample is then no measure of anything. The
-//! readings of the force next to an event (of the baseline, of the plant with the effect, or of one with a nudged initial state) count
-//! for nothing [rig-model.md, Accuracy: single samples of the force at stick and contact events excepted]. An event that moves by more than
-//! a sample is seen in those between.
+//! Where a piston stops, breaks away or turns, and where the linkage makes contact, the force jumps. Which side of a sample
+//! such an event falls on is decided by microseconds; a difference of hundreds of newtons in one sample is then no measure of
+//! anything. The readings of the force next to an event (of the baseline, of the plant with the effect, or of one with a nudged
+//! initial state) count for nothing [rig-model.md, Accuracy: single samples of the force at stick and contact events excepted].
+//! An event that moves by more than a sample is seen in those between.
 //!
-//! Sensitivities are differences over a change that is small against the noise. Through stick and slip they are what they are: one
-//! side of a kink. Source: discrepancy-notes.md, 1 and 6; Kay 1998, Fundamentals of Statistical Signal Processing II, 4.3.
+//! Sensitivities are differences over a change that is small against the noise. Through stick and slip they are what they are:
+//! one side of a kink. Source: discrepancy-notes.md, 1 and 6; Kay 1998, Fundamentals of Statistical Signal Processing II, 4.3.
 
 use crate::study::course::{Course, POINT_NUMBERS, Point, WINDOW};
 use nalgebra::DMatrix;

@@ -21,6 +21,8 @@ struct Bench {
     stop: AtomicBool,
     made: AtomicUsize,
     head: &'static str,
+    /// Seed of a draw whose record cannot be made.
+    tripped: Option<u64>,
 }
 
 impl Bench {
@@ -28,11 +30,22 @@ impl Bench {
         let folder = tempfile::tempdir().unwrap();
         let study = Study::begin(&folder.path().join("study"), &Plan::new(5, SHAPE)).unwrap();
         let program = program(&folder, script);
-        Bench { folder, study, program, stop: AtomicBool::new(false), made: AtomicUsize::new(0), head: HEAD }
+        Bench {
+            folder,
+            study,
+            program,
+            stop: AtomicBool::new(false),
+            made: AtomicUsize::new(0),
+            head: HEAD,
+            tripped: None,
+        }
     }
 
     fn run(&self, change: impl FnOnce(&mut Campaign<'_>)) -> Result<CampaignEnd, CampaignError> {
-        let make = |_: &Recipe, _: &RigParameters, measurement: &Path, truth: &Path| {
+        let make = |recipe: &Recipe, _: &RigParameters, measurement: &Path, truth: &Path| {
+            if self.tripped == Some(recipe.seed) {
+                return Err("tripped".to_owned());
+            }
             self.made.fetch_add(1, Ordering::Relaxed);
             let write = |path: PathBuf, text: &str| fs::write(path, text).map_err(|error| error.to_string());
             write(measurement.join("measurement.csv"), &format!("{}0.000,0,0.1\n", self.head))?;
@@ -149,6 +162,16 @@ fn a_column_that_could_tell_is_refused() {
     let bench = Bench { head: "time_s,drive_valve,drive_leakage\n", ..Bench::new("exit 0") };
     let error = bench.run(|_| {}).unwrap_err().to_string();
     assert!(error.contains("drive_leakage"), "{error}");
+}
+
+#[test]
+fn a_record_that_cannot_be_made_does_not_keep_the_others_waiting() {
+    let mut bench = Bench::new("exit 0");
+    bench.tripped = Some(bench.study.draws[0].recipe.seed);
+    let error = bench.run(|_| {}).unwrap_err().to_string();
+    assert_eq!(error, "draw 0: its record cannot be made: tripped");
+    assert!(!bench.path(0, "result.json").exists());
+    assert!(bench.path(1, "result.json").exists() && bench.path(2, "result.json").exists());
 }
 
 #[test]

@@ -177,7 +177,8 @@ fn numbers_are_compared_in_their_unit_and_with_two_standard_errors() {
         let text = entry("inclination").replace(
             "\"alternatives\"",
             &format!(
-                r#""parameters": [{{"name": "force_n", "value": {value}, "unit": "{unit}", "standard_error": {error}}}], "alternatives""#
+                r#""parameters": [{{"name": "force_n", "value": {value}, "unit": "{unit}",
+                "standard_error": {error}}}], "alternatives""#
             ),
         );
         let report = parse(format!(r#"{{"verdict": "named", "named": [{text}]}}"#).as_bytes());

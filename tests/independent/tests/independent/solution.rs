@@ -1,0 +1,158 @@
+//! The equations under a window's commands, solved by diffsol: Tsitouras' explicit pair of orders 5 and 4 with its own control of
+//! the step, from edge to edge of the commands, across which nothing is smooth.
+
+use diffsol::{MatrixCommon, NalgebraMat, OdeBuilder, OdeSolverMethod};
+
+use super::equations::{
+    AXIS, BRISTLE, GAS_MASS, P, P_NODE, P_SILENCER, Q, SHOWN, SPOOL, STATES, System, V, X,
+};
+use super::numbers::{CARRIAGE, GAS, Numbers, P_EXHAUST, STROKE, T_WALL};
+use plant::{Inputs, State};
+
+/// Relative tolerance of the solver; ten times stricter moves no result by more than 1e-4 of the noise.
+const RELATIVE: f64 = 1e-9;
+
+/// Absolute tolerances: extension, velocity, spool and its rate, pressures, masses, flows, silencer, bristles, what sensors show.
+const ABSOLUTE: [f64; AXIS] =
+    [1e-11, 1e-9, 1e-10, 1e-7, 1e-3, 1e-3, 1e-13, 1e-13, 1e-12, 1e-12, 1e-3, 1e-13, 1e-11, 1e-3, 1e-3];
+
+/// What is compared, of one axis at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Seen {
+    pub(crate) velocity: f64,
+    pub(crate) spool: f64,
+    /// Position, force, pressure a, pressure b.
+    pub(crate) truth: [f64; 4],
+    /// The same as the sensors show it, without noise.
+    pub(crate) shown: [f64; 4],
+    pub(crate) silencer: f64,
+    pub(crate) bristles: f64,
+    /// Of the supply node, the same for both axes.
+    pub(crate) node: f64,
+}
+
+type Y = [f64; STATES];
+
+/// What the sensors would show at each millisecond of a window, for both axes.
+pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<[Seen; 2]> {
+    let mut system =
+        System { numbers, target: [0.0; 2], linked: start.linked, added_mass: start.added_mass_kg };
+    let end = inputs.len() as f64 * 1e-3;
+    let mut edges: Vec<f64> = vec![0.0, end];
+    let mut asked: Vec<f64> = Vec::new();
+    for k in 0..=inputs.len() {
+        let t = k as f64 * 1e-3;
+        edges.extend(numbers.axes.iter().map(|axis| t + axis.dead_time));
+        let skews = numbers.axes.iter().flat_map(|axis| axis.skew);
+        asked.extend(skews.map(|skew| t - skew).filter(|&t| t >= 0.0));
+        asked.push(t);
+    }
+    for times in [&mut edges, &mut asked] {
+        times.retain(|&t| (0.0..=end).contains(&t));
+        times.sort_by(f64::total_cmp);
+        times.dedup_by(|b, a| *b - *a < 1e-12);
+    }
+
+    let mut y = first(&system, start);
+    let mut solved: Vec<(f64, Y)> = vec![(0.0, y)];
+    let mut play = start.axes.map(|axis| axis.spool);
+    for leg in edges.windows(2) {
+        let middle = 0.5 * (leg[0] + leg[1]);
+        for axis in [0, 1] {
+            let n = &numbers.axes[axis];
+            let sent_at = middle - n.dead_time;
+            let command = if sent_at < 0.0 {
+                start.axes[axis].spool
+            } else {
+                inputs[(sent_at / 1e-3) as usize].valve[axis]
+            };
+            let arriving = command + n.null_offset;
+            play[axis] = play[axis].clamp(arriving - n.play, arriving + n.play);
+            system.target[axis] = play[axis].clamp(-1.0, 1.0);
+        }
+        let inside = |t: f64| t > leg[0] + 1e-12 && t < leg[1] - 1e-12;
+        let mut times: Vec<f64> = asked.iter().copied().filter(|&t| inside(t)).collect();
+        times.push(leg[1]);
+        for (t, state) in times.iter().zip(through(&system, &y, leg[0], &times)) {
+            solved.push((*t, state));
+            y = state;
+        }
+    }
+    let at = |t: f64| -> &Y {
+        let near = |(s, _): &&(f64, Y)| (s - t).abs() < 1e-9;
+        &solved.iter().find(near).expect("this time was asked for").1
+    };
+    (1..=inputs.len()).map(|k| [0, 1].map(|axis| seen(&system, axis, k as f64 * 1e-3, at))).collect()
+}
+
+/// The states at these times, of which the last ends the leg.
+fn through(system: &System<'_>, from: &Y, begin: f64, times: &[f64]) -> Vec<Y> {
+    let absolute = (0..STATES).map(|i| if i == P_NODE { 1e-3 } else { ABSOLUTE[i % AXIS] });
+    let problem = OdeBuilder::<NalgebraMat<f64>>::new()
+        .t0(begin)
+        .h0(1e-6)
+        .rtol(RELATIVE)
+        .atol(absolute.collect::<Vec<f64>>())
+        .rhs(|y: &[f64], _: &[f64], _: f64, rate: &mut [f64]| system.rates(y, rate))
+        .init(|_: &[f64], _: f64, y: &mut [f64]| y.copy_from_slice(from), STATES)
+        .build()
+        .expect("a plain system of equations");
+    let mut solver = problem.tsit45().expect("an explicit rule needs no more");
+    let (states, _) = solver.solve_dense(times).expect("the window is smooth");
+    let column = |j: usize| std::array::from_fn(|i| states.inner()[(i, j)]);
+    (0..times.len()).map(column).collect()
+}
+
+/// The start of a window, with all that effects remember at rest, as the plant has it.
+fn first(system: &System<'_>, start: &State) -> Y {
+    let mut y = [0.0; STATES];
+    for (axis, own) in start.axes.iter().enumerate() {
+        let row = &mut y[AXIS * axis..AXIS * (axis + 1)];
+        row[X] = own.extension_m;
+        row[V] = own.rod_velocity_m_per_s;
+        row[SPOOL] = own.spool;
+        row[P_SILENCER] = P_EXHAUST;
+        row[BRISTLE] = 0.0;
+        let stored = [own.stored_air_a_j, own.stored_air_b_j];
+        let flow = [own.flow_a_m3_per_s, own.flow_b_m3_per_s];
+        for chamber in 0..2 {
+            row[P[chamber]] = stored[chamber] / system.volume(axis, chamber, own.extension_m);
+            row[GAS_MASS[chamber]] = stored[chamber] / (GAS * T_WALL);
+            row[Q[chamber]] = flow[chamber];
+        }
+        let position = [own.extension_m, STROKE - own.extension_m][axis];
+        (row[SHOWN[0]], row[SHOWN[1]], row[SHOWN[2]]) = (position, row[P[0]], row[P[1]]);
+    }
+    y[P_NODE] = start.supply_pressure_pa;
+    y
+}
+
+/// Position, force, pressures of an axis by rig-model.md.
+fn truths(system: &System<'_>, axis: usize, y: &Y) -> [f64; 4] {
+    let own = &y[AXIS * axis..AXIS * (axis + 1)];
+    let contact = system.contact(y);
+    let behind = CARRIAGE + system.added_mass;
+    let force = [behind * system.acceleration(0, y) - contact, -contact][axis];
+    [[own[X], STROKE - own[X]][axis], force, own[P[0]], own[P[1]]]
+}
+
+fn seen<'y>(system: &System<'_>, axis: usize, t: f64, at: impl Fn(f64) -> &'y Y) -> Seen {
+    let (y, n) = (at(t), &system.numbers.axes[axis]);
+    let own = &y[AXIS * axis..AXIS * (axis + 1)];
+    let truth = truths(system, axis, y);
+    let lagged = [own[SHOWN[0]], truth[1], own[SHOWN[1]], own[SHOWN[2]]];
+    let shown = [0, 1, 2, 3].map(|i: usize| {
+        let lag = if n.lag[i] > 0.0 { lagged[i] - truth[i] } else { 0.0 };
+        let old = truths(system, axis, at((t - n.skew[i]).max(0.0)))[i];
+        truth[i] + lag + n.gain[i] * truth[i] + n.offset[i] + (old - truth[i])
+    });
+    Seen {
+        velocity: own[V],
+        spool: own[SPOOL],
+        truth,
+        shown,
+        silencer: own[P_SILENCER],
+        bristles: -system.bristles(axis, own)[0],
+        node: y[P_NODE],
+    }
+}
