@@ -115,9 +115,13 @@ impl Motion {
     /// Whether a resting axis under this force stays, force in N without any friction.
     #[inline(always)]
     pub(crate) fn holds(&self, extension: f64, force: f64, levels: &Levels) -> bool {
-        force.abs() <= levels.break_away_n[side(force)]
-            || extension <= 0.0 && force < 0.0
-            || extension >= self.stroke_m && force > 0.0
+        force.abs() <= levels.break_away_n[side(force)] || self.pressed(extension, force)
+    }
+
+    /// Whether a force presses an axis against an end of its stroke.
+    #[inline(always)]
+    pub(crate) fn pressed(&self, extension: f64, force: f64) -> bool {
+        extension <= 0.0 && force < 0.0 || extension >= self.stroke_m && force > 0.0
     }
 
     /// Whether resting axes might leave within the span, so that a step must look closer; `break_away` is that of the force's

@@ -276,6 +276,11 @@ impl Forces {
                 .and_then(|(effects, rubbing)| effects.bristles(integrator, i, &rubbing, place, force));
             if let Some(bristles) = bristles {
                 sliding_n = bristles.sum(0.0);
+                // What the bristles leave of a force that presses against an end, the end takes.
+                let rest = force + sliding_n;
+                if place.velocity == 0.0 && motion.pressed(place.extension, rest) {
+                    holding_n = -rest;
+                }
             } else if place.velocity != 0.0 {
                 sliding_n = -levels.sliding_n[side(place.velocity)] * place.velocity.signum();
             } else if motion.holds(place.extension, force, &levels) {

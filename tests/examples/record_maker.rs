@@ -38,11 +38,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Each effect in the record maker against the same effect in the plant, as Markdown: a free run of 6 s, in units of the noise.
+/// Each effect in the record maker against the same effect in the plant, as Markdown: free runs, in units of the noise.
 fn agree() -> Result<(), Box<dyn Error>> {
-    const ROWS_COMPARED: usize = 6000;
+    const ROWS_COMPARED: [usize; 3] = [2000, 6000, 10_000];
     let rig = RigParameters::baseline();
-    println!("| effect | end | without it: x, F, p_a, p_b | with it |\n|---|---|---|---|");
+    println!(
+        "| effect | end | without it, 10 s: x, F, p_a, p_b | with it, 2 s | 6 s | 10 s |\n|---|---|---|---|---|---|"
+    );
     for sheet in SHEETS {
         for end in [0, 1] {
             let place = sheet.place.places()[0];
@@ -53,14 +55,16 @@ fn agree() -> Result<(), Box<dyn Error>> {
             let with_it = rig.with_effect(sheet.name, &place.to_string(), &keys)?;
             let hidden = vec![Hidden { name: sheet.name, place, numbers }];
             let record = simulate(&Recipe { hidden, both_axes, ..Recipe::default() }, &rig)?;
-            let cells = [&rig, &with_it].map(|rig| {
-                let rms = comparison::with_effects(&record, rig, ROWS_COMPARED);
+            let cell = |rig: &RigParameters, rows: usize| {
+                let rms = comparison::with_effects(&record, rig, rows);
                 rms.map_or_else(
                     |error| error.to_string(),
                     |rms| rms[0].map(|rms| format!("{rms:.2}")).join(", "),
                 )
-            });
-            println!("| {} | {end} | {} | {} |", sheet.name, cells[0], cells[1]);
+            };
+            let without = cell(&rig, ROWS_COMPARED[2]);
+            let with = ROWS_COMPARED.map(|rows| cell(&with_it, rows)).join(" | ");
+            println!("| {} | {end} | {without} | {with} |", sheet.name);
         }
     }
     Ok(())

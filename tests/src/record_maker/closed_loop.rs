@@ -58,7 +58,7 @@ pub(super) fn run(
 }
 
 /// The recipe's rig under given valve commands of drive and load, one pair for each row: what the record would have been with
-/// other hidden effects under the same inputs.
+/// other hidden effects under the same inputs. The valve of an axis that rests stays shut.
 ///
 /// # Errors
 /// As [`simulate`].
@@ -77,8 +77,9 @@ pub(super) fn replay_with(
     let mut made = Made::new(recipe, rig, &scene, steps_per_ms)?;
     let mut record = record(recipe, &scene, valves.len());
     for (cycle, valve) in valves.iter().enumerate() {
-        made.sample(cycle as u64, *valve, &mut |_| {});
-        let row = made.step(cycle as u64, *valve);
+        let valve = [0, 1].map(|i| if made.rig.active[i] { valve[i] } else { 0.0 });
+        made.sample(cycle as u64, valve, &mut |_| {});
+        let row = made.step(cycle as u64, valve);
         check(&row)?;
         record.rows.push(row);
     }

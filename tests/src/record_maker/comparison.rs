@@ -142,10 +142,9 @@ fn state(record: &Record, rig: &RigParameters, row: &Row) -> Result<State, Setup
     Ok(state)
 }
 
-/// What the plant of a rig with the record's effects shows beside what the record's sensors show, from the first row on: rms
-/// of the
+/// What the plant of a rig with the record's effects shows beside what the record's sensors show, from row 0 on: rms of the
 /// first `rows` in units of the noise, for drive and load and their signals. One free run, since a record does not hold what
-/// effects remember; rounding of the plant's sensors is in it, 0.1 to 0.4 of a count.
+/// effects remember; rounding of the sensors is in it, some 0.1 of the noise in position and 0.04 in force and pressure.
 ///
 /// # Errors
 /// When the first state is none that the plant can be in, or the rig's noise cannot be left out.

@@ -242,11 +242,17 @@ impl Motion {
         let full = self.full_deflection(at, velocity);
         let slip = self.slip(deflection, full);
         let rate = velocity * (1.0 - slip * deflection / full);
-        let share = velocity / BRISTLE_M_PER_S;
-        let damping = self.micro_damping_n_s_per_m * libm::exp(-share * share);
+        let stiffness = self.laws.presliding.expect("asked for with bristles alone");
+        let damping = if self.laws.foreign {
+            let share = velocity / BRISTLE_M_PER_S;
+            self.micro_damping_n_s_per_m * libm::exp(-share * share)
+        } else {
+            // Never more than the level at any speed.
+            let level = stiffness * full.abs();
+            self.micro_damping_n_s_per_m * level / (level + self.micro_damping_n_s_per_m * velocity.abs())
+        };
         let direction = if velocity < 0.0 { -1.0 } else { 1.0 };
         let viscous = self.viscous_n_s_per_m * (1.0 + self.side(velocity, direction) * self.laws.asymmetry);
-        let stiffness = self.laws.presliding.expect("asked for with bristles alone");
         -(stiffness * deflection + damping * rate + viscous * velocity)
     }
 

@@ -313,6 +313,10 @@ impl Rig {
             }
             let from = state.y[i];
             add(&mut state.y[i], &middle.rates[i], h);
+            if state.y[i][SPOOL].abs() > 1.0 {
+                // The spool meets the end of its way.
+                (state.y[i][SPOOL], state.y[i][SPOOL + 1]) = (state.y[i][SPOOL].signum(), 0.0);
+            }
             let axis = &self.axes[i];
             if axis.motion.laws.presliding.is_some() {
                 let place = axis.at(&y[i], &middle.air[i], rest_s[i]);
