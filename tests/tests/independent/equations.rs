@@ -83,12 +83,13 @@ impl System<'_> {
         } else {
             -(p - (p * p - 4.0 * series * series).max(0.0).sqrt()) / 2.0
         };
-        if let Some([kv, length, _]) = n.cushion {
-            if q < 0.0 && [x, STROKE - x][chamber] < length {
-                let cushion = root(kv);
-                drop -= (p - (p * p - 4.0 * cushion * cushion).max(0.0).sqrt()) / 2.0;
-                drop -= 1e3 * (cushion - p / 2.0).max(0.0);
-            }
+        if let Some([kv, length, _]) = n.cushion
+            && q < 0.0
+            && [x, STROKE - x][chamber] < length
+        {
+            let cushion = root(kv);
+            drop -= (p - (p * p - 4.0 * cushion * cushion).max(0.0).sqrt()) / 2.0;
+            drop -= 1e3 * (cushion - p / 2.0).max(0.0);
         }
         drop
     }

@@ -58,7 +58,7 @@ pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<
     let mut play = start.axes.map(|axis| axis.spool);
     for leg in edges.windows(2) {
         let middle = 0.5 * (leg[0] + leg[1]);
-        for axis in 0..2 {
+        for (axis, play) in play.iter_mut().enumerate() {
             let n = &numbers.axes[axis];
             let sent_at = middle - n.dead_time;
             let command = if sent_at < 0.0 {
@@ -67,8 +67,8 @@ pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<
                 inputs[(sent_at / 1e-3) as usize].valve[axis]
             };
             let arriving = command + n.null_offset;
-            play[axis] = play[axis].clamp(arriving - n.play, arriving + n.play);
-            system.target[axis] = play[axis].clamp(-1.0, 1.0);
+            *play = play.clamp(arriving - n.play, arriving + n.play);
+            system.target[axis] = play.clamp(-1.0, 1.0);
         }
         let inside = |t: f64| t > leg[0] + 1e-12 && t < leg[1] - 1e-12;
         let mut times: Vec<f64> = asked.iter().copied().filter(|&t| inside(t)).collect();
