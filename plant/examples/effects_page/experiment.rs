@@ -124,7 +124,7 @@ impl Experiment {
             Kind::Step => 0.0,
             Kind::SlowStroke => PROPORTIONAL_PER_M * (self.set_point_m(k) - shown[0][0]),
         };
-        let wanted_n = if k / TURN_MS % 2 == 0 { PRESSING_N } else { -PRESSING_N };
+        let wanted_n = if (k / TURN_MS).is_multiple_of(2) { PRESSING_N } else { -PRESSING_N };
         let load = match self.kind {
             _ if self.linked => PROPORTIONAL_PER_N * (wanted_n - shown[1][1]),
             // Both axes draw from the supply.

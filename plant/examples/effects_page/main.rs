@@ -146,7 +146,7 @@ fn show(sheet: &Sheet, baseline: &RigParameters, noise: [f64; 4]) -> Shown {
 
 /// The drive's places; of the two seals of rod-leakage the rod's.
 fn is_shown(sheet: &Sheet, place: &str) -> bool {
-    !place.starts_with("load") && !(sheet.name == "rod-leakage" && place == "drive.a")
+    !place.starts_with("load") && (sheet.name != "rod-leakage" || place != "drive.a")
 }
 
 /// The geometric middle of what is drawn, positive.
