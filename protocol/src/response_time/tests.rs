@@ -83,8 +83,9 @@ fn simulated(streams: &[(u64, u64)], offsets: &[u64], horizon: u64) -> Vec<u64> 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Small wires, all phasings that matter: the bound is never exceeded, and the worst phasing comes within the one bit by
-    /// which a blocking frame must have begun before.
+    /// Small wires, all phasings that matter: the bound is never exceeded, and the worst phasing is that of a blocking frame of
+    /// which the one bit is gone by which it must have begun before. (That bit may cost more than its own time: another frame
+    /// of higher priority gets in.)
     #[test]
     fn the_bound_is_the_worst_of_all_phasings(
         streams in proptest::collection::vec((2..6_u64, 12..30_u64), 2..5),
@@ -105,8 +106,10 @@ proptest! {
             let offsets: Vec<_> = (0..streams.len()).map(offset).collect();
             let horizon = bound.busy_period_ns + 200;
             let seen = simulated(&streams, &offsets, horizon)[place];
-            let slack = u64::from(below.is_some());
-            prop_assert!(seen <= bound.response_ns && seen + slack >= bound.response_ns, "{seen} of {bound:?}");
+            let begun = below.map(|who| stream(streams[who].0 - 1, streams[who].1));
+            let left: Vec<_> = analysed[..=place].iter().cloned().chain(begun).collect();
+            prop_assert_eq!(seen, response(&left, place, &line).unwrap().response_ns);
+            prop_assert!(seen <= bound.response_ns, "{} of {:?}", seen, bound);
         }
     }
 
