@@ -86,7 +86,7 @@ pub(super) const UNFINISHED: Rule = Rule {
         ("a.py", concat!("# HA", "CK: odd\n"), 1),
     ],
     good: &[
-        ("scripts/a", concat!("mktemp a.XX", "XXXX\n")),
+        ("scripts/a", concat!("mktemp a.", "XX", "XX", "XX\n")),
         ("a.rs", "// nothing to do; ignore it\n"),
         ("a.csv", concat!("FIX", "ME\n")),
     ],
