@@ -1,14 +1,14 @@
 # shellcheck shell=bash
 # Sourced, with `root` set: tables that are shown or put between the two marks of a page.
 
-# tables EXAMPLE PAGE [--write]: what an example of the system tests prints.
+# tables EXAMPLE PAGE [--write]: what an example of `package` prints, of the system tests unless set.
 # shellcheck disable=SC2154 # root is the sourcing script's
 tables() {
     local text
     text=$(mktemp)
     # shellcheck disable=SC2064 # expanded now: local is gone at the end
     trap "rm -f '$text'" EXIT
-    cargo run --quiet --release --manifest-path "$root/Cargo.toml" -p system-tests --example "$1" >"$text"
+    cargo run --quiet --release --manifest-path "$root/Cargo.toml" -p "${package:-system-tests}" --example "$1" >"$text"
     if [ "${3:-}" != --write ]; then
         cat "$text"
         return

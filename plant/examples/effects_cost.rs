@@ -1,6 +1,6 @@
 //! Makes the table of `docs/effects-cost.md`: what a period costs with no effect, with each alone, with ten, with all.
 //!
-//! `cargo run --release -p plant --example effects_cost -- --write` puts it into the page; without `--write` it is printed.
+//! `scripts/effects-tables` prints it, and puts it into the page with `--write`.
 //!
 //! The motion is that of the benchmark: a thousand periods in the middle of the linked motion under load steps, with the
 //! baseline's commands, each effect at all its places at the geometric middle of its drawn range. Times are those of short
@@ -33,9 +33,6 @@ const PART: usize = 25;
 const PASSES: u32 = 40;
 /// Every fourth effect of the catalogue: some of each room.
 const EVERY: usize = 4;
-/// The page, and the marks between which the table stands.
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/effects-cost.md");
-const MARKS: [&str; 2] = ["<!-- effects-cost: begin -->", "<!-- effects-cost: end -->"];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -54,9 +51,8 @@ fn main() -> ExitCode {
             println!("{}", table());
             ExitCode::SUCCESS
         }
-        ["--write"] => write(&table()),
         _ => {
-            eprintln!("usage: effects_cost [--write]");
+            eprintln!("usage: effects_cost");
             ExitCode::from(2)
         }
     }
@@ -151,24 +147,4 @@ fn table() -> String {
         lines.push(format!("| {name} | {count} | {ratio} | {time:.0} | {:.2} |", time / times[0]));
     }
     lines.join("\n")
-}
-
-/// Puts the table between the marks of the page.
-fn write(table: &str) -> ExitCode {
-    let page = std::fs::read_to_string(PAGE).unwrap_or_default();
-    let parts = page.split_once(MARKS[0]).and_then(|(head, rest)| Some((head, rest.split_once(MARKS[1])?.1)));
-    let Some((head, tail)) = parts else {
-        eprintln!(
-            "{PAGE}: not written, the marks '{}' and '{}' do not stand there once each",
-            MARKS[0], MARKS[1]
-        );
-        return ExitCode::from(2);
-    };
-    match std::fs::write(PAGE, format!("{head}{}\n{table}\n\n{}{tail}", MARKS[0], MARKS[1])) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("{PAGE}: {error}: make the file writable");
-            ExitCode::FAILURE
-        }
-    }
 }

@@ -160,9 +160,8 @@ impl Integrator {
         let mut supply_pa = state.supply_pressure_pa;
         for substep in 0..self.substeps {
             let carried = laws.carried();
-            let local_s = f64::from(substep) * self.coarse.span_s;
             let node = self.node(&self.coarse, supply_pa, held.stopped);
-            let at = At { of: self, span: &self.coarse, from: &lanes, node, held, local_s };
+            let at = At { of: self, span: &self.coarse, from: &lanes, node, held, substep, part: 0 };
             let (next, handed_on, corner) = self.smooth(laws, at, carried);
             let valves_move =
                 self.supply.check_valves_shut(supply_pa) != self.supply.check_valves_shut(node.end_pa);
@@ -170,8 +169,7 @@ impl Integrator {
                 let mut carried = carried;
                 for part in 0..PARTS {
                     let node = self.node(&self.fine, supply_pa, held.stopped);
-                    let local_s = local_s + f64::from(part) * self.fine.span_s;
-                    let at = At { of: self, span: &self.fine, from: &lanes, node, held, local_s };
+                    let at = At { of: self, span: &self.fine, from: &lanes, node, held, substep, part };
                     (lanes, carried) = self.careful(laws, at, carried);
                     supply_pa = node.end_pa;
                 }
@@ -244,7 +242,7 @@ impl Integrator {
         let mut velocity = (way.keep * from.velocity + way.gain * force).where_true(moving);
         let mut extension =
             from.extension + (way.drift * from.velocity + way.push * force).where_true(moving);
-        let mut sticks = !Mask::none();
+        let mut sticks = None;
         if laws.on_bristles() != [false; 2] {
             let unresisted = forces.pneumatic + forces.hand + forces.contact;
             let place = |axis: usize, carried: &mut L::Carried| {
@@ -259,7 +257,7 @@ impl Integrator {
             let (drive, load) = (place(0, &mut carried), place(1, &mut carried));
             extension = Pair::new(drive.extension, load.extension);
             velocity = Pair::new(drive.velocity, load.velocity);
-            sticks = Mask::new(laws.on_bristles().map(|on| !on));
+            sticks = Some(Mask::new(laws.on_bristles().map(|on| !on)));
         }
 
         let growth =
@@ -268,7 +266,8 @@ impl Integrator {
         let margin = growth.abs() + Pair::both(nudged_n);
         let break_away = laws.break_away(at, &middle, force);
         let leaves = !moving & self.motion.might_leave(from.extension, force, margin, break_away);
-        let turns = moving & (velocity * from.velocity).at_most(zero) & sticks;
+        let turns = moving & (velocity * from.velocity).at_most(zero);
+        let turns = sticks.map_or(turns, |sticks| turns & sticks);
         let overruns = extension.less(zero) | Pair::both(self.motion.stroke_m()).less(extension);
         let touches =
             held.linked && self.linkage.made_contact(self.distance(from.extension), self.distance(extension));

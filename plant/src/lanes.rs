@@ -109,13 +109,6 @@ impl Mask {
         Pair::new(f64::from(u8::from(yes[0])), f64::from(u8::from(yes[1]))).differs(Pair::both(0.0))
     }
 
-    /// No for both.
-    #[inline(always)]
-    pub(crate) fn none() -> Self {
-        let zero = Pair::both(0.0);
-        zero.less(zero)
-    }
-
     /// `yes` where true, `no` where false.
     #[inline(always)]
     pub(crate) fn choose(self, yes: Pair, no: Pair) -> Pair {

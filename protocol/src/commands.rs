@@ -69,7 +69,7 @@ impl CommandIntake {
         };
         self.counters.late += u64::from(age > 1);
         self.counters.duplicate += u64::from(self.last.replace(command) == Some(command));
-        if let Step::Continues { lost } = self.sources.note(command.alive, live.count()) {
+        if let Step::Continues { lost } = self.sources.note(command.alive, live.count(), live.count() - age) {
             // A refused frame leaves a gap in the counters of those accepted, but it came.
             self.counters.lost += lost.saturating_sub(self.refused_since_accepted);
         }

@@ -10,8 +10,10 @@
 //!   two in step:                  4 4 5 5 6 6      steps 0 1 0 1      every second one
 //! ```
 //!
-//! Cycles are those that were sent: what a late rig skipped is no silence of a sender. Four breaks within 20 cycles latch the
-//! fault; it goes when none was seen for 20 cycles, which is what one sender falling silent brings about (bus.md, Frames).
+//! A sender that stood still answers several cycles at once, so the cycles that passed are those of the answers where these
+//! are more. Cycles are those that were sent: what a late rig skipped is no silence of a sender. Four breaks within 20
+//! cycles latch the fault; it goes when none was seen for 20 cycles, which is what one sender falling silent brings about
+//! (bus.md, Frames).
 
 use crate::frames::ALIVE_RANGE;
 
@@ -32,35 +34,43 @@ pub enum Step {
     Breaks,
 }
 
+/// The last frame.
+struct Seen {
+    alive: u8,
+    cycle: u64,
+    answered: u64,
+}
+
 /// Watches the counter of one command identifier.
 #[derive(Default)]
 pub struct SourceWatch {
-    last: Option<(u8, u64)>,
+    last: Option<Seen>,
     breaks: [Option<u64>; BREAKS_TO_LATCH],
     two_sources: bool,
 }
 
 impl SourceWatch {
-    /// Takes note of a frame with counter `alive` in `cycle`.
-    pub fn note(&mut self, alive: u8, cycle: u64) -> Step {
-        let step = match self.last {
+    /// Takes note of a frame with counter `alive` that came in `cycle` and answers the cycle `answered`.
+    pub fn note(&mut self, alive: u8, cycle: u64, answered: u64) -> Step {
+        let step = match &self.last {
             None => Step::Continues { lost: 0 },
             // After a silence the command was stale, which is told; what comes now may be a restart, so that its
             // counter says nothing about loss.
-            Some((_, seen)) if cycle - seen > SILENCE_CYCLES => Step::Continues { lost: 0 },
-            Some((last, seen)) => {
-                let ahead = (ALIVE_RANGE + u64::from(alive) - u64::from(last)) % ALIVE_RANGE;
+            Some(seen) if cycle - seen.cycle > SILENCE_CYCLES => Step::Continues { lost: 0 },
+            Some(seen) => {
+                let ahead = (ALIVE_RANGE + u64::from(alive) - u64::from(seen.alive)) % ALIVE_RANGE;
+                let passed = (cycle - seen.cycle).max(answered.saturating_sub(seen.answered));
                 // A frame may come late into the next cycle, so one more than the cycles that passed.
-                let allowed = cycle - seen + 1;
+                let allowed = passed + 1;
                 match ahead {
                     // Sixteen lost frames look like none; the cycles that passed tell them apart.
-                    0 if cycle - seen >= ALIVE_RANGE => Step::Continues { lost: ALIVE_RANGE - 1 },
+                    0 if passed >= ALIVE_RANGE => Step::Continues { lost: ALIVE_RANGE - 1 },
                     1.. if ahead <= allowed => Step::Continues { lost: ahead - 1 },
                     _ => Step::Breaks,
                 }
             }
         };
-        self.last = Some((alive, cycle));
+        self.last = Some(Seen { alive, cycle, answered });
         if step == Step::Breaks {
             self.breaks.rotate_left(1);
             self.breaks[BREAKS_TO_LATCH - 1] = Some(cycle);
@@ -87,7 +97,7 @@ mod tests {
     fn feed(watch: &mut SourceWatch, starts: &[u8], cycles: std::ops::Range<u64>) {
         for cycle in cycles {
             for start in starts {
-                watch.note(((u64::from(*start) + cycle) % 16) as u8, cycle);
+                watch.note(((u64::from(*start) + cycle) % 16) as u8, cycle, cycle);
             }
         }
     }
@@ -128,11 +138,22 @@ mod tests {
     #[test]
     fn lost_frames_are_counted_by_the_gap() {
         let mut watch = SourceWatch::default();
-        watch.note(4, 10);
-        assert_eq!(watch.note(5, 11), Step::Continues { lost: 0 });
-        assert_eq!(watch.note(8, 14), Step::Continues { lost: 2 });
-        assert_eq!(watch.note(9, 14), Step::Continues { lost: 0 });
-        assert_eq!(watch.note(9, 15), Step::Breaks);
-        assert_eq!(watch.note(13, 36), Step::Continues { lost: 0 }, "after a silence of 21 cycles");
+        watch.note(4, 10, 9);
+        assert_eq!(watch.note(5, 11, 10), Step::Continues { lost: 0 });
+        assert_eq!(watch.note(8, 14, 13), Step::Continues { lost: 2 });
+        assert_eq!(watch.note(9, 14, 13), Step::Continues { lost: 0 });
+        assert_eq!(watch.note(9, 15, 14), Step::Breaks);
+        assert_eq!(watch.note(13, 36, 35), Step::Continues { lost: 0 }, "after a silence of 21 cycles");
+    }
+
+    #[test]
+    fn a_frame_lost_out_of_a_burst_is_counted() {
+        let mut watch = SourceWatch::default();
+        watch.note(4, 10, 9);
+        // The sender stood still for five cycles and answers them at once; the third answer is lost.
+        assert_eq!(watch.note(5, 15, 10), Step::Continues { lost: 0 });
+        assert_eq!(watch.note(6, 15, 11), Step::Continues { lost: 0 });
+        assert_eq!(watch.note(8, 15, 13), Step::Continues { lost: 1 });
+        assert_eq!(watch.note(9, 15, 14), Step::Continues { lost: 0 });
     }
 }

@@ -56,10 +56,12 @@ fn segment_folder(number: u32) -> String {
 fn every_frame_of_a_soak_is_accounted_for_and_the_injected_loss_is_found() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let ended = soak(&scene, 0.4).wait_within(Duration::from_secs(90)).expect_code(0);
-    assert!(ended.stderr.contains("soak: may be trusted: 3 segments"), "{}", ended.stderr);
+    // Time for three segments even where it takes long to judge one.
+    let ended = soak(&scene, 0.5).wait_within(Duration::from_secs(90)).expect_code(0);
+    assert!(ended.stderr.contains("soak: may be trusted: "), "{}", ended.stderr);
     let soak_json = results(&scene);
     let segments = soak_json["segments"].as_array().expect("segments");
+    assert!(segments.len() >= 3, "{}", ended.stderr);
     for segment in segments {
         for name in ["processes", "account", "gaps", "records"] {
             assert_eq!(check(segment, name), "passed", "{name} of {segment}");
@@ -75,7 +77,7 @@ fn every_frame_of_a_soak_is_accounted_for_and_the_injected_loss_is_found() {
     assert_eq!(segments[1]["load"].as_str().map(|load| load.ends_with("sleep 600")), Some(true));
     assert!(count(&soak_json, "/distributions/emulator-wakeup/count") > 15_000);
     // Started again, it is done.
-    let again = soak(&scene, 0.4).wait().expect_code(0);
+    let again = soak(&scene, 0.5).wait().expect_code(0);
     assert!(again.stderr.contains("the time asked for is up"), "{}", again.stderr);
     assert_eq!(results(&scene)["segments"], soak_json["segments"]);
 }

@@ -89,9 +89,12 @@ impl Evidence {
         let counters = self.log.as_ref().map(|log| log.counters.clone()).unwrap_or_default();
         let axes = [("110", "drive_commands"), ("111", "load_commands")];
         let gaps = axes.iter().filter_map(|(id, key)| {
-            let lost = self.summary[*key]["lost"].as_u64()?;
+            let commands = &self.summary[*key];
+            let lost = commands["lost"].as_u64()?;
             let (first, last) = *counters.get(*id)?;
-            Some(((*id).to_owned(), Gaps::Commands { lost, first, last }))
+            let times = |key: &str| commands[key].as_u64().unwrap_or(0);
+            let pauses = times("expired") + times("refused_stale");
+            Some(((*id).to_owned(), Gaps::Commands { lost, first, last, pauses }))
         });
         Party { gaps: gaps.collect(), ..party("emulator", &self.summary) }
     }

@@ -119,9 +119,7 @@ impl Laws for Effects {
     fn middle(&self, at: At<'_>, carried: &mut Moving) -> Middle {
         let At { of, span, from, node, .. } = at;
         let half_s = span.span_s / 2.0;
-        // From the beginning of the substep that this step is a part of; both are sums of equal parts, with roundings.
-        let substeps = at.local_s / self.substep_s;
-        let ahead_s = (substeps - (substeps + 1e-9).floor()) * self.substep_s + half_s;
+        let (since_period_s, ahead_s) = (at.since_period_s(), at.since_substep_s() + half_s);
         let extension = of.ahead(span, from);
         let volume = [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let volume_from = [of.chambers.volume_a(from.extension), of.chambers.volume_b(from.extension)];
@@ -130,8 +128,8 @@ impl Laws for Effects {
         for axis in 0..2 {
             let lane = |pair: Pair| pair.to_array()[axis];
             let own = &mut carried.axes[axis];
-            let spool = self.spool_over(axis, own, at, lane(from.spool), at.local_s);
-            own.spool = self.spool_over(axis, own, at, spool, at.local_s + half_s);
+            let spool = self.spool_over(axis, own, at, lane(from.spool), since_period_s);
+            own.spool = self.spool_over(axis, own, at, spool, since_period_s + half_s);
             let exhaust =
                 ExhaustSide { silencer_back_pressure: own.silencer_pa + own.silencer_pa_per_s * half_s };
             for chamber in 0..2 {

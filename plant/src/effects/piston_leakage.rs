@@ -15,15 +15,14 @@
 //! Source: laminar gap flow of a gas, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; leakage between the
 //! chambers also in Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::laminar_gap::LaminarGap;
+use super::sheet::{Effect, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
-use crate::parameters::table::Unit;
 
 /// The numbers of this effect on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PistonLeakage {
-    /// k, m^3/s per Pa^2.
-    gap: f64,
+    gap: LaminarGap,
 }
 
 impl Effect for PistonLeakage {
@@ -33,34 +32,18 @@ impl Effect for PistonLeakage {
         place: PlaceKind::Axis,
         law: "laminar leakage past the piston seal, from chamber to chamber",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
-        keys: &[EffectKey {
-            name: "leakage_nl_per_min",
-            unit: Unit::NormalLitrePerMinute,
-            min: 0.0,
-            max: 50.0,
-            drawn: [0.2, 10.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
-            meaning: "q_ref, flow from 6 bar to 1 bar absolute",
-        }],
+        keys: &[LaminarGap::KEY],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PistonLeakage { gap: gap(numbers[0]) }
+        PistonLeakage { gap: LaminarGap::of(numbers[0]) }
     }
-}
-
-/// k of a gap that passes this normal flow, m^3/s, from 6 to 1 bar absolute.
-pub(super) fn gap(leakage_m3_per_s: f64) -> f64 {
-    const REFERENCE_PA2: f64 = 6e5 * 6e5 - 1e5 * 1e5;
-    leakage_m3_per_s / REFERENCE_PA2
 }
 
 impl PistonLeakage {
     /// q_ab, normal flow from chamber a to chamber b, m^3/s; pressures absolute, Pa.
     pub(crate) fn flow(&self, pressure_a_pa: f64, pressure_b_pa: f64) -> f64 {
-        self.gap * ((pressure_a_pa - pressure_b_pa) * (pressure_a_pa + pressure_b_pa))
+        self.gap.flow(pressure_a_pa, pressure_b_pa)
     }
 }
 

@@ -17,6 +17,7 @@
 //! Source: Hooke's law for the spring; cogging as a sine of its pitch is usual for linear drives; both shapes and the range:
 //! effects.md, textbook prior.
 
+use super::over_stroke::{Ripple, line};
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
@@ -26,10 +27,8 @@ use crate::parameters::table::Unit;
 pub(crate) struct PositionDependentForce {
     /// F_c, force at x = 0, falling in a straight line to its negative at the other end; positive centres.
     pub(crate) spring_n: f64,
-    /// F_r, amplitude of the cogging.
-    pub(crate) ripple_n: f64,
-    /// P, period of the cogging.
-    pub(crate) pitch_m: f64,
+    /// F_r and P, amplitude and period of the cogging.
+    ripple: Ripple,
     /// L/2 of the rig.
     pub(crate) half_stroke_m: f64,
 }
@@ -64,25 +63,14 @@ impl Effect for PositionDependentForce {
                 neutral: Some(0.0),
                 meaning: "F_r, amplitude of the cogging",
             },
-            EffectKey {
-                name: "pitch_mm",
-                unit: Unit::Millimetre,
-                min: 2.0,
-                max: 500.0,
-                drawn: [20.0, 100.0],
-                signed: false,
-                default: Some(50.0),
-                neutral: None,
-                meaning: "P, period of the cogging",
-            },
+            Ripple::PITCH,
         ],
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
         PositionDependentForce {
             spring_n: numbers[0],
-            ripple_n: numbers[1],
-            pitch_m: numbers[2],
+            ripple: Ripple { amplitude_n: numbers[1], pitch_m: numbers[2] },
             half_stroke_m: rig.cylinder().stroke_m / 2.0,
         }
     }
@@ -91,9 +79,7 @@ impl Effect for PositionDependentForce {
 impl PositionDependentForce {
     /// Force in +x of the rig at this position, m; N.
     pub(crate) fn term(&self, position_m: f64) -> f64 {
-        let spring_n = -self.spring_n * ((position_m - self.half_stroke_m) / self.half_stroke_m);
-        let ripple_n = self.ripple_n * libm::sin(std::f64::consts::TAU * position_m / self.pitch_m);
-        spring_n + ripple_n
+        -self.spring_n * line(self.half_stroke_m, position_m) + self.ripple.at(position_m)
     }
 }
 

@@ -22,6 +22,7 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7), on friction that depends on position; shapes
 //! and range: effects.md, textbook prior.
 
+use super::over_stroke::{Ripple, line};
 use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
@@ -37,10 +38,8 @@ pub(crate) struct PositionDependentFriction {
     pub(crate) width_m: f64,
     /// F_s, growth from mid-stroke to the rod fully out.
     pub(crate) slope_n: f64,
-    /// F_r, amplitude of the ripple.
-    pub(crate) ripple_n: f64,
-    /// P, period of the ripple.
-    pub(crate) pitch_m: f64,
+    /// F_r and P, amplitude and period of the ripple.
+    ripple: Ripple,
     /// L/2 of the rig.
     pub(crate) half_stroke_m: f64,
 }
@@ -108,17 +107,7 @@ impl Effect for PositionDependentFriction {
                 neutral: Some(0.0),
                 meaning: "F_r, amplitude of the ripple",
             },
-            EffectKey {
-                name: "pitch_mm",
-                unit: Unit::Millimetre,
-                min: 2.0,
-                max: 500.0,
-                drawn: [20.0, 100.0],
-                signed: false,
-                default: Some(50.0),
-                neutral: None,
-                meaning: "P, period of the ripple",
-            },
+            Ripple::PITCH,
         ],
     };
 
@@ -128,8 +117,7 @@ impl Effect for PositionDependentFriction {
             centre_m: numbers[1],
             width_m: numbers[2],
             slope_n: numbers[3],
-            ripple_n: numbers[4],
-            pitch_m: numbers[5],
+            ripple: Ripple { amplitude_n: numbers[4], pitch_m: numbers[5] },
             half_stroke_m: rig.cylinder().stroke_m / 2.0,
         }
     }
@@ -140,9 +128,7 @@ impl PositionDependentFriction {
     pub(crate) fn term(&self, extension_m: f64) -> f64 {
         let from_bump = (extension_m - self.centre_m) / self.width_m;
         let bump_n = self.bump_n * libm::exp(-from_bump * from_bump);
-        let slope_n = self.slope_n * ((extension_m - self.half_stroke_m) / self.half_stroke_m);
-        let ripple_n = self.ripple_n * libm::sin(std::f64::consts::TAU * extension_m / self.pitch_m);
-        bump_n + slope_n + ripple_n
+        bump_n + self.slope_n * line(self.half_stroke_m, extension_m) + self.ripple.at(extension_m)
     }
 }
 

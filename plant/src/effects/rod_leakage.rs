@@ -13,16 +13,14 @@
 //!
 //! Source: laminar gap flow of a gas, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
-use super::piston_leakage::gap;
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::laminar_gap::LaminarGap;
+use super::sheet::{Effect, Group, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
-use crate::parameters::table::Unit;
 
 /// The numbers of this effect at one chamber.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RodLeakage {
-    /// k, m^3/s per Pa^2.
-    gap: f64,
+    gap: LaminarGap,
 }
 
 impl Effect for RodLeakage {
@@ -32,28 +30,18 @@ impl Effect for RodLeakage {
         place: PlaceKind::Chamber,
         law: "laminar leakage to the atmosphere: past the rod seal out of b, past the cap's static seal out of a",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
-        keys: &[EffectKey {
-            name: "leakage_nl_per_min",
-            unit: Unit::NormalLitrePerMinute,
-            min: 0.0,
-            max: 50.0,
-            drawn: [0.2, 10.0],
-            signed: false,
-            default: None,
-            neutral: Some(0.0),
-            meaning: "q_ref, flow from 6 bar to 1 bar absolute",
-        }],
+        keys: &[LaminarGap::KEY],
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        RodLeakage { gap: gap(numbers[0]) }
+        RodLeakage { gap: LaminarGap::of(numbers[0]) }
     }
 }
 
 impl RodLeakage {
     /// q_out, normal flow out of the chamber, m^3/s; pressures absolute, Pa.
     pub(crate) fn flow(&self, chamber_pa: f64, atmospheric_pa: f64) -> f64 {
-        self.gap * ((chamber_pa - atmospheric_pa) * (chamber_pa + atmospheric_pa))
+        self.gap.flow(chamber_pa, atmospheric_pa)
     }
 }
 

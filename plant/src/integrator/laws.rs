@@ -18,8 +18,22 @@ pub(crate) struct At<'s> {
     pub(crate) from: &'s Lanes,
     pub(crate) node: Node,
     pub(crate) held: Held,
+    /// Which substep of the period, and which part of it; 0 for a substep that is made in one.
+    pub(crate) substep: u32,
+    pub(crate) part: u32,
+}
+
+impl At<'_> {
+    /// Time from the substep's beginning to the step's, s.
+    pub(crate) fn since_substep_s(&self) -> f64 {
+        let [_, fine] = self.of.spans();
+        f64::from(self.part) * fine.span_s
+    }
+
     /// Time from the period's beginning to the step's, s.
-    pub(crate) local_s: f64,
+    pub(crate) fn since_period_s(&self) -> f64 {
+        f64::from(self.substep) * self.of.substep_s() + self.since_substep_s()
+    }
 }
 
 /// The laws of a rig; pairs hold a value for each axis, forces are along its own extension.

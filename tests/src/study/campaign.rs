@@ -9,11 +9,12 @@ use crate::study::SCHEMA_VERSION;
 use crate::study::draws::Draw;
 use crate::study::folder::{FolderError, Study, make_whole, read};
 use crate::study::program::{Identity, Interrupted, Program, Taken};
+use discrepancy::records::{self, ReadError, ReadOptions, Unknown};
 use plant::RigParameters;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader};
+use std::io;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,22 +25,6 @@ pub const EXPERIMENTS: [(Experiment, &str); 3] = [
     (Experiment::Train, "train"),
     (Experiment::HeldOut(0), "held-out-0"),
     (Experiment::HeldOut(1), "held-out-1"),
-];
-
-/// Columns of measurement.csv [rig-model.md, Measurement file]; another one could tell what is hidden.
-const COLUMNS: [&str; 12] = [
-    "time_s",
-    "drive_valve",
-    "drive_position_m",
-    "drive_force_N",
-    "drive_pressure_a_Pa",
-    "drive_pressure_b_Pa",
-    "load_valve",
-    "load_position_m",
-    "load_force_N",
-    "load_pressure_a_Pa",
-    "load_pressure_b_Pa",
-    "supply_pressure_Pa",
 ];
 
 /// Largest report that is kept.
@@ -120,15 +105,13 @@ pub enum CampaignError {
         /// What the maker says.
         reason: String,
     },
-    /// A record has a column that the measurement file does not have.
-    #[error(
-        "draw {number}: column '{column}' of its record is none of rig-model.md: it could tell what is hidden"
-    )]
-    Column {
+    /// A record is none, or holds what could tell what is hidden.
+    #[error("draw {number}: {error}")]
+    Record {
         /// Which draw.
         number: usize,
-        /// Which column.
-        column: String,
+        /// What the reader says.
+        error: ReadError,
     },
     /// The disk is nearly full.
     #[error(
@@ -305,17 +288,16 @@ impl Campaign<'_> {
         let number = draw.number;
         let files = |error| CampaignError::Files { number, error };
         let empty = tempfile::tempdir().map_err(files)?;
-        let records = self.study.records(number);
+        let folder_of_records = self.study.records(number);
         let test = EXPERIMENTS
             .iter()
             .find(|(experiment, _)| *experiment == draw.test())
             .map_or("train", |found| found.1);
         fs::write(empty.path().join("rig.toml"), RigParameters::BASELINE_TOML).map_err(files)?;
         for (name, copy) in [("train", "train.csv"), (test, "test.csv")] {
-            let record = records.join(name).join("measurement.csv");
-            if let Some(column) = foreign_column(&record).map_err(files)? {
-                return Err(CampaignError::Column { number, column });
-            }
+            let record = folder_of_records.join(name).join("measurement.csv");
+            let blind = ReadOptions { unknown: Unknown::Refused, ..ReadOptions::default() };
+            records::read(&record, &blind).map_err(|error| CampaignError::Record { number, error })?;
             fs::copy(record, empty.path().join(copy)).map_err(files)?;
         }
         let said = folder.join("stderr.txt");
@@ -367,19 +349,6 @@ pub fn read_result(path: &Path) -> Result<RunResult, FolderError> {
             if good { Ok(result) } else { Err(format!("schema version {}", result.schema_version)) }
         })
         .map_err(|what| FolderError::content(path, format!("is no result of this version: {what}")))
-}
-
-/// A column of a record that a blind record does not have.
-fn foreign_column(record: &Path) -> io::Result<Option<String>> {
-    let mut lines = BufReader::new(File::open(record)?).lines();
-    let head = loop {
-        match lines.next().transpose()? {
-            Some(line) if line.starts_with("# linked=") => {}
-            line => break line.unwrap_or_default(),
-        }
-    };
-    let mut columns = head.split(',').map(str::trim);
-    Ok(columns.find(|column| !COLUMNS.contains(column)).map(str::to_owned))
 }
 
 /// Time left in words, as the draws so far took.

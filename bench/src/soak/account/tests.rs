@@ -16,7 +16,7 @@ fn whole() -> (Vec<Party>, Wire) {
             ..Seen::default()
         }),
         // 996 = 62 * 16 + 4: the last one sent has counter 4; the last that came 3, so one is missing behind it.
-        gaps: BTreeMap::from([("110".into(), Gaps::Commands { lost: 0, first: 2, last: 3 })]),
+        gaps: BTreeMap::from([("110".into(), Gaps::Commands { lost: 0, first: 2, last: 3, pauses: 0 })]),
         ..Party::default()
     };
     let controller = Party {
@@ -125,8 +125,21 @@ fn what_nobody_sent_is_told() {
 #[test]
 fn a_series_of_commands_is_missing_what_lies_before_between_and_after() {
     // 1 to 20 were sent; 1, 2, 7 and 20 did not come.
-    assert_eq!(Gaps::Commands { lost: 1, first: 3, last: 3 }.missing(20), 4);
-    assert_eq!(Gaps::Commands { lost: 0, first: 1, last: 0 }.missing(16), 0);
+    assert_eq!(Gaps::Commands { lost: 1, first: 3, last: 3, pauses: 0 }.missing(20), 4);
+    assert_eq!(Gaps::Commands { lost: 0, first: 1, last: 0, pauses: 0 }.missing(16), 0);
+}
+
+#[test]
+fn a_frame_lost_in_a_pause_of_its_sender_may_leave_no_gap_but_none_may_be_too_many() {
+    let with = |lost, pauses| {
+        let gaps = Gaps::Commands { lost, first: 1, last: 3, pauses };
+        broken(|parties, _| {
+            parties[0].gaps.insert("110".into(), gaps);
+        })
+    };
+    assert_eq!(with(0, 0).gaps_broken.len(), 1);
+    assert_eq!(with(0, 1).gaps_broken, Vec::<String>::new());
+    assert_eq!(with(2, 1).gaps_broken.len(), 1);
 }
 
 #[test]
