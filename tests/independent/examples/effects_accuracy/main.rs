@@ -1,6 +1,7 @@
 //! Makes the tables of `plant/docs/effects-accuracy.md`: the plant with smooth effects against an independent solver.
 //!
-//! `scripts/effects-tables` prints them, and puts them into the page with `--write`. What is compared, and in which motions: `tests/independent/tests/independent/mod.rs`.
+//! `scripts/effects-tables` prints them, and puts them into the page with `--write`. What is compared, and in which motions:
+//! `tests/independent/tests/independent/mod.rs`.
 
 #![allow(clippy::print_stdout)]
 
