@@ -3,5 +3,11 @@
 //! | file | holds |
 //! |---|---|
 //! | [`records`] | one reader of records, whatever their form: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
+//! | [`check`] | whether a record can be used, and its noise |
+//! | [`course`] | a record on the simulation's grid |
+//! | [`report`] | what was found, as data |
 
+pub mod check;
+pub mod course;
 pub mod records;
+pub mod report;

@@ -1,0 +1,359 @@
+//! A record as the simulation needs it: inputs and samples of every millisecond, and where the pistons were.
+//!
+//! ```text
+//!   record ──► grid of 1 ms ──► inputs held over each period, samples or None, points (x, v, p_a, p_b) by local parabolas
+//! ```
+//!
+//! Rows are put on the grid by their nearest millisecond; a period without a row has no samples, and its command is that before.
+//! A window that lacks more than a few commands in a row is not simulated ([`Course::gaps`]).
+//!
+//! The points are where windows start; what is left of their noise is estimated with each window. A piston is at rest where its
+//! parabola's speed is within three standard errors of zero for all of a while: there the speed is zero and nothing else.
+//!
+//! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
+
+use crate::check::Checked;
+use crate::records::{Channel, Record, Signal};
+use plant::{Axis, Inputs, RigParameters, quantise_valve};
+
+/// Channels of an axis that are simulated: position, force, pressures a and b.
+pub const CHANNELS: usize = 4;
+/// Their signals.
+pub const SIGNALS: [Signal; CHANNELS] =
+    [Signal::Position, Signal::Force, Signal::PressureA, Signal::PressureB];
+/// A period, s.
+pub const PERIOD_S: f64 = 1e-3;
+/// Samples to each side of a local parabola of the position.
+const POSITION_REACH: usize = 10;
+/// The same of a pressure.
+const PRESSURE_REACH: usize = 5;
+/// Periods that a piston must seem at rest around an instant to be at rest in it.
+const REST_REACH: usize = 12;
+/// Longest run of periods without a command that a window bears.
+const HELD_LONGEST: usize = 3;
+
+/// A record on its grid.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// File of the record.
+    pub name: String,
+    /// Whether the load's eye sat in the carriage.
+    pub linked: bool,
+    /// Weights on the carriage, kg.
+    pub added_mass_kg: f64,
+    /// Which axes were measured, drive and load.
+    pub measured: [bool; 2],
+    /// What acts over each period.
+    pub inputs: Vec<Inputs>,
+    /// Readings at the start of each period, in the order of [`SIGNALS`], rig coordinates, the load's offset taken off.
+    pub samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
+    /// Where each axis was at the start of each period.
+    pub points: Vec<[Point; 2]>,
+    /// Standard deviation of each reading, its rounding included.
+    pub noise: [[f64; CHANNELS]; 2],
+    /// Periods whose command nobody knows, or whose points nothing supports.
+    pub gaps: Vec<bool>,
+}
+
+/// Mechanical state and pressures of an axis, in its own extension.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// How far the rod is out, m.
+    pub extension_m: f64,
+    /// Its rate, m/s; exactly 0 at rest.
+    pub rod_velocity_m_per_s: f64,
+    /// Absolute pressures of the chambers a and b, Pa.
+    pub pressures_pa: [f64; 2],
+}
+
+/// Why a record cannot be simulated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CourseError {
+    /// A signal that the simulation needs is not there.
+    #[error(
+        "{file}: no column {column}: the simulation of an axis needs valve, position, force and both pressures"
+    )]
+    Missing {
+        /// The record.
+        file: String,
+        /// The column.
+        column: String,
+    },
+    /// No axis is measured.
+    #[error("{file}: no axis is measured: a record needs the columns of drive or load")]
+    NoAxis {
+        /// The record.
+        file: String,
+    },
+    /// The record is too short.
+    #[error("{file}: {length_ms} ms: a record needs at least {least_ms} ms")]
+    Short {
+        /// The record.
+        file: String,
+        /// Its length.
+        length_ms: usize,
+        /// What is needed.
+        least_ms: usize,
+    },
+}
+
+/// Shortest record, periods.
+const SHORTEST: usize = 1000;
+
+impl Course {
+    /// Puts a checked record on its grid.
+    ///
+    /// # Errors
+    /// [`CourseError`] when a signal is missing or the record is too short.
+    pub fn of(record: &Record, checked: &Checked, rig: &RigParameters) -> Result<Course, CourseError> {
+        let file = record.file().display().to_string();
+        let measured = Axis::ALL.map(|axis| record.channel(Channel::Of(axis, Signal::Position)).is_some());
+        if measured == [false, false] {
+            return Err(CourseError::NoAxis { file });
+        }
+        for axis in Axis::ALL.into_iter().filter(|axis| measured[axis.index()]) {
+            for signal in [Signal::Valve].into_iter().chain(SIGNALS) {
+                let channel = Channel::Of(axis, signal);
+                if record.channel(channel).is_none() {
+                    return Err(CourseError::Missing { file, column: channel.column() });
+                }
+            }
+        }
+        let places = places(record);
+        let length = places.last().map_or(0, |last| last + 1);
+        if length < SHORTEST {
+            return Err(CourseError::Short { file, length_ms: length, least_ms: SHORTEST });
+        }
+        let mut course = Course {
+            name: file,
+            linked: record.setup().linked,
+            added_mass_kg: record.setup().added_mass_kg,
+            measured,
+            inputs: vec![Inputs::default(); length],
+            samples: vec![[[None; CHANNELS]; 2]; length],
+            points: vec![[Point::default(); 2]; length],
+            noise: [[0.0; CHANNELS]; 2],
+            gaps: vec![false; length],
+        };
+        for axis in Axis::ALL {
+            if measured[axis.index()] {
+                course.fill(axis, record, checked, rig, &places);
+            }
+        }
+        Ok(course)
+    }
+
+    /// Periods.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.inputs.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.inputs.is_empty()
+    }
+
+    fn fill(
+        &mut self,
+        axis: Axis,
+        record: &Record,
+        checked: &Checked,
+        rig: &RigParameters,
+        places: &[usize],
+    ) {
+        let i = axis.index();
+        let stroke_m = rig.cylinder().stroke_m;
+        let sensors = rig.sensors();
+        let offset_m = if axis == Axis::Load { sensors.load_position_offset_m } else { 0.0 };
+        let mut commands = vec![None; self.len()];
+        let valve = Channel::Of(axis, Signal::Valve);
+        for (row, place) in places.iter().enumerate() {
+            commands[*place] = record.value(valve, row).filter(|_| checked.is_usable(valve, row));
+            for (at, signal) in SIGNALS.into_iter().enumerate() {
+                let channel = Channel::Of(axis, signal);
+                let value = record.value(channel, row).filter(|_| checked.is_usable(channel, row));
+                let offset = if signal == Signal::Position { offset_m } else { 0.0 };
+                self.samples[*place][i][at] = value.map(|value| value - offset);
+            }
+        }
+        let steps = [
+            sensors.position_step_m(),
+            sensors.force_step_n(),
+            sensors.pressure_step_pa(),
+            sensors.pressure_step_pa(),
+        ];
+        let specified = [
+            sensors.position_noise_m,
+            sensors.force_noise_n,
+            sensors.pressure_noise_pa,
+            sensors.pressure_noise_pa,
+        ];
+        for at in 0..CHANNELS {
+            let own = checked.noise(Channel::Of(axis, SIGNALS[at])).unwrap_or(specified[at]);
+            // A record that shows less than its rounding has the rounding's.
+            self.noise[i][at] = own.max(steps[at] / 12.0_f64.sqrt());
+        }
+        hold(&mut commands, &mut self.gaps);
+        for (inputs, command) in self.inputs.iter_mut().zip(&commands) {
+            inputs.valve[i] = quantise_valve(command.unwrap_or(0.0).clamp(-1.0, 1.0));
+        }
+        let column =
+            |at: usize| -> Vec<Option<f64>> { self.samples.iter().map(|sample| sample[i][at]).collect() };
+        let position = parabolas(&column(0), POSITION_REACH);
+        let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
+        let rests = rests(&position, &column(0), self.noise[i][0]);
+        for place in 0..self.len() {
+            let [Some(x), Some(a), Some(b)] = [position[place], pressures[0][place], pressures[1][place]]
+            else {
+                self.gaps[place] = true;
+                continue;
+            };
+            let rest_m = rests[place];
+            let (x_m, v_m_per_s) = rest_m.map_or((x.value, x.slope / PERIOD_S), |rest_m| (rest_m, 0.0));
+            let (extension_m, rate) =
+                if axis == Axis::Load { (stroke_m - x_m, -v_m_per_s) } else { (x_m, v_m_per_s) };
+            self.points[place][i] = Point {
+                extension_m: extension_m.clamp(0.0, stroke_m),
+                rod_velocity_m_per_s: rate,
+                pressures_pa: [a.value, b.value],
+            };
+        }
+    }
+}
+
+/// The grid's place of each row; rows whose time jumps back share the place of the one before.
+fn places(record: &Record) -> Vec<usize> {
+    let times = record.time_s();
+    let first = times.first().copied().unwrap_or(0.0);
+    let mut last = 0;
+    times
+        .iter()
+        .map(|time| {
+            last = last.max(((time - first) / PERIOD_S).round().max(0.0) as usize);
+            last
+        })
+        .collect()
+}
+
+/// Holds commands over short gaps, and marks long ones.
+fn hold(commands: &mut [Option<f64>], gaps: &mut [bool]) {
+    let mut since = 0;
+    for place in 0..commands.len() {
+        if commands[place].is_some() {
+            since = 0;
+            continue;
+        }
+        since += 1;
+        commands[place] = place.checked_sub(1).and_then(|before| commands[before]);
+        if since > HELD_LONGEST || commands[place].is_none() {
+            gaps[place + 1 - since..=place].fill(true);
+        }
+    }
+}
+
+/// A local parabola at its middle: value, and slope per period.
+#[derive(Clone, Copy, Debug)]
+struct Parabola {
+    value: f64,
+    slope: f64,
+}
+
+/// A parabola around each place, by least squares over what is there; `None` where less than half of it is.
+fn parabolas(values: &[Option<f64>], reach: usize) -> Vec<Option<Parabola>> {
+    (0..values.len())
+        .map(|place| {
+            let from = place.saturating_sub(reach);
+            let to = (place + reach + 1).min(values.len());
+            let mut sums = [[0.0; 4]; 3];
+            let mut count = 0;
+            for (at, value) in values[from..to].iter().enumerate() {
+                let Some(value) = value else { continue };
+                let t = (from + at) as f64 - place as f64;
+                let powers = [1.0, t, t * t];
+                for row in 0..3 {
+                    for column in 0..3 {
+                        sums[row][column] += powers[row] * powers[column];
+                    }
+                    sums[row][3] += powers[row] * value;
+                }
+                count += 1;
+            }
+            if count <= reach {
+                return None;
+            }
+            solve(sums).map(|[value, slope, _]| Parabola { value, slope })
+        })
+        .collect()
+}
+
+/// Solves three equations by elimination with pivots; `None` when they are none.
+fn solve(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
+    for pivot in 0..3 {
+        let best = (pivot..3).max_by(|a, b| rows[*a][pivot].abs().total_cmp(&rows[*b][pivot].abs()))?;
+        rows.swap(pivot, best);
+        if rows[pivot][pivot].abs() < 1e-12 {
+            return None;
+        }
+        for row in 0..3 {
+            if row != pivot {
+                let factor = rows[row][pivot] / rows[pivot][pivot];
+                let pivot_row = rows[pivot];
+                rows[row].iter_mut().zip(pivot_row).for_each(|(own, other)| *own -= factor * other);
+            }
+        }
+    }
+    Some([rows[0][3] / rows[0][0], rows[1][3] / rows[1][1], rows[2][3] / rows[2][2]])
+}
+
+/// The resting position where a piston is at rest, over all of [`REST_REACH`] to each side.
+fn rests(parabolas: &[Option<Parabola>], positions: &[Option<f64>], noise_m: f64) -> Vec<Option<f64>> {
+    // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
+    let n = POSITION_REACH as f64;
+    let slope_error = noise_m * (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt();
+    let slow: Vec<bool> = parabolas
+        .iter()
+        .map(|parabola| parabola.is_some_and(|parabola| parabola.slope.abs() < 3.5 * slope_error))
+        .collect();
+    (0..slow.len())
+        .map(|place| {
+            let from = place.saturating_sub(REST_REACH);
+            let to = (place + REST_REACH + 1).min(slow.len());
+            if !slow[from..to].iter().all(|slow| *slow) {
+                return None;
+            }
+            let near: Vec<f64> = positions[from..to].iter().flatten().copied().collect();
+            let mean_m = near.iter().sum::<f64>() / near.len() as f64;
+            let half = near.len() / 2;
+            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+            let creep_m = (mean(&near[half..]) - mean(&near[..half])).abs();
+            // Two means of a dozen samples each, four standard errors.
+            (creep_m < 4.0 * noise_m * (2.0 / half as f64).sqrt()).then_some(mean_m)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_is_its_own_parabola_holes_and_all() {
+        let values: Vec<_> = (0..50)
+            .map(|at| (at % 7 != 3).then_some(2.0 + 0.5 * f64::from(at) - 0.1 * f64::from(at * at)))
+            .collect();
+        let own = parabolas(&values, 10)[20].unwrap();
+        assert!((own.value - (2.0 + 10.0 - 40.0)).abs() < 1e-9, "{own:?}");
+        assert!((own.slope - (0.5 - 4.0)).abs() < 1e-9, "{own:?}");
+    }
+
+    #[test]
+    fn commands_are_held_over_a_short_gap_and_a_long_one_is_marked() {
+        let mut commands = vec![Some(0.5), None, None, Some(0.1), None, None, None, None, Some(0.2)];
+        let mut gaps = vec![false; 9];
+        hold(&mut commands, &mut gaps);
+        assert_eq!(commands[2], Some(0.5));
+        assert_eq!(gaps, [false, false, false, false, true, true, true, true, false]);
+    }
+}

@@ -1,0 +1,363 @@
+//! `report.json`: what the workflow found, as data. Schema: `discrepancy/docs/report.md`.
+//!
+//! Every list has an order that follows from the records alone, and nothing in it depends on time, threads or machine: two runs write
+//! the same bytes. Only `gap` and `verification` know the held-out record.
+
+use plant::effects::sheet::{Part, Place};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Version of the schema; a new optional field does not change it.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// What the workflow says in the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nothing is missing above the detection limits.
+    NothingMissing,
+    /// Only numbers of the baseline are off.
+    ParametersOnly,
+    /// Effects are missing, and these are they.
+    Named,
+    /// Effects are missing, and several explain the records alike.
+    Ambiguous,
+    /// Something is missing that the catalogue does not have.
+    OutsideCatalogue,
+    /// A record cannot be used.
+    BadData,
+}
+
+/// All that the workflow found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The verdict in a sentence or two.
+    pub summary: String,
+    /// File names of rig and records as given.
+    pub inputs: InputFiles,
+    /// Missing effects, the best first.
+    pub named: Vec<NamedEffect>,
+    /// Numbers of the baseline that were off, and no others.
+    pub parameters: Vec<Quantity>,
+    /// What is missing that the catalogue does not have.
+    pub outside: Option<Outside>,
+    /// Per signal of the held-out record, as `drive_position_m`; empty without `--test`.
+    pub gap: BTreeMap<String, Gap>,
+    /// More of the held-out record; null without `--test`.
+    pub verification: Option<Verification>,
+    /// All candidates, the best first.
+    pub candidates: Vec<Candidate>,
+    /// Effects that the training records do not excite.
+    pub not_excited: Vec<EffectPlace>,
+    /// Smallest amplitude of each other effect that would have been named.
+    pub detection_limits: Vec<DetectionLimit>,
+    /// Where model and records disagree.
+    pub location: Option<Location>,
+    /// Fitness of the records.
+    pub checks: Vec<RecordCheck>,
+    /// The experiment that would tell what is ambiguous apart, or why there is none.
+    pub next: Option<Next>,
+}
+
+/// Files of a run of the workflow.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct InputFiles {
+    /// The rig file.
+    pub rig: String,
+    /// Training records.
+    pub train: Vec<String>,
+}
+
+/// Where an effect is.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+pub struct Where {
+    /// drive, load, linkage or supply.
+    pub axis: String,
+    /// a, b, position or force; null for an effect of a whole axis.
+    pub element: Option<String>,
+}
+
+impl From<Place> for Where {
+    fn from(place: Place) -> Self {
+        let name = place.to_string();
+        let (axis, element) =
+            name.split_once('.').map_or((name.as_str(), None), |(axis, element)| (axis, Some(element)));
+        debug_assert!(place.element.is_some() == element.is_some() || matches!(place.part, Part::Linkage));
+        Where { axis: axis.to_owned(), element: element.map(str::to_owned) }
+    }
+}
+
+/// A number with its unit and its standard error.
+#[derive(Clone, Debug, Serialize)]
+pub struct Quantity {
+    /// Key of the effect's sheet, or `parameter:…`.
+    pub name: String,
+    /// In `unit`.
+    pub value: f64,
+    /// Unit of the rig file; empty for a plain number.
+    pub unit: String,
+    /// One standard error; null when the records do not bound the number.
+    pub standard_error: Option<f64>,
+    /// What the rig file said, where it says something.
+    pub before: Option<f64>,
+}
+
+/// A missing effect with what is known of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct NamedEffect {
+    /// Name in the catalogue.
+    pub effect: String,
+    /// Where it is.
+    #[serde(rename = "where")]
+    pub place: Where,
+    /// Its numbers, in the order of its sheet.
+    pub parameters: Vec<Quantity>,
+    /// Share of the excess of the training records that goes when it is added.
+    pub share_explained: f64,
+    /// What explains these records as well.
+    pub alternatives: Vec<NamedEffect>,
+}
+
+/// An effect at a place.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectPlace {
+    /// Name in the catalogue.
+    pub effect: String,
+    /// Where.
+    #[serde(rename = "where")]
+    pub place: Where,
+}
+
+/// How a candidate did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Candidate {
+    /// Name in the catalogue.
+    pub effect: String,
+    /// Where.
+    #[serde(rename = "where")]
+    pub place: Where,
+    /// Gain of the linear screening over the calibrated threshold of nothing: above 1 it stands out.
+    pub score: f64,
+    /// Share of the excess that goes with it alone, after its refit in the simulator; null when it was not refitted.
+    pub share_explained: Option<f64>,
+    /// Its amplitude, refitted or linear, in the unit of its sheet.
+    pub amplitude: f64,
+    /// Unit of the amplitude.
+    pub unit: String,
+    /// What became of it, in words.
+    pub fate: String,
+}
+
+/// The smallest amplitude that these records would have shown.
+#[derive(Clone, Debug, Serialize)]
+pub struct DetectionLimit {
+    /// Name in the catalogue.
+    pub effect: String,
+    /// Where.
+    #[serde(rename = "where")]
+    pub place: Where,
+    /// Key of the amplitude.
+    pub name: String,
+    /// Change from the value at which the rig is the baseline.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// A disagreement that no effect of the catalogue explains.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outside {
+    /// As in [`BalanceBar::balance`].
+    pub balance: String,
+    /// What it depends on, the strongest first, with the significance of the dependence.
+    pub variables: Vec<Dependence>,
+    /// The missing term over its first variable.
+    pub curve: Option<Curve>,
+    /// A short formula, if one fits.
+    pub formula: Option<String>,
+}
+
+/// Statistical dependence of a disagreement on a variable.
+#[derive(Clone, Debug, Serialize)]
+pub struct Dependence {
+    /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt.
+    pub variable: String,
+    /// Share of the variance explained on folds it was not fitted on.
+    pub r2: f64,
+    /// Of 200 circular shifts, the share that reached this much.
+    pub p_value: f64,
+}
+
+/// A smooth curve with a band.
+#[derive(Clone, Debug, Serialize)]
+pub struct Curve {
+    /// The variable, and its unit.
+    pub variable: String,
+    /// Unit of the variable.
+    pub variable_unit: String,
+    /// Unit of the term.
+    pub unit: String,
+    /// Values of the variable.
+    pub at: Vec<f64>,
+    /// The term there.
+    pub value: Vec<f64>,
+    /// Two standard errors of it.
+    pub band: Vec<f64>,
+}
+
+/// The gap of a signal of the held-out record, rms over windows, in the signal's unit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Gap {
+    /// Baseline against measurement.
+    pub before: f64,
+    /// Extended model against measurement.
+    pub after: f64,
+    /// Noise of the sensor alone.
+    pub floor: f64,
+    /// Share of the excess power over the floor that went, 1 - (after^2 - floor^2) / (before^2 - floor^2), at most 1; null when there was none.
+    pub closed: Option<f64>,
+}
+
+/// What the held-out record says of both models, frozen.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verification {
+    /// The record.
+    pub record: String,
+    /// Windowed chi2 per degree of freedom of the baseline.
+    pub chi2_before: f64,
+    /// Of the extended model.
+    pub chi2_after: f64,
+    /// 95 % range of the same for nothing missing.
+    pub chi2_null: [f64; 2],
+    /// Per signal: normalised rms error of a free run, in percent of the signal's range.
+    pub free_run_nrmse_percent: BTreeMap<String, BeforeAfter>,
+    /// Per signal: lag-1 autocorrelation of the windowed residuals.
+    pub whiteness: BTreeMap<String, BeforeAfter>,
+    /// What the free run did that a rig cannot, in words; empty when nothing.
+    pub physical: Vec<String>,
+    /// Whether the extended model is better by more than three clustered standard errors and no signal worse by more than 2 %.
+    pub confirmed: bool,
+}
+
+/// A figure of both models.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct BeforeAfter {
+    /// Baseline.
+    pub before: f64,
+    /// Extended model.
+    pub after: f64,
+}
+
+/// Where the baseline and the training records disagree.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Location {
+    /// One for each balance.
+    pub balances: Vec<BalanceBar>,
+    /// One for each balance and regime.
+    pub regimes: Vec<RegimeCell>,
+    /// Unknown inputs over their strongest variables.
+    pub maps: Vec<Curve>,
+    /// Series of the unknown inputs, thinned out for a picture.
+    pub series: Vec<UnknownInput>,
+}
+
+/// The disagreement of a balance.
+#[derive(Clone, Debug, Serialize)]
+pub struct BalanceBar {
+    /// `drive.flow-a`, `drive.flow-b`, `drive.force`, `drive.force-sensor`, the load's, `linkage`.
+    pub balance: String,
+    /// rms of the unknown input over its propagated noise; 1 is nothing.
+    pub over_noise: f64,
+    /// rms of the unknown input.
+    pub rms: f64,
+    /// Its unit, N or Nl/min.
+    pub unit: String,
+}
+
+/// The disagreement of a balance in a regime.
+#[derive(Clone, Debug, Serialize)]
+pub struct RegimeCell {
+    /// As in [`BalanceBar::balance`].
+    pub balance: String,
+    /// hold, onset, motion-out, motion-in, near-ends, valve-edge.
+    pub regime: String,
+    /// Windows of this regime.
+    pub windows: usize,
+    /// As in [`BalanceBar::over_noise`].
+    pub over_noise: f64,
+}
+
+/// An unknown input over time.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnknownInput {
+    /// As in [`BalanceBar::balance`].
+    pub balance: String,
+    /// Unit.
+    pub unit: String,
+    /// Times, s.
+    pub time_s: Vec<f64>,
+    /// Values.
+    pub value: Vec<f64>,
+    /// Propagated noise, one standard deviation.
+    pub noise: f64,
+}
+
+/// Whether a record can be used, and what was noticed.
+#[derive(Clone, Debug, Serialize)]
+pub struct RecordCheck {
+    /// The file.
+    pub file: String,
+    /// Whether the workflow can use it.
+    pub usable: bool,
+    /// Samples and length.
+    pub rows: usize,
+    /// Last time minus first, s.
+    pub length_s: f64,
+    /// What was noticed.
+    pub findings: Vec<Finding>,
+    /// Noise and quantum of each channel, estimated from the record.
+    pub channels: BTreeMap<String, ChannelCheck>,
+}
+
+/// Something noticed in a record.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// gap, repeated-time, jumping-time, clipped, stuck, wrong-unit, swapped-pressures, force-sign, lost-samples, …
+    pub kind: String,
+    /// Column, if it is about one.
+    pub column: Option<String>,
+    /// First line of the file that it is about.
+    pub line: Option<u64>,
+    /// Whether the record cannot be used for it; else its samples are left out.
+    pub fatal: bool,
+    /// What, where, and what to do.
+    pub text: String,
+}
+
+/// What a channel is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ChannelCheck {
+    /// Standard deviation of its noise, in SI; null when it cannot be told.
+    pub noise: Option<f64>,
+    /// Smallest step between its values, in SI; null when it has none.
+    pub quantum: Option<f64>,
+    /// Share of samples that cannot be used.
+    pub unusable: f64,
+}
+
+/// What to measure next.
+#[derive(Clone, Debug, Serialize)]
+pub struct Next {
+    /// Why.
+    pub reason: String,
+    /// Experiment that can be run, its file beside the report; null when none on this rig tells them apart.
+    pub experiment: Option<String>,
+    /// Expected divergence of what is ambiguous, in squared standard deviations; 25 is wanted.
+    pub divergence: Option<f64>,
+    /// What would tell them apart where no experiment of this rig does.
+    pub otherwise: Option<String>,
+}
