@@ -7,7 +7,16 @@
 //! | [`course`] | a record on the simulation's grid |
 //! | [`report`] | what was found, as data |
 
+pub mod calibrate;
+pub mod candidates;
 pub mod check;
 pub mod course;
+pub mod engine;
+pub mod fit;
+pub mod name;
+pub mod parameters;
 pub mod records;
+pub mod refit;
 pub mod report;
+pub mod screen;
+pub mod windows;

@@ -188,6 +188,16 @@ impl RigParameters {
         Self::from_entries(self.entries.with(path, numbers)?)
     }
 
+    /// The numbers of a key, `table.key`, in the file's unit.
+    ///
+    /// # Panics
+    /// If the table of parameters holds no such key: a typing error.
+    #[must_use]
+    pub fn numbers(&self, path: &str) -> &[f64] {
+        let (table, name) = path.split_once('.').unwrap_or((path, ""));
+        &self.entries.entry(table, name).numbers
+    }
+
     /// The same rig with one effect switched on, or with other numbers where it is on already.
     ///
     /// `place` is `drive`, `drive.a` and so on; `numbers` are keys of the effect's sheet in the file's units; keys that are

@@ -1,0 +1,77 @@
+//! The baseline's own parameters from records: what fits best when nothing is missing, with errors, and what the records cannot tell.
+//!
+//! Gauss-Newton over all factors at once, sensitivities taken anew at each point. A record cannot tell a parameter whose error is not
+//! clearly below its tolerance, nor two whose errors hang together.
+//!
+//! Source: Neugebauer 2011, section 3.2 (identification of the model's parameters); effects.md, Parameters that may merely be wrong.
+
+use crate::engine::Engine;
+use crate::parameters::{COUNT, PARAMETERS, with_factors};
+use crate::refit::{Around, Refit, refit};
+use crate::report::Quantity;
+use plant::RigParameters;
+
+/// Points at most.
+const POINTS: usize = 4;
+/// Fall of the loss below which it has settled.
+const SETTLED: f64 = 1.0;
+/// Share of the tolerance above which an error says that the record does not tell.
+const UNTOLD: f64 = 0.7;
+
+/// The parameters that fit best, effects left out.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// The fit.
+    pub fit: Refit,
+    /// Sensitivities at its point.
+    pub around: Around,
+}
+
+/// Fits all parameters.
+#[must_use]
+pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
+    let mut around = baseline.clone();
+    let mut best = refit(engine, &around, &[], 0.0).expect("the baseline is a rig");
+    for _ in 1..POINTS {
+        let columns = engine.parameter_columns(engine.rig(), &best.factors);
+        let next = Around { columns, factors: best.factors };
+        let Some(own) = refit(engine, &next, &[], 0.0) else { break };
+        let settled = own.loss > best.loss - SETTLED;
+        if own.loss < best.loss {
+            (best, around) = (own, next);
+        }
+        if settled {
+            break;
+        }
+    }
+    Calibrated { fit: best, around }
+}
+
+impl Calibrated {
+    /// The rig with the parameters that fit best.
+    #[must_use]
+    pub fn rig(&self, rig: &RigParameters) -> RigParameters {
+        with_factors(rig, &self.fit.factors)
+    }
+
+    /// All parameters with their errors; those that the records cannot tell have none.
+    #[must_use]
+    pub fn quantities(&self, rig: &RigParameters) -> Vec<Quantity> {
+        (0..COUNT).map(|at| quantity(rig, at, &self.fit)).collect()
+    }
+}
+
+/// A parameter of a fit, in the unit of the rig file.
+#[must_use]
+pub fn quantity(rig: &RigParameters, at: usize, fit: &Refit) -> Quantity {
+    let parameter = PARAMETERS[at];
+    let (before, unit) = parameter.value(rig);
+    let error = fit.errors[fit.errors.len() - COUNT + at];
+    Quantity {
+        name: parameter.name.to_owned(),
+        value: before * fit.factors[at],
+        unit: unit.to_owned(),
+        standard_error: (error < UNTOLD * parameter.tolerance).then_some(before * error),
+        before: Some(before),
+    }
+}

@@ -1,0 +1,260 @@
+//! What may be missing: every effect of the catalogue at every place that the records can show, and how its numbers are moved.
+//!
+//! Fits move coordinates in place of the file's numbers, so that 0 is the baseline and 1 about the strongest that occurs:
+//!
+//! ```text
+//!   neutral value n      z = (a - n) / largest drawn change
+//!   neutral at infinity  z = drawn least / a                    (stiffness, conductance, rate: the smaller the stronger)
+//!   far from neutral     z = ln(a / n) / ln(largest drawn ratio)  (where the range spans decades on both sides)
+//!   shape                z = (a - default) / drawn width          (changes nothing while the amplitude is 0)
+//! ```
+
+use plant::Axis;
+use plant::RigParameters;
+use plant::effects::SHEETS;
+use plant::effects::sheet::{EffectKey, Part, Place, Sheet};
+use plant::parameters::ParameterError;
+
+/// Ratio of the largest to the smallest drawn value from which a key is moved by its logarithm.
+const DECADES: f64 = 30.0;
+/// Neutral values from which on a key counts as neutral at infinity, as a multiple of the largest drawn one.
+const FAR: f64 = 10.0;
+
+/// Effects whose traces change their shape as they grow.
+const BENT: [&str; 6] = [
+    "valve-dead-zone",
+    "valve-hysteresis",
+    "spool-rate-limit",
+    "stribeck-friction",
+    "end-cushion",
+    "silencer-back-pressure",
+];
+
+/// An effect at a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate {
+    /// Its sheet.
+    pub sheet: &'static Sheet,
+    /// Where.
+    pub place: Place,
+}
+
+/// How a key is moved.
+#[derive(Clone, Copy, Debug)]
+enum Scale {
+    Linear { neutral: f64, unit: f64 },
+    Reciprocal { least: f64, neutral: f64 },
+    Logarithm { neutral: f64, unit: f64 },
+}
+
+impl Scale {
+    fn of(key: &EffectKey) -> Scale {
+        let [least, most] = key.drawn;
+        match key.neutral.or(if key.default.is_none() { Some(f64::INFINITY) } else { None }) {
+            Some(neutral) if neutral > FAR * most => Scale::Reciprocal { least, neutral },
+            Some(neutral) if neutral > 0.0 && most / least > DECADES => {
+                let unit = (most / neutral).ln().abs().max((least / neutral).ln().abs());
+                Scale::Logarithm { neutral, unit }
+            }
+            Some(neutral) => {
+                Scale::Linear { neutral, unit: (most - neutral).abs().max((least - neutral).abs()) }
+            }
+            None => Scale::Linear { neutral: key.default.unwrap_or(0.0), unit: most - least },
+        }
+    }
+
+    fn number(self, z: f64) -> f64 {
+        match self {
+            Scale::Linear { neutral, unit } => neutral + z * unit,
+            Scale::Reciprocal { least, neutral } => 1.0 / (z.max(1e-9) / least + 1.0 / neutral),
+            Scale::Logarithm { neutral, unit } => neutral * (z * unit).exp(),
+        }
+    }
+
+    fn coordinate(self, number: f64) -> f64 {
+        match self {
+            Scale::Linear { neutral, unit } => (number - neutral) / unit,
+            Scale::Reciprocal { least, neutral } => least * (1.0 / number - 1.0 / neutral),
+            Scale::Logarithm { neutral, unit } => (number / neutral).ln() / unit,
+        }
+    }
+
+    /// d number / d z.
+    fn slope(self, z: f64) -> f64 {
+        match self {
+            Scale::Linear { unit, .. } => unit,
+            Scale::Reciprocal { least, .. } => {
+                let number = self.number(z);
+                -number * number / least
+            }
+            Scale::Logarithm { unit, .. } => self.number(z) * unit,
+        }
+    }
+}
+
+impl Candidate {
+    /// All candidates that records of these axes can show.
+    #[must_use]
+    pub fn all(measured: [bool; 2], linked: bool, without: &[String]) -> Vec<Candidate> {
+        let shown = |place: &Place| match place.part {
+            Part::Drive => measured[Axis::Drive.index()],
+            Part::Load => measured[Axis::Load.index()],
+            Part::Linkage => linked && measured == [true, true],
+            Part::Supply => true,
+        };
+        SHEETS
+            .iter()
+            .filter(|sheet| !without.iter().any(|name| name == sheet.name))
+            .flat_map(|sheet| {
+                let places = sheet.place.places().iter().copied().filter(move |place| shown(place));
+                places.map(move |place| Candidate { sheet, place })
+            })
+            .collect()
+    }
+
+    /// Name and place, as `piston-leakage drive`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        format!("{} {}", self.sheet.name, self.place)
+    }
+
+    /// Coordinates of the baseline: amplitudes 0, shapes at their defaults.
+    #[must_use]
+    pub fn origin(&self) -> Vec<f64> {
+        vec![0.0; self.sheet.keys.len()]
+    }
+
+    /// Whether a key changes nothing while the amplitudes are none.
+    #[must_use]
+    pub fn is_shape(&self, key: usize) -> bool {
+        key > 0 && self.sheet.keys[key].neutral.is_none()
+    }
+
+    /// Whether the effect goes over into the baseline as its amplitude does.
+    #[must_use]
+    pub fn is_anchored(&self) -> bool {
+        self.sheet.keys[0].neutral.is_some()
+    }
+
+    /// Smallest and largest coordinate of a key.
+    #[must_use]
+    pub fn range(&self, key: usize) -> [f64; 2] {
+        let sheet_key = &self.sheet.keys[key];
+        let scale = Scale::of(sheet_key);
+        let ends = [scale.coordinate(sheet_key.min), scale.coordinate(sheet_key.max)];
+        [ends[0].min(ends[1]), ends[0].max(ends[1])]
+    }
+
+    /// Whether the first key can go to both sides of the baseline.
+    #[must_use]
+    pub fn is_two_sided(&self) -> bool {
+        let [least, most] = self.range(0);
+        least < -1e-6 && most > 1e-6
+    }
+
+    /// The numbers at some coordinates, in the file's units, held in their ranges.
+    #[must_use]
+    pub fn numbers(&self, coordinates: &[f64]) -> Vec<f64> {
+        self.sheet
+            .keys
+            .iter()
+            .zip(coordinates)
+            .map(|(key, z)| Scale::of(key).number(*z).clamp(key.min, key.max))
+            .collect()
+    }
+
+    /// d number / d coordinate of a key.
+    #[must_use]
+    pub fn slope(&self, key: usize, coordinate: f64) -> f64 {
+        Scale::of(&self.sheet.keys[key]).slope(coordinate)
+    }
+
+    /// The coordinate of a number of a key.
+    #[must_use]
+    pub fn coordinate(&self, key: usize, number: f64) -> f64 {
+        Scale::of(&self.sheet.keys[key]).coordinate(number)
+    }
+
+    /// The rig with this effect.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when the numbers do not fit together.
+    pub fn rig(&self, rig: &RigParameters, coordinates: &[f64]) -> Result<RigParameters, ParameterError> {
+        let numbers = self.numbers(coordinates);
+        let named: Vec<(&str, f64)> =
+            self.sheet.keys.iter().map(|key| key.name).zip(numbers.iter().copied()).collect();
+        rig.with_effect(self.sheet.name, &self.place.to_string(), &named)
+    }
+
+    /// Coordinates at which the effect is simulated once before anything is fitted: what it looks like, weak and strong.
+    #[must_use]
+    pub fn probes(&self) -> Vec<Vec<f64>> {
+        let keys = self.sheet.keys.len();
+        let at = |key: usize, z: f64| {
+            let mut coordinates = self.origin();
+            coordinates[key] = z;
+            coordinates
+        };
+        let mut probes = if self.is_two_sided() && self.sheet.keys[0].signed {
+            vec![at(0, 0.3)]
+        } else if self.is_two_sided() {
+            vec![at(0, 0.2), at(0, -0.2)]
+        } else if self.is_anchored() && BENT.contains(&self.sheet.name) {
+            vec![at(0, 0.1), at(0, 0.5)]
+        } else if self.is_anchored() {
+            vec![at(0, 0.25)]
+        } else {
+            vec![at(0, 0.6), at(0, 0.85)]
+        };
+        for key in (1..keys).filter(|key| !self.is_shape(*key)) {
+            probes.push(at(key, 0.4));
+        }
+        if self.sheet.name == "position-dependent-friction" {
+            // A bump elsewhere looks like nothing near the one in the middle.
+            for centre in [-0.45, 0.45] {
+                let mut coordinates = at(0, 0.3);
+                coordinates[1] = centre;
+                probes.push(coordinates);
+            }
+        }
+        probes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_probe_of_every_effect_is_a_rig_and_its_coordinates_come_back() {
+        let rig = RigParameters::baseline();
+        let all = Candidate::all([true, true], true, &[]);
+        assert!(all.len() > SHEETS.len());
+        for candidate in all {
+            for probe in candidate.probes() {
+                candidate.rig(&rig, &probe).unwrap_or_else(|error| panic!("{}: {error}", candidate.name()));
+                let numbers = candidate.numbers(&probe);
+                // A stiffness without end is held at what a file may say.
+                let moved = numbers.iter().zip(&probe).enumerate().filter(|(_, (_, z))| **z != 0.0);
+                for (key, (number, z)) in moved {
+                    let back = candidate.coordinate(key, *number);
+                    assert!(
+                        (back - z).abs() < 1e-6,
+                        "{} key {key}: {z} comes back as {back}",
+                        candidate.name()
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_largest_drawn_change_is_about_one() {
+        for candidate in Candidate::all([true, false], false, &[]) {
+            let key = &candidate.sheet.keys[0];
+            let ends = key.drawn.map(|number| candidate.coordinate(0, number).abs());
+            let most = ends[0].max(ends[1]);
+            assert!((most - 1.0).abs() < 1e-6, "{}: {most}", candidate.name());
+        }
+    }
+}

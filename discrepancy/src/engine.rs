@@ -1,0 +1,121 @@
+//! The records of a run of the workflow with everything that is simulated of them.
+//!
+//! ```text
+//!   e      = readings - baseline                     what the baseline leaves
+//!   N      = (baseline with a factor - baseline) / change of the factor, for each parameter that may be wrong
+//!   C_j    = effect j at a probe - baseline
+//! ```
+//!
+//! All in windows, whitened, with what the windows' starts explain taken out ([`crate::windows`]). Simulations run on all cores; what
+//! they give is gathered in the order of the candidates, so that two runs have the same bits.
+
+use crate::course::Course;
+use crate::parameters::{COUNT, PARAMETERS, with_factors};
+use crate::windows::Windows;
+use plant::RigParameters;
+use rayon::prelude::*;
+
+/// Change of a factor by which the sensitivity to a parameter is taken.
+const FACTOR_CHANGE: f64 = 0.01;
+
+/// The records, and the baseline's readings.
+#[derive(Debug)]
+pub struct Engine<'a> {
+    windows: Vec<Windows<'a>>,
+    rig: RigParameters,
+    rows: usize,
+    freedom: Vec<f64>,
+}
+
+impl<'a> Engine<'a> {
+    /// An engine of some records of the same axes.
+    #[must_use]
+    pub fn new(courses: &'a [Course], rig: &RigParameters) -> Self {
+        let windows: Vec<Windows<'a>> = courses.par_iter().map(|course| Windows::new(course, rig)).collect();
+        let rows = windows.first().map_or(0, Windows::rows);
+        let freedom = windows.iter().flat_map(Windows::freedom).collect();
+        Engine { windows, rig: rig.clone(), rows, freedom }
+    }
+
+    /// The baseline.
+    #[must_use]
+    pub fn rig(&self) -> &RigParameters {
+        &self.rig
+    }
+
+    /// The windows of each record.
+    #[must_use]
+    pub fn windows(&self) -> &[Windows<'a>] {
+        &self.windows
+    }
+
+    /// Numbers in a window.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Degrees of freedom of each window.
+    #[must_use]
+    pub fn freedom(&self) -> &[f64] {
+        &self.freedom
+    }
+
+    /// Whitened readings of a rig, all records.
+    #[must_use]
+    pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
+        self.windows.iter().flat_map(|windows| windows.simulate(rig)).collect()
+    }
+
+    /// The same in longer steps, for differences.
+    #[must_use]
+    pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
+        self.windows.iter().flat_map(|windows| windows.simulate_coarsely(rig)).collect()
+    }
+
+    /// What is left of the readings beside a simulation.
+    #[must_use]
+    pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
+        self.each(simulated, |windows, simulated, _| windows.residual(simulated), simulated)
+    }
+
+    /// What one simulation differs from another by.
+    #[must_use]
+    pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
+        self.each(simulated, Windows::difference, from)
+    }
+
+    fn each(
+        &self,
+        simulated: &[f64],
+        what: impl Fn(&Windows<'a>, &[f64], &[f64]) -> Vec<f64>,
+        from: &[f64],
+    ) -> Vec<f64> {
+        let mut at = 0;
+        let mut all = Vec::with_capacity(simulated.len());
+        for windows in &self.windows {
+            let length = windows.count() * self.rows;
+            all.extend(what(windows, &simulated[at..at + length], &from[at..at + length]));
+            at += length;
+        }
+        all
+    }
+
+    /// Sensitivities of a rig's readings to the factors of all parameters, at these factors; an effect may be switched on.
+    #[must_use]
+    pub fn parameter_columns(&self, rig: &RigParameters, factors: &[f64; COUNT]) -> Vec<Vec<f64>> {
+        let around = |at: usize, change: f64| {
+            let mut factors = *factors;
+            factors[at] += change;
+            self.simulate(&with_factors(rig, &factors))
+        };
+        (0..PARAMETERS.len())
+            .into_par_iter()
+            .map(|at| {
+                let mut column = self.difference(&around(at, FACTOR_CHANGE), &around(at, -FACTOR_CHANGE));
+                column.iter_mut().for_each(|own| *own /= 2.0 * FACTOR_CHANGE);
+                column
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,337 @@
+//! Names what is missing: screened, fitted in the simulator, compared, accepted or refused.
+//!
+//! ```text
+//!   parameters alone ──► screening of all candidates ──► the best fitted in the simulator ──► accepted?
+//!                             ▲                                                                 │ yes: joins the model
+//!                             └───────── what is left, the model's own columns beside ──────────┘ up to three times
+//!   each that joined is taken out once: what is not missed goes; what fits as well as one of them is its alternative
+//! ```
+//!
+//! An effect is accepted when the loss falls by more than [`calibrated`](threshold) for nothing, several times over and by more than
+//! its errors hang together, when its amplitude is no smaller than a share of what occurs, and when it takes a good share of what
+//! the model leaves. What stays behind after three, or beside an explanation that leaves much, is outside the catalogue.
+//!
+//! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
+
+use crate::calibrate::{Calibrated, calibrate};
+use crate::candidates::Candidate;
+use crate::engine::Engine;
+use crate::fit::Products;
+use crate::parameters::{COUNT, PARAMETERS};
+use crate::refit::{Around, Placed, Refit, refit, refit_steps, rig_of};
+use crate::screen::{Columns, Screened};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// Effects at most.
+const MOST: usize = 3;
+/// Candidates that are fitted in the simulator at most, in each round.
+const CONTENDERS: usize = 6;
+/// Share of the best screened gain below which a candidate is not fitted.
+const CONTENDS: f64 = 0.35;
+/// What each number of an effect costs: it must be worth more than one more candidate tried.
+const NUMBER_COSTS: f64 = 8.0;
+/// Multiple of the threshold of nothing that is asked for, since a model is never exact.
+const SAFETY: f64 = 3.0;
+/// Share of what a model leaves that one more effect must take.
+const TAKES: f64 = 0.3;
+/// Share of the smallest change that occurs below which an effect is none.
+const FLOOR: f64 = 0.3;
+/// Share of what the parameters leave that may stay beside an explanation.
+const STAYS: f64 = 0.3;
+/// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart.
+const ALIKE: f64 = 20.0;
+/// The same as a share of what the effect takes.
+const ALIKE_SHARE: f64 = 0.02;
+/// Simulated records of nothing for the threshold.
+const NULLS: usize = 300;
+/// Share of them that stays below it.
+const NULL_SHARE: f64 = 0.99;
+/// A generator's seed: the threshold is part of the result, and has the same bits each run.
+const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
+
+/// What naming found.
+#[derive(Debug)]
+pub struct Found {
+    /// The parameters alone.
+    pub calibrated: Calibrated,
+    /// The model that explains the records.
+    pub model: Refit,
+    /// What takes the place of each of its effects just as well.
+    pub alternatives: Vec<Vec<Refit>>,
+    /// Share of the excess that goes with each effect.
+    pub shares: Vec<f64>,
+    /// All candidates as first screened, the best first.
+    pub screened: Vec<Screened>,
+    /// Those that were fitted alone.
+    pub fitted: Vec<Refit>,
+    /// Loss that nothing may gain.
+    pub threshold: f64,
+    /// Screening's columns, for limits.
+    pub columns: Columns,
+    /// Sensitivities of the parameters at the baseline.
+    pub around: Around,
+    /// Whether the model leaves more than it may.
+    pub inadequate: bool,
+}
+
+/// Names what is missing from a baseline.
+#[must_use]
+pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn FnMut(&str)) -> Found {
+    let ones = [1.0; COUNT];
+    let around = Around { columns: engine.parameter_columns(engine.rig(), &ones), factors: ones };
+    progress("parameters alone");
+    let calibrated = calibrate(engine, &around);
+    progress(&format!("screening {} candidates", candidates.len()));
+    let columns = Columns::new(engine, candidates);
+    let baseline = engine.residual(&engine.simulate(engine.rig()));
+    let (nothing, mut screened) = columns.screen(engine, &around, &baseline, &[]);
+    screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+
+    let mut model = calibrated.fit.clone();
+    let mut threshold = threshold(engine, &columns, &calibrated.around, &model);
+    let mut fitted = Vec::new();
+    let mut rounds: Vec<(Vec<Placed>, Vec<Refit>)> = Vec::new();
+    for round in 0..MOST {
+        let (own_nothing, own_screened) =
+            if round == 0 { (nothing, screened.clone()) } else { screen_again(engine, &columns, &model) };
+        let taken = |screened: &Screened| {
+            let own = &columns.candidates[screened.at];
+            model.placed.iter().any(|placed| {
+                placed.candidate.sheet.name == own.sheet.name && placed.candidate.place == own.place
+            })
+        };
+        let mut contenders: Vec<Screened> =
+            own_screened.into_iter().filter(|screened| !taken(screened)).collect();
+        contenders.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        let Some(best) = contenders.first() else { break };
+        let most = own_nothing - best.loss;
+        if most < threshold {
+            break;
+        }
+        contenders.truncate(CONTENDERS);
+        contenders.retain(|screened| own_nothing - screened.loss > CONTENDS * most);
+        progress(&format!("fitting {} candidates, round {}", contenders.len(), round + 1));
+        let point = if round == 0 { around.clone() } else { around_of(engine, &model) };
+        let mut refits: Vec<Refit> = contenders
+            .par_iter()
+            .filter_map(|screened| {
+                let mut start = model.placed.clone();
+                start.push(screened.start.clone());
+                refit_steps(engine, &point, &start, NUMBER_COSTS, if round == 0 { 5 } else { 3 })
+            })
+            .collect();
+        refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        // Sensitivities of the parameters were those of the model before: the best get their own.
+        let gain = model.loss - refits.first().map_or(model.loss, |best| best.loss);
+        let near = refits.iter().take(3).filter(|own| model.loss - own.loss > 0.5 * gain).count();
+        let refined: Vec<Refit> = refits[..near].par_iter().map(|own| refine(engine, own)).collect();
+        refits.splice(..near, refined);
+        refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        let Some(best) = refits.first() else { break };
+        if round == 0 {
+            fitted = refits.clone();
+        }
+        if !accepted(&model, best, threshold) {
+            break;
+        }
+        rounds.push((model.placed.clone(), refits.clone()));
+        model = best.clone();
+        threshold = self::threshold(engine, &columns, &around_of(engine, &model), &model);
+        if model.loss < threshold {
+            break;
+        }
+    }
+    drop_unneeded(engine, &calibrated, &mut model, &mut rounds, threshold);
+    let excess = (calibrated.fit.loss - model.loss).max(1e-9);
+    let inadequate = model.loss > STAYS * calibrated.fit.loss && model.loss > 2.0 * threshold;
+    let alternatives =
+        model.placed.iter().map(|placed| alternatives(placed, &model, &calibrated, &rounds)).collect();
+    let shares = shares(&model, &rounds, &calibrated, excess);
+    Found {
+        calibrated,
+        model,
+        alternatives,
+        shares,
+        screened,
+        fitted,
+        threshold,
+        columns,
+        around,
+        inadequate,
+    }
+}
+
+/// Sensitivities of the parameters at a model.
+fn around_of(engine: &Engine<'_>, model: &Refit) -> Around {
+    let rig = rig_of(engine.rig(), &model.placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
+    Around { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
+}
+
+/// Fits a model again with sensitivities taken at itself.
+fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
+    match refit(engine, &around_of(engine, own), &own.placed, NUMBER_COSTS) {
+        Some(refined) if refined.loss < own.loss => refined,
+        _ => own.clone(),
+    }
+}
+
+/// Whether a model is better than the one before by more than chance and inexactness give.
+fn accepted(before: &Refit, after: &Refit, threshold: f64) -> bool {
+    let gain = before.loss - after.loss;
+    let Some(joined) = after.placed.last() else { return false };
+    let takes = gain > TAKES * before.loss.max(0.0);
+    gain > SAFETY * threshold && takes && is_large(joined)
+}
+
+/// Whether one of an effect's amplitudes is no smaller than a share of what occurs.
+#[must_use]
+pub fn is_large(placed: &Placed) -> bool {
+    let candidate = &placed.candidate;
+    (0..placed.coordinates.len()).filter(|key| !candidate.is_shape(*key)).any(|key| {
+        let sheet_key = &candidate.sheet.keys[key];
+        let ends = sheet_key.drawn.map(|number| candidate.coordinate(key, number));
+        // A range that holds the neutral value has no smallest change.
+        let least = if ends[0] * ends[1] < 0.0 { 0.05 } else { FLOOR * ends[0].abs().min(ends[1].abs()) };
+        placed.coordinates[key].abs() >= least
+    })
+}
+
+/// Screens all candidates against what a model leaves, its own derivatives beside.
+fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<Screened>) {
+    let around = around_of(engine, model);
+    let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
+    let simulated = engine.simulate(&rig);
+    let residual = engine.residual(&simulated);
+    let beside: Vec<Vec<f64>> = (0..model.placed.len())
+        .into_par_iter()
+        .filter_map(|at| {
+            let mut placed = model.placed.clone();
+            let change = 0.02_f64.max(0.05 * placed[at].coordinates[0].abs());
+            placed[at].coordinates[0] += change;
+            let rig = rig_of(engine.rig(), &placed, &model.factors)?;
+            let mut column = engine.difference(&engine.simulate(&rig), &simulated);
+            column.iter_mut().for_each(|own| *own /= change);
+            Some(column)
+        })
+        .collect();
+    columns.screen(engine, &around, &residual, &beside)
+}
+
+/// The gain that a share of records of nothing stays below: the residual of a model, window by window with random signs, against
+/// all candidates. Signs keep what hangs together within a window, and take away what hangs together with a candidate.
+fn threshold(engine: &Engine<'_>, columns: &Columns, around: &Around, model: &Refit) -> f64 {
+    let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
+    let residual = engine.residual(&engine.simulate(&rig));
+    let leading: Vec<&[f64]> = columns
+        .probes
+        .iter()
+        .flat_map(|probes| probes.iter().map(|(_, place)| columns.column(*place)))
+        .collect();
+    let all: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).chain(leading.iter().copied()).collect();
+    let products = Products::new(&residual, &all, engine.freedom(), engine.rows());
+    let ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
+    let parameters: Vec<usize> = (0..COUNT).collect();
+    let weights = &products.fit(&parameters, &ridges).weights;
+    let scores = products.cleared_scores(&parameters, weights, &ridges);
+    let mut random = Pcg64::seed_from_u64(SEED);
+    let mut most: Vec<f64> = (0..NULLS)
+        .map(|_| {
+            let signs: Vec<f64> =
+                weights.iter().map(|_| if random.next_u64() >> 63 == 0 { 1.0 } else { -1.0 }).collect();
+            scores
+                .iter()
+                .map(|(own, information)| {
+                    let sum: f64 = own.iter().zip(&signs).map(|(own, sign)| own * sign).sum();
+                    sum * sum / information
+                })
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    most.sort_by(f64::total_cmp);
+    most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
+}
+
+/// Takes out effects that are not missed.
+fn drop_unneeded(
+    engine: &Engine<'_>,
+    calibrated: &Calibrated,
+    model: &mut Refit,
+    rounds: &mut Vec<(Vec<Placed>, Vec<Refit>)>,
+    threshold: f64,
+) {
+    while model.placed.len() > 1 {
+        let without: Vec<Option<Refit>> = (0..model.placed.len())
+            .into_par_iter()
+            .map(|at| {
+                let mut placed = model.placed.clone();
+                placed.remove(at);
+                refit_steps(engine, &around_of(engine, model), &placed, NUMBER_COSTS, 4)
+            })
+            .collect();
+        let least = without
+            .into_iter()
+            .enumerate()
+            .filter_map(|(at, own)| Some((at, own?)))
+            .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
+        let Some((at, own)) = least else { break };
+        let share = (own.loss - model.loss) / (calibrated.fit.loss - model.loss).max(1e-9);
+        if own.loss - model.loss > SAFETY * threshold && share > 0.002 {
+            break;
+        }
+        rounds.remove(at.min(rounds.len() - 1));
+        *model = own;
+    }
+}
+
+/// What takes the place of an effect of the model just as well.
+fn alternatives(
+    placed: &Placed,
+    model: &Refit,
+    calibrated: &Calibrated,
+    rounds: &[(Vec<Placed>, Vec<Refit>)],
+) -> Vec<Refit> {
+    let same = |left: &Placed, right: &Placed| {
+        left.candidate.sheet.name == right.candidate.sheet.name
+            && left.candidate.place == right.candidate.place
+    };
+    // The round in which it joined.
+    let Some((before, refits)) = rounds.iter().find(|(_, refits)| {
+        refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
+    }) else {
+        return Vec::new();
+    };
+    let best = &refits[0];
+    let earlier = if before.is_empty() { calibrated.fit.loss } else { model.loss.max(best.loss) };
+    let _ = earlier;
+    let gain = calibrated.fit.loss - best.loss;
+    refits[1..]
+        .iter()
+        .filter(|own| own.loss - best.loss < (ALIKE * best.inflation).max(ALIKE_SHARE * gain))
+        .cloned()
+        .collect()
+}
+
+/// Share of the excess that goes with each effect: of one alone all, of several what is missed without it.
+fn shares(
+    model: &Refit,
+    rounds: &[(Vec<Placed>, Vec<Refit>)],
+    calibrated: &Calibrated,
+    excess: f64,
+) -> Vec<f64> {
+    let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
+    let mut before = calibrated.fit.loss;
+    model
+        .placed
+        .iter()
+        .enumerate()
+        .map(|(at, _)| {
+            let after =
+                rounds.get(at).and_then(|(_, refits)| refits.first()).map_or(model.loss, |own| own.loss);
+            let share = (before - after) / excess * whole;
+            before = after;
+            share.clamp(0.0, 1.0)
+        })
+        .collect()
+}

@@ -1,0 +1,231 @@
+//! Fits effects in the simulator itself: their numbers by Gauss-Newton, the parameters that may be wrong linearly beside them.
+//!
+//! ```text
+//!   e(z) = readings - simulation with the effects at z       columns: N (parameters), d simulation / d z_i
+//!   fit of the columns to e(z) -> step of z, halved until the loss falls; parameters start from 0 each time
+//! ```
+//!
+//! Derivatives are differences of a twentieth of the coordinate's unit, never exact ones: through stick and slip those of a single
+//! trajectory say nothing. Source: discrepancy-notes.md, pipeline 6.
+
+use crate::candidates::Candidate;
+use crate::engine::Engine;
+use crate::fit::{Fit, Products};
+use crate::parameters::{COUNT, PARAMETERS, with_factors};
+use plant::RigParameters;
+
+/// Change of a coordinate by which derivatives are taken, at least and in proportion.
+const CHANGE: f64 = 0.02;
+const CHANGE_SHARE: f64 = 0.05;
+/// Steps at most, and halvings of one.
+const STEPS: usize = 7;
+const HALVINGS: usize = 3;
+/// Fall of the loss below which a fit has settled.
+const SETTLED: f64 = 0.3;
+/// Standard deviations of coordinates before anything is measured: amplitudes, shapes.
+const AMPLITUDE_TOLERANCE: f64 = 3.0;
+const SHAPE_TOLERANCE: f64 = 0.7;
+/// Coordinates beyond which nothing is looked for: a half more than the strongest that occurs.
+const FARTHEST: f64 = 1.5;
+
+/// One effect at some coordinates.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// Which.
+    pub candidate: Candidate,
+    /// One for each key of its sheet.
+    pub coordinates: Vec<f64>,
+}
+
+/// Some effects and the parameters beside them, fitted.
+#[derive(Clone, Debug)]
+pub struct Refit {
+    /// The effects.
+    pub placed: Vec<Placed>,
+    /// Factors of the parameters.
+    pub factors: [f64; COUNT],
+    /// The loss, priors and a penalty for each number included.
+    pub loss: f64,
+    /// Squares of each window.
+    pub squares: Vec<f64>,
+    /// Standard errors of all coordinates, in the order of the effects and their keys, then of the factors; clustered by windows.
+    pub errors: Vec<f64>,
+    /// How many times larger the clustered variance is than the plain one, for the first amplitude; at least 1.
+    pub inflation: f64,
+}
+
+/// Sensitivities around a point, and the factors that they were taken at.
+#[derive(Clone, Debug)]
+pub struct Around {
+    /// Columns of the parameters.
+    pub columns: Vec<Vec<f64>>,
+    /// Factors at which they were taken.
+    pub factors: [f64; COUNT],
+}
+
+/// The rig with some effects and factors; `None` where the numbers do not fit together.
+#[must_use]
+pub fn rig_of(rig: &RigParameters, placed: &[Placed], factors: &[f64; COUNT]) -> Option<RigParameters> {
+    placed.iter().try_fold(with_factors(rig, factors), |rig, placed| {
+        placed.candidate.rig(&rig, &placed.coordinates).ok()
+    })
+}
+
+/// Ridges of the parameters, for changes from `factors` of what is believed to be 1.
+fn parameter_ridges() -> Vec<f64> {
+    PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect()
+}
+
+fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
+    let tolerance = if candidate.is_shape(key) { SHAPE_TOLERANCE } else { AMPLITUDE_TOLERANCE };
+    tolerance.powi(-2)
+}
+
+/// Which coordinates of the effects are moved: all of them, place in `placed` and key.
+fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
+    placed
+        .iter()
+        .enumerate()
+        .flat_map(|(at, placed)| (0..placed.coordinates.len()).map(move |key| (at, key)))
+        .collect()
+}
+
+/// A point of a fit: where, and what is left there.
+struct Point {
+    placed: Vec<Placed>,
+    simulated: Vec<f64>,
+    residual: Vec<f64>,
+    fit: Fit,
+}
+
+/// Fits some effects from a start. `penalty` is what each number that is moved costs.
+///
+/// `None` when the start is none that the rig can have.
+#[must_use]
+pub fn refit(engine: &Engine<'_>, around: &Around, start: &[Placed], penalty: f64) -> Option<Refit> {
+    refit_steps(engine, around, start, penalty, STEPS)
+}
+
+/// The same with another number of steps at most; 0 only tells how good the start is.
+#[must_use]
+pub fn refit_steps(
+    engine: &Engine<'_>,
+    around: &Around,
+    start: &[Placed],
+    penalty: f64,
+    steps: usize,
+) -> Option<Refit> {
+    let parameters: Vec<usize> = (0..COUNT).collect();
+    let ridges = parameter_ridges();
+    let moved = moved(start);
+    let parameter_columns: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).collect();
+    let mut parameter_products: Option<Products> = None;
+    let mut evaluate = |placed: Vec<Placed>| -> Option<Point> {
+        let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &around.factors)?);
+        let residual = engine.residual(&simulated);
+        let products = match &mut parameter_products {
+            Some(products) => {
+                products.set_residual(&residual, &parameter_columns, engine.rows());
+                products
+            }
+            none => {
+                none.insert(Products::new(&residual, &parameter_columns, engine.freedom(), engine.rows()))
+            }
+        };
+        let fit = products.fit(&parameters, &ridges);
+        Some(Point { placed, simulated, residual, fit })
+    };
+    let prior = |placed: &[Placed]| -> f64 {
+        moved
+            .iter()
+            .map(|(at, key)| {
+                coordinate_ridge(&placed[*at].candidate, *key) * placed[*at].coordinates[*key].powi(2)
+            })
+            .sum()
+    };
+    let mut point = evaluate(start.to_vec())?;
+    let mut last = None;
+    for step in 0..=steps {
+        let columns: Vec<Vec<f64>> = moved
+            .iter()
+            .map(|(at, key)| derivative(engine, around, &point, *at, *key))
+            .collect::<Option<_>>()?;
+        let all: Vec<&[f64]> =
+            parameter_columns.iter().copied().chain(columns.iter().map(Vec::as_slice)).collect();
+        let products = Products::new(&point.residual, &all, engine.freedom(), engine.rows());
+        let chosen: Vec<usize> = (0..all.len()).collect();
+        let mut all_ridges = ridges.clone();
+        all_ridges.extend(moved.iter().map(|(at, key)| coordinate_ridge(&point.placed[*at].candidate, *key)));
+        let joint = products.fit(&chosen, &all_ridges);
+        let before = point.fit.loss + prior(&point.placed);
+        last = Some((products, all_ridges, chosen));
+        if step == steps {
+            break;
+        }
+        let mut share = 1.0;
+        let mut better = None;
+        for _ in 0..=HALVINGS {
+            let mut placed = point.placed.clone();
+            for ((at, key), change) in moved.iter().zip(&joint.coefficients[COUNT..]) {
+                let candidate = placed[*at].candidate;
+                let range = candidate.range(*key);
+                let (least, most) = (range[0].max(-FARTHEST), range[1].min(FARTHEST));
+                let own = &mut placed[*at].coordinates[*key];
+                *own = (*own + share * change).clamp(least.min(most), most);
+            }
+            if let Some(tried) = evaluate(placed)
+                && tried.fit.loss + prior(&tried.placed) < before
+            {
+                better = Some(tried);
+                break;
+            }
+            share *= 0.4;
+        }
+        let Some(tried) = better else { break };
+        let settled = before - (tried.fit.loss + prior(&tried.placed)) < SETTLED;
+        point = tried;
+        if settled {
+            break;
+        }
+    }
+    let (products, all_ridges, chosen) = last?;
+    // At the point itself: parameters as fitted there, coordinates where they are.
+    let mut at_point = point.fit.clone();
+    at_point.coefficients.extend(std::iter::repeat_n(0.0, moved.len()));
+    let covariance = products.covariance(&chosen, &at_point, &all_ridges);
+    let (plain, _) = products.normal(&chosen, &at_point.weights, &all_ridges);
+    let plain = plain.try_inverse();
+    let error = |at: usize| covariance.as_ref().map_or(f64::INFINITY, |own| own[(at, at)].max(0.0).sqrt());
+    let inflation = match (&covariance, &plain) {
+        (Some(own), Some(plain)) if !moved.is_empty() => {
+            (own[(COUNT, COUNT)] / plain[(COUNT, COUNT)]).max(1.0)
+        }
+        _ => 1.0,
+    };
+    let errors = (COUNT..chosen.len()).chain(0..COUNT).map(error).collect();
+    let mut factors = around.factors;
+    factors.iter_mut().zip(&point.fit.coefficients).for_each(|(own, change)| *own += change);
+    let loss = point.fit.loss + prior(&point.placed) + penalty * moved.len() as f64;
+    Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
+}
+
+/// What a coordinate changes, per unit of it; towards the inside where the range ends.
+fn derivative(
+    engine: &Engine<'_>,
+    around: &Around,
+    point: &Point,
+    at: usize,
+    key: usize,
+) -> Option<Vec<f64>> {
+    let candidate = point.placed[at].candidate;
+    let own = point.placed[at].coordinates[key];
+    let size = CHANGE.max(CHANGE_SHARE * own.abs());
+    let [_, most] = candidate.range(key);
+    let change = if own + size > most.min(FARTHEST) { -size } else { size };
+    let mut placed = point.placed.clone();
+    placed[at].coordinates[key] += change;
+    let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &around.factors)?);
+    let mut column = engine.difference(&simulated, &point.simulated);
+    column.iter_mut().for_each(|own| *own /= change);
+    Some(column)
+}

@@ -1,0 +1,139 @@
+//! Screening: how much each candidate would explain, from simulations at its probes, and where its fit should start.
+//!
+//! Each probe is one column; with the parameters' columns beside it, its coefficient says how strong the effect would be if its
+//! traces grew in proportion to it. They do not quite: a probe is also judged as it is, and the fit in the simulator decides.
+
+use crate::candidates::Candidate;
+use crate::engine::Engine;
+use crate::fit::Products;
+use crate::parameters::{COUNT, PARAMETERS};
+use crate::refit::{Around, Placed};
+use rayon::prelude::*;
+
+/// All columns of a screening.
+#[derive(Debug)]
+pub struct Columns {
+    /// The candidates.
+    pub candidates: Vec<Candidate>,
+    /// Of each candidate its probes, and their columns' places.
+    pub probes: Vec<Vec<(Vec<f64>, usize)>>,
+    columns: Vec<Vec<f64>>,
+}
+
+/// What screening found of a candidate.
+#[derive(Clone, Debug)]
+pub struct Screened {
+    /// Place in [`Columns::candidates`].
+    pub at: usize,
+    /// Loss with it.
+    pub loss: f64,
+    /// Where its fit starts.
+    pub start: Placed,
+}
+
+impl Columns {
+    /// Simulates all probes of some candidates.
+    #[must_use]
+    pub fn new(engine: &Engine<'_>, candidates: Vec<Candidate>) -> Self {
+        let baseline = engine.simulate_coarsely(engine.rig());
+        let tasks: Vec<(usize, Vec<f64>)> = candidates
+            .iter()
+            .enumerate()
+            .flat_map(|(at, candidate)| candidate.probes().into_iter().map(move |probe| (at, probe)))
+            .collect();
+        let made: Vec<Option<Vec<f64>>> = tasks
+            .par_iter()
+            .map(|(at, probe)| {
+                let rig = candidates[*at].rig(engine.rig(), probe).ok()?;
+                Some(engine.difference(&engine.simulate_coarsely(&rig), &baseline))
+            })
+            .collect();
+        let mut probes = vec![Vec::new(); candidates.len()];
+        let mut columns = Vec::new();
+        for ((at, probe), column) in tasks.into_iter().zip(made) {
+            if let Some(column) = column {
+                probes[at].push((probe, columns.len()));
+                columns.push(column);
+            }
+        }
+        Columns { candidates, probes, columns }
+    }
+
+    /// Column of a probe.
+    #[must_use]
+    pub fn column(&self, place: usize) -> &[f64] {
+        &self.columns[place]
+    }
+
+    /// Screens all candidates against a residual; `beside` are columns that are fitted with each (effects already in the model).
+    #[must_use]
+    pub fn screen(
+        &self,
+        engine: &Engine<'_>,
+        around: &Around,
+        residual: &[f64],
+        beside: &[Vec<f64>],
+    ) -> (f64, Vec<Screened>) {
+        let always = COUNT + beside.len();
+        let all: Vec<&[f64]> =
+            around.columns.iter().chain(beside).chain(&self.columns).map(Vec::as_slice).collect();
+        let products = Products::new(residual, &all, engine.freedom(), engine.rows());
+        let mut ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
+        ridges.resize(always, 1e-2);
+        let basic: Vec<usize> = (0..always).collect();
+        let nothing = products.fit(&basic, &ridges).loss;
+        let screened = (0..self.candidates.len())
+            .into_par_iter()
+            .filter_map(|at| self.screen_one(&products, at, always, &basic, &ridges))
+            .collect();
+        (nothing, screened)
+    }
+
+    fn screen_one(
+        &self,
+        products: &Products,
+        at: usize,
+        always: usize,
+        basic: &[usize],
+        ridges: &[f64],
+    ) -> Option<Screened> {
+        let candidate = self.candidates[at];
+        // Probes of the amplitude lead, each alone; those of further keys that go over into the baseline join.
+        let (leading, joining): (Vec<_>, Vec<_>) =
+            self.probes[at].iter().partition(|(probe, _)| probe[0] != 0.0);
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        let alone = Vec::new();
+        for (probe, place) in &leading {
+            for with in if joining.is_empty() { vec![&alone] } else { vec![&alone, &joining] } {
+                let mut chosen = basic.to_vec();
+                let mut own_ridges = ridges.to_vec();
+                chosen.push(always + place);
+                chosen.extend(with.iter().map(|(_, place)| always + place));
+                own_ridges.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
+                let fit = products.fit(&chosen, &own_ridges);
+                let mut coordinates = probe.clone();
+                let [least, most] = candidate.range(0);
+                let coefficient = fit.coefficients[always];
+                let amplitude = coefficient * probe[0];
+                // On the wrong side of the baseline it explains nothing.
+                if amplitude <= least.max(-10.0) || amplitude >= most.min(10.0) {
+                    if amplitude.signum() != probe[0].signum() {
+                        continue;
+                    }
+                }
+                coordinates[0] = amplitude.clamp(least.max(-1.3), most.min(1.3));
+                for ((probe, _), coefficient) in with.iter().zip(&fit.coefficients[always + 1..]) {
+                    for (key, z) in probe.iter().enumerate().skip(1).filter(|(_, z)| **z != 0.0) {
+                        let [least, most] = candidate.range(key);
+                        coordinates[key] = (coefficient * z).clamp(least.max(-1.3), most.min(1.3));
+                    }
+                }
+                let loss = fit.loss + 6.0 * (1 + with.len()) as f64;
+                if best.as_ref().is_none_or(|(best, _)| loss < *best) {
+                    best = Some((loss, coordinates));
+                }
+            }
+        }
+        best.map(|(loss, coordinates)| Screened { at, loss, start: Placed { candidate, coordinates } })
+    }
+}

@@ -1,0 +1,359 @@
+//! A record in windows of 100 ms, each simulated from where the record says that the pistons were.
+//!
+//! ```text
+//!   e_k = M_k (y_k - f_k(start_k; rig)) / sigma          window k: readings y, simulation f, noise sigma
+//!   M_k = 1 - Q_k Q_k'                                   Q_k: what a change of x, v, p_a, p_b at the window's start explains
+//! ```
+//!
+//! Spool, lagged flows and whatever effects remember go on from window to window; mechanics and pressures start anew from the
+//! record's points, whose errors M_k takes out to first order. A direction of the start that is worth less than one standard
+//! deviation over the whole window is left in: at rest the speed is none.
+//!
+//! Where a piston stops, breaks away or turns, the force jumps, and microseconds decide on which side of a sample: a reading of
+//! the force that differs from those around it more than noise can is put back to their median, in residuals and sensitivities
+//! alike [rig-model.md, Accuracy].
+//!
+//! Source: discrepancy-notes.md, 1 (windows of 100 to 200 ms judge best), 6.
+
+use crate::course::{CHANNELS, Course, Point};
+use plant::{Inputs, Plant, RigParameters, Setup, State};
+
+/// Periods of a window.
+pub const WINDOW: usize = 100;
+/// Place of the force among the readings.
+const FORCE: usize = 1;
+/// Steps of a period where only a difference is wanted.
+const COARSE_SUBSTEPS: u32 = 5;
+/// Readings to each side that a reading of the force is compared with.
+const SPIKE_REACH: usize = 4;
+/// Standard deviations by which it may differ from their median.
+const SPIKE: f64 = 6.0;
+/// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
+const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
+/// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
+const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
+
+/// The windows of a course under a rig, with what their starts explain.
+#[derive(Debug)]
+pub struct Windows<'a> {
+    course: &'a Course,
+    rig: RigParameters,
+    /// First period of each window.
+    starts: Vec<usize>,
+    /// Axis and channel of each lane.
+    lanes: Vec<(usize, usize)>,
+    /// Readings over their noise, window by window, period by period, lane by lane; 0 where there is none.
+    readings: Vec<f64>,
+    valid: Vec<bool>,
+    /// Orthonormal, per window.
+    bases: Vec<Vec<Vec<f64>>>,
+}
+
+impl<'a> Windows<'a> {
+    /// The windows of a course, their starts' sensitivities under a baseline rig.
+    #[must_use]
+    pub fn new(course: &'a Course, rig: &RigParameters) -> Self {
+        let measured = (0..2).filter(|axis| course.measured[*axis]);
+        let lanes: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
+        // The first window fills lags and memories, and is not judged [rig-model.md: a record is judged after 0.1 s].
+        let starts: Vec<usize> = (1..course.len() / WINDOW)
+            .map(|window| window * WINDOW)
+            .filter(|start| !course.gaps[*start..start + WINDOW].contains(&true))
+            .collect();
+        let mut readings = Vec::with_capacity(starts.len() * WINDOW * lanes.len());
+        let mut valid = Vec::with_capacity(readings.capacity());
+        for start in &starts {
+            for samples in &course.samples[*start..start + WINDOW] {
+                for (axis, at) in &lanes {
+                    let sample = samples[*axis][*at];
+                    valid.push(sample.is_some());
+                    readings.push(sample.map_or(0.0, |value| value / course.noise[*axis][*at]));
+                }
+            }
+        }
+        let mut windows =
+            Windows { course, rig: rig.clone(), starts, lanes, readings, valid, bases: Vec::new() };
+        windows.bases = windows.sensitivities();
+        windows
+    }
+
+    /// The baseline rig.
+    #[must_use]
+    pub fn rig(&self) -> &RigParameters {
+        &self.rig
+    }
+
+    /// The course.
+    #[must_use]
+    pub fn course(&self) -> &Course {
+        self.course
+    }
+
+    /// How many windows there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// First period of each window.
+    #[must_use]
+    pub fn starts(&self) -> &[usize] {
+        &self.starts
+    }
+
+    /// Axis and channel of each lane.
+    #[must_use]
+    pub fn lanes(&self) -> &[(usize, usize)] {
+        &self.lanes
+    }
+
+    /// Numbers in a window.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        WINDOW * self.lanes.len()
+    }
+
+    /// Degrees of freedom of each window.
+    #[must_use]
+    pub fn freedom(&self) -> Vec<f64> {
+        let rows = self.rows();
+        let valid = self.valid.chunks_exact(rows).map(|valid| valid.iter().filter(|valid| **valid).count());
+        valid.zip(&self.bases).map(|(valid, basis)| valid.saturating_sub(basis.len()).max(1) as f64).collect()
+    }
+
+    /// Readings over their noise that this rig would have given, without noise and rounding.
+    #[must_use]
+    pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
+        self.run(self.plant(rig))
+    }
+
+    /// The same in longer steps: half the time, good enough for what one simulation differs from another by.
+    #[must_use]
+    pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
+        self.run(self.plant(rig).with_substeps(COARSE_SUBSTEPS))
+    }
+
+    fn plant(&self, rig: &RigParameters) -> Plant {
+        Plant::in_state(rig, &first_state(self.course, rig)).expect("a start state is one of the rig's")
+    }
+
+    fn run(&self, mut plant: Plant) -> Vec<f64> {
+        let mut simulated = Vec::with_capacity(self.readings.len());
+        let mut next = 0;
+        // Windows that are not judged are simulated as well: memories go on.
+        for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
+            self.seat(&mut plant, start, None);
+            let judged = self.starts.get(next) == Some(&start);
+            next += usize::from(judged);
+            for inputs in &self.course.inputs[start..start + WINDOW] {
+                if judged {
+                    self.read(&plant, inputs, &mut simulated);
+                }
+                plant.step(inputs);
+            }
+        }
+        simulated
+    }
+
+    /// What is left of the readings beside a simulation: without single jumps of the force and what the starts explain.
+    #[must_use]
+    pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
+        let mut left: Vec<f64> =
+            self.readings.iter().zip(simulated).map(|(reading, own)| reading - own).collect();
+        self.reduce(&mut left);
+        left
+    }
+
+    /// What one simulation differs from another by, treated as a residual is.
+    #[must_use]
+    pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
+        let mut differs: Vec<f64> = simulated.iter().zip(from).map(|(own, from)| own - from).collect();
+        self.reduce(&mut differs);
+        differs
+    }
+
+    fn reduce(&self, values: &mut [f64]) {
+        for (value, _) in values.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
+            *value = 0.0;
+        }
+        let rows = self.rows();
+        for (window, basis) in values.chunks_exact_mut(rows).zip(&self.bases) {
+            self.flatten_spikes(window);
+            project(window, basis);
+        }
+    }
+
+    fn flatten_spikes(&self, window: &mut [f64]) {
+        let width = self.lanes.len();
+        let forces: Vec<usize> =
+            self.lanes.iter().enumerate().filter(|(_, (_, at))| *at == FORCE).map(|(lane, _)| lane).collect();
+        for lane in forces {
+            let own: Vec<f64> = window.iter().skip(lane).step_by(width).copied().collect();
+            for at in 0..own.len() {
+                let mut near = [0.0; 2 * SPIKE_REACH + 1];
+                let from = at.saturating_sub(SPIKE_REACH);
+                let to = (at + SPIKE_REACH + 1).min(own.len());
+                let near = &mut near[..to - from];
+                near.copy_from_slice(&own[from..to]);
+                near.sort_unstable_by(f64::total_cmp);
+                let median = near[near.len() / 2];
+                if (own[at] - median).abs() > SPIKE {
+                    window[at * width + lane] = median;
+                }
+            }
+        }
+    }
+
+    fn read(&self, plant: &Plant, inputs: &Inputs, into: &mut Vec<f64>) {
+        let shown = plant.shown(&plant.truth(inputs));
+        into.extend(self.lanes.iter().map(|(axis, at)| shown[*axis][*at] / self.course.noise[*axis][*at]));
+    }
+
+    /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
+    fn seat(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
+        let mut points = self.course.points[start];
+        if let Some((axis, number)) = nudged {
+            let point = &mut points[axis];
+            match number {
+                0 => point.extension_m += NUDGES[0],
+                1 => point.rod_velocity_m_per_s += NUDGES[1],
+                2 => point.pressures_pa[0] += NUDGES[2],
+                _ => point.pressures_pa[1] += NUDGES[3],
+            }
+        }
+        seat(plant, self.course, &points);
+    }
+
+    /// An orthonormal basis of what each window's start explains.
+    fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
+        let mut plant = self.plant(&self.rig);
+        let rows = self.rows();
+        let mut bases = Vec::with_capacity(self.starts.len());
+        for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
+            let place = self.starts.get(bases.len()).is_some_and(|own| *own == start);
+            let before = plant.clone();
+            self.seat(&mut plant, start, None);
+            let mut straight = Vec::with_capacity(rows);
+            for inputs in &self.course.inputs[start..start + WINDOW] {
+                self.read(&plant, inputs, &mut straight);
+                plant.step(inputs);
+            }
+            if !place {
+                continue;
+            }
+            let valid = &self.valid[bases.len() * rows..][..rows];
+            let mut basis: Vec<Vec<f64>> = Vec::new();
+            for axis in (0..2).filter(|axis| self.course.measured[*axis]) {
+                for (number, nudge) in NUDGES.iter().enumerate() {
+                    let mut nudged = before.clone();
+                    self.seat(&mut nudged, start, Some((axis, number)));
+                    let mut own = Vec::with_capacity(rows);
+                    for inputs in &self.course.inputs[start..start + WINDOW] {
+                        self.read(&nudged, inputs, &mut own);
+                        nudged.step(inputs);
+                    }
+                    let scale = DOUBT[number] / nudge;
+                    for ((own, straight), valid) in own.iter_mut().zip(&straight).zip(valid) {
+                        *own = if *valid { (*own - straight) * scale } else { 0.0 };
+                    }
+                    self.flatten_jumps(&mut own, scale);
+                    // Twice, as rounding asks for.
+                    project(&mut own, &basis);
+                    project(&mut own, &basis);
+                    let length = dot(&own, &own).sqrt();
+                    if length > 1.0 {
+                        own.iter_mut().for_each(|own| *own /= length);
+                        basis.push(own);
+                    }
+                }
+            }
+            bases.push(basis);
+        }
+        bases
+    }
+
+    /// A sensitivity is scaled up from a small change: a jump that moves by a sample is no part of it.
+    fn flatten_jumps(&self, own: &mut [f64], scale: f64) {
+        own.iter_mut().for_each(|own| *own /= scale);
+        let width = self.lanes.len();
+        for lane in 0..width {
+            if self.lanes[lane].1 != FORCE {
+                continue;
+            }
+            let force: Vec<f64> = own.iter().skip(lane).step_by(width).copied().collect();
+            for at in 0..force.len() {
+                let from = at.saturating_sub(SPIKE_REACH);
+                let to = (at + SPIKE_REACH + 1).min(force.len());
+                let mut near = force[from..to].to_vec();
+                near.sort_unstable_by(f64::total_cmp);
+                let median = near[near.len() / 2];
+                if (force[at] - median).abs() > 0.5 {
+                    own[at * width + lane] = median;
+                }
+            }
+        }
+        own.iter_mut().for_each(|own| *own *= scale);
+    }
+}
+
+/// The state in which a simulation of a course begins: as a run starts, with the record's set-up.
+#[must_use]
+pub fn first_state(course: &Course, rig: &RigParameters) -> State {
+    let stroke_m = rig.cylinder().stroke_m;
+    let drive_m = if course.measured[0] { course.points[0][0].extension_m } else { 0.1 };
+    let setup = Setup {
+        carriage_position_m: drive_m.clamp(0.0, stroke_m),
+        linked: course.linked,
+        added_mass_kg: course.added_mass_kg,
+    };
+    let plant = Plant::new(rig, &setup).expect("the set-up was checked");
+    let mut state = *plant.state();
+    for (axis, inputs) in state.axes.iter_mut().zip(course.inputs[0].valve) {
+        axis.spool = inputs;
+    }
+    state
+}
+
+/// Puts the measured axes of a plant at these points; volumes are the plant's own, since an effect may have changed them.
+pub fn seat(plant: &mut Plant, course: &Course, points: &[Point; 2]) {
+    let mut state = *plant.state();
+    let truth = plant.truth(&Inputs::default());
+    let cylinder = *plant.rig().cylinder();
+    for i in (0..2).filter(|i| course.measured[*i]) {
+        let (own, point, axis) = (&mut state.axes[i], &points[i], &truth.axes[i]);
+        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+        let volume_a_m3 = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
+        let volume_b_m3 = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
+        own.extension_m += way_m;
+        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
+        own.stored_air_a_j = point.pressures_pa[0].max(1e4) * volume_a_m3;
+        own.stored_air_b_j = point.pressures_pa[1].max(1e4) * volume_b_m3;
+    }
+    // Rounding may have left the stroke by a bit.
+    for own in &mut state.axes {
+        own.extension_m = own.extension_m.clamp(0.0, cylinder.stroke_m);
+    }
+    plant.go_on_in(&state).expect("the points of a record are states of the rig");
+}
+
+/// Takes out what an orthonormal basis explains.
+pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
+    for direction in basis {
+        let share = dot(values, direction);
+        values.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
+    }
+}
+
+/// Sum of products, in four lanes that are added in one order.
+#[must_use]
+pub fn dot(left: &[f64], right: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (left_chunks, right_chunks) = (left.chunks_exact(4), right.chunks_exact(4));
+    let rest: f64 = left_chunks.remainder().iter().zip(right_chunks.remainder()).map(|(a, b)| a * b).sum();
+    for (left, right) in left_chunks.zip(right_chunks) {
+        for (sum, (a, b)) in sums.iter_mut().zip(left.iter().zip(right)) {
+            *sum += a * b;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
