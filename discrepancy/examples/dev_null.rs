@@ -37,6 +37,7 @@ fn main() {
             })
             .collect();
         chi.sort_by(f64::total_cmp);
+        print!("jit {:.6} mem {:.2?} ", course.jitter_s, course.memory);
         println!(
             "{} n={} mean {:.3} median {:.3} p95 {:.3} worst {:?} lanes {:.3?}  {:?} {:?} {:?}",
             &folder[folder.len() - 3..],

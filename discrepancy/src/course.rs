@@ -29,6 +29,15 @@ const POSITION_REACH: usize = 10;
 const PRESSURE_REACH: usize = 5;
 /// Periods that a piston must seem at rest around an instant to be at rest in it.
 const REST_REACH: usize = 12;
+/// Differences that a channel's memory is told from at a time, and how many such blocks at rest it takes.
+const MEMORY_BLOCK: usize = 25;
+const FEWEST_AT_REST: usize = 10;
+/// Memory and jitter below which there is none.
+const LEAST_MEMORY: f64 = 0.15;
+const LEAST_JITTER_S: f64 = 2e-5;
+/// Samples in a row whose scatter is looked at, and the speed from which on motion adds to it.
+const JITTER_BLOCK: usize = 20;
+const JITTER_SPEED_M_PER_S: f64 = 0.1;
 /// Longest run of periods without a command that a window bears.
 const HELD_LONGEST: usize = 3;
 
@@ -51,6 +60,10 @@ pub struct Course {
     pub points: Vec<[Point; 2]>,
     /// Standard deviation of each reading, its rounding included.
     pub noise: [[f64; CHANNELS]; 2],
+    /// How much of a reading's noise is still there a period later, 0 to 1.
+    pub memory: [[f64; CHANNELS]; 2],
+    /// By how much the instants of sampling are off, rms, s.
+    pub jitter_s: f64,
     /// Periods whose command nobody knows, or whose points nothing supports.
     pub gaps: Vec<bool>,
 }
@@ -133,6 +146,8 @@ impl Course {
             samples: vec![[[None; CHANNELS]; 2]; length],
             points: vec![[Point::default(); 2]; length],
             noise: [[0.0; CHANNELS]; 2],
+            memory: [[0.0; CHANNELS]; 2],
+            jitter_s: 0.0,
             gaps: vec![false; length],
         };
         for axis in Axis::ALL {
@@ -220,7 +235,64 @@ impl Course {
                 pressures_pa: [a.value, b.value],
             };
         }
+        let resting: Vec<bool> = rests.iter().map(Option::is_some).collect();
+        for at in 0..CHANNELS {
+            self.memory[i][at] = memory(&column(at), &resting, self.noise[i][at]);
+        }
+        self.jitter_s = self.jitter_s.max(jitter_s(&position, &column(0), &resting));
     }
+}
+
+/// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1 - share).
+fn memory(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
+    let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / MEMORY_BLOCK)
+        .filter_map(|block| {
+            let places = block * MEMORY_BLOCK..(block + 1) * MEMORY_BLOCK;
+            let differences: Option<Vec<f64>> = places
+                .map(|at| if resting[at] { Some(values[at + 1]? - values[at]?) } else { None })
+                .collect();
+            let differences = differences?;
+            let mean = differences.iter().sum::<f64>() / MEMORY_BLOCK as f64;
+            let squares: f64 = differences.iter().map(|own| (own - mean).powi(2)).sum();
+            Some(squares / (MEMORY_BLOCK as f64 - 1.0))
+        })
+        .collect();
+    if variances.len() < FEWEST_AT_REST {
+        return 0.0;
+    }
+    variances.sort_unstable_by(f64::total_cmp);
+    let spread = variances[variances.len() / 2].sqrt();
+    let share = 1.0 - spread * spread / (2.0 * noise * noise);
+    if share < LEAST_MEMORY { 0.0 } else { share.min(0.95) }
+}
+
+/// How far the instants of sampling are off, from what motion adds to the spread of positions around their parabolas.
+fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: &[bool]) -> f64 {
+    let squares = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
+        let mut blocks: Vec<f64> = (0..positions.len() / JITTER_BLOCK)
+            .filter_map(|block| {
+                let own: Option<Vec<f64>> =
+                    (block * JITTER_BLOCK..(block + 1) * JITTER_BLOCK).map(of).collect();
+                own.map(|own| own.iter().sum::<f64>() / JITTER_BLOCK as f64)
+            })
+            .collect();
+        blocks.sort_unstable_by(f64::total_cmp);
+        blocks
+    };
+    let square = |at: usize| Some((positions[at]? - parabolas[at]?.value).powi(2));
+    let still = squares(&|at| if resting[at] { square(at) } else { None });
+    let Some(still) = still.get(still.len() / 2).copied() else { return 0.0 };
+    let moving = squares(&|at| {
+        let slope = parabolas[at]?.slope / PERIOD_S;
+        if slope.abs() < JITTER_SPEED_M_PER_S { None } else { Some((square(at)? - still) / (slope * slope)) }
+    });
+    let Some(variance) = moving.get(moving.len() / 2) else { return 0.0 };
+    // A parabola takes up a part of what scatters around it.
+    let m = POSITION_REACH as f64;
+    let kept =
+        1.0 - 3.0 * (3.0 * m * m + 3.0 * m - 1.0) / ((2.0 * m - 1.0) * (2.0 * m + 1.0) * (2.0 * m + 3.0));
+    let jitter_s = (variance / kept).max(0.0).sqrt();
+    if jitter_s < LEAST_JITTER_S { 0.0 } else { jitter_s }
 }
 
 /// The grid's place of each row; rows whose time jumps back share the place of the one before.

@@ -15,7 +15,7 @@
 //!
 //! Source: discrepancy-notes.md, 1 (windows of 100 to 200 ms judge best), 6.
 
-use crate::course::{CHANNELS, Course, Point};
+use crate::course::{CHANNELS, Course, PERIOD_S, Point};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
 
 /// Periods of a window.
@@ -45,6 +45,8 @@ pub struct Windows<'a> {
     /// Readings over their noise, window by window, period by period, lane by lane; 0 where there is none.
     readings: Vec<f64>,
     valid: Vec<bool>,
+    /// What an error of the sampling instant would change in each reading, in standard deviations.
+    drifts: Vec<f64>,
     /// Orthonormal, per window.
     bases: Vec<Vec<Vec<f64>>>,
 }
@@ -71,8 +73,12 @@ impl<'a> Windows<'a> {
                 }
             }
         }
+        let mut drifts = Vec::with_capacity(readings.len());
+        for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
+            drifts.extend(lanes.iter().map(|(axis, channel)| drift(course, at, *axis, *channel)));
+        }
         let mut windows =
-            Windows { course, rig: rig.clone(), starts, lanes, readings, valid, bases: Vec::new() };
+            Windows { course, rig: rig.clone(), starts, lanes, readings, valid, drifts, bases: Vec::new() };
         windows.bases = windows.sensitivities();
         windows
     }
@@ -177,9 +183,39 @@ impl<'a> Windows<'a> {
             *value = 0.0;
         }
         let rows = self.rows();
-        for (window, basis) in values.chunks_exact_mut(rows).zip(&self.bases) {
+        for (at, (window, basis)) in values.chunks_exact_mut(rows).zip(&self.bases).enumerate() {
             self.flatten_spikes(window);
+            self.whiten(at, window);
             project(window, basis);
+        }
+    }
+
+    /// Takes account of errors of the sampling instant, which all readings of an instant share, and of noise that lasts longer
+    /// than a period: with d the drift of an instant's readings, (1 + d d')^(-1/2) and then e_n - r e_(n-1) over sqrt(1 - r^2).
+    fn whiten(&self, at: usize, window: &mut [f64]) {
+        let width = self.lanes.len();
+        let drifts = &self.drifts[at * self.rows()..][..self.rows()];
+        for (own, drift) in window.chunks_exact_mut(width).zip(drifts.chunks_exact(width)) {
+            let square = dot(drift, drift);
+            if square > 1e-6 {
+                let share = dot(own, drift) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
+                own.iter_mut().zip(drift).for_each(|(own, drift)| *own -= share * drift);
+            }
+        }
+        for (lane, (axis, channel)) in self.lanes.iter().enumerate() {
+            let memory = self.course.memory[*axis][*channel];
+            if memory == 0.0 {
+                continue;
+            }
+            for period in (1..WINDOW).rev() {
+                let (place, before) = (period * width + lane, (period - 1) * width + lane);
+                if !(self.valid[at * self.rows() + place] && self.valid[at * self.rows() + before]) {
+                    continue;
+                }
+                // Where the instants are off, the noise of neighbours has less in common.
+                let own = memory / (1.0 + drifts[place] * drifts[place]);
+                window[place] = (window[place] - own * window[before]) / (1.0 - own * own).sqrt();
+            }
         }
     }
 
@@ -257,6 +293,7 @@ impl<'a> Windows<'a> {
                         *own = if *valid { (*own - straight) * scale } else { 0.0 };
                     }
                     self.flatten_jumps(&mut own, scale);
+                    self.whiten(bases.len(), &mut own);
                     // Twice, as rounding asks for.
                     project(&mut own, &basis);
                     project(&mut own, &basis);
@@ -294,6 +331,24 @@ impl<'a> Windows<'a> {
         }
         own.iter_mut().for_each(|own| *own *= scale);
     }
+}
+
+/// Rate of a reading times the error of the sampling instant, over its noise; nobody knows that of the force.
+fn drift(course: &Course, at: usize, axis: usize, channel: usize) -> f64 {
+    if course.jitter_s == 0.0 || channel == FORCE {
+        return 0.0;
+    }
+    let (before, after) = (at.saturating_sub(1), (at + 1).min(course.len() - 1));
+    let [before, own, after] = [before, at, after].map(|at| course.points[at][axis]);
+    let rate = match channel {
+        0 if axis == 0 => own.rod_velocity_m_per_s,
+        0 => -own.rod_velocity_m_per_s,
+        channel => {
+            let [before, after] = [before, after].map(|point| point.pressures_pa[channel - 2]);
+            (after - before) / (2.0 * PERIOD_S)
+        }
+    };
+    rate * course.jitter_s / course.noise[axis][channel]
 }
 
 /// The state in which a simulation of a course begins: as a run starts, with the record's set-up.
