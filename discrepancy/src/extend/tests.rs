@@ -32,10 +32,9 @@ fn extended(text: &str, additions: &[Addition], changed: &[Quantity]) -> RigPara
     RigParameters::from_toml(&text, "rig.toml").unwrap()
 }
 
-/// Lines of the one text that the other does not have, in order.
+/// Lines of the new text that the old one has not.
 fn new_lines<'t>(old: &str, new: &'t str) -> Vec<&'t str> {
-    let mut old = old.lines().peekable();
-    new.lines().filter(|line| old.next_if_eq(line).is_none()).collect()
+    new.lines().filter(|line| !old.lines().any(|old| old == *line)).collect()
 }
 
 #[test]
@@ -68,10 +67,10 @@ fn a_new_table_tells_value_error_unit_range_and_records() {
     let new = extend(old, "rig.toml", &[leakage()], &[], &records()).unwrap();
     assert!(new.starts_with(old));
     let lines = new_lines(old, &new);
-    assert!(lines[1].starts_with("# piston-leakage: "), "{lines:?}");
-    assert_eq!(lines[2..4], ["# Found from a.csv, b.csv.", "[effects.piston-leakage.drive]"]);
-    assert!(lines[4].starts_with("# 2.513 +- 0.041 Nl/min; "), "{lines:?}");
-    assert_eq!(lines[5..], ["leakage_nl_per_min = 2.5131713"]);
+    assert!(lines[0].starts_with("# piston-leakage: "), "{lines:?}");
+    assert_eq!(lines[1..3], ["# Found from a.csv, b.csv.", "[effects.piston-leakage.drive]"]);
+    assert!(lines[3].starts_with("# 2.513 +- 0.041 Nl/min; "), "{lines:?}");
+    assert_eq!(lines[4..], ["leakage_nl_per_min = 2.5131713"]);
 }
 
 #[test]
@@ -152,19 +151,44 @@ fn sliding_friction_takes_the_break_away_force_along() {
 
 #[test]
 fn an_effect_that_is_on_gets_other_numbers_and_keeps_the_rest() {
-    let on = "\n[effects.presliding.drive]\n  # mine\n  bristle_stiffness_n_per_m = 3e5 # guess\n";
-    let sheet = sheet("presliding").unwrap();
-    let [first, second] = [sheet.keys[0].name, sheet.keys[1].name];
-    let on = on.replace("bristle_stiffness_n_per_m", first);
-    let old = format!("{}{on}", RigParameters::BASELINE_TOML);
-    let value = sheet.keys[1].min + 0.5 * (sheet.keys[1].max - sheet.keys[1].min);
-    let change = addition("presliding", "drive", &[(first, 4.125e5, Some(1e3)), (second, value, None)]);
+    let sheet = sheet("spool-second-order").unwrap();
+    let [first, second] = [sheet.keys[0], sheet.keys[1]];
+    let value = second.min + 0.5 * (second.max - second.min);
+    let head = "\n[effects.spool-second-order.drive]\n";
+    let old = format!("{}{head}  # mine\n  {} = 8e1 # guess\n", RigParameters::BASELINE_TOML, first.name);
+    let old = if second.default.is_some() { old } else { format!("{old}  {} = {value}\n", second.name) };
+    let numbers = [(first.name, 91.25, Some(1.5)), (second.name, value, None)];
+    let change = addition(sheet.name, "drive", &numbers);
     let new = extend(&old, "rig.toml", &[change], &[], &records()).unwrap();
-    assert!(new.contains("  # mine\n") && new.contains(&format!("  {first} = 412500.0 # guess\n")), "{new}");
-    assert!(new.contains("  # was 3e5; 412500 +- 1000 "), "{new}");
+    assert!(
+        new.contains(&format!("  # mine\n  # was 8e1; 91.2 +- 1.5 Hz from a.csv, b.csv; {}", first.range())),
+        "{new}"
+    );
+    assert!(new.contains(&format!("\n  {} = 91.25 # guess\n", first.name)), "{new}");
     let rig = RigParameters::from_toml(&new, "rig.toml").unwrap();
-    assert_eq!(rig.effects()[0].numbers[..2], [4.125e5, value]);
     assert_eq!(rig.effects().len(), 1);
+    assert_eq!(rig.effects()[0].numbers[..2], [91.25, value]);
+}
+
+#[test]
+fn a_number_that_a_table_left_out_is_put_into_it() {
+    // An effect whose numbers all have defaults, and so a table that may be empty.
+    let with_default = |sheet: &&Sheet| sheet.keys.iter().skip(1).any(|key| key.default.is_some());
+    for sheet in SHEETS.iter().filter(with_default) {
+        let key = sheet.keys.iter().skip(1).find(|key| key.default.is_some()).unwrap();
+        let given: String = sheet
+            .keys
+            .iter()
+            .filter(|key| key.default.is_none())
+            .map(|key| format!("\t{} = {:?}\n", key.name, key.drawn[0]))
+            .collect();
+        let place = sheet.place.names()[0].clone();
+        let old = format!("{}\n[effects.{}.{place}]\n{given}", RigParameters::BASELINE_TOML, sheet.name);
+        let value = key.min + 0.5 * (key.max - key.min);
+        let rig = extended(old.trim_end(), &[addition(sheet.name, &place, &[(key.name, value, None)])], &[]);
+        let at = sheet.keys.iter().position(|other| other.name == key.name).unwrap();
+        assert_eq!(rig.effects()[0].numbers[at], value, "{}", sheet.name);
+    }
 }
 
 #[test]
@@ -214,12 +238,12 @@ fn unusual_tables_keep_their_layout() {
          discharge_time_constant_s = 0.05, recovery_time_constant_s = 0.3, check_valve_pressure_bar = 2.5 }}\n{old}"
     );
     let changed = [
-        quantity("parameter:supply-pressure", 7.25, "bar", Some(7.0)),
+        quantity("parameter:supply-pressure", 7.3, "bar", Some(7.0)),
         quantity("parameter:kv-scale", 2.0, "", None),
     ];
     let new = extend(&old, "rig.toml", &[], &changed, &records()).unwrap();
-    assert!(new.starts_with("# was 7; 7.250 +- 0.073 bar, by parameter:supply-pressure"), "{new}");
-    assert!(new.contains("supply = { pressure_bar = 7.25, exhaust"), "{new}");
+    assert!(new.starts_with("# was 7; 7.300 +- 0.073 bar, by parameter:supply-pressure"), "{new}");
+    assert!(new.contains("supply = { pressure_bar = 7.3, exhaust"), "{new}");
     assert!(new.contains("[ # measured\n    0.0, 0.0,\n    0.23, 0.72, # here\n    1.2, 1.32 ]\n"), "{new}");
     assert!(new.contains("  # was [0, 0.0, 0.115, 36e-2, 0.60, 0.66]; times 2.000 +- 0.020, by"), "{new}");
 }

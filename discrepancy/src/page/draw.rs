@@ -195,7 +195,7 @@ pub(super) fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
     for power in 1..=(largest.log10().floor() as i32) {
         let at = place(10f64.powi(power));
         body += &stroke("grid", (at, 4.0), (at, bottom));
-        body += &text("middle", (at, bottom + 16.0), &words::short(10f64.powi(power)));
+        body += &text("middle", (at, bottom + 16.0), &words::round(10f64.powi(power)));
     }
     body += &stroke("edge", (one, 4.0), (one, bottom + 4.0));
     body += &text("middle", (one, bottom + 16.0), "1");

@@ -40,18 +40,7 @@ pub(super) fn finding(report: &Report) -> String {
         if report.verdict == Verdict::ParametersOnly {
             text += &paragraph(about);
         }
-        let row = |quantity: &Quantity| {
-            vec![
-                said(&quantity.name),
-                number(words::quantity(quantity)),
-                number(quantity.before.map_or_else(
-                    || words::NOTHING.to_owned(),
-                    |before| words::with_unit(&words::short(before), &quantity.unit),
-                )),
-            ]
-        };
-        let rows = report.parameters.iter().map(row);
-        text += &table("Parameters", &["parameter", "from the records", "in the rig file"], rows);
+        text += &quantities("Parameters", "parameter", &report.parameters, |_| String::new());
     }
     if let Some(outside) = &report.outside {
         text += &unknown(outside);
@@ -95,19 +84,30 @@ fn effect(named: &NamedEffect) -> String {
 
 fn numbers(named: &NamedEffect) -> String {
     let sheet = sheet(&named.effect);
-    let row = |quantity: &Quantity| {
-        let key = sheet.and_then(|sheet| sheet.keys.iter().find(|key| key.name == quantity.name));
-        vec![
-            Cell::About(quantity.name.clone(), key.map_or(String::new(), |key| key.meaning.to_owned())),
-            number(words::quantity(quantity)),
-            number(quantity.before.map_or_else(
-                || words::NOTHING.to_owned(),
-                |before| words::with_unit(&words::short(before), &quantity.unit),
-            )),
-        ]
+    let meaning = |name: &str| {
+        let key = sheet.and_then(|sheet| sheet.keys.iter().find(|key| key.name == name));
+        key.map_or(String::new(), |key| key.meaning.to_owned())
     };
-    let rows = named.parameters.iter().map(row);
-    table("Numbers of the effect", &["number", "value", "in the rig file"], rows)
+    quantities("Numbers of the effect", "number", &named.parameters, meaning)
+}
+
+/// Numbers with their errors, and what the rig file says where it says something of one of them.
+fn quantities(label: &str, head: &str, all: &[Quantity], meaning: impl Fn(&str) -> String) -> String {
+    let is_in_file = all.iter().any(|quantity| quantity.before.is_some());
+    let row = |quantity: &Quantity| {
+        let mut cells = vec![
+            Cell::About(quantity.name.clone(), meaning(&quantity.name)),
+            number(words::quantity(quantity)),
+        ];
+        if is_in_file {
+            let before =
+                quantity.before.map(|before| words::with_unit(&words::short(before), &quantity.unit));
+            cells.push(number(before.unwrap_or_else(|| words::NOTHING.to_owned())));
+        }
+        cells
+    };
+    let heads = [head, "from the records", "in the rig file"];
+    table(label, &heads[..if is_in_file { 3 } else { 2 }], all.iter().map(row))
 }
 
 /// With a capital and without its full stop.
@@ -174,12 +174,12 @@ pub(super) fn curve_figure(identifier: &str, caption: &str, curve: &Curve) -> St
     let mut plot = Plot::new(x, y, &label(&curve.variable, &x_unit), &label("unknown input", &y_unit));
     plot.band(&at, &low, &high);
     plot.level(0.0);
-    plot.line("line s1", at.iter().copied().zip(value.iter().copied()));
+    plot.line("line s0", at.iter().copied().zip(value.iter().copied()));
     let told = format!("{} values.", at.len());
     figure(
         caption,
         "",
-        &[(Sample::Line("line s1"), "unknown input"), (Sample::Area("area"), "\u{b1} 2 standard errors")],
+        &[(Sample::Line("line s0"), "unknown input"), (Sample::Area("area"), "\u{b1} 2 standard errors")],
         &plot.drawn(identifier, caption, &told),
     )
 }

@@ -23,6 +23,11 @@ pub(super) fn short(value: f64) -> String {
     fixed(value, (2.0 - magnitude).max(0.0) as usize)
 }
 
+/// A whole number; with a power of ten from a hundred thousand on.
+pub(super) fn round(value: f64) -> String {
+    if value.abs() < 1e5 { fixed(value, 0) } else { short(value) }
+}
+
 /// A number with this many digits behind the point.
 pub(super) fn fixed(value: f64, digits: usize) -> String {
     if !value.is_finite() {
