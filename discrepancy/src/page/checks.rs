@@ -3,10 +3,11 @@
 use super::markup::{Cell, folded, heading, number, table, words as said};
 use super::words;
 use crate::report::{ChannelCheck, Finding, RecordCheck, Report};
+use bench::page_style::escaped;
 
 /// The section.
 pub(super) fn checks(report: &Report) -> String {
-    report.checks.iter().map(|check| record(check)).collect()
+    report.checks.iter().map(record).collect()
 }
 
 fn record(check: &RecordCheck) -> String {
@@ -19,15 +20,8 @@ fn record(check: &RecordCheck) -> String {
     let mut findings: Vec<&Finding> = check.findings.iter().collect();
     // What keeps the record from being used comes first; else as in the report.
     findings.sort_by_key(|finding| !finding.fatal);
-    let row = |finding: &&Finding| {
-        let weight = if finding.fatal { "cannot be used for it" } else { "left out" };
-        vec![
-            Cell::About(finding.kind.replace('-', " "), weight.to_owned()),
-            said(finding.column.as_deref().unwrap_or(words::NOTHING)),
-            number(finding.line.map_or_else(|| words::NOTHING.to_owned(), |line| line.to_string())),
-            Cell::Sentence(finding.text.clone()),
-        ]
-    };
+    let noticed: String = findings.into_iter().map(finding).collect();
+    let noticed = if noticed.is_empty() { noticed } else { format!("<ul>\n{noticed}</ul>\n") };
     let channel = |(column, channel): (&String, &ChannelCheck)| {
         let (unit, factor) = words::shown_small(words::unit_of(column));
         let size = |value: Option<f64>| {
@@ -50,6 +44,24 @@ fn record(check: &RecordCheck) -> String {
     );
     heading(&check.file)
         + &table("Record", &["record", "samples", "length"], facts)
-        + &table("Findings", &["noticed", "column", "line", "what, and what to do"], findings.iter().map(row))
+        + &noticed
         + &folded("Its channels", &channels)
+}
+
+/// A list, not a table: what to do about it must be seen on a telephone too.
+fn finding(finding: &Finding) -> String {
+    let (class, sign) = if finding.fatal { ("bad", '\u{2717}') } else { ("soft", '\u{b7}') };
+    let mut place = finding.kind.replace('-', " ");
+    if let Some(column) = &finding.column {
+        place += &format!(", {column}");
+    }
+    if let Some(line) = finding.line {
+        place += &format!(", line {line}");
+    }
+    let weight = if finding.fatal { "the record cannot be used" } else { "left out" };
+    format!(
+        "<li><span class=\"{class}\">{sign} {}</span>: {} <span class=\"soft\">({weight})</span></li>\n",
+        escaped(&place),
+        escaped(&finding.text)
+    )
 }

@@ -46,7 +46,7 @@ impl Scale {
         let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
         let large = self.low.abs().max(self.high.abs());
         let written = |value: f64| {
-            if large >= 1e5 || large < 1e-4 { words::short(value) } else { words::fixed(value, digits) }
+            if (1e-4..1e5).contains(&large) { words::fixed(value, digits) } else { words::short(value) }
         };
         (first..=last).map(|index| index as f64 * step).map(|value| (value, written(value))).collect()
     }

@@ -73,7 +73,7 @@ fn all(report: &Report, pictures: &Pictures, model: Model, lead: &str) -> String
 }
 
 fn pair(report: &Report, trace: &Trace, model: Model) -> String {
-    charts(&[close(report, trace, model), whole(trace, model)])
+    charts(&[close(report, trace, model), whole(report, trace, model)])
 }
 
 fn rms(values: &[f64]) -> f64 {
@@ -152,9 +152,10 @@ fn look(model: Model) -> (&'static str, &'static str) {
     }
 }
 
-fn whole(trace: &Trace, model: Model) -> String {
+fn whole(report: &Report, trace: &Trace, model: Model) -> String {
     let over_noise =
         |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value / trace.noise).collect() };
+    let first = if report.verdict == Verdict::NothingMissing { "measured minus simulated" } else { "before" };
     let (before, after) = (over_noise(&trace.before_residual), over_noise(&trace.after_residual));
     let (low, high) = range(before.iter().chain(&after).copied()).unwrap_or((-1.0, 1.0));
     let reach = low.abs().max(high.abs()).max(4.0);
@@ -164,7 +165,7 @@ fn whole(trace: &Trace, model: Model) -> String {
     plot.stretch(trace.time_s[part.start], trace.time_s[part.end - 1]);
     plot.between(-2.0, 2.0);
     plot.series("line s1", "trace s1", &columns(&trace.time_s, &before, COLUMNS));
-    let mut legend = vec![(Sample::Area("trace s1"), "before")];
+    let mut legend = vec![(Sample::Area("trace s1"), first)];
     if model == Model::After {
         plot.series("line s2", "trace s2", &columns(&trace.time_s, &after, COLUMNS));
         legend.push((Sample::Area("trace s2"), "after"));

@@ -31,7 +31,7 @@ pub(super) fn head(report: &Report) -> String {
         }
         _ => ('\u{2713}', "verdict", ""),
     };
-    let mut points: Vec<String> = report.named.iter().map(named).collect();
+    let mut points: Vec<String> = report.named.iter().flat_map(named).collect();
     points.extend(report.parameters.iter().map(|quantity| {
         let before = quantity.before.map_or(String::new(), |before| {
             format!(", the rig file says {}", words::with_unit(&words::short(before), &quantity.unit))
@@ -59,25 +59,21 @@ pub(super) fn head(report: &Report) -> String {
     )
 }
 
-fn named(named: &NamedEffect) -> String {
+/// A name and, as weighty as it, what explains the records as well.
+fn named(named: &NamedEffect) -> Vec<String> {
+    let own = one(named, "");
+    std::iter::once(own).chain(named.alternatives.iter().map(|other| one(other, "<i>or</i> "))).collect()
+}
+
+fn one(named: &NamedEffect, before: &str) -> String {
     let numbers: Vec<String> = named
         .parameters
         .iter()
         .map(|quantity| format!("{} {}", words::key(quantity), words::quantity(quantity)))
         .collect();
     let numbers = if numbers.is_empty() { String::new() } else { format!(": {}", numbers.join(", ")) };
-    let alternatives: Vec<String> = named
-        .alternatives
-        .iter()
-        .map(|other| format!("{} at the {}", other.effect, words::place(&other.effect, &other.place)))
-        .collect();
-    let or = if alternatives.is_empty() {
-        String::new()
-    } else {
-        format!(" <i>or</i> {}", escaped(&words::listed(&alternatives, "or")))
-    };
     format!(
-        "<b>{}</b> at the {}{}; it explains {} of the disagreement{or}",
+        "{before}<b>{}</b> at the {}{}; it explains {} of the disagreement",
         escaped(&named.effect),
         escaped(&words::place(&named.effect, &named.place)),
         escaped(&numbers),
