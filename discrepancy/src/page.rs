@@ -1,8 +1,8 @@
-//! What was found, as one page that a person understands in a minute: opens offline, needs no script, asks for nothing from elsewhere.
+//! What was found, as one page that a person understands in a minute: opens offline, without script, with nothing from elsewhere.
 //!
 //! First the verdict in a sentence with the names, then the disagreement as a picture, what is known of each name, the picture
-//! after; below that the evidence, in the order in which somebody who doubts the verdict would ask for it. A section that has nothing
-//! to say is left out. Markup that an XML parser reads too, in the style of all pages ([`bench::page_style`]).
+//! after; below that the evidence, in the order in which somebody who doubts the verdict would ask for it. A section that has
+//! nothing to say is left out. Markup that an XML parser reads too, in the style of all pages ([`bench::page_style`]).
 //!
 //! | file | holds |
 //! |---|---|
@@ -75,7 +75,7 @@ pub fn page(report: &Report, pictures: &Pictures) -> String {
         ("disagreement", "Measured against simulated", pictures::before(report, pictures)),
         ("finding", finding::title(report), finding::finding(report)),
         ("next", "What to measure next", finding::next(report)),
-        ("after", "After", pictures::after(report, pictures)),
+        ("after", "After: with what was found", pictures::after(report, pictures)),
         ("gap", "The gap, before and after", held_out::gap(report)),
         ("verification", "On a record that nothing was fitted on", held_out::verification(report)),
         ("location", "Where they disagree", location::location(report)),

@@ -43,8 +43,8 @@ pub fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static str>> {
 
 /// The keys of a changed parameter, and the factor on them.
 ///
-/// Without a unit the value is the factor, on both axes; with the file's unit it is the new number of the first key. A mass is the
-/// load's where the number before was the load's and not the drive's.
+/// Without a unit the value is the factor, on both axes; with the file's unit it is the new number of the first key. A mass is
+/// the load's where the number before was the load's and not the drive's.
 fn scaling(
     rig: &RigParameters,
     quantity: &Quantity,
@@ -128,7 +128,7 @@ pub(super) fn change(
     Ok(edits.applied())
 }
 
-/// A piston at rest holds at least what holds it while it slides: a break-away force that a new sliding force is above follows it.
+/// A piston at rest holds at least what holds it while it slides: a break-away force below the new sliding force follows it.
 fn hold_at_rest(
     text: &str,
     document: &Document<&str>,

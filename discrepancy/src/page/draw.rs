@@ -1,7 +1,7 @@
 //! Axes, lines, bands and bars as inline SVG, in the colours and dashes of the stylesheet.
 //!
-//! Every drawing is [`WIDTH`] wide and stands in a column of at most twice a telephone's width, so that its letters are as large as
-//! the text's on any screen. Drawings have a title and a description for who does not see them.
+//! Every drawing is [`WIDTH`] wide and stands in a column of at most twice a telephone's width, so that its letters are about as
+//! large as the text's on any screen. Drawings have a title and a description for who does not see them.
 
 use super::thin::Column;
 use super::words;

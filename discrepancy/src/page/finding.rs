@@ -24,8 +24,8 @@ pub(super) fn finding(report: &Report) -> String {
     let mut text = String::new();
     if report.verdict == Verdict::NothingMissing {
         text += &paragraph(
-            "The rig file explains the records as well as their noise lets anything do. An effect above its limit below would have \
-             shown; a smaller one may be there.",
+            "The rig file explains the records as well as their noise lets anything do. An effect above its limit below would \
+             have shown; a smaller one may be there.",
         );
         text += &candidates::limits_table(report);
     }

@@ -22,8 +22,8 @@ pub(super) fn gap(report: &Report) -> String {
         return table;
     }
     paragraph(
-        "Rms of measured minus simulated over windows of the held-out record. Closed: the share of its power above the noise that \
-         went; a tick from 95 % on.",
+        "Rms of measured minus simulated over windows of the held-out record. Closed: the share of its power above the noise \
+         that went; a tick from 95 % on.",
     ) + &table
 }
 

@@ -25,8 +25,8 @@ pub(super) fn location(report: &Report) -> String {
         return text;
     }
     paragraph(
-        "An unknown input (a force, or air into a chamber) is added to each balance of the model wherever the record asks for one. \
-         Where nothing is missing it is as large as its noise, 1.",
+        "An unknown input (a force, or air into a chamber) is added to each balance of the model wherever the record asks for \
+         one. Where nothing is missing it is as large as its noise, 1.",
     ) + &text
 }
 

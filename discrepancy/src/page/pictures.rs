@@ -26,17 +26,11 @@ pub(super) fn before(report: &Report, pictures: &Pictures) -> String {
     if report.verdict == Verdict::BadData {
         return String::new();
     }
-    let lead = match report.verdict {
-        Verdict::NothingMissing => {
-            "Left the second in which record and simulation differ most, right their difference over the whole record: it stays \
-             within the noise."
-        }
-        _ => {
-            "Left the second in which record and simulation differ most, right their difference over the whole record, in units \
-             of the sensor's noise."
-        }
-    };
-    all(report, pictures, Model::Before, lead)
+    let mut lead = "One picture is of the second in which record and simulation differ most, the other of their difference over the \
+                    whole record, in units of the sensor's noise"
+        .to_owned();
+    lead += if report.verdict == Verdict::NothingMissing { ": it stays within it." } else { "." };
+    all(report, pictures, Model::Before, &lead)
 }
 
 /// The record against the extended model.

@@ -270,7 +270,9 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             first.alternatives = vec![named("friction-asymmetry", at("drive", None), asymmetry, 0.938)];
             report.named = vec![first];
             report.next = Some(Next {
-                reason: "While the piston slides, both are a constant force; only break-away and speed tell them apart.".to_owned(),
+                reason:
+                    "While the piston slides, both are a constant force; only break-away and speed differ."
+                        .to_owned(),
                 experiment: Some("next.toml".to_owned()),
                 divergence: Some(63.0),
                 otherwise: Some("Tilting the rig would tell at once.".to_owned()),

@@ -65,7 +65,7 @@ fn the_verdict_stands_first_with_names_numbers_and_errors() {
         "On test.csv, which nothing was fitted on, 92 % to 99.6 % of the gap to the noise is closed",
         "where they differ most",
         "What is missing",
-        "After",
+        "After: with",
         "The gap, before and after",
         "Which balance",
         "All 38 candidates",
