@@ -26,8 +26,8 @@ pub(super) fn before(report: &Report, pictures: &Pictures) -> String {
     if report.verdict == Verdict::BadData {
         return String::new();
     }
-    let mut lead = "One picture is of the second in which record and simulation differ most, the other of their difference over the \
-                    whole record, in units of the sensor's noise"
+    let mut lead = "One picture is of the second in which record and simulation differ most, the other of their difference over \
+                    the whole record, in units of the sensor's noise"
         .to_owned();
     lead += if report.verdict == Verdict::NothingMissing { ": it stays within it." } else { "." };
     all(report, pictures, Model::Before, &lead)
