@@ -5,15 +5,28 @@
 //! | [`records`] | one reader of records, whatever their form: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
 //! | [`check`] | whether a record can be used, and its noise |
 //! | [`course`] | a record on the simulation's grid |
+//! | [`windows`] | a record in windows, each simulated from its own start |
+//! | [`engine`] | all records with everything that is simulated of them |
+//! | [`fit`] | what some columns explain of the windows |
+//! | [`candidates`] | every effect at every place, and how its numbers are moved |
+//! | [`parameters`] | numbers of the baseline that may merely be wrong |
+//! | [`calibrate`] | these numbers from records |
+//! | [`screen`] | how much each candidate would explain |
+//! | [`refit`] | effects fitted in the simulator itself |
+//! | [`name`](mod@name) | which effects are missing |
+//! | [`extend`] | the rig file with what was found |
 //! | [`report`] | what was found, as data |
+//! | [`page`] | the same as one page for people |
 
 pub mod calibrate;
 pub mod candidates;
 pub mod check;
 pub mod course;
 pub mod engine;
+pub mod extend;
 pub mod fit;
 pub mod name;
+pub mod page;
 pub mod parameters;
 pub mod records;
 pub mod refit;

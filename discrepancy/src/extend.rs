@@ -1,0 +1,226 @@
+//! The rig file with what was found: new effects, numbers that were off, and nothing else touched.
+//!
+//! ```text
+//!   rig.toml ──► spans of its keys and values ──► edits of the text ──► read again as a rig
+//!   [mass]                                     [mass]
+//!   drive_kg = 5.0  # mine                     # was 5.0; 5.263 +- 0.041 kg, by parameter:mass from a.csv
+//!                                              drive_kg = 5.2631  # mine
+//!                                              [effects.piston-leakage.drive] …
+//! ```
+//!
+//! The text is edited at the spans that the parser gives, so that comments, order, blanks and line ends of the rest stay as they
+//! are. Old values stay as comments. New numbers are written in full, so that the emulator computes with the bits that were
+//! verified; their comments are rounded to what the standard error leaves of them.
+//!
+//! What a `parameter:` name scales is what the records of the study scale [tests/src/record_maker/numbers.rs].
+
+mod edits;
+mod parameters;
+
+use crate::report::Quantity;
+use edits::Edits;
+pub use parameters::key_of_parameter;
+use plant::effects::sheet::{EffectKey, Sheet};
+use plant::effects::{SHEETS, sheet};
+use plant::{ParameterError, RigParameters};
+use toml_edit::Document;
+
+/// An effect to be switched on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Addition {
+    /// Name in the catalogue.
+    pub effect: String,
+    /// `drive`, `drive.a` and so on.
+    pub place: String,
+    /// Keys of its sheet, values in the file's units, standard errors; keys left out keep their value or get their default.
+    pub numbers: Vec<(String, f64, Option<f64>)>,
+}
+
+/// Why a rig file cannot be extended.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExtendError {
+    /// The file is no rig.
+    #[error(transparent)]
+    Rig(ParameterError),
+    /// No such effect.
+    #[error("unknown effect {effect}; known: {known}")]
+    UnknownEffect {
+        /// As given.
+        effect: String,
+        /// The catalogue.
+        known: String,
+    },
+    /// The effect cannot be there.
+    #[error("{effect} cannot be at {place}; it can be at {known}")]
+    UnknownPlace {
+        /// The effect.
+        effect: String,
+        /// As given.
+        place: String,
+        /// Its places.
+        known: String,
+    },
+    /// The effect has no such number.
+    #[error("{effect} has no number {key}; it has {known}")]
+    UnknownKey {
+        /// The effect.
+        effect: String,
+        /// As given.
+        key: String,
+        /// Its keys.
+        known: String,
+    },
+    /// Told twice.
+    #[error("{what} is to be changed twice")]
+    Twice {
+        /// Effect and place, or the parameter.
+        what: String,
+    },
+    /// No such parameter.
+    #[error("unknown parameter {name}; known: {known}")]
+    UnknownParameter {
+        /// As given.
+        name: String,
+        /// Those of effects.md.
+        known: String,
+    },
+    /// The parameter's number is in another unit than the rig file's.
+    #[error("{name} is in {unit:?}; the rig file has it in {wanted:?}, and a factor has no unit")]
+    Unit {
+        /// The parameter.
+        name: String,
+        /// As given.
+        unit: String,
+        /// The file's.
+        wanted: String,
+    },
+    /// A value that is none.
+    #[error("{what} = {value} is no finite number")]
+    NotFinite {
+        /// Effect, place and key, or the parameter.
+        what: String,
+        /// As given.
+        value: String,
+    },
+    /// What came out is no rig, as when a value is out of its range.
+    #[error("the extended rig file would be refused: {0}")]
+    Refused(ParameterError),
+    /// The file is written in a way that nothing can be added to.
+    #[error(
+        "{file}: cannot add {what} to a file written like this: {reason}; write it as a table of its own"
+    )]
+    Layout {
+        /// The rig file.
+        file: String,
+        /// What was to be added.
+        what: String,
+        /// What the parser said.
+        reason: String,
+    },
+}
+
+/// The rig file with these effects and parameters, `records` named as where they come from; `file` is only its name for messages.
+///
+/// # Errors
+/// [`ExtendError`] with what is known or allowed, for a file that is no rig, for effects, places, keys and parameters that do not
+/// exist, and for values that a rig file must not hold.
+pub fn extend(
+    rig_text: &str,
+    file: &str,
+    additions: &[Addition],
+    changed: &[Quantity],
+    records: &[String],
+) -> Result<String, ExtendError> {
+    let rig = RigParameters::from_toml(rig_text, file).map_err(ExtendError::Rig)?;
+    let from = source(records);
+    let layout = |what: &str, reason: String| ExtendError::Layout {
+        file: file.to_owned(),
+        what: what.to_owned(),
+        reason: reason.lines().last().unwrap_or_default().to_owned(),
+    };
+    let mut text = parameters::change(rig_text, &rig, changed, &from, &layout)?;
+    let mut done: Vec<(&str, &str)> = Vec::new();
+    for addition in additions {
+        let told = format!("{} at {}", addition.effect, addition.place);
+        if done.contains(&(addition.effect.as_str(), addition.place.as_str())) {
+            return Err(ExtendError::Twice { what: told });
+        }
+        done.push((&addition.effect, &addition.place));
+        let sheet = checked(addition)?;
+        // Parsed anew for each: its predecessor has moved the spans.
+        let document =
+            Document::parse(text.as_str()).map_err(|error| layout(&told, error.message().to_owned()))?;
+        let mut edits = Edits::new(&text);
+        edits.switch_on(&document, sheet, addition, &from);
+        let extended = edits.applied();
+        Document::parse(extended.as_str()).map_err(|error| layout(&told, error.message().to_owned()))?;
+        text = extended;
+    }
+    RigParameters::from_toml(&text, file).map_err(ExtendError::Refused)?;
+    Ok(text)
+}
+
+/// The sheet of an addition whose place and keys it has.
+fn checked(addition: &Addition) -> Result<&'static Sheet, ExtendError> {
+    let effect = addition.effect.clone();
+    let Some(sheet) = sheet(&addition.effect) else {
+        let known = SHEETS.iter().map(|sheet| sheet.name).collect::<Vec<_>>().join(", ");
+        return Err(ExtendError::UnknownEffect { effect, known });
+    };
+    if sheet.place_named(&addition.place).is_none() {
+        let known = sheet.place.names().join(", ");
+        return Err(ExtendError::UnknownPlace { effect, place: addition.place.clone(), known });
+    }
+    for (at, (key, value, _)) in addition.numbers.iter().enumerate() {
+        if !sheet.keys.iter().any(|known| known.name == key) {
+            let known = sheet.keys.iter().map(|key| key.name).collect::<Vec<_>>().join(", ");
+            return Err(ExtendError::UnknownKey { effect, key: key.clone(), known });
+        }
+        let what = format!("effects.{effect}.{}.{key}", addition.place);
+        if addition.numbers[..at].iter().any(|(earlier, ..)| earlier == key) {
+            return Err(ExtendError::Twice { what });
+        }
+        if !value.is_finite() {
+            return Err(ExtendError::NotFinite { what, value: value.to_string() });
+        }
+    }
+    Ok(sheet)
+}
+
+/// ` from a.csv, b.csv`, or nothing.
+fn source(records: &[String]) -> String {
+    if records.is_empty() { String::new() } else { format!(" from {}", in_comment(&records.join(", "))) }
+}
+
+/// Text that a comment can hold: TOML refuses control characters there.
+fn in_comment(text: &str) -> String {
+    text.chars()
+        .map(|letter| if letter.is_control() { char::REPLACEMENT_CHARACTER } else { letter })
+        .collect()
+}
+
+/// `2.513 +- 0.041 Nl/min`: the value rounded to the second digit of its standard error.
+fn told(value: f64, standard_error: Option<f64>, unit: &str) -> String {
+    let text = match standard_error.filter(|error| error.is_finite() && *error > 0.0) {
+        Some(error) => {
+            // The second digit that counts: 10^(floor(log10 e) - 1).
+            let digits = (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize;
+            format!("{value:.digits$} +- {error:.digits$} {unit}")
+        }
+        None => format!("{value} {unit}").trim_end().to_owned() + ", not bounded by the records",
+    };
+    text.trim_end().to_owned()
+}
+
+/// A number as TOML reads it back with the same bits; whole ones keep their point.
+fn written(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// The comment above a number of an effect.
+fn key_comment(key: &EffectKey, value: f64, standard_error: Option<f64>, from: &str) -> String {
+    format!("{}{from}; {}: {}", told(value, standard_error, key.unit.name()), key.range(), key.meaning)
+}
+
+#[cfg(test)]
+mod tests;

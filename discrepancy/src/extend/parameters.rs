@@ -1,0 +1,193 @@
+//! `parameter:` names and the keys of the rig file that they scale.
+
+use super::edits::Edits;
+use super::{ExtendError, told, written};
+use crate::report::Quantity;
+use plant::parameters::table::KEYS;
+use plant::{Axis, RigParameters};
+use std::ops::Range;
+use toml_edit::{Document, Item};
+
+/// All names, in the order of effects.md.
+pub(super) const NAMES: [&str; 9] = [
+    "parameter:mass",
+    "parameter:viscous-friction",
+    "parameter:sliding-friction",
+    "parameter:break-away-force",
+    "parameter:supply-pressure",
+    "parameter:spool-time-constant",
+    "parameter:flow-lag",
+    "parameter:kv-scale",
+    "parameter:piston-area",
+];
+
+/// The keys of the rig file, as `mass.drive_kg`, that a parameter scales; the first one is the parameter's own number.
+///
+/// Only the mass differs between the axes. The carriage, which the force sensor moves, is scaled with the drive's mass.
+#[must_use]
+pub fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static str>> {
+    Some(match name {
+        "parameter:mass" if axis == Axis::Load => vec!["mass.load_kg"],
+        "parameter:mass" => vec!["mass.drive_kg", "mass.carriage_kg"],
+        "parameter:viscous-friction" => vec!["friction.viscous_n_per_mm_per_s"],
+        "parameter:sliding-friction" => vec!["friction.sliding_force_n"],
+        "parameter:break-away-force" => vec!["friction.break_away_force_n"],
+        "parameter:supply-pressure" => vec!["supply.pressure_bar"],
+        "parameter:spool-time-constant" => vec!["valve.spool_time_constant_ms"],
+        "parameter:flow-lag" => vec!["valve.flow_lag_time_constant_ms"],
+        "parameter:kv-scale" => vec!["valve.kv_supply_m3_per_h", "valve.kv_exhaust_m3_per_h"],
+        "parameter:piston-area" => vec!["cylinder.piston_area_mm2", "cylinder.annulus_area_mm2"],
+        _ => return None,
+    })
+}
+
+/// The keys of a changed parameter, and the factor on them.
+///
+/// Without a unit the value is the factor, on both axes; with the file's unit it is the new number of the first key. A mass is
+/// the load's where the number before was the load's and not the drive's.
+fn scaling(
+    rig: &RigParameters,
+    quantity: &Quantity,
+    number_of: impl Fn(&str) -> Option<f64>,
+) -> Result<(Vec<&'static str>, Option<f64>), ExtendError> {
+    let unknown = || ExtendError::UnknownParameter { name: quantity.name.clone(), known: NAMES.join(", ") };
+    if !quantity.value.is_finite() {
+        let (what, value) = (quantity.name.clone(), quantity.value.to_string());
+        return Err(ExtendError::NotFinite { what, value });
+    }
+    if quantity.unit.is_empty() {
+        let mut keys = key_of_parameter(&quantity.name, Axis::Drive).ok_or_else(unknown)?;
+        for key in key_of_parameter(&quantity.name, Axis::Load).ok_or_else(unknown)? {
+            if !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
+        return Ok((keys, Some(quantity.value)));
+    }
+    let [drive_kg, load_kg] = [rig.mass().drive_kg, rig.mass().load_kg];
+    let is_load = quantity.before.is_some_and(|before| before == load_kg && before != drive_kg);
+    let axis = if is_load { Axis::Load } else { Axis::Drive };
+    let keys = key_of_parameter(&quantity.name, axis).ok_or_else(unknown)?;
+    let key = KEYS.iter().find(|key| key.path() == keys[0]).filter(|key| key.count == 1);
+    let wanted = key.map_or("", |key| key.unit.name());
+    if quantity.unit != wanted {
+        return Err(ExtendError::Unit {
+            name: quantity.name.clone(),
+            unit: quantity.unit.clone(),
+            wanted: wanted.to_owned(),
+        });
+    }
+    // A number that was 0 has no factor; no key beside the first one needs it then.
+    let factor = number_of(keys[0]).map(|old| quantity.value / old).filter(|factor| factor.is_finite());
+    Ok((keys, factor))
+}
+
+/// The text with all changed parameters.
+pub(super) fn change(
+    text: &str,
+    rig: &RigParameters,
+    changed: &[Quantity],
+    from: &str,
+    layout: &dyn Fn(&str, String) -> ExtendError,
+) -> Result<String, ExtendError> {
+    let document =
+        Document::parse(text).map_err(|error| layout("changed parameters", error.message().to_owned()))?;
+    let mut edits = Edits::new(text);
+    let mut done: Vec<&str> = Vec::new();
+    let number_of = |path: &str| match spots(&document, path)?.values.as_slice() {
+        [only] => number(text, only),
+        _ => None,
+    };
+    for quantity in changed {
+        let (keys, factor) = scaling(rig, quantity, number_of)?;
+        for (at, path) in keys.into_iter().enumerate() {
+            if done.contains(&path) {
+                return Err(ExtendError::Twice { what: path.to_owned() });
+            }
+            done.push(path);
+            let Some(spots) = spots(&document, path) else { continue };
+            let is_own = at == 0 && !quantity.unit.is_empty();
+            let unit = if is_own { quantity.unit.as_str() } else { "" };
+            let told = if is_own {
+                told(quantity.value, quantity.standard_error, unit)
+            } else {
+                let error =
+                    quantity.standard_error.map(|error| error * factor.unwrap_or(1.0) / quantity.value);
+                format!("times {}", told(factor.unwrap_or(1.0), error, ""))
+            };
+            let comment = format!("was {}; {told}, by {}{from}", spots.written(text), quantity.name);
+            edits.comment_above(spots.key.start, &comment);
+            for span in &spots.values {
+                let Some(old) = number(text, span) else { continue };
+                let new = if is_own { quantity.value } else { old * factor.unwrap_or(1.0) };
+                edits.replace(span.clone(), written(new));
+            }
+        }
+    }
+    hold_at_rest(text, &document, changed, from, &mut edits);
+    Ok(edits.applied())
+}
+
+/// A piston at rest holds at least what holds it while it slides: a break-away force below the new sliding force follows it.
+fn hold_at_rest(
+    text: &str,
+    document: &Document<&str>,
+    changed: &[Quantity],
+    from: &str,
+    edits: &mut Edits<'_>,
+) {
+    let new = |name: &str, old_n: f64| {
+        let quantity = changed.iter().find(|quantity| quantity.name == name)?;
+        Some(if quantity.unit.is_empty() { old_n * quantity.value } else { quantity.value })
+    };
+    let (Some(sliding), Some(rest)) =
+        (spots(document, "friction.sliding_force_n"), spots(document, "friction.break_away_force_n"))
+    else {
+        return;
+    };
+    let (Some(old_sliding_n), Some(old_rest_n)) =
+        (number(text, &sliding.values[0]), number(text, &rest.values[0]))
+    else {
+        return;
+    };
+    let Some(sliding_n) = new("parameter:sliding-friction", old_sliding_n) else { return };
+    if new("parameter:break-away-force", old_rest_n).is_none() && sliding_n > old_rest_n {
+        let comment = format!("was {}; not below the sliding force{from}", rest.written(text));
+        edits.comment_above(rest.key.start, &comment);
+        edits.replace(rest.values[0].clone(), written(sliding_n));
+    }
+}
+
+/// Where a key of the rig file and its numbers stand.
+struct Spots {
+    key: Range<usize>,
+    values: Vec<Range<usize>>,
+    is_array: bool,
+}
+
+impl Spots {
+    /// The value on one line, without the comments that an array may hold.
+    fn written(&self, text: &str) -> String {
+        let numbers: Vec<&str> = self.values.iter().map(|span| &text[span.clone()]).collect();
+        if self.is_array { format!("[{}]", numbers.join(", ")) } else { numbers.join(", ") }
+    }
+}
+
+/// Where `table.key` stands; `None` when it is no number or array of them, which the reader of rig files has refused.
+fn spots(document: &Document<&str>, path: &str) -> Option<Spots> {
+    let (table, name) = path.split_once('.')?;
+    let table = document.get(table)?.as_table_like()?;
+    let key = table.key(name)?.span()?;
+    let item = table.get(name)?;
+    let array = item.as_array();
+    let values = match array {
+        Some(array) => array.iter().map(|value| value.span()).collect::<Option<Vec<_>>>()?,
+        None => vec![Item::span(item)?],
+    };
+    (!values.is_empty()).then_some(Spots { key, values, is_array: array.is_some() })
+}
+
+fn number(text: &str, span: &Range<usize>) -> Option<f64> {
+    let value: toml_edit::Value = text.get(span.clone())?.parse().ok()?;
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}

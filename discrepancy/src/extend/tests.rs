@@ -1,0 +1,299 @@
+//! What is written is what was found, and nothing else changes.
+
+use super::parameters::NAMES;
+use super::*;
+use plant::Axis;
+
+fn records() -> Vec<String> {
+    vec!["a.csv".to_owned(), "b.csv".to_owned()]
+}
+
+fn addition(effect: &str, place: &str, numbers: &[(&str, f64, Option<f64>)]) -> Addition {
+    let numbers = numbers.iter().map(|(key, value, error)| ((*key).to_owned(), *value, *error)).collect();
+    Addition { effect: effect.to_owned(), place: place.to_owned(), numbers }
+}
+
+fn leakage() -> Addition {
+    addition("piston-leakage", "drive", &[("leakage_nl_per_min", 2.513_171_3, Some(0.0412))])
+}
+
+fn quantity(name: &str, value: f64, unit: &str, before: Option<f64>) -> Quantity {
+    Quantity {
+        name: name.to_owned(),
+        value,
+        unit: unit.to_owned(),
+        standard_error: Some(0.01 * value),
+        before,
+    }
+}
+
+fn extended(text: &str, additions: &[Addition], changed: &[Quantity]) -> RigParameters {
+    let text = extend(text, "rig.toml", additions, changed, &records()).unwrap();
+    RigParameters::from_toml(&text, "rig.toml").unwrap()
+}
+
+/// Lines of the new text that the old one has not.
+fn new_lines<'t>(old: &str, new: &'t str) -> Vec<&'t str> {
+    new.lines().filter(|line| !old.lines().any(|old| old == *line)).collect()
+}
+
+#[test]
+fn nothing_found_changes_nothing() {
+    let text = RigParameters::BASELINE_TOML;
+    assert_eq!(extend(text, "rig.toml", &[], &[], &records()).unwrap(), text);
+}
+
+#[test]
+fn each_effect_is_switched_on_as_it_was_added_at_each_of_its_places() {
+    for sheet in SHEETS {
+        for place in sheet.place.names() {
+            let numbers: Vec<_> = sheet
+                .keys
+                .iter()
+                .map(|key| (key.name, key.drawn[0] + 0.3137 * (key.drawn[1] - key.drawn[0]), None))
+                .collect();
+            let plain: Vec<_> = numbers.iter().map(|(key, value, _)| (*key, *value)).collect();
+            let wanted = RigParameters::baseline().with_effect(sheet.name, &place, &plain).unwrap();
+            let rig = extended(RigParameters::BASELINE_TOML, &[addition(sheet.name, &place, &numbers)], &[]);
+            assert_eq!(rig.effects(), wanted.effects(), "{} at {place}", sheet.name);
+            assert_eq!(rig.friction(), wanted.friction());
+        }
+    }
+}
+
+#[test]
+fn a_new_table_tells_value_error_unit_range_and_records() {
+    let old = RigParameters::BASELINE_TOML;
+    let new = extend(old, "rig.toml", &[leakage()], &[], &records()).unwrap();
+    assert!(new.starts_with(old));
+    let lines = new_lines(old, &new);
+    assert!(lines[0].starts_with("# piston-leakage: "), "{lines:?}");
+    assert_eq!(lines[1..3], ["# Found from a.csv, b.csv.", "[effects.piston-leakage.drive]"]);
+    assert!(lines[3].starts_with("# 2.513 +- 0.041 Nl/min; "), "{lines:?}");
+    assert_eq!(lines[4..], ["leakage_nl_per_min = 2.5131713"]);
+}
+
+#[test]
+fn a_changed_parameter_keeps_its_comments_and_its_old_value() {
+    let old = RigParameters::BASELINE_TOML.replace("drive_kg = 5.0", "drive_kg = 5.0   # weighed in May");
+    let mass = quantity("parameter:mass", 5.25, "kg", Some(5.0));
+    let new = extend(&old, "rig.toml", &[], &[mass], &records()).unwrap();
+    assert_eq!(
+        new_lines(&old, &new),
+        [
+            "# was 5.0; 5.250 +- 0.052 kg, by parameter:mass from a.csv, b.csv",
+            "drive_kg = 5.25   # weighed in May",
+            "# was 3.5; times 1.050 +- 0.011, by parameter:mass from a.csv, b.csv",
+            "carriage_kg = 3.6750000000000003",
+        ]
+    );
+}
+
+#[test]
+fn each_parameter_scales_what_the_records_of_the_study_scale() {
+    let base = RigParameters::baseline();
+    let text = RigParameters::BASELINE_TOML;
+    for name in NAMES {
+        let rig = extended(text, &[], &[quantity(name, 1.03, "", None)]);
+        let ratios = [
+            (rig.mass().drive_kg / base.mass().drive_kg, "parameter:mass"),
+            (rig.mass().carriage_kg / base.mass().carriage_kg, "parameter:mass"),
+            (rig.mass().load_kg / base.mass().load_kg, "parameter:mass"),
+            (
+                rig.friction().viscous_n_s_per_m / base.friction().viscous_n_s_per_m,
+                "parameter:viscous-friction",
+            ),
+            (rig.friction().sliding_force_n / base.friction().sliding_force_n, "parameter:sliding-friction"),
+            (
+                rig.friction().break_away_force_n / base.friction().break_away_force_n,
+                "parameter:break-away-force",
+            ),
+            (rig.supply().pressure_pa / base.supply().pressure_pa, "parameter:supply-pressure"),
+            (
+                rig.valve().spool_time_constant_s / base.valve().spool_time_constant_s,
+                "parameter:spool-time-constant",
+            ),
+            (
+                rig.valve().flow_lag_time_constant_s / base.valve().flow_lag_time_constant_s,
+                "parameter:flow-lag",
+            ),
+            (rig.valve().kv_supply_m3_per_h[3] / base.valve().kv_supply_m3_per_h[3], "parameter:kv-scale"),
+            (rig.valve().kv_exhaust_m3_per_h[5] / base.valve().kv_exhaust_m3_per_h[5], "parameter:kv-scale"),
+            (rig.cylinder().piston_area_m2 / base.cylinder().piston_area_m2, "parameter:piston-area"),
+            (rig.cylinder().annulus_area_m2 / base.cylinder().annulus_area_m2, "parameter:piston-area"),
+        ];
+        for (ratio, of) in ratios {
+            let wanted = if of == name { 1.03 } else { 1.0 };
+            assert!((ratio - wanted).abs() < 1e-12, "{name}: {of} times {ratio}");
+        }
+        for path in Axis::ALL.iter().flat_map(|axis| key_of_parameter(name, *axis).unwrap()) {
+            assert!(plant::parameters::table::KEYS.iter().any(|key| key.path() == path), "{path}");
+        }
+    }
+    assert_eq!(key_of_parameter("parameter:colour", Axis::Drive), None);
+}
+
+#[test]
+fn the_mass_that_was_the_loads_is_the_loads() {
+    let rig =
+        extended(RigParameters::BASELINE_TOML, &[], &[quantity("parameter:mass", 1.6, "kg", Some(1.5))]);
+    assert_eq!((rig.mass().load_kg, rig.mass().drive_kg), (1.6, 5.0));
+}
+
+#[test]
+fn sliding_friction_takes_the_break_away_force_along() {
+    let changed = [quantity("parameter:sliding-friction", 40.0, "N", Some(26.0))];
+    let rig = extended(RigParameters::BASELINE_TOML, &[], &changed);
+    assert_eq!((rig.friction().sliding_force_n, rig.friction().break_away_force_n), (40.0, 40.0));
+    let both = [changed[0].clone(), quantity("parameter:break-away-force", 50.0, "N", Some(35.0))];
+    assert_eq!(extended(RigParameters::BASELINE_TOML, &[], &both).friction().break_away_force_n, 50.0);
+}
+
+#[test]
+fn an_effect_that_is_on_gets_other_numbers_and_keeps_the_rest() {
+    let sheet = sheet("spool-second-order").unwrap();
+    let [first, second] = [sheet.keys[0], sheet.keys[1]];
+    let value = second.min + 0.5 * (second.max - second.min);
+    let head = "\n[effects.spool-second-order.drive]\n";
+    let old = format!("{}{head}  # mine\n  {} = 8e1 # guess\n", RigParameters::BASELINE_TOML, first.name);
+    let old = if second.default.is_some() { old } else { format!("{old}  {} = {value}\n", second.name) };
+    let numbers = [(first.name, 91.25, Some(1.5)), (second.name, value, None)];
+    let change = addition(sheet.name, "drive", &numbers);
+    let new = extend(&old, "rig.toml", &[change], &[], &records()).unwrap();
+    assert!(
+        new.contains(&format!("  # mine\n  # was 8e1; 91.2 +- 1.5 Hz from a.csv, b.csv; {}", first.range())),
+        "{new}"
+    );
+    assert!(new.contains(&format!("\n  {} = 91.25 # guess\n", first.name)), "{new}");
+    let rig = RigParameters::from_toml(&new, "rig.toml").unwrap();
+    assert_eq!(rig.effects().len(), 1);
+    assert_eq!(rig.effects()[0].numbers[..2], [91.25, value]);
+}
+
+#[test]
+fn a_number_that_a_table_left_out_is_put_into_it() {
+    // An effect whose numbers all have defaults, and so a table that may be empty.
+    let with_default = |sheet: &&Sheet| sheet.keys.iter().skip(1).any(|key| key.default.is_some());
+    for sheet in SHEETS.iter().filter(with_default) {
+        let key = sheet.keys.iter().skip(1).find(|key| key.default.is_some()).unwrap();
+        let given: String = sheet
+            .keys
+            .iter()
+            .filter(|key| key.default.is_none())
+            .map(|key| format!("\t{} = {:?}\n", key.name, key.drawn[0]))
+            .collect();
+        let place = sheet.place.names()[0].clone();
+        let old = format!("{}\n[effects.{}.{place}]\n{given}", RigParameters::BASELINE_TOML, sheet.name);
+        let value = key.min + 0.5 * (key.max - key.min);
+        let rig = extended(old.trim_end(), &[addition(sheet.name, &place, &[(key.name, value, None)])], &[]);
+        let at = sheet.keys.iter().position(|other| other.name == key.name).unwrap();
+        assert_eq!(rig.effects()[0].numbers[at], value, "{}", sheet.name);
+    }
+}
+
+#[test]
+fn an_effect_that_stands_with_defaults_alone_or_in_any_layout_is_changed_or_joined() {
+    let base = RigParameters::BASELINE_TOML;
+    let layouts = [
+        format!("effects.piston-leakage.load.leakage_nl_per_min = 1.5\n{base}"),
+        format!("effects.piston-leakage.drive.leakage_nl_per_min = 1.5\n{base}"),
+        format!("effects = {{ piston-leakage = {{ drive = {{ leakage_nl_per_min = 1.5 }} }} }}\n{base}"),
+        format!("effects = {{ piston-leakage = {{ load = {{ leakage_nl_per_min = 1.5 }} }} }}\n{base}"),
+        format!("effects = {{ inclination = {{ load = {{ force_n = 10 }} }} }}\n{base}"),
+        format!("{base}\n[effects.piston-leakage]\ndrive = {{ leakage_nl_per_min = 1.5 }}"),
+        format!("{base}\n[effects]\npiston-leakage.drive.leakage_nl_per_min = 1.5"),
+        format!("{base}\n[effects]\npiston-leakage.load.leakage_nl_per_min = 1.5"),
+        format!("{base}\n  [ effects . \"piston-leakage\" . drive ]\n  'leakage_nl_per_min'=1.5# odd"),
+    ];
+    for old in layouts {
+        let before = RigParameters::from_toml(&old, "rig.toml").unwrap();
+        let wanted = before.with_effect("piston-leakage", "drive", &[("leakage_nl_per_min", 2.513_171_3)]);
+        let rig = extended(&old, &[leakage()], &[]);
+        assert_eq!(rig.effects(), wanted.unwrap().effects(), "{}", &old[..80]);
+    }
+}
+
+#[test]
+fn windows_line_ends_a_missing_last_one_and_a_byte_order_mark_survive() {
+    let unix = format!("\u{feff}{}", RigParameters::BASELINE_TOML.trim_end());
+    let old = unix.replace('\n', "\r\n");
+    let changed = [quantity("parameter:kv-scale", 1.05, "", Some(1.0))];
+    let new = extend(&old, "rig.toml", &[leakage()], &changed, &records()).unwrap();
+    assert_eq!(new.matches('\n').count(), new.matches("\r\n").count());
+    assert!(new.starts_with('\u{feff}') && new.matches('\u{feff}').count() == 1);
+    let same = extend(&unix, "rig.toml", &[leakage()], &changed, &records()).unwrap();
+    assert_eq!(new.replace("\r\n", "\n"), same);
+}
+
+#[test]
+fn unusual_tables_keep_their_layout() {
+    let base = RigParameters::BASELINE_TOML;
+    let head = base.find("[gas]").unwrap();
+    let old = base[head..].replace(
+        "kv_supply_m3_per_h = [0.0, 0.0, 0.115, 0.36, 0.60, 0.66]",
+        "  kv_supply_m3_per_h = [ # measured\n    0, 0.0,\n    0.115, 36e-2, # here\n    0.60, 0.66 ]",
+    );
+    let old = format!(
+        "supply = {{ pressure_bar = 7, exhaust_pressure_bar = 1.01325, atmospheric_pressure_bar = 1.01325, \
+         discharge_time_constant_s = 0.05, recovery_time_constant_s = 0.3, check_valve_pressure_bar = 2.5 }}\n{old}"
+    );
+    let changed = [
+        quantity("parameter:supply-pressure", 7.3, "bar", Some(7.0)),
+        quantity("parameter:kv-scale", 2.0, "", None),
+    ];
+    let new = extend(&old, "rig.toml", &[], &changed, &records()).unwrap();
+    assert!(new.starts_with("# was 7; 7.300 +- 0.073 bar, by parameter:supply-pressure"), "{new}");
+    assert!(new.contains("supply = { pressure_bar = 7.3, exhaust"), "{new}");
+    assert!(new.contains("[ # measured\n    0.0, 0.0,\n    0.23, 0.72, # here\n    1.2, 1.32 ]\n"), "{new}");
+    assert!(new.contains("  # was [0, 0.0, 0.115, 36e-2, 0.60, 0.66]; times 2.000 +- 0.020, by"), "{new}");
+}
+
+#[test]
+fn what_no_rig_can_hold_is_refused_with_what_could_be() {
+    let base = RigParameters::BASELINE_TOML;
+    let refused = |additions: &[Addition], changed: &[Quantity]| {
+        extend(base, "rig.toml", additions, changed, &records()).unwrap_err().to_string()
+    };
+    let says = |message: String, parts: &[&str]| {
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+    };
+    says(refused(&[addition("gremlins", "drive", &[])], &[]), &["gremlins", "piston-leakage"]);
+    says(refused(&[addition("piston-leakage", "drive.a", &[])], &[]), &["drive.a", "drive, load"]);
+    says(
+        refused(&[addition("piston-leakage", "drive", &[("size", 1.0, None)])], &[]),
+        &["size", "leakage_nl_per_min"],
+    );
+    let huge = addition("piston-leakage", "drive", &[("leakage_nl_per_min", 1e6, None)]);
+    says(
+        refused(&[huge], &[]),
+        &["effects.piston-leakage.drive.leakage_nl_per_min = 1000000.0 is out of range", "Nl/min"],
+    );
+    let nan = addition("piston-leakage", "drive", &[("leakage_nl_per_min", f64::NAN, None)]);
+    says(refused(&[nan], &[]), &["leakage_nl_per_min = NaN"]);
+    says(refused(&[leakage(), leakage()], &[]), &["piston-leakage at drive", "twice"]);
+    says(refused(&[addition("piston-leakage", "drive", &[])], &[]), &["missing", "leakage_nl_per_min"]);
+    says(refused(&[], &[quantity("parameter:colour", 1.0, "", None)]), &["colour", "parameter:mass"]);
+    says(refused(&[], &[quantity("parameter:mass", 5e3, "g", Some(5.0))]), &["\"g\"", "\"kg\""]);
+    says(
+        refused(&[], &[quantity("parameter:supply-pressure", 20.0, "bar", Some(7.0))]),
+        &["supply.pressure_bar = 20.0 is out of range; allowed: 3 to 12 bar"],
+    );
+    let twice = quantity("parameter:flow-lag", 1.1, "", None);
+    says(refused(&[], &[twice.clone(), twice]), &["valve.flow_lag_time_constant_ms", "twice"]);
+    let broken = extend("[supply", "rig.toml", &[], &[], &[]).unwrap_err().to_string();
+    says(broken, &["rig.toml:1: not TOML"]);
+}
+
+#[test]
+fn a_records_name_cannot_break_out_of_its_comment() {
+    let records = ["a\nb = 1\r\u{7f}.csv".to_owned()];
+    let new = extend(RigParameters::BASELINE_TOML, "rig.toml", &[leakage()], &[], &records).unwrap();
+    assert!(new.contains("# Found from a\u{fffd}b = 1\u{fffd}\u{fffd}.csv."));
+}
+
+#[test]
+fn comments_are_rounded_to_the_second_digit_of_the_error() {
+    assert_eq!(told(2.513_17, Some(0.0412), "N"), "2.513 +- 0.041 N");
+    assert_eq!(told(412_500.3, Some(1234.0), ""), "412500 +- 1234");
+    assert_eq!(told(7.0, None, "bar"), "7 bar, not bounded by the records");
+}

@@ -1,0 +1,112 @@
+//! What was found, as one page that a person understands in a minute: opens offline, without script, with nothing from elsewhere.
+//!
+//! First the verdict in a sentence with the names, then the disagreement as a picture, what is known of each name, the picture
+//! after; below that the evidence, in the order in which somebody who doubts the verdict would ask for it. A section that has
+//! nothing to say is left out. Markup that an XML parser reads too, in the style of all pages ([`bench::page_style`]).
+//!
+//! | file | holds |
+//! |---|---|
+//! | `verdict` | the box on top |
+//! | `pictures` | measured against simulated, before and after |
+//! | `finding` | names, parameters, what is outside the catalogue, what to run next |
+//! | `location` | balances, regimes, maps, unknown inputs over time |
+//! | `candidates` | ranking, what is not excited, detection limits |
+//! | `held_out` | gap and verification |
+//! | `checks` | the records |
+//! | `draw`, `thin`, `markup`, `words` | drawings, long series, tables, numbers |
+
+mod candidates;
+mod checks;
+mod draw;
+mod finding;
+mod held_out;
+mod location;
+mod markup;
+mod pictures;
+mod thin;
+mod verdict;
+mod words;
+
+use crate::report::{Report, Verdict};
+use bench::page_style::{document, escaped};
+
+/// Numbers of one signal over time, in the unit that stands beside them; what is missing is not finite.
+pub type Values = Vec<f64>;
+
+/// A signal of a record with both models, sample by sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// As a column of the record, `drive_position_m`.
+    pub signal: String,
+    /// SI.
+    pub unit: String,
+    /// Times, s.
+    pub time_s: Values,
+    /// What the record says.
+    pub measured: Values,
+    /// What the baseline says.
+    pub before: Values,
+    /// What the extended model says; empty when there is none.
+    pub after: Values,
+    /// Measured minus baseline, free of what the windows' start states take up.
+    pub before_residual: Values,
+    /// Measured minus extended model; empty when there is none.
+    pub after_residual: Values,
+    /// Standard deviation of the sensor's noise, its rounding included.
+    pub noise: f64,
+}
+
+/// What the pictures are made of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pictures {
+    /// The record.
+    pub record: String,
+    /// Whether nothing was fitted on it.
+    pub held_out: bool,
+    /// Its signals.
+    pub traces: Vec<Trace>,
+}
+
+/// The page.
+#[must_use]
+pub fn page(report: &Report, pictures: &Pictures) -> String {
+    let bad = report.verdict == Verdict::BadData;
+    let mut sections = vec![
+        ("disagreement", "Measured against simulated", pictures::before(report, pictures)),
+        ("finding", finding::title(report), finding::finding(report)),
+        ("next", "What to measure next", finding::next(report)),
+        ("after", "After: with what was found", pictures::after(report, pictures)),
+        ("gap", "The gap, before and after", held_out::gap(report)),
+        ("verification", "On a record that nothing was fitted on", held_out::verification(report)),
+        ("location", "Where they disagree", location::location(report)),
+        ("candidates", "Candidates, the best first", candidates::candidates(report)),
+        ("limits", "What these records can show", candidates::limits(report)),
+        ("records", "The records", checks::checks(report)),
+    ];
+    if bad {
+        // Of a record that cannot be used, what is wrong with it comes first.
+        sections.rotate_right(1);
+    }
+    sections.retain(|(_, _, markup)| !markup.is_empty());
+    let contents: String = sections
+        .iter()
+        .map(|(name, title, _)| format!("<li><a href=\"#{name}\">{}</a></li>\n", escaped(title)))
+        .collect();
+    let body: String =
+        sections.iter().map(|(name, title, inside)| markup::section(name, title, inside)).collect();
+    document(
+        verdict::title(report.verdict),
+        &format!(
+            "{}<nav aria-label=\"Contents\">\n<ul class=\"contents\">\n{contents}</ul>\n</nav>\n<main>\n{body}</main>\n\
+             <footer class=\"page-foot\">\n<p>Schema version {}. The same for programs is in report.json beside this page. \
+             \u{b1} is one standard error.</p>\n</footer>\n",
+            verdict::head(report),
+            report.schema_version
+        ),
+    )
+}
+
+#[cfg(test)]
+mod samples;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,85 @@
+//! The ranking of candidates, what the records do not excite, and the smallest amplitude of each effect that would have shown.
+
+use super::draw::{Bar, bars, figure};
+use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as said};
+use super::words;
+use crate::report::{Candidate, Report, Verdict};
+
+/// Candidates that are drawn; all stand in the table.
+const DRAWN: usize = 15;
+
+/// The section of the ranking.
+pub(super) fn candidates(report: &Report) -> String {
+    if report.candidates.is_empty() {
+        return String::new();
+    }
+    let bar = |one: &Candidate| Bar {
+        label: format!("{} {}", one.effect, words::place_key(&one.place)),
+        value: one.score,
+        text: words::short(one.score),
+        is_full: one.score > 1.0,
+    };
+    let rows: Vec<Bar> = report.candidates.iter().take(DRAWN).map(bar).collect();
+    let drawn = figure(
+        "How much each would explain",
+        "Over what pure noise would reach, logarithmic: beyond 1 a candidate stands out. It is named only when its refit in the \
+         simulator holds too.",
+        &[],
+        &bars("ranking", "Candidates by score", &rows),
+    );
+    let row = |one: &Candidate| {
+        vec![
+            said(&one.effect),
+            said(words::place(&one.effect, &one.place)),
+            number(words::short(one.score)),
+            number(one.share_explained.map_or_else(|| words::NOTHING.to_owned(), words::percent)),
+            number(words::with_unit(&words::short(one.amplitude), &one.unit)),
+            Cell::Sentence(one.fate.clone()),
+        ]
+    };
+    let heads = ["effect", "where", "score", "explains alone", "amplitude", "what became of it"];
+    let count = report.candidates.len();
+    let all = table("All candidates", &heads, report.candidates.iter().map(row));
+    charts(&[drawn]) + &folded(&format!("All {count} candidates, and what became of each"), &all)
+}
+
+/// The section of what can be seen at all.
+pub(super) fn limits(report: &Report) -> String {
+    let mut text = String::new();
+    if !report.not_excited.is_empty() {
+        text += &heading("Not excited");
+        text += &paragraph(
+            "Whether these are there, the training records do not tell: they do nothing in what was run.",
+        );
+        let rows = report
+            .not_excited
+            .iter()
+            .map(|one| vec![said(&one.effect), said(words::place(&one.effect, &one.place))]);
+        text += &table("Not excited", &["effect", "where"], rows);
+    }
+    // Without anything missing the limits are the answer, and stand further up.
+    if report.verdict != Verdict::NothingMissing {
+        let limits = limits_table(report);
+        if !limits.is_empty() {
+            text += &heading("Detection limits");
+            text += &paragraph(
+                "The smallest amplitude of each other effect that these records would have shown.",
+            );
+            text += &folded(&format!("Limits of {} effects", report.detection_limits.len()), &limits);
+        }
+    }
+    text
+}
+
+/// The detection limits.
+pub(super) fn limits_table(report: &Report) -> String {
+    let rows = report.detection_limits.iter().map(|one| {
+        vec![
+            said(&one.effect),
+            said(words::place(&one.effect, &one.place)),
+            said(&one.name),
+            number(words::with_unit(&words::short(one.value), &one.unit)),
+        ]
+    });
+    table("Detection limits", &["effect", "where", "number", "would have shown from"], rows)
+}

@@ -1,0 +1,294 @@
+//! Axes, lines, bands and bars as inline SVG, in the colours and dashes of the stylesheet.
+//!
+//! Every drawing is [`WIDTH`] wide and stands in a column of at most twice a telephone's width, so that its letters are about as
+//! large as the text's on any screen. Drawings have a title and a description for who does not see them.
+
+use super::thin::Column;
+use super::words;
+use bench::page_style::escaped;
+use std::fmt::Write as _;
+
+/// Width of all drawings, in their own pixels.
+pub(super) const WIDTH: f64 = 420.0;
+const LEFT: f64 = 54.0;
+const RIGHT: f64 = 12.0;
+const TOP: f64 = 24.0;
+const FOOT: f64 = 40.0;
+/// Height of what is inside the axes.
+const BODY: f64 = 176.0;
+
+/// From values to pixels, in equal steps.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+}
+
+impl Scale {
+    /// Where a value stands; at the axis' end when it is beyond it.
+    fn at(&self, value: f64) -> f64 {
+        let share = (value.clamp(self.low, self.high) - self.low) / (self.high - self.low);
+        self.from + if share.is_finite() { share } else { 0.0 } * (self.to - self.from)
+    }
+
+    /// Round values, about as many as asked for, as they are written.
+    fn ticks(&self, about: f64) -> Vec<(f64, String)> {
+        let rough = (self.high - self.low) / about;
+        if !rough.is_finite() || rough <= 0.0 {
+            return Vec::new();
+        }
+        let power = 10f64.powf(rough.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough);
+        let step = step.unwrap_or(10.0 * power);
+        let (first, last) = ((self.low / step).ceil() as i64, (self.high / step).floor() as i64);
+        let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+        let large = self.low.abs().max(self.high.abs());
+        let written = |value: f64| {
+            if (1e-4..1e5).contains(&large) { words::fixed(value, digits) } else { words::short(value) }
+        };
+        (first..=last).map(|index| index as f64 * step).map(|value| (value, written(value))).collect()
+    }
+}
+
+/// Smallest and largest of what is finite; `None` without any.
+pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let start = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = values
+        .filter(|value| value.is_finite())
+        .fold(start, |(low, high), value| (low.min(value), high.max(value)));
+    (low <= high).then_some((low, high))
+}
+
+/// A pair of axes with what is drawn between them.
+pub(super) struct Plot {
+    x: Scale,
+    y: Scale,
+    body: String,
+}
+
+impl Plot {
+    /// Empty axes over these ranges; a range without length gets some. The labels have their units.
+    pub(super) fn new(x: (f64, f64), y: (f64, f64), x_label: &str, y_label: &str) -> Self {
+        let wide = |(low, high): (f64, f64), room: f64| {
+            let more = if high > low { (high - low) * room } else { low.abs().max(1.0) * 0.5 };
+            (low - more, high + more)
+        };
+        let (y_low, y_high) = wide(y, 0.06);
+        let (x_low, x_high) = if x.1 > x.0 { x } else { wide(x, 0.0) };
+        let mut plot = Plot {
+            x: Scale { low: x_low, high: x_high, from: LEFT, to: WIDTH - RIGHT },
+            y: Scale { low: y_low, high: y_high, from: TOP + BODY, to: TOP },
+            body: String::new(),
+        };
+        for (value, label) in plot.y.ticks(5.0) {
+            let at = plot.y.at(value);
+            plot.body += &stroke("grid", (LEFT, at), (WIDTH - RIGHT, at));
+            plot.body += &text("end", (LEFT - 6.0, at + 4.5), &label);
+        }
+        for (value, label) in plot.x.ticks(6.0) {
+            let at = plot.x.at(value);
+            plot.body += &stroke("edge", (at, TOP + BODY), (at, TOP + BODY + 4.0));
+            plot.body += &text("middle", (at, TOP + BODY + 18.0), &label);
+        }
+        plot.body += &stroke("edge", (LEFT, TOP + BODY), (WIDTH - RIGHT, TOP + BODY));
+        plot.body += &text("", (4.0, 14.0), y_label);
+        plot.body += &text("end", (WIDTH - RIGHT, TOP + BODY + 34.0), x_label);
+        plot
+    }
+
+    /// A stretch of the horizontal axis that is marked.
+    pub(super) fn stretch(&mut self, from: f64, to: f64) {
+        let (from, to) = (self.x.at(from), self.x.at(to));
+        let _ = writeln!(
+            self.body,
+            "<rect x=\"{from:.1}\" y=\"{TOP}\" width=\"{:.1}\" height=\"{BODY}\" style=\"fill:var(--mark)\"/>",
+            (to - from).max(3.0)
+        );
+    }
+
+    /// All between two levels.
+    pub(super) fn between(&mut self, low: f64, high: f64) {
+        let (top, bottom) = (self.y.at(high), self.y.at(low));
+        let _ = writeln!(
+            self.body,
+            "<rect class=\"area\" x=\"{LEFT}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
+            WIDTH - RIGHT - LEFT,
+            (bottom - top).max(1.0)
+        );
+    }
+
+    /// A dashed level with its name.
+    pub(super) fn level(&mut self, value: f64) {
+        let at = self.y.at(value);
+        self.body += &stroke("cut", (LEFT, at), (WIDTH - RIGHT, at));
+    }
+
+    /// A band around a curve.
+    pub(super) fn band(&mut self, at: &[f64], low: &[f64], high: &[f64]) {
+        let there = at.iter().zip(high).chain(at.iter().zip(low).rev());
+        self.path("area", there.map(|(x, y)| (*x, *y)), true);
+    }
+
+    /// A line, broken where a value is missing.
+    pub(super) fn line(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>) {
+        let points: Vec<_> = points.collect();
+        for piece in points.split(|(x, y)| !x.is_finite() || !y.is_finite()) {
+            self.path(class, piece.iter().copied(), false);
+        }
+    }
+
+    /// A long series: a line where each column has one value, else the area between smallest and largest.
+    pub(super) fn series(&mut self, line: &str, area: &str, pieces: &[Vec<Column>]) {
+        for piece in pieces {
+            let is_line = piece.iter().all(|column| column.low == column.high);
+            let upper = piece.iter().map(|column| (column.time_s, column.high));
+            if is_line {
+                self.path(line, upper, false);
+            } else {
+                let lower = piece.iter().rev().map(|column| (column.time_s, column.low));
+                self.path(area, upper.chain(lower), true);
+            }
+        }
+    }
+
+    fn path(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)>, is_closed: bool) {
+        let mut path = String::new();
+        for (place, (x, y)) in points.filter(|(x, y)| x.is_finite() && y.is_finite()).enumerate() {
+            let letter = if place == 0 { 'M' } else { 'L' };
+            let _ = write!(path, "{letter}{:.1} {:.1}", self.x.at(x), self.y.at(y));
+        }
+        if !path.is_empty() {
+            let end = if is_closed { "Z" } else { "" };
+            let _ = writeln!(self.body, "<path class=\"{class}\" d=\"{path}{end}\"/>");
+        }
+    }
+
+    /// The drawing.
+    pub(super) fn drawn(self, identifier: &str, title: &str, description: &str) -> String {
+        svg(identifier, TOP + BODY + FOOT, title, description, &self.body)
+    }
+}
+
+/// A bar of a chart of bars.
+pub(super) struct Bar {
+    /// What it is of.
+    pub(super) label: String,
+    /// Its length, over the line at 1.
+    pub(super) value: f64,
+    /// What stands behind it.
+    pub(super) text: String,
+    /// Whether it counts; else it is hollow.
+    pub(super) is_full: bool,
+}
+
+/// Bars over a logarithmic axis with a line at 1, which they start from: to the right of it is more than noise or chance.
+pub(super) fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
+    const ROW: f64 = 36.0;
+    let largest = bars.iter().map(|bar| bar.value).filter(|value| value.is_finite()).fold(3.0, f64::max);
+    let scale = Scale { low: 0.3f64.log10(), high: largest.log10(), from: 8.0, to: WIDTH - 14.0 };
+    let place = |value: f64| scale.at(if value.is_nan() { 1.0 } else { value.max(1e-9) }.log10());
+    let bottom = 6.0 + ROW * bars.len() as f64;
+    let one = place(1.0);
+    let mut body = String::new();
+    for power in 1..=(largest.log10().floor() as i32) {
+        let at = place(10f64.powi(power));
+        body += &stroke("grid", (at, 4.0), (at, bottom));
+        body += &text("middle", (at, bottom + 16.0), &words::round(10f64.powi(power)));
+    }
+    body += &stroke("edge", (one, 4.0), (one, bottom + 4.0));
+    body += &text("middle", (one, bottom + 16.0), "1");
+    for (row, bar) in bars.iter().enumerate() {
+        let top = 6.0 + ROW * row as f64;
+        let at = place(bar.value);
+        let class = if bar.is_full { "bar s1" } else { "bar wait s1" };
+        let _ = writeln!(
+            body,
+            "<rect class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"11\"/>",
+            at.min(one),
+            top + 19.0,
+            (at - one).abs().max(1.0)
+        );
+        body += &text("name", (8.0, top + 14.0), &bar.label);
+        body += &text("end name", (WIDTH - 8.0, top + 14.0), &bar.text);
+    }
+    let told: Vec<String> = bars.iter().map(|bar| format!("{}: {}.", bar.label, bar.text)).collect();
+    svg(identifier, bottom + 24.0, title, &told.join(" "), &body)
+}
+
+fn svg(identifier: &str, height: f64, title: &str, description: &str, body: &str) -> String {
+    format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-labelledby=\"{identifier}-t {identifier}-d\">\n\
+         <title id=\"{identifier}-t\">{}</title>\n<desc id=\"{identifier}-d\">{}</desc>\n{body}</svg>\n",
+        escaped(title),
+        escaped(description)
+    )
+}
+
+fn stroke(class: &str, from: (f64, f64), to: (f64, f64)) -> String {
+    let ((x1, y1), (x2, y2)) = (from, to);
+    format!("<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>\n")
+}
+
+fn text(class: &str, (x, y): (f64, f64), words: &str) -> String {
+    format!("<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\">{}</text>\n", escaped(words))
+}
+
+/// How an entry of a legend is drawn.
+#[derive(Clone, Copy)]
+pub(super) enum Sample {
+    /// A line of this class.
+    Line(&'static str),
+    /// An area of this class.
+    Area(&'static str),
+}
+
+/// A drawing with its caption, what is said below it, and the names of its curves.
+pub(super) fn figure(caption: &str, about: &str, legend: &[(Sample, &str)], drawing: &str) -> String {
+    let entry = |(sample, name): &(Sample, &str)| {
+        let inside = match sample {
+            Sample::Line(class) => format!("<path class=\"{class}\" d=\"M1 7L37 7\"/>"),
+            Sample::Area(class) => {
+                format!("<rect class=\"{class}\" x=\"1\" y=\"2\" width=\"36\" height=\"10\"/>")
+            }
+        };
+        format!(
+            "<li><svg viewBox=\"0 0 38 14\" aria-hidden=\"true\">{inside}</svg><span>{}</span></li>\n",
+            escaped(name)
+        )
+    };
+    let legend: String = legend.iter().map(entry).collect();
+    let legend = if legend.is_empty() { legend } else { format!("<ul class=\"legend\">\n{legend}</ul>\n") };
+    let about = if about.is_empty() {
+        String::new()
+    } else {
+        format!("<br/><span class=\"soft\">{}</span>", escaped(about))
+    };
+    format!(
+        "<figure style=\"max-width:36rem\">\n<figcaption>{}{about}</figcaption>\n{legend}{drawing}</figure>\n",
+        escaped(caption)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_told_apart() {
+        let scale = Scale { low: -3.0, high: 61.0, from: 0.0, to: 1.0 };
+        let ticks = |scale: Scale| scale.ticks(7.0).into_iter().map(|(_, text)| text).collect::<Vec<_>>();
+        assert_eq!(ticks(scale), ["0", "10", "20", "30", "40", "50", "60"]);
+        assert_eq!(ticks(Scale { low: 0.0, high: 0.05, ..scale })[1], "0.01");
+        assert!(ticks(Scale { low: 1.0, high: 1.0, ..scale }).is_empty());
+        assert_eq!(scale.at(1e9), 1.0);
+    }
+
+    #[test]
+    fn a_series_with_a_hole_is_two_paths() {
+        let mut plot = Plot::new((0.0, 3.0), (0.0, 1.0), "s", "m");
+        plot.line("line s0", [(0.0, 1.0), (1.0, f64::NAN), (2.0, 1.0), (3.0, 0.0)].into_iter());
+        assert_eq!(plot.drawn("a", "b", "c").matches("<path").count(), 2);
+    }
+}

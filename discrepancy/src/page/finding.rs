@@ -1,0 +1,207 @@
+//! What was found, in full: names with their numbers and rivals, parameters, what the catalogue does not have, what to run next.
+
+use super::candidates;
+use super::draw::{Plot, Sample, figure, range};
+use super::markup::{Cell, charts, heading, number, paragraph, table, words as said};
+use super::words;
+use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Verdict};
+use plant::effects::sheet;
+
+/// What the section is called.
+pub(super) fn title(report: &Report) -> &'static str {
+    match report.verdict {
+        Verdict::NothingMissing => "Nothing above these limits",
+        Verdict::ParametersOnly => "What is off",
+        Verdict::Named => "What is missing",
+        Verdict::Ambiguous => "What it can be",
+        Verdict::OutsideCatalogue => "What it looks like",
+        Verdict::BadData => "What was found",
+    }
+}
+
+/// The section.
+pub(super) fn finding(report: &Report) -> String {
+    let mut text = String::new();
+    if report.verdict == Verdict::NothingMissing {
+        text += &paragraph(
+            "The rig file explains the records as well as their noise lets anything do. An effect above its limit below would \
+             have shown; a smaller one may be there.",
+        );
+        text += &candidates::limits_table(report);
+    }
+    for named in &report.named {
+        text += &effect(named);
+    }
+    if !report.parameters.is_empty() {
+        if !report.named.is_empty() {
+            text += &heading("Numbers of the rig file that are off");
+        }
+        let about = "No effect is missing for these: the model is right, its numbers are not.";
+        if report.verdict == Verdict::ParametersOnly {
+            text += &paragraph(about);
+        }
+        text += &quantities("Parameters", "parameter", &report.parameters, |_| String::new());
+    }
+    if let Some(outside) = &report.outside {
+        text += &unknown(outside);
+    }
+    text
+}
+
+fn effect(named: &NamedEffect) -> String {
+    let place = words::place(&named.effect, &named.place);
+    let mut text = heading(&format!("{} at the {place}", named.effect));
+    let sheet = sheet(&named.effect);
+    if let Some(sheet) = sheet {
+        text += &paragraph(&format!(
+            "{}. It explains {} of what the rig file leaves unexplained.",
+            sentence(sheet.law),
+            words::percent(named.share_explained)
+        ));
+    }
+    text += &numbers(named);
+    if !named.alternatives.is_empty() {
+        text += &paragraph("These records cannot tell it from:");
+        let row = |other: &NamedEffect| {
+            let values: Vec<String> = other
+                .parameters
+                .iter()
+                .map(|quantity| format!("{} {}", words::key(quantity), words::quantity(quantity)))
+                .collect();
+            let law = plant::effects::sheet(&other.effect).map_or("", |sheet| sheet.law);
+            vec![
+                Cell::About(other.effect.clone(), law.to_owned()),
+                said(words::place(&other.effect, &other.place)),
+                said(values.join(", ")),
+                number(words::percent(other.share_explained)),
+            ]
+        };
+        let rows = named.alternatives.iter().map(row);
+        text += &table("Alternatives", &["it can be as well", "where", "numbers", "explains"], rows);
+    }
+    text
+}
+
+fn numbers(named: &NamedEffect) -> String {
+    let sheet = sheet(&named.effect);
+    let meaning = |name: &str| {
+        let key = sheet.and_then(|sheet| sheet.keys.iter().find(|key| key.name == name));
+        key.map_or(String::new(), |key| key.meaning.to_owned())
+    };
+    quantities("Numbers of the effect", "number", &named.parameters, meaning)
+}
+
+/// Numbers with their errors, and what the rig file says where it says something of one of them.
+fn quantities(label: &str, head: &str, all: &[Quantity], meaning: impl Fn(&str) -> String) -> String {
+    let is_in_file = all.iter().any(|quantity| quantity.before.is_some());
+    let row = |quantity: &Quantity| {
+        let mut cells = vec![
+            Cell::About(quantity.name.clone(), meaning(&quantity.name)),
+            number(words::quantity(quantity)),
+        ];
+        if is_in_file {
+            let before =
+                quantity.before.map(|before| words::with_unit(&words::short(before), &quantity.unit));
+            cells.push(number(before.unwrap_or_else(|| words::NOTHING.to_owned())));
+        }
+        cells
+    };
+    let heads = [head, "from the records", "in the rig file"];
+    table(label, &heads[..if is_in_file { 3 } else { 2 }], all.iter().map(row))
+}
+
+/// With a capital and without its full stop.
+fn sentence(law: &str) -> String {
+    let mut letters = law.trim_end_matches('.').chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn unknown(outside: &Outside) -> String {
+    let mut text = paragraph(&format!(
+        "No effect of the catalogue explains it. It is in this balance: {}. It depends on:",
+        words::balance(&outside.balance)
+    ));
+    let rows = outside.variables.iter().map(|one| {
+        let chance = if one.p_value <= 0.0 { "none of 200".to_owned() } else { words::percent(one.p_value) };
+        vec![said(&one.variable), number(words::percent(one.r2.max(0.0))), number(chance)]
+    });
+    text += &table(
+        "Dependence",
+        &["variable", "explains, on data it was not fitted on", "shuffled data reach that"],
+        rows,
+    );
+    if let Some(formula) = &outside.formula {
+        text += &format!(
+            "<p>A formula that fits: <code style=\"font-size:1.1rem\">{}</code></p>\n",
+            bench::page_style::escaped(formula)
+        );
+    } else {
+        text += &paragraph("No short formula fits; the curve can be added to the model as a table.");
+    }
+    if let Some(curve) = &outside.curve {
+        text += &charts(&[curve_figure(
+            "outside-curve",
+            &format!("What is missing over {}", curve.variable),
+            curve,
+        )]);
+    }
+    text
+}
+
+/// A curve with its band.
+pub(super) fn curve_figure(identifier: &str, caption: &str, curve: &Curve) -> String {
+    let (x_unit, x_factor) = words::shown(&curve.variable_unit);
+    let (y_unit, y_factor) = words::shown_small(&curve.unit);
+    let scaled =
+        |values: &[f64], factor: f64| -> Vec<f64> { values.iter().map(|value| value * factor).collect() };
+    let (at, value) = (scaled(&curve.at, x_factor), scaled(&curve.value, y_factor));
+    let band = scaled(&curve.band, y_factor);
+    let with = |sign: f64| -> Vec<f64> {
+        value
+            .iter()
+            .zip(band.iter().chain(std::iter::repeat(&0.0)))
+            .map(|(value, band)| value + sign * band)
+            .collect()
+    };
+    let (low, high) = (with(-1.0), with(1.0));
+    let (Some(x), Some(y)) =
+        (range(at.iter().copied()), range(low.iter().chain(&high).copied().chain([0.0])))
+    else {
+        return String::new();
+    };
+    let label =
+        |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") };
+    let mut plot = Plot::new(x, y, &label(&curve.variable, &x_unit), &label("unknown input", &y_unit));
+    plot.band(&at, &low, &high);
+    plot.level(0.0);
+    plot.line("line s0", at.iter().copied().zip(value.iter().copied()));
+    let told = format!("{} values.", at.len());
+    figure(
+        caption,
+        "",
+        &[(Sample::Line("line s0"), "unknown input"), (Sample::Area("area"), "\u{b1} 2 standard errors")],
+        &plot.drawn(identifier, caption, &told),
+    )
+}
+
+/// The experiment that is proposed.
+pub(super) fn next(report: &Report) -> String {
+    let Some(next) = &report.next else { return String::new() };
+    let mut text = paragraph(&next.reason);
+    if let Some(experiment) = &next.experiment {
+        let divergence = next.divergence.map_or(String::new(), |divergence| {
+            format!(
+                " It is expected to set them {} squared standard deviations apart; 25 are wanted.",
+                words::short(divergence)
+            )
+        });
+        text += &format!(
+            "<p>Run <code>{}</code>, which stands beside this page.{divergence}</p>\n",
+            bench::page_style::escaped(experiment)
+        );
+    }
+    if let Some(otherwise) = &next.otherwise {
+        text += &paragraph(otherwise);
+    }
+    text
+}

@@ -1,0 +1,96 @@
+//! What the held-out record says: the gap of each signal, and whether the extended model is confirmed.
+
+use super::markup::{Cell, number, paragraph, table, words as said};
+use super::words;
+use crate::report::{BeforeAfter, Gap, Report};
+use std::collections::BTreeMap;
+
+/// The table of gaps.
+pub(super) fn gap(report: &Report) -> String {
+    let row = |(signal, gap): (&String, &Gap)| {
+        let (unit, factor) = words::shown_small(words::unit_of(signal));
+        let size = |value: f64| number(words::with_unit(&words::short(value * factor), &unit));
+        let closed = match gap.closed {
+            Some(closed) => Cell::Judged(closed >= 0.95, words::percent(closed)),
+            None => said("there was none"),
+        };
+        vec![said(words::signal(signal)), size(gap.before), size(gap.after), size(gap.floor), closed]
+    };
+    let heads = ["signal", "before", "after", "noise alone", "closed"];
+    let table = table("Gap of each signal", &heads, report.gap.iter().map(row));
+    if table.is_empty() {
+        return table;
+    }
+    paragraph(
+        "Rms of measured minus simulated over windows of the held-out record. Closed: the share of its power above the noise \
+         that went; a tick from 95 % on.",
+    ) + &table
+}
+
+/// Verification on the held-out record.
+pub(super) fn verification(report: &Report) -> String {
+    let Some(seen) = &report.verification else { return String::new() };
+    let [low, high] = seen.chi2_null.map(words::short);
+    let within = seen.chi2_after >= seen.chi2_null[0] && seen.chi2_after <= seen.chi2_null[1];
+    let mut rows = vec![
+        vec![
+            said("extended model better, no signal worse"),
+            Cell::Judged(
+                seen.confirmed,
+                if seen.confirmed { "confirmed" } else { "not confirmed" }.to_owned(),
+            ),
+        ],
+        vec![
+            said("windowed \u{3c7}\u{b2} per degree of freedom, before"),
+            said(words::short(seen.chi2_before)),
+        ],
+        vec![
+            said("the same, after"),
+            Cell::Judged(
+                within,
+                format!(
+                    "{}; with nothing missing it is {low} to {high} in 95 of 100 records",
+                    words::short(seen.chi2_after)
+                ),
+            ),
+        ],
+    ];
+    let sound = if seen.physical.is_empty() {
+        Cell::Judged(true, "nothing that a rig cannot do".to_owned())
+    } else {
+        Cell::Judged(false, seen.physical.join("; "))
+    };
+    rows.push(vec![said("free run"), sound]);
+    let mut text =
+        paragraph(&format!("Record: {}. The models were frozen before it was opened.", seen.record));
+    text += &table("Verification", &["what", "result"], rows);
+    text + &signals(&seen.free_run_nrmse_percent, &seen.whiteness)
+}
+
+fn signals(errors: &BTreeMap<String, BeforeAfter>, whiteness: &BTreeMap<String, BeforeAfter>) -> String {
+    let mut names: Vec<&String> = errors.keys().chain(whiteness.keys()).collect();
+    names.sort();
+    names.dedup();
+    let two = |pair: Option<&BeforeAfter>, unit: &str| {
+        let told = |value: fn(&BeforeAfter) -> f64| {
+            let text = pair.map_or_else(|| words::NOTHING.to_owned(), |pair| words::short(value(pair)));
+            number(if pair.is_some() { words::with_unit(&text, unit) } else { text })
+        };
+        [told(|pair| pair.before), told(|pair| pair.after)]
+    };
+    let rows = names.into_iter().map(|name| {
+        let cells = two(errors.get(name), "%").into_iter().chain(two(whiteness.get(name), ""));
+        std::iter::once(said(words::signal(name))).chain(cells).collect()
+    });
+    table(
+        "Free run and whiteness",
+        &[
+            "signal",
+            "free run, of its range, before",
+            "after",
+            "residuals' memory of 1 sample, before",
+            "after",
+        ],
+        rows,
+    )
+}

@@ -1,0 +1,210 @@
+//! The disagreement as a picture, and the picture after: the second in which they differ most, and the difference over all of it.
+//!
+//! The difference is drawn in units of the sensor's noise, since a gap that nobody would see beside the whole stroke may be a
+//! hundred times what the sensor can tell apart. Before and after share their axes.
+
+use super::draw::{Plot, Sample, figure, range};
+use super::markup::{charts, folded, paragraph};
+use super::thin::{COLUMNS, columns};
+use super::words;
+use super::{Pictures, Trace};
+use crate::report::{Report, Verdict};
+use std::ops::Range;
+
+/// Length of the stretch that is looked at closely, s.
+const CLOSE_S: f64 = 1.0;
+
+/// Which of both models.
+#[derive(Clone, Copy, PartialEq)]
+enum Model {
+    Before,
+    After,
+}
+
+/// The record against the baseline.
+pub(super) fn before(report: &Report, pictures: &Pictures) -> String {
+    if report.verdict == Verdict::BadData {
+        return String::new();
+    }
+    let mut lead = "One picture is of the second in which record and simulation differ most, the other of their difference over \
+                    the whole record, in units of the sensor's noise"
+        .to_owned();
+    lead += if report.verdict == Verdict::NothingMissing { ": it stays within it." } else { "." };
+    all(report, pictures, Model::Before, &lead)
+}
+
+/// The record against the extended model.
+pub(super) fn after(report: &Report, pictures: &Pictures) -> String {
+    let is_there = pictures.traces.iter().any(|trace| !trace.after.is_empty());
+    if report.verdict == Verdict::BadData || !is_there {
+        return String::new();
+    }
+    all(report, pictures, Model::After, "The same with what was found added to the model, on the same axes.")
+}
+
+fn all(report: &Report, pictures: &Pictures, model: Model, lead: &str) -> String {
+    let mut traces: Vec<&Trace> =
+        pictures.traces.iter().filter(|trace| trace.noise > 0.0 && !trace.time_s.is_empty()).collect();
+    if model == Model::After {
+        traces.retain(|trace| !trace.after.is_empty());
+    }
+    // The largest disagreement first; equal ones by name.
+    traces.sort_by(|one, other| {
+        let size = |trace: &Trace| rms(&trace.before_residual) / trace.noise;
+        size(other).total_cmp(&size(one)).then_with(|| one.signal.cmp(&other.signal))
+    });
+    let Some((first, others)) = traces.split_first() else { return String::new() };
+    let record = if pictures.held_out {
+        format!("{}, on which nothing was fitted.", pictures.record)
+    } else {
+        format!("{}, on which the models were fitted.", pictures.record)
+    };
+    let more: String = others.iter().map(|trace| pair(report, trace, model)).collect();
+    let count = others.len();
+    let summary =
+        if count == 1 { "The other signal".to_owned() } else { format!("The other {count} signals") };
+    paragraph(&format!("{lead} Record: {record}")) + &pair(report, first, model) + &folded(&summary, &more)
+}
+
+fn pair(report: &Report, trace: &Trace, model: Model) -> String {
+    charts(&[close(report, trace, model), whole(report, trace, model)])
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let (sum, count) = values
+        .iter()
+        .filter(|value| value.is_finite())
+        .fold((0.0, 0usize), |(sum, count), value| (sum + value * value, count + 1));
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+/// Samples of the second in which the baseline differs most.
+fn worst(trace: &Trace) -> Range<usize> {
+    let count = trace.time_s.len();
+    let length_s = trace.time_s[count - 1] - trace.time_s[0];
+    if length_s <= CLOSE_S {
+        return 0..count;
+    }
+    let length = ((CLOSE_S / length_s * count as f64) as usize).clamp(1, count);
+    let power = |at: usize| {
+        let value = trace.before_residual.get(at).copied().unwrap_or(0.0);
+        if value.is_finite() { value * value } else { 0.0 }
+    };
+    let mut sum: f64 = (0..length).map(power).sum();
+    let (mut best, mut start) = (sum, 0);
+    for from in 1..=count - length {
+        sum += power(from + length - 1) - power(from - 1);
+        if sum > best {
+            (best, start) = (sum, from);
+        }
+    }
+    start..start + length
+}
+
+fn close(report: &Report, trace: &Trace, model: Model) -> String {
+    let part = worst(trace);
+    let (unit, factor) = words::shown(&trace.unit);
+    let cut = |values: &[f64]| -> Vec<f64> {
+        values.get(part.clone()).unwrap_or_default().iter().map(|value| value * factor).collect()
+    };
+    let time_s = &trace.time_s[part.clone()];
+    let [measured, before, after] = [&trace.measured, &trace.before, &trace.after].map(|values| cut(values));
+    // Of all three, so that both pictures have the same axes.
+    let values = measured.iter().chain(&before).chain(&after).copied();
+    let y = range(values).unwrap_or((0.0, 1.0));
+    let mut plot = Plot::new(
+        (time_s[0], time_s[time_s.len() - 1]),
+        y,
+        "time, s",
+        &format!("{}, {unit}", words::signal(&trace.signal)),
+    );
+    let simulated = if model == Model::Before { &before } else { &after };
+    let (class, area) = look(model);
+    plot.series("line s0", "trace s0", &columns(time_s, &measured, COLUMNS));
+    plot.series(class, area, &columns(time_s, simulated, COLUMNS));
+    let name = match (model, report.verdict) {
+        (Model::Before, Verdict::NothingMissing) => "simulated",
+        (Model::Before, _) => "simulated, the rig file as it was",
+        (Model::After, _) => "simulated, with what was found",
+    };
+    let id = identifier(trace, model, "close");
+    let title = format!("{}: measured and {name}", words::signal(&trace.signal));
+    let told =
+        format!("From {} to {} s.", words::fixed(time_s[0], 2), words::fixed(time_s[time_s.len() - 1], 2));
+    figure(
+        &format!("{}, where they differ most", words::signal(&trace.signal)),
+        &told,
+        &[(Sample::Line("line s0"), "measured"), (Sample::Line(class), name)],
+        &plot.drawn(&id, &title, &told),
+    )
+}
+
+fn look(model: Model) -> (&'static str, &'static str) {
+    match model {
+        Model::Before => ("line s1", "trace s1"),
+        Model::After => ("line s2", "trace s2"),
+    }
+}
+
+fn whole(report: &Report, trace: &Trace, model: Model) -> String {
+    let over_noise =
+        |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value / trace.noise).collect() };
+    let first = if report.verdict == Verdict::NothingMissing { "measured minus simulated" } else { "before" };
+    let (before, after) = (over_noise(&trace.before_residual), over_noise(&trace.after_residual));
+    let (low, high) = range(before.iter().chain(&after).copied()).unwrap_or((-1.0, 1.0));
+    let reach = low.abs().max(high.abs()).max(4.0);
+    let x = (trace.time_s[0], trace.time_s[trace.time_s.len() - 1]);
+    let mut plot = Plot::new(x, (-reach, reach), "time, s", "difference over the sensor's noise");
+    let part = worst(trace);
+    plot.stretch(trace.time_s[part.start], trace.time_s[part.end - 1]);
+    plot.between(-2.0, 2.0);
+    plot.series("line s1", "trace s1", &columns(&trace.time_s, &before, COLUMNS));
+    let mut legend = vec![(Sample::Area("trace s1"), first)];
+    if model == Model::After {
+        plot.series("line s2", "trace s2", &columns(&trace.time_s, &after, COLUMNS));
+        legend.push((Sample::Area("trace s2"), "after"));
+    }
+    legend.push((Sample::Area("area"), "noise, \u{b1} 2 standard deviations"));
+    let sizes = format!("rms {} times the noise", words::short(rms(&before)));
+    let sizes = if model == Model::After {
+        format!("{sizes} before, {} after", words::short(rms(&after)))
+    } else {
+        sizes
+    };
+    figure(
+        &format!("{}, difference", words::signal(&trace.signal)),
+        &sizes,
+        &legend,
+        &plot.drawn(
+            &identifier(trace, model, "whole"),
+            &format!("{}: difference, {sizes}", words::signal(&trace.signal)),
+            &sizes,
+        ),
+    )
+}
+
+/// Unique on the page, and a name that XML allows.
+fn identifier(trace: &Trace, model: Model, what: &str) -> String {
+    let signal: String = trace
+        .signal
+        .chars()
+        .map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '-' })
+        .collect();
+    format!("p-{signal}-{what}-{}", if model == Model::Before { "before" } else { "after" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_second_is_found() {
+        let time_s: Vec<f64> = (0..5000).map(|ms| f64::from(ms) * 1e-3).collect();
+        let mut trace = Trace { before_residual: vec![0.0; 5000], time_s, noise: 1.0, ..Trace::default() };
+        trace.before_residual[3000..3900].fill(2.0);
+        trace.before_residual[10] = f64::NAN;
+        let part = worst(&trace);
+        assert!(part.contains(&3000) && part.contains(&3899) && part.len() == 1000, "{part:?}");
+        assert!((rms(&trace.before_residual) - (3600.0_f64 / 4999.0).sqrt()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,249 @@
+//! The page of each verdict is well-formed, says what the report says, and asks for nothing.
+
+use super::samples::{VERDICTS, at, pictures, sample};
+use super::*;
+use crate::report::{Gap, NamedEffect, Verdict};
+
+fn parsed(page: &str) -> roxmltree::Document<'_> {
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
+    roxmltree::Document::parse_with_options(page, options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// All text that a person sees, in one line.
+fn text(page: &str) -> String {
+    let document = parsed(page);
+    let body = document.descendants().find(|node| node.has_tag_name("body")).expect("there is a body");
+    let words: Vec<_> =
+        body.descendants().filter(|node| node.is_text()).filter_map(|node| node.text()).collect();
+    words.concat().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn made(verdict: Verdict) -> String {
+    let (report, pictures) = sample(verdict);
+    page(&report, &pictures)
+}
+
+#[test]
+fn the_page_of_each_verdict_is_well_formed_self_contained_and_small() {
+    for verdict in VERDICTS {
+        let made = made(verdict);
+        // For who wants to look at them: PAGES=folder cargo test -p discrepancy page::
+        if let Some(folder) = std::env::var_os("PAGES") {
+            std::fs::write(std::path::Path::new(&folder).join(format!("{verdict:?}.html")), &made).unwrap();
+        }
+        let document = parsed(&made);
+        let mut identifiers: Vec<_> =
+            document.descendants().filter_map(|node| node.attribute("id")).collect();
+        let count = identifiers.len();
+        identifiers.sort_unstable();
+        identifiers.dedup();
+        assert_eq!(identifiers.len(), count, "{verdict:?}: an identifier is there twice");
+        for node in document.descendants() {
+            assert!(!node.has_tag_name("script") && node.attribute("src").is_none(), "{verdict:?}");
+            if let Some(link) = node.attribute("href") {
+                let target = link.strip_prefix('#').expect("links stay on the page");
+                assert!(identifiers.binary_search(&target).is_ok(), "{verdict:?}: {link}");
+            }
+            assert!(!node.text().is_some_and(|text| text.contains("NaN")), "{verdict:?}");
+            for part in ["x", "y", "width", "d", "x1"] {
+                let value = node.attribute(part).unwrap_or_default();
+                assert!(!value.contains("NaN") && !value.contains("inf"), "{verdict:?}: {part}={value}");
+            }
+        }
+        assert!(made.len() < 600_000, "{verdict:?}: {} bytes", made.len());
+        assert_eq!(made, self::made(verdict), "the same bytes each time");
+    }
+}
+
+#[test]
+fn the_verdict_stands_first_with_names_numbers_and_errors() {
+    let page = made(Verdict::Named);
+    let seen = text(&page);
+    let order = [
+        "\u{2713} Air leaks past",
+        "piston-leakage at the drive axis: leakage 2.513 \u{b1} 0.041 Nl/min; it explains 97 % of the disagreement",
+        "On test.csv, which nothing was fitted on, 92 % to 99.6 % of the gap to the noise is closed",
+        "where they differ most",
+        "What is missing",
+        "After: with",
+        "The gap, before and after",
+        "Which balance",
+        "All 38 candidates",
+        "Not excited",
+        "Detection limits",
+        "The records",
+    ];
+    let mut from = seen.find("What the simulation lacks").expect("the heading");
+    for part in order {
+        let found = seen[from..]
+            .find(part)
+            .unwrap_or_else(|| panic!("{part:?} is not behind the one before: {seen}"));
+        from += found;
+    }
+}
+
+#[test]
+fn what_is_ambiguous_stands_together_with_the_experiment_that_tells() {
+    let seen = text(&made(Verdict::Ambiguous));
+    for part in [
+        "inclination",
+        "or friction-asymmetry at the drive axis: asymmetry 47.1 \u{b1} 1.2 %; it explains 94 %",
+        "To run next: next.toml",
+        "63",
+        "Tilting the rig",
+    ] {
+        assert!(seen.contains(part), "{part}");
+    }
+}
+
+#[test]
+fn nothing_missing_is_said_with_its_limits_and_has_no_picture_after() {
+    let page = made(Verdict::NothingMissing);
+    let seen = text(&page);
+    assert!(seen.contains("\u{2713} Nothing is missing above the detection limits"));
+    assert!(seen.contains("would have shown from"));
+    assert!(!page.contains("id=\"after\"") && !page.contains("id=\"limits-title\">Detection"));
+    assert!(!seen.contains("of the gap to the noise is closed"));
+}
+
+#[test]
+fn what_is_outside_the_catalogue_has_its_curve_formula_and_significance() {
+    let page = made(Verdict::OutsideCatalogue);
+    let seen = text(&page);
+    for part in ["drive: force on the piston", "14 sin(9 x) + 20 x^2", "none of 200", "91 %"] {
+        assert!(seen.contains(part), "{part}");
+    }
+    assert!(page.contains("id=\"outside-curve-t\""));
+}
+
+#[test]
+fn bad_data_shows_its_findings_first_and_no_pictures() {
+    let page = made(Verdict::BadData);
+    let seen = text(&page);
+    assert!(seen.contains("\u{2717} train.csv: pressure b does not change"));
+    let stuck = seen.find("record again").expect("the fatal finding");
+    assert!(stuck < seen.find("windows there are left out").expect("the other one"), "fatal ones first");
+    assert!(!page.contains("id=\"disagreement\"") && !page.contains("id=\"after\""));
+}
+
+#[test]
+fn parameters_are_told_with_what_the_rig_file_says() {
+    let seen = text(&made(Verdict::ParametersOnly));
+    assert!(seen.contains("parameter:mass: 5.263 \u{b1} 0.041 kg, the rig file says 5.00 kg"), "{seen}");
+}
+
+#[test]
+fn text_of_the_report_cannot_become_markup_and_strange_numbers_draw_nothing_strange() {
+    let (mut report, mut pictures) = sample(Verdict::Named);
+    report.summary = "<script>&\u{1}".to_owned();
+    report.named.push(NamedEffect {
+        effect: "<b>".to_owned(),
+        place: at("\"", Some("<")),
+        parameters: Vec::new(),
+        share_explained: f64::NAN,
+        alternatives: Vec::new(),
+    });
+    let gap = Gap { before: f64::NAN, after: f64::INFINITY, floor: 0.0, closed: Some(f64::NAN) };
+    report.gap.insert("a'<_x".to_owned(), gap);
+    report.candidates[0].score = f64::NAN;
+    report.candidates[1].score = f64::INFINITY;
+    report.candidates[2].score = 0.0;
+    let location = report.location.as_mut().expect("a sample has one");
+    location.maps[0].value[3] = f64::NAN;
+    location.maps[0].band.truncate(5);
+    location.series[0].value.clear();
+    pictures.traces[0].measured[100] = f64::NAN;
+    pictures.traces[1].before.truncate(10);
+    pictures.traces[2].noise = 0.0;
+    pictures.traces[3].time_s.truncate(1);
+    let page = page(&report, &pictures);
+    let document = parsed(&page);
+    for node in document.descendants().filter(|node| node.is_element()) {
+        for attribute in node.attributes().filter(|attribute| attribute.name() != "class") {
+            let value = attribute.value();
+            assert!(!value.contains("NaN") && !value.contains("inf"), "{} {value}", attribute.name());
+        }
+    }
+    assert!(!text(&page).contains("NaN"));
+}
+
+#[test]
+fn a_report_without_anything_else_still_has_a_page() {
+    let (mut report, _) = sample(Verdict::Named);
+    report.gap.clear();
+    report.verification = None;
+    report.candidates.clear();
+    report.location = None;
+    report.checks.clear();
+    report.not_excited.clear();
+    report.detection_limits.clear();
+    let page = page(&report, &Pictures::default());
+    assert!(text(&page).contains("piston-leakage"));
+    assert!(!page.contains("id=\"location\"") && !page.contains("id=\"disagreement\""));
+}
+
+#[test]
+fn a_long_record_makes_no_larger_page() {
+    let (report, _) = sample(Verdict::Named);
+    let mut long = pictures(1.0);
+    for trace in &mut long.traces {
+        let count = trace.time_s.len();
+        trace.time_s.extend((0..28_000).map(|ms| 20.0 + f64::from(ms) * 1e-3));
+        for values in [
+            &mut trace.measured,
+            &mut trace.before,
+            &mut trace.after,
+            &mut trace.before_residual,
+            &mut trace.after_residual,
+        ] {
+            values.extend_from_within(0..20_000);
+            values.extend_from_within(0..28_000 - 20_000);
+            assert_eq!(values.len(), count + 28_000);
+        }
+    }
+    assert!(page(&report, &long).len() < 600_000);
+}
+
+/// Names of fields of a JSON value; keys of maps, which follow the records, are left out.
+fn fields(value: &serde_json::Value, found: &mut std::collections::BTreeSet<String>) {
+    const MAPS: [&str; 4] = ["gap", "free_run_nrmse_percent", "whiteness", "channels"];
+    match value {
+        serde_json::Value::Object(object) => {
+            for (name, inner) in object {
+                found.insert(name.clone());
+                match inner {
+                    serde_json::Value::Object(map) if MAPS.contains(&name.as_str()) => {
+                        map.values().for_each(|entry| fields(entry, found));
+                    }
+                    inner => fields(inner, found),
+                }
+            }
+        }
+        serde_json::Value::Array(items) => items.iter().for_each(|item| fields(item, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn the_document_names_every_field_and_its_example_has_every_field_of_the_whole() {
+    let document = include_str!("../../docs/report.md");
+    let mut all = std::collections::BTreeSet::new();
+    for verdict in VERDICTS {
+        let (report, _) = sample(verdict);
+        let value = serde_json::to_value(&report).unwrap();
+        fields(&value, &mut all);
+        let name = value["verdict"].as_str().unwrap();
+        assert!(document.contains(&format!("| `{name}` |")), "{name}");
+    }
+    assert!(all.len() > 60, "{}", all.len());
+    let words: Vec<&str> =
+        document.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_').collect();
+    for name in &all {
+        assert!(words.contains(&name.as_str()), "{name} is not in docs/report.md");
+    }
+    let example = document.split("```json").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let example: serde_json::Value = serde_json::from_str(example).unwrap();
+    let whole = serde_json::to_value(sample(Verdict::Named).0).unwrap();
+    let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    assert_eq!(keys(&example), keys(&whole));
+}

@@ -1,0 +1,99 @@
+//! The box on top: verdict, names with their numbers, what became of the gap.
+
+use super::words;
+use crate::report::{NamedEffect, Report, Verdict};
+use bench::page_style::escaped;
+
+/// What the page is called.
+pub(super) fn title(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingMissing => "Nothing is missing",
+        Verdict::ParametersOnly => "Numbers of the rig are off",
+        Verdict::Named => "What the simulation lacks",
+        Verdict::Ambiguous => "Several explanations fit alike",
+        Verdict::OutsideCatalogue => "Something is missing that the catalogue does not have",
+        Verdict::BadData => "A record cannot be used",
+    }
+}
+
+/// Heading, files and box.
+pub(super) fn head(report: &Report) -> String {
+    let files = &report.inputs;
+    let mut from = format!("{} against {}", files.rig, words::listed(&files.train, "and"));
+    if let Some(verification) = &report.verification {
+        from += &format!(", verified on {}", verification.record);
+    }
+    // Green and whole for an answer, amber for an open question, dashed for no answer.
+    let (sign, class, style) = match report.verdict {
+        Verdict::BadData => ('\u{2717}', "verdict no", ""),
+        Verdict::Ambiguous | Verdict::OutsideCatalogue => {
+            ('?', "verdict", " style=\"border-color:var(--s4)\"")
+        }
+        _ => ('\u{2713}', "verdict", ""),
+    };
+    let mut points: Vec<String> = report.named.iter().flat_map(named).collect();
+    points.extend(report.parameters.iter().map(|quantity| {
+        let before = quantity.before.map_or(String::new(), |before| {
+            format!(", the rig file says {}", words::with_unit(&words::short(before), &quantity.unit))
+        });
+        format!(
+            "<b>{}</b>: {}{}",
+            escaped(&quantity.name),
+            escaped(&words::quantity(quantity)),
+            escaped(&before)
+        )
+    }));
+    points.extend(gap(report));
+    if let Some(next) = &report.next {
+        let what = next.experiment.as_ref().or(next.otherwise.as_ref());
+        points.extend(what.map(|what| format!("To run next: {}", escaped(what))));
+    }
+    let points: String = points.iter().map(|point| format!("<li>{point}</li>\n")).collect();
+    let points = if points.is_empty() { points } else { format!("<ul>\n{points}</ul>\n") };
+    format!(
+        "<header>\n<h1>{}</h1>\n<p class=\"soft\">{}</p>\n<div class=\"{class}\"{style} role=\"note\" aria-label=\"Verdict\">\n\
+         <p>{sign} {}</p>\n{points}</div>\n</header>\n",
+        title(report.verdict),
+        escaped(&from),
+        escaped(&report.summary)
+    )
+}
+
+/// A name and, as weighty as it, what explains the records as well.
+fn named(named: &NamedEffect) -> Vec<String> {
+    let own = one(named, "");
+    std::iter::once(own).chain(named.alternatives.iter().map(|other| one(other, "<i>or</i> "))).collect()
+}
+
+fn one(named: &NamedEffect, before: &str) -> String {
+    let numbers: Vec<String> = named
+        .parameters
+        .iter()
+        .map(|quantity| format!("{} {}", words::key(quantity), words::quantity(quantity)))
+        .collect();
+    let numbers = if numbers.is_empty() { String::new() } else { format!(": {}", numbers.join(", ")) };
+    format!(
+        "{before}<b>{}</b> at the {}{}; it explains {} of the disagreement",
+        escaped(&named.effect),
+        escaped(&words::place(&named.effect, &named.place)),
+        escaped(&numbers),
+        words::percent(named.share_explained)
+    )
+}
+
+/// How much of the gap of the held-out record is closed, over the signals that had one.
+fn gap(report: &Report) -> Option<String> {
+    if matches!(report.verdict, Verdict::NothingMissing | Verdict::BadData) {
+        return None;
+    }
+    let record = escaped(&report.verification.as_ref()?.record);
+    let mut closed: Vec<f64> = report.gap.values().filter_map(|gap| gap.closed).collect();
+    closed.sort_by(f64::total_cmp);
+    let (least, most) = (closed.first()?, closed.last()?);
+    let range = if words::percent(*least) == words::percent(*most) {
+        words::percent(*least)
+    } else {
+        format!("{} to {}", words::percent(*least), words::percent(*most))
+    };
+    Some(format!("On {record}, which nothing was fitted on, {range} of the gap to the noise is closed"))
+}
