@@ -56,16 +56,16 @@ impl Calibrated {
 
     /// All parameters with their errors; those that the records cannot tell have none.
     #[must_use]
-    pub fn quantities(&self, rig: &RigParameters) -> Vec<Quantity> {
-        (0..COUNT).map(|at| quantity(rig, at, &self.fit)).collect()
+    pub fn quantities(&self, engine: &Engine<'_>) -> Vec<Quantity> {
+        (0..COUNT).map(|at| quantity(engine, at, &self.fit)).collect()
     }
 }
 
-/// A parameter of a fit, in the unit of the rig file.
+/// A parameter of a fit, in the unit of the rig file; of tables their common factor.
 #[must_use]
-pub fn quantity(rig: &RigParameters, at: usize, fit: &Refit) -> Quantity {
+pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
     let parameter = PARAMETERS[at];
-    let (before, unit) = parameter.value(rig);
+    let (before, unit) = parameter.value(engine.rig(), engine.windows()[0].course().measured);
     let error = fit.errors[fit.errors.len() - COUNT + at];
     Quantity {
         name: parameter.name.to_owned(),

@@ -11,12 +11,15 @@
 
 use crate::course::Course;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::windows::Windows;
+use crate::windows::{Windows, dot};
 use plant::RigParameters;
 use rayon::prelude::*;
 
 /// Change of a factor by which the sensitivity to a parameter is taken.
 const FACTOR_CHANGE: f64 = 0.01;
+
+/// How far the level of noise is corrected: an effect that is seen in every window must not pass for noise.
+const LEVELS: [f64; 2] = [0.6, 1.05];
 
 /// The records, and the baseline's readings.
 #[derive(Debug)]
@@ -34,7 +37,11 @@ impl<'a> Engine<'a> {
         let windows: Vec<Windows<'a>> = courses.par_iter().map(|course| Windows::new(course, rig)).collect();
         let rows = windows.first().map_or(0, Windows::rows);
         let freedom = windows.iter().flat_map(Windows::freedom).collect();
-        Engine { windows, rig: rig.clone(), rows, freedom }
+        let mut engine = Engine { windows, rig: rig.clone(), rows, freedom };
+        let residual = engine.residual(&engine.simulate(rig));
+        let level = level(&residual, rows, &engine.freedom);
+        engine.freedom.iter_mut().for_each(|own| *own *= level);
+        engine
     }
 
     /// The baseline.
@@ -55,7 +62,7 @@ impl<'a> Engine<'a> {
         self.rows
     }
 
-    /// Degrees of freedom of each window.
+    /// Degrees of freedom of each window, times what the quiet windows say that the noise is too small or large.
     #[must_use]
     pub fn freedom(&self) -> &[f64] {
         &self.freedom
@@ -118,4 +125,16 @@ impl<'a> Engine<'a> {
             })
             .collect()
     }
+}
+
+/// By how much the quietest windows are off what noise gives: the noise as it was estimated is right to some per cent only, and
+/// over 200 windows a few per cent would look like a large excess.
+fn level(residual: &[f64], rows: usize, freedom: &[f64]) -> f64 {
+    let mut quiet: Vec<f64> =
+        residual.chunks_exact(rows).zip(freedom).map(|(own, freedom)| dot(own, own) / freedom).collect();
+    quiet.sort_unstable_by(f64::total_cmp);
+    let Some(own) = quiet.get(quiet.len() / 10) else { return 1.0 };
+    let mean = freedom.iter().sum::<f64>() / freedom.len() as f64;
+    // The lowest tenth of chi2 / f ends 1.28 standard deviations below 1.
+    (own / (1.0 - 1.28 * (2.0 / mean).sqrt())).clamp(LEVELS[0], LEVELS[1])
 }

@@ -16,6 +16,7 @@
 //! | [`name`](mod@name) | which effects are missing |
 //! | [`extend`] | the rig file with what was found |
 //! | [`report`] | what was found, as data |
+//! | [`workflow`] | all of it in order |
 //! | [`page`] | the same as one page for people |
 
 pub mod calibrate;
@@ -33,3 +34,4 @@ pub mod refit;
 pub mod report;
 pub mod screen;
 pub mod windows;
+pub mod workflow;

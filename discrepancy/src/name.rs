@@ -7,7 +7,7 @@
 //!   each that joined is taken out once: what is not missed goes; what fits as well as one of them is its alternative
 //! ```
 //!
-//! An effect is accepted when the loss falls by more than [`calibrated`](threshold) for nothing, several times over and by more than
+//! An effect is accepted when the loss falls by more than it does for nothing, several times over and by more than
 //! its errors hang together, when its amplitude is no smaller than a share of what occurs, and when it takes a good share of what
 //! the model leaves. What stays behind after three, or beside an explanation that leaves much, is outside the catalogue.
 //!
@@ -72,6 +72,10 @@ pub struct Found {
     pub columns: Columns,
     /// Sensitivities of the parameters at the baseline.
     pub around: Around,
+    /// Loss with the parameters alone, as screening sees it.
+    pub nothing: f64,
+    /// Smallest coordinate of each candidate's amplitude that would have been accepted; `None` where nothing is seen of it.
+    pub limits: Vec<Option<f64>>,
     /// Whether the model leaves more than it may.
     pub inadequate: bool,
 }
@@ -90,7 +94,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
     let mut model = calibrated.fit.clone();
-    let mut threshold = threshold(engine, &columns, &calibrated.around, &model);
+    let mut threshold = Nothing::new(engine, &columns, &calibrated.around, &model).threshold();
     let mut fitted = Vec::new();
     let mut rounds: Vec<(Vec<Placed>, Vec<Refit>)> = Vec::new();
     for round in 0..MOST {
@@ -138,16 +142,17 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         }
         rounds.push((model.placed.clone(), refits.clone()));
         model = best.clone();
-        threshold = self::threshold(engine, &columns, &around_of(engine, &model), &model);
+        threshold = Nothing::new(engine, &columns, &around_of(engine, &model), &model).threshold();
         if model.loss < threshold {
             break;
         }
     }
     drop_unneeded(engine, &calibrated, &mut model, &mut rounds, threshold);
+    let left = Nothing::new(engine, &columns, &around_of(engine, &model), &model);
+    let limits = left.limits(columns.candidates.len(), left.threshold());
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
     let inadequate = model.loss > STAYS * calibrated.fit.loss && model.loss > 2.0 * threshold;
-    let alternatives =
-        model.placed.iter().map(|placed| alternatives(placed, &model, &calibrated, &rounds)).collect();
+    let alternatives = model.placed.iter().map(|placed| alternatives(placed, &calibrated, &rounds)).collect();
     let shares = shares(&model, &rounds, &calibrated, excess);
     Found {
         calibrated,
@@ -159,6 +164,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         threshold,
         columns,
         around,
+        nothing,
+        limits,
         inadequate,
     }
 }
@@ -219,38 +226,69 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
     columns.screen(engine, &around, &residual, &beside)
 }
 
-/// The gain that a share of records of nothing stays below: the residual of a model, window by window with random signs, against
-/// all candidates. Signs keep what hangs together within a window, and take away what hangs together with a candidate.
-fn threshold(engine: &Engine<'_>, columns: &Columns, around: &Around, model: &Refit) -> f64 {
-    let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
-    let residual = engine.residual(&engine.simulate(&rig));
-    let leading: Vec<&[f64]> = columns
-        .probes
-        .iter()
-        .flat_map(|probes| probes.iter().map(|(_, place)| columns.column(*place)))
-        .collect();
-    let all: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).chain(leading.iter().copied()).collect();
-    let products = Products::new(&residual, &all, engine.freedom(), engine.rows());
-    let ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
-    let parameters: Vec<usize> = (0..COUNT).collect();
-    let weights = &products.fit(&parameters, &ridges).weights;
-    let scores = products.cleared_scores(&parameters, weights, &ridges);
-    let mut random = Pcg64::seed_from_u64(SEED);
-    let mut most: Vec<f64> = (0..NULLS)
-        .map(|_| {
-            let signs: Vec<f64> =
-                weights.iter().map(|_| if random.next_u64() >> 63 == 0 { 1.0 } else { -1.0 }).collect();
-            scores
-                .iter()
-                .map(|(own, information)| {
-                    let sum: f64 = own.iter().zip(&signs).map(|(own, sign)| own * sign).sum();
-                    sum * sum / information
-                })
-                .fold(0.0, f64::max)
-        })
-        .collect();
-    most.sort_by(f64::total_cmp);
-    most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
+/// What a model leaves, against all candidates, window by window.
+struct Nothing {
+    /// Of each probe: candidate, coordinate of the amplitude, scores of the windows, information.
+    probes: Vec<(usize, f64, Vec<f64>, f64)>,
+}
+
+impl Nothing {
+    fn new(engine: &Engine<'_>, columns: &Columns, around: &Around, model: &Refit) -> Self {
+        let rig =
+            rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
+        let residual = engine.residual(&engine.simulate(&rig));
+        let of: Vec<(usize, f64, usize)> = columns
+            .probes
+            .iter()
+            .enumerate()
+            .flat_map(|(at, probes)| probes.iter().map(move |(probe, place)| (at, probe[0], *place)))
+            .collect();
+        let parameter_columns = around.columns.iter().map(Vec::as_slice);
+        let all: Vec<&[f64]> =
+            parameter_columns.chain(of.iter().map(|(_, _, place)| columns.column(*place))).collect();
+        let products = Products::new(&residual, &all, engine.freedom(), engine.rows());
+        let ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
+        let parameters: Vec<usize> = (0..COUNT).collect();
+        let weights = &products.fit(&parameters, &ridges).weights;
+        let scores = products.cleared_scores(&parameters, weights, &ridges);
+        let probes =
+            of.into_iter().zip(scores).map(|((at, z, _), (scores, own))| (at, z, scores, own)).collect();
+        Nothing { probes }
+    }
+
+    /// The gain that a share of records of nothing stays below: random signs of the windows keep what hangs together within each,
+    /// and take away what hangs together with a candidate.
+    fn threshold(&self) -> f64 {
+        let windows = self.probes.first().map_or(0, |(_, _, scores, _)| scores.len());
+        let mut random = Pcg64::seed_from_u64(SEED);
+        let mut most: Vec<f64> = (0..NULLS)
+            .map(|_| {
+                let signs: Vec<f64> =
+                    (0..windows).map(|_| if random.next_u64() >> 63 == 0 { 1.0 } else { -1.0 }).collect();
+                self.probes
+                    .iter()
+                    .map(|(_, _, scores, information)| {
+                        let sum: f64 = scores.iter().zip(&signs).map(|(own, sign)| own * sign).sum();
+                        sum * sum / information
+                    })
+                    .fold(0.0, f64::max)
+            })
+            .collect();
+        most.sort_by(f64::total_cmp);
+        most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
+    }
+
+    /// Smallest coordinate of each candidate's amplitude whose gain would have been accepted.
+    fn limits(&self, candidates: usize, threshold: f64) -> Vec<Option<f64>> {
+        let mut limits: Vec<Option<f64>> = vec![None; candidates];
+        for (at, z, _, information) in self.probes.iter().filter(|(_, z, _, _)| *z != 0.0) {
+            let limit = z.abs() * (SAFETY * threshold / information).sqrt();
+            if limit.is_finite() && limits[*at].is_none_or(|own| limit < own) {
+                limits[*at] = Some(limit);
+            }
+        }
+        limits
+    }
 }
 
 /// Takes out effects that are not missed.
@@ -288,7 +326,6 @@ fn drop_unneeded(
 /// What takes the place of an effect of the model just as well.
 fn alternatives(
     placed: &Placed,
-    model: &Refit,
     calibrated: &Calibrated,
     rounds: &[(Vec<Placed>, Vec<Refit>)],
 ) -> Vec<Refit> {
@@ -297,14 +334,12 @@ fn alternatives(
             && left.candidate.place == right.candidate.place
     };
     // The round in which it joined.
-    let Some((before, refits)) = rounds.iter().find(|(_, refits)| {
+    let Some((_, refits)) = rounds.iter().find(|(_, refits)| {
         refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
     }) else {
         return Vec::new();
     };
     let best = &refits[0];
-    let earlier = if before.is_empty() { calibrated.fit.loss } else { model.loss.max(best.loss) };
-    let _ = earlier;
     let gain = calibrated.fit.loss - best.loss;
     refits[1..]
         .iter()

@@ -65,12 +65,15 @@ impl Parameter {
         })
     }
 
-    /// Value and unit in a rig file; of tables their last value.
+    /// Value and unit in a rig file, of the first axis that is measured; of tables 1, without a unit: their common factor.
     #[must_use]
-    pub fn value(&self, rig: &RigParameters) -> (f64, &'static str) {
-        let value = rig.numbers(self.keys[0]).last().copied().expect("a key has a number");
-        let key = table::KEYS.iter().find(|key| key.path() == self.keys[0]).expect("the table has it");
-        (value, key.unit.name())
+    pub fn value(&self, rig: &RigParameters, measured: [bool; 2]) -> (f64, &'static str) {
+        let own = if self.name == "parameter:mass" && !measured[0] { self.keys.len() - 1 } else { 0 };
+        let key = table::KEYS.iter().find(|key| key.path() == self.keys[own]).expect("the table has it");
+        match rig.numbers(self.keys[own]) {
+            [one] => (*one, key.unit.name()),
+            _ => (1.0, ""),
+        }
     }
 }
 
@@ -82,10 +85,10 @@ pub fn with_factors(rig: &RigParameters, factors: &[f64; COUNT]) -> RigParameter
     let order: [usize; COUNT] =
         if factors[3] >= factors[2] { [0, 1, 3, 2, 4, 5, 6, 7, 8] } else { [0, 1, 2, 3, 4, 5, 6, 7, 8] };
     for at in order {
-        if factors[at] != 1.0 {
-            if let Ok(scaled) = PARAMETERS[at].scaled(&rig, factors[at]) {
-                rig = scaled;
-            }
+        if factors[at] != 1.0
+            && let Ok(scaled) = PARAMETERS[at].scaled(&rig, factors[at])
+        {
+            rig = scaled;
         }
     }
     rig

@@ -1,0 +1,400 @@
+//! The whole workflow: records and a rig in, a report and what goes with it out.
+//!
+//! ```text
+//!   records ─► check ─► course ─► parameters alone ─► locate ─► name ─► extend ─┬─► report, page, rig.toml
+//!                 └─ cannot be used: bad-data                   next ◄── alike  └─► verify: opens the held-out record, alone
+//! ```
+//!
+//! Everything but [`Report::gap`] and [`Report::verification`] is done before the held-out record is opened.
+
+use crate::candidates::Candidate;
+use crate::check::{Checked, check};
+use crate::course::{Course, CourseError};
+use crate::engine::Engine;
+use crate::extend::{Addition, ExtendError, extend};
+use crate::name::{Found, is_large, name};
+use crate::page::Pictures;
+use crate::parameters::{COUNT, PARAMETERS};
+use crate::records::{self, ReadError, ReadOptions};
+use crate::refit::{Placed, Refit, rig_of};
+use crate::report::{
+    self, DetectionLimit, EffectPlace, InputFiles, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict,
+    Where,
+};
+use plant::{ParameterError, RigParameters};
+use std::path::{Path, PathBuf};
+
+/// Standard errors by which a parameter must be off to be told.
+const OFF_ERRORS: f64 = 4.0;
+/// The least that it must be off by.
+const OFF_LEAST: f64 = 0.01;
+
+/// What the workflow is asked.
+#[derive(Clone, Debug, Default)]
+pub struct Task {
+    /// The rig file.
+    pub rig: PathBuf,
+    /// Training records.
+    pub train: Vec<PathBuf>,
+    /// The held-out record.
+    pub test: Option<PathBuf>,
+    /// How records are read.
+    pub options: ReadOptions,
+    /// Effects that are no candidates.
+    pub without: Vec<String>,
+}
+
+/// What it gives.
+#[derive(Debug)]
+pub struct Outcome {
+    /// What was found.
+    pub report: Report,
+    /// The rig file with it; `None` when a record cannot be used.
+    pub extended: Option<String>,
+    /// Series for the page.
+    pub pictures: Pictures,
+    /// File of the proposed experiment.
+    pub experiment: Option<String>,
+}
+
+/// Why the workflow did not run.
+#[derive(Debug, thiserror::Error)]
+pub enum WorkflowError {
+    /// The rig file cannot be read.
+    #[error("{file}: {why}")]
+    Rig {
+        /// The file.
+        file: String,
+        /// What the system said.
+        why: std::io::Error,
+    },
+    /// The rig file is no rig.
+    #[error(transparent)]
+    Parameters(#[from] ParameterError),
+    /// A record cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A record cannot be simulated.
+    #[error(transparent)]
+    Course(#[from] CourseError),
+    /// Records of different axes or set-ups.
+    #[error("{first} and {other} are not of the same axes and set-up: give records of one set-up at a time")]
+    Mixed {
+        /// The first record.
+        first: String,
+        /// One that does not go with it.
+        other: String,
+    },
+    /// The rig file cannot be extended.
+    #[error(transparent)]
+    Extend(#[from] ExtendError),
+}
+
+/// A rig file and its text.
+#[derive(Clone, Debug)]
+pub struct RigFile {
+    /// As given.
+    pub file: String,
+    /// Its text.
+    pub text: String,
+    /// What it says.
+    pub rig: RigParameters,
+}
+
+impl RigFile {
+    /// Reads a rig file.
+    ///
+    /// # Errors
+    /// [`WorkflowError`] with file, line, key and what is allowed.
+    pub fn read(path: &Path) -> Result<Self, WorkflowError> {
+        let file = path.display().to_string();
+        let text =
+            std::fs::read_to_string(path).map_err(|why| WorkflowError::Rig { file: file.clone(), why })?;
+        let rig = RigParameters::from_toml(&text, &file)?;
+        Ok(RigFile { file, text, rig })
+    }
+}
+
+/// A record with its check, and its course when it can be used.
+#[derive(Debug)]
+pub struct Opened {
+    /// The check.
+    pub checked: Checked,
+    /// The course; `None` when the record cannot be used.
+    pub course: Option<Course>,
+}
+
+/// Reads and checks a record.
+///
+/// # Errors
+/// [`WorkflowError`] when it cannot be read or simulated at all.
+pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<Opened, WorkflowError> {
+    let record = records::read(path, options)?;
+    let checked = check(&record, rig);
+    let course = if checked.report.usable { Some(Course::of(&record, &checked, rig)?) } else { None };
+    Ok(Opened { checked, course })
+}
+
+/// Runs the whole workflow.
+///
+/// # Errors
+/// [`WorkflowError`]; a record that cannot be used is none, but a verdict.
+pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, WorkflowError> {
+    let rig_file = RigFile::read(&task.rig)?;
+    let rig = &rig_file.rig;
+    let opened = open_all(task, rig, progress)?;
+    let checks = opened.iter().map(|opened| opened.checked.report.clone()).collect();
+    let inputs = InputFiles {
+        rig: rig_file.file.clone(),
+        train: task.train.iter().map(|path| path.display().to_string()).collect(),
+    };
+    let courses: Vec<Course> = opened.into_iter().filter_map(|opened| opened.course).collect();
+    if courses.len() < task.train.len() {
+        return Ok(bad_data(inputs, checks));
+    }
+    one_set_up(&courses)?;
+
+    let engine = Engine::new(&courses, rig);
+    let candidates = Candidate::all(courses[0].measured, courses[0].linked, &task.without);
+    let found = name(&engine, candidates, progress);
+    let mut report = report_of(&engine, &found);
+    report.inputs = inputs;
+    report.checks = checks;
+    let records: Vec<String> = report.inputs.train.clone();
+    let additions: Vec<Addition> = report.named.iter().map(addition).collect();
+    let extended = extend(&rig_file.text, &rig_file.file, &additions, &report.parameters, &records)?;
+    Ok(Outcome { report, extended: Some(extended), pictures: Pictures::default(), experiment: None })
+}
+
+fn open_all(
+    task: &Task,
+    rig: &RigParameters,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Vec<Opened>, WorkflowError> {
+    task.train
+        .iter()
+        .map(|path| {
+            progress(&format!("reading {}", path.display()));
+            open(path, &task.options, rig)
+        })
+        .collect()
+}
+
+fn one_set_up(courses: &[Course]) -> Result<(), WorkflowError> {
+    let first = &courses[0];
+    let other = courses.iter().find(|course| {
+        (course.measured, course.linked, course.added_mass_kg)
+            != (first.measured, first.linked, first.added_mass_kg)
+    });
+    match other {
+        Some(other) => Err(WorkflowError::Mixed { first: first.name.clone(), other: other.name.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// The outcome of records that cannot be used.
+fn bad_data(inputs: InputFiles, checks: Vec<report::RecordCheck>) -> Outcome {
+    let fatal: Vec<&str> = checks
+        .iter()
+        .flat_map(|check| &check.findings)
+        .filter(|finding| finding.fatal)
+        .map(|finding| finding.text.as_str())
+        .collect();
+    let summary = format!("A record cannot be used: {}", fatal.join("; "));
+    let report = Report { inputs, checks, ..empty(Verdict::BadData, summary) };
+    Outcome { report, extended: None, pictures: Pictures::default(), experiment: None }
+}
+
+/// A report without anything in it.
+fn empty(verdict: Verdict, summary: String) -> Report {
+    Report {
+        schema_version: SCHEMA_VERSION,
+        verdict,
+        summary,
+        inputs: InputFiles::default(),
+        named: Vec::new(),
+        parameters: Vec::new(),
+        outside: None,
+        gap: std::collections::BTreeMap::new(),
+        verification: None,
+        candidates: Vec::new(),
+        not_excited: Vec::new(),
+        detection_limits: Vec::new(),
+        location: None,
+        checks: Vec::new(),
+        next: None,
+    }
+}
+
+/// What naming found, as a report.
+fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
+    let named = named(found);
+    let parameters = parameters_off(engine, found);
+    let verdict = if found.inadequate {
+        Verdict::OutsideCatalogue
+    } else if named.iter().any(|named| !named.alternatives.is_empty()) {
+        Verdict::Ambiguous
+    } else if !named.is_empty() {
+        Verdict::Named
+    } else if !parameters.is_empty() {
+        Verdict::ParametersOnly
+    } else {
+        Verdict::NothingMissing
+    };
+    let named = if verdict == Verdict::OutsideCatalogue { Vec::new() } else { named };
+    let (not_excited, detection_limits) = limits(found);
+    Report {
+        named,
+        parameters,
+        candidates: candidates(found),
+        not_excited,
+        detection_limits,
+        ..empty(verdict, String::new())
+    }
+}
+
+fn named(found: &Found) -> Vec<NamedEffect> {
+    let mut at = 0;
+    let mut all = Vec::new();
+    for ((placed, share), alternatives) in
+        found.model.placed.iter().zip(&found.shares).zip(&found.alternatives)
+    {
+        let errors = &found.model.errors[at..at + placed.coordinates.len()];
+        at += placed.coordinates.len();
+        let alternatives = alternatives
+            .iter()
+            .filter_map(|other| {
+                let placed = other.placed.last()?;
+                let from = other.errors.len() - COUNT - placed.coordinates.len();
+                Some(named_effect(placed, &other.errors[from..], *share, Vec::new()))
+            })
+            .collect();
+        all.push(named_effect(placed, errors, *share, alternatives));
+    }
+    all.sort_by(|left, right| right.share_explained.total_cmp(&left.share_explained));
+    all
+}
+
+fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<NamedEffect>) -> NamedEffect {
+    let candidate = &placed.candidate;
+    let numbers = candidate.numbers(&placed.coordinates);
+    let parameters = candidate
+        .sheet
+        .keys
+        .iter()
+        .enumerate()
+        .map(|(at, key)| Quantity {
+            name: key.name.to_owned(),
+            value: numbers[at],
+            unit: key.unit.name().to_owned(),
+            standard_error: Some(errors[at] * candidate.slope(at, placed.coordinates[at]).abs())
+                .filter(|error| error.is_finite()),
+            before: key.neutral.filter(|neutral| neutral.is_finite()),
+        })
+        .collect();
+    NamedEffect {
+        effect: candidate.sheet.name.to_owned(),
+        place: Where::from(candidate.place),
+        parameters,
+        share_explained: share,
+        alternatives,
+    }
+}
+
+/// Parameters that are off by more than their errors and more than nothing.
+fn parameters_off(engine: &Engine<'_>, found: &Found) -> Vec<Quantity> {
+    let model: &Refit = &found.model;
+    let errors = &model.errors[model.errors.len() - COUNT..];
+    (0..PARAMETERS.len())
+        .filter(|at| {
+            let off = (model.factors[*at] - 1.0).abs();
+            off > OFF_LEAST && off > OFF_ERRORS * errors[*at]
+        })
+        .map(|at| crate::calibrate::quantity(engine, at, model))
+        .collect()
+}
+
+fn addition(named: &NamedEffect) -> Addition {
+    let place = match &named.place.element {
+        Some(element) => format!("{}.{element}", named.place.axis),
+        None => named.place.axis.clone(),
+    };
+    let numbers =
+        named.parameters.iter().map(|own| (own.name.clone(), own.value, own.standard_error)).collect();
+    Addition { effect: named.effect.clone(), place, numbers }
+}
+
+fn candidates(found: &Found) -> Vec<report::Candidate> {
+    let nothing = found.nothing;
+    found
+        .screened
+        .iter()
+        .map(|screened| {
+            let placed = &screened.start;
+            let candidate = &placed.candidate;
+            let fitted = found.fitted.iter().find(|own| {
+                let other = &own.placed[0].candidate;
+                other.sheet.name == candidate.sheet.name && other.place == candidate.place
+            });
+            let is_named = found.model.placed.iter().any(|own| {
+                own.candidate.sheet.name == candidate.sheet.name && own.candidate.place == candidate.place
+            });
+            let shown = fitted.map_or(placed, |own| &own.placed[0]);
+            let share = fitted.map(|own| {
+                ((found.calibrated.fit.loss - own.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
+            });
+            let fate = match (is_named, fitted.is_some()) {
+                (true, _) if !found.inadequate => "named",
+                (true, _) => "explains too little",
+                (false, true) => "fitted, and others explain more",
+                (false, false) => "not among the best of the screening",
+            };
+            report::Candidate {
+                effect: candidate.sheet.name.to_owned(),
+                place: Where::from(candidate.place),
+                score: (nothing - screened.loss) / found.threshold.max(1e-9),
+                share_explained: share,
+                amplitude: candidate.numbers(&shown.coordinates)[0],
+                unit: candidate.sheet.keys[0].unit.name().to_owned(),
+                fate: fate.to_owned(),
+            }
+        })
+        .collect()
+}
+
+/// What the records would not have shown at all, and from what amplitude on they would have shown the rest.
+fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
+    let mut not_excited = Vec::new();
+    let mut limits = Vec::new();
+    for (candidate, limit) in found.columns.candidates.iter().zip(&found.limits) {
+        let place = Where::from(candidate.place);
+        let effect = candidate.sheet.name.to_owned();
+        match limit {
+            Some(z) if *z <= 1.0 => {
+                let key = &candidate.sheet.keys[0];
+                let at = candidate.numbers(&{
+                    let mut coordinates = candidate.origin();
+                    coordinates[0] = *z;
+                    coordinates
+                })[0];
+                let neutral = key.neutral.filter(|neutral| neutral.is_finite());
+                limits.push(DetectionLimit {
+                    effect,
+                    place,
+                    name: key.name.to_owned(),
+                    value: neutral.map_or(at, |neutral| (at - neutral).abs()),
+                    unit: key.unit.name().to_owned(),
+                });
+            }
+            _ => not_excited.push(EffectPlace { effect, place }),
+        }
+    }
+    (not_excited, limits)
+}
+
+/// The rig that a model is.
+#[must_use]
+pub fn model_rig(rig: &RigParameters, model: &Refit) -> Option<RigParameters> {
+    let kept: Vec<Placed> = model.placed.iter().filter(|placed| is_large(placed)).cloned().collect();
+    rig_of(rig, &kept, &model.factors)
+}
