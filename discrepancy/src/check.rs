@@ -59,7 +59,10 @@ impl Checked {
     #[must_use]
     pub fn is_parked(&self, axis: Axis) -> bool {
         let column = Channel::Of(axis, Signal::Position).column();
-        self.report.findings.iter().any(|finding| finding.kind == PARKED && finding.column.as_ref() == Some(&column))
+        self.report
+            .findings
+            .iter()
+            .any(|finding| finding.kind == PARKED && finding.column.as_ref() == Some(&column))
     }
 }
 
@@ -72,7 +75,8 @@ pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     units::check(&mut notes, rig);
     range::check(&mut notes, rig, &grid);
     stuck::check(&mut notes, rig, &grid);
-    let channels = record.channels().map(|channel| (channel.column(), told(channel, &notes, &grid))).collect();
+    let channels =
+        record.channels().map(|channel| (channel.column(), told(channel, &notes, &grid))).collect();
     // Signs are asked of numbers that mean what they say.
     if !notes.is_fatal() {
         signs::check(&mut notes, rig, &grid);

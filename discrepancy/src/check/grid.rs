@@ -7,7 +7,7 @@ use crate::records::{Channel, Record};
 /// Places of a record's rows in units of its own period.
 #[derive(Debug)]
 pub(super) struct Grid {
-    /// Median time from row to row, s.
+    /// Usual time from row to row, s.
     pub(super) period_s: f64,
     /// The row of each place, if there is one.
     pub(super) rows: Vec<Option<usize>>,
@@ -22,7 +22,9 @@ impl Grid {
         let times = record.time_s();
         let period_s = period_s(times).unwrap_or(1e-3);
         let any = record.channels().next();
-        let bad = |row: usize| any.is_some_and(|any| notes.unusable[any.index()].get(row).copied().unwrap_or(false));
+        let bad = |row: usize| {
+            any.is_some_and(|any| notes.unusable[any.index()].get(row).copied().unwrap_or(false))
+        };
         let good: Vec<usize> = (0..times.len()).filter(|row| !bad(*row)).collect();
         let [Some(first), Some(last)] = [good.first().copied(), good.last().copied()] else {
             return Grid { period_s, rows: Vec::new() };
@@ -45,8 +47,12 @@ impl Grid {
     }
 }
 
-/// Median step of time that goes forward, s; `None` when it never does.
+/// Step of time where it goes forward, s: the mean of the usual ones, so that neither holes nor jitter count; `None` when it never does.
 pub(super) fn period_s(times_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    median(&mut steps)
+    let mut steps: Vec<f64> =
+        times_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    let middle = median(&mut steps)?;
+    let usual = steps.iter().filter(|step| (0.5 * middle..1.5 * middle).contains(*step));
+    let (sum_s, count) = usual.fold((0.0, 0_usize), |(sum_s, count), step| (sum_s + step, count + 1));
+    Some(if count == 0 { middle } else { sum_s / count as f64 })
 }

@@ -133,7 +133,8 @@ fn fitted(lags: &[f64; LAGS.len()]) -> f64 {
 fn shares(lags: &[f64; LAGS.len()], terms: &[&[f64; LAGS.len()]; 3], set: u8) -> Option<(f64, [f64; 3])> {
     let used: Vec<usize> = (0..3).filter(|term| set & (1 << term) != 0).collect();
     let count = used.len();
-    let matrix = nalgebra::DMatrix::from_fn(LAGS.len(), count, |lag, column| terms[used[column]][lag] / lags[lag]);
+    let matrix =
+        nalgebra::DMatrix::from_fn(LAGS.len(), count, |lag, column| terms[used[column]][lag] / lags[lag]);
     let ones = nalgebra::DVector::from_element(LAGS.len(), 1.0);
     let solved = (matrix.transpose() * &matrix).cholesky()?.solve(&(matrix.transpose() * &ones));
     if solved.iter().any(|share| *share < 0.0) {

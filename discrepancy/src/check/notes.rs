@@ -75,6 +75,14 @@ impl<'a> Notes<'a> {
         bad as f64 / rows.max(1) as f64
     }
 
+    /// Channels of which nothing fatal was found yet: in a wrong unit everything would seem clipped.
+    pub(super) fn open_channels(&self) -> Vec<Channel> {
+        let fatal = |column: &str| {
+            self.findings.iter().any(|finding| finding.fatal && finding.column.as_deref() == Some(column))
+        };
+        self.record.channels().filter(|channel| !fatal(&channel.column())).collect()
+    }
+
     /// Whether something makes the record useless.
     pub(super) fn is_fatal(&self) -> bool {
         self.findings.iter().any(|finding| finding.fatal)

@@ -18,8 +18,11 @@ pub(super) fn of(values: &[f64]) -> Option<f64> {
     sorted.sort_unstable_by(f64::total_cmp);
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());
     // Two roundings of the same count differ by the last bits, and by no more.
-    let mut distances: Vec<f64> =
-        sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|distance| *distance > 1e-10 * largest).collect();
+    let mut distances: Vec<f64> = sorted
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|distance| *distance > 1e-10 * largest)
+        .collect();
     if distances.len() < 2 {
         return None;
     }
@@ -38,7 +41,8 @@ fn accepted(distances: &[f64], guess: f64) -> Option<f64> {
         });
         step = lengths / counts;
     }
-    let near: Vec<f64> = distances.iter().map(|distance| distance / step).filter(|count| *count < FARTHEST).collect();
+    let near: Vec<f64> =
+        distances.iter().map(|distance| distance / step).filter(|count| *count < FARTHEST).collect();
     let whole = near.iter().filter(|count| (*count - count.round()).abs() < TOLERANCE).count();
     (near.len() >= 2 && whole as f64 >= NEARLY_ALL * near.len() as f64).then_some(step)
 }
@@ -46,24 +50,27 @@ fn accepted(distances: &[f64], guess: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_core::{Rng, SeedableRng};
 
-    fn wobble(at: u32) -> f64 {
-        f64::from(at.wrapping_mul(2_654_435_761) >> 8) / f64::from(1_u32 << 24)
+    /// Numbers from 0 to 1.
+    fn wobbles(count: usize) -> impl Iterator<Item = f64> {
+        let mut stream = rand_pcg::Pcg64::seed_from_u64(7);
+        (0..count).map(move |_| (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64)
     }
 
     #[test]
     fn a_rounded_channel_has_its_step() {
         let step = 0.5 / 65535.0;
-        let values: Vec<f64> = (0..5000).map(|at| (wobble(at) * 300.0).round() * step).collect();
+        let values: Vec<f64> = wobbles(5000).map(|wobble| (wobble * 300.0).round() * step).collect();
         let own = of(&values).unwrap();
         assert!((own / step - 1.0).abs() < 1e-6, "{own}");
     }
 
     #[test]
     fn sparse_values_have_it_too_and_smooth_ones_have_none() {
-        let sparse: Vec<f64> = (0..400).map(|at| (wobble(at) * 4000.0).round() * 61.0).collect();
+        let sparse: Vec<f64> = wobbles(400).map(|wobble| (wobble * 4000.0).round() * 61.0).collect();
         assert!((of(&sparse).unwrap() - 61.0).abs() < 1e-6);
-        let smooth: Vec<f64> = (0..4000).map(|at| wobble(at) + 1e-3 * f64::from(at)).collect();
+        let smooth: Vec<f64> = wobbles(4000).collect();
         assert_eq!(of(&smooth), None);
         assert_eq!((of(&[1.0; 9]), of(&[])), (None, None));
     }

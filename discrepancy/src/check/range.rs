@@ -21,8 +21,7 @@ const MOST: f64 = 0.5;
 const PARKED_M: f64 = 1e-3;
 
 pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
-    let record = notes.record;
-    let channels: Vec<Channel> = record.channels().collect();
+    let channels = notes.open_channels();
     for channel in channels {
         if matches!(channel, Channel::Of(_, Signal::Valve | Signal::AppliedForce)) {
             continue;
@@ -46,7 +45,9 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
         let subject = Subject { channel: Some(channel), row: grid.rows[first] };
         let present: Vec<f64> = values.iter().flatten().copied().collect();
         if at_limit && is_parked(channel, &present) {
-            let text = format!("the axis stands at the end of its stroke all the time ({level} m): it tells nothing here");
+            let text = format!(
+                "the axis stands at the end of its stroke all the time ({level} m): it tells nothing here"
+            );
             notes.tell(PARKED, subject, false, &text);
         } else {
             let share = clipped as f64 / present.len().max(1) as f64;
@@ -55,7 +56,11 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
                 "{clipped} samples ({:.2} %) are clipped at {level}{}: {}",
                 1e2 * share,
                 if at_limit { ", the limit of the sensor" } else { ", the extreme of this record" },
-                if fatal { "record again with a larger range" } else { "they are left out with their neighbours" }
+                if fatal {
+                    "record again with a larger range"
+                } else {
+                    "they are left out with their neighbours"
+                }
             );
             notes.tell("clipped", subject, fatal, &text);
         }
@@ -77,7 +82,8 @@ fn limits(channel: Channel, rig: &RigParameters, notes: &Notes) -> Vec<(f64, boo
     }
     let sensors = rig.sensors();
     // Half a count, for values that were written with few digits.
-    let pair = |least: f64, most: f64, step: f64| vec![(least + 0.5 * step, true), (most - 0.5 * step, false)];
+    let pair =
+        |least: f64, most: f64, step: f64| vec![(least + 0.5 * step, true), (most - 0.5 * step, false)];
     match channel.quantity() {
         Quantity::Length => pair(0.0, sensors.position_range_m, sensors.position_step_m()),
         Quantity::Force => pair(-sensors.force_range_n, sensors.force_range_n, sensors.force_step_n()),
@@ -96,13 +102,19 @@ fn is_parked(channel: Channel, values: &[f64]) -> bool {
 fn at_extremes(values: &[Option<f64>], bad: &mut [bool]) {
     let most = values.iter().flatten().copied().fold(f64::MIN, f64::max);
     let least = values.iter().flatten().copied().fold(f64::MAX, f64::min);
-    let inner: Vec<_> = values.iter().map(|value| value.filter(|value| *value < most && *value > least)).collect();
+    let inner: Vec<_> =
+        values.iter().map(|value| value.filter(|value| *value < most && *value > least)).collect();
     // A channel of few values has its extremes often.
     let Some(longest) = by_chance(&inner) else { return };
     for extreme in [least, most] {
-        let found = runs(values).into_iter().any(|run| values[run.start] == Some(extreme) && run.len() > longest);
+        let found =
+            runs(values).into_iter().any(|run| values[run.start] == Some(extreme) && run.len() > longest);
         if found {
-            values.iter().zip(&mut *bad).filter(|(value, _)| **value == Some(extreme)).for_each(|(_, bad)| *bad = true);
+            values
+                .iter()
+                .zip(&mut *bad)
+                .filter(|(value, _)| **value == Some(extreme))
+                .for_each(|(_, bad)| *bad = true);
         }
     }
 }

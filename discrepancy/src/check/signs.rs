@@ -99,8 +99,14 @@ fn tell(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usize>, bal
             Signal::PressureA,
             "pressures a and b are swapped: change the two columns (or the two hoses)",
         ),
-        Reading::ValveSign => ("valve-sign", Signal::Valve, "the command has the wrong sign: positive extends the rod"),
-        _ => ("position-sign", Signal::Position, "the position counts the wrong way: it grows as the drive's rod extends"),
+        Reading::ValveSign => {
+            ("valve-sign", Signal::Valve, "the command has the wrong sign: positive extends the rod")
+        }
+        _ => (
+            "position-sign",
+            Signal::Position,
+            "the position counts the wrong way: it grows as the drive's rod extends",
+        ),
     };
     let text = format!(
         "{text}; flow and force balance correlate by {:.2} and {:.2} as the columns stand, and hold when that is changed",
@@ -208,7 +214,11 @@ fn flows(motion: &Motion, rig: &RigParameters, period_s: f64) -> Option<Pairs> {
                 let flow = if opening > 0.0 {
                     flow_m3_per_h(kv(&valve.kv_supply_m3_per_h, valve, opening), supply.pressure_pa, (*p)?)
                 } else {
-                    -flow_m3_per_h(kv(&valve.kv_exhaust_m3_per_h, valve, -opening), (*p)?, supply.exhaust_pressure_pa)
+                    -flow_m3_per_h(
+                        kv(&valve.kv_exhaust_m3_per_h, valve, -opening),
+                        (*p)?,
+                        supply.exhaust_pressure_pa,
+                    )
                 };
                 lagged += toward(valve.flow_lag_time_constant_s) * (flow / 3600.0 - lagged);
                 Some(lagged)
@@ -248,7 +258,11 @@ fn gas_n(motion: &Motion, rig: &RigParameters, place: usize) -> Option<f64> {
 /// Friction of a moving rod, N; none below the speed from which its sign is known.
 fn friction_n(rig: &RigParameters, speed_m_per_s: f64) -> f64 {
     let friction = rig.friction();
-    let sliding = if speed_m_per_s.abs() > MOVING_M_PER_S { friction.sliding_force_n * speed_m_per_s.signum() } else { 0.0 };
+    let sliding = if speed_m_per_s.abs() > MOVING_M_PER_S {
+        friction.sliding_force_n * speed_m_per_s.signum()
+    } else {
+        0.0
+    };
     friction.viscous_n_s_per_m * speed_m_per_s + sliding
 }
 
@@ -260,7 +274,8 @@ fn forces(motion: &Motion, rig: &RigParameters, axis: Axis, period_s: f64) -> Op
     let rates = slopes(&speeds, REACH);
     let mut rows = Vec::new();
     for place in 0..speeds.len() {
-        let (Some(speed), Some(rate), Some(gas)) = (speeds[place], rates[place], gas_n(motion, rig, place)) else {
+        let (Some(speed), Some(rate), Some(gas)) = (speeds[place], rates[place], gas_n(motion, rig, place))
+        else {
             continue;
         };
         let speed = speed / period_s;
@@ -297,7 +312,8 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     let pairs: Vec<(usize, f64, f64)> = (0..force.len())
         .filter_map(|place| {
             let expected = if linked {
-                let (speed, own) = (speeds[place]? / grid.period_s, rates[place]? / (grid.period_s * grid.period_s));
+                let (speed, own) =
+                    (speeds[place]? / grid.period_s, rates[place]? / (grid.period_s * grid.period_s));
                 gas_n(motion, rig, place)? - own_kg * own - friction_n(rig, speed)
             } else {
                 moved_kg * rates[place]? / (grid.period_s * grid.period_s)
@@ -310,8 +326,10 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     if spread < FORCE_SHOWS * rig.sensors().force_noise_n || pairs.correlation().abs() < HOLDS {
         return;
     }
-    let subject =
-        Subject { channel: Some(Channel::Of(axis, Signal::Force)), row: pairs.worst.and_then(|place| grid.rows[place]) };
+    let subject = Subject {
+        channel: Some(Channel::Of(axis, Signal::Force)),
+        row: pairs.worst.and_then(|place| grid.rows[place]),
+    };
     let by = if linked { "the pressures" } else { "the acceleration" };
     if pairs.correlation() < 0.0 {
         let text = format!(

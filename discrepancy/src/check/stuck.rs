@@ -24,9 +24,11 @@ const MOST: f64 = 0.5;
 const TOLD: usize = 5;
 
 pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
-    let channels: Vec<Channel> = notes.record.channels().collect();
+    let channels = notes.open_channels();
     for channel in channels {
-        let Channel::Of(axis, Signal::Position | Signal::Force | Signal::PressureA | Signal::PressureB) = channel else {
+        let Channel::Of(axis, Signal::Position | Signal::Force | Signal::PressureA | Signal::PressureB) =
+            channel
+        else {
             continue;
         };
         let values = grid.series(notes, channel);

@@ -19,6 +19,8 @@ const FEWEST_ROWS: usize = 50;
 const HOLE: usize = 4;
 /// Holes that are told one by one.
 const HOLES_TOLD: usize = 20;
+/// Part of a period by which times must differ to be two.
+const SAME: f64 = 0.01;
 /// Share of lost rows beyond which nothing is left to use.
 const MOST_LOST: f64 = 0.5;
 /// Spread of sampling instants around their grid, in periods, that is told, and that spoils speeds.
@@ -30,21 +32,24 @@ pub(super) fn check(notes: &mut Notes) {
         return notes.tell_time("empty", None, true, "there is no row of data: record again");
     }
     let of_rig = Axis::ALL.into_iter().any(|axis| notes.is_of_rig(axis));
-    order(notes);
     let times = record.time_s();
     let Some(period) = period_s(times) else {
         return notes.tell_time("too-short", Some(0), true, "time never grows: record again");
     };
+    order(notes, SAME * period);
     let nominal = record.nominal_period_s().or(of_rig.then_some(PERIOD_S)).unwrap_or(period);
     let ratio = period / nominal;
     if !(0.9..=1.1).contains(&ratio) && unit_of_time(notes, ratio) {
         return;
     }
-    let length_s = times.iter().copied().fold(f64::MIN, f64::max) - times.iter().copied().fold(f64::MAX, f64::min);
+    let length_s =
+        times.iter().copied().fold(f64::MIN, f64::max) - times.iter().copied().fold(f64::MAX, f64::min);
     let short = if of_rig { length_s < SHORTEST_S - 1.5 * nominal } else { times.len() < FEWEST_ROWS };
     if short {
-        let text =
-            format!("{} rows over {length_s:.3} s are too short: at least {SHORTEST_S} s are needed", times.len());
+        let text = format!(
+            "{} rows over {length_s:.3} s are too short: at least {SHORTEST_S} s are needed",
+            times.len()
+        );
         notes.tell_time("too-short", Some(0), true, &text);
     }
     if !(0.9..=1.1).contains(&ratio) {
@@ -66,7 +71,8 @@ pub(super) fn check(notes: &mut Notes) {
 /// Whether the period is off by the factor between two units of time, and told so.
 fn unit_of_time(notes: &mut Notes, ratio: f64) -> bool {
     let units = [(1e3, "ms"), (1e6, "us"), (1e9, "ns"), (1.0 / 60.0, "min")];
-    let Some((factor, unit)) = units.into_iter().find(|(factor, _)| (0.9..=1.1).contains(&(ratio / factor))) else {
+    let Some((factor, unit)) = units.into_iter().find(|(factor, _)| (0.9..=1.1).contains(&(ratio / factor)))
+    else {
         return false;
     };
     let text = format!("time reads as {unit}: divide it by {factor} so that it is in s");
@@ -75,16 +81,23 @@ fn unit_of_time(notes: &mut Notes, ratio: f64) -> bool {
 }
 
 /// Rows whose time repeats or goes back.
-fn order(notes: &mut Notes) {
+fn order(notes: &mut Notes, same_s: f64) {
     let times = notes.record.time_s();
-    let kept = growing(times);
+    let kept = growing(times, same_s);
     let mut repeated = Vec::new();
     let mut jumping = Vec::new();
     for row in 0..times.len() {
         if !kept[row] {
-            let neighbour = |other: Option<usize>| other.and_then(|other| times.get(other)) == Some(&times[row]);
-            let twin = neighbour(row.checked_sub(1)) || neighbour(Some(row + 1));
-            if twin { repeated.push(row) } else { jumping.push(row) }
+            let neighbour = |other: Option<usize>| other.and_then(|other| times.get(other));
+            let same = |other: Option<usize>| {
+                neighbour(other).is_some_and(|other| (other - times[row]).abs() <= same_s)
+            };
+            let twin = same(row.checked_sub(1)) || same(Some(row + 1));
+            if twin {
+                repeated.push(row)
+            } else {
+                jumping.push(row)
+            }
             notes.leave_row_out(row);
         }
     }
@@ -102,12 +115,12 @@ fn order(notes: &mut Notes) {
     }
 }
 
-/// Whether each value belongs to the longest strictly growing chain; of equal neighbours the last.
-fn growing(values: &[f64]) -> Vec<bool> {
+/// Whether each value belongs to the longest chain that grows by more than `same`; of equal neighbours the last.
+fn growing(values: &[f64], same: f64) -> Vec<bool> {
     let mut ends: Vec<usize> = Vec::new();
     let mut before = vec![usize::MAX; values.len()];
     for (at, value) in values.iter().enumerate() {
-        let length = ends.partition_point(|end| values[*end] < *value);
+        let length = ends.partition_point(|end| values[*end] + same < *value);
         before[at] = if length == 0 { usize::MAX } else { ends[length - 1] };
         if length == ends.len() { ends.push(at) } else { ends[length] = at }
     }
@@ -146,17 +159,29 @@ fn lost(notes: &mut Notes, period_s: f64) {
         let text = format!(
             "{singles} rows of {all} ({:.2} %) are lost one by one: {}",
             1e2 * singles as f64 / all as f64,
-            if fatal { "too many, record again" } else { "they are left open, and the command before goes on" }
+            if fatal {
+                "too many, record again"
+            } else {
+                "they are left open, and the command before goes on"
+            }
         );
         notes.tell_time("lost-samples", Some(first), fatal, &text);
     }
     for (row, gone) in holes.iter().take(HOLES_TOLD) {
-        let text = format!("a hole of {:.1} ms before {:.3} s: nothing is simulated across it", 1e3 * period_s * *gone as f64, times[*row]);
+        let text = format!(
+            "a hole of {:.1} ms before {:.3} s: nothing is simulated across it",
+            1e3 * period_s * *gone as f64,
+            times[*row]
+        );
         notes.tell_time("gap", Some(*row), fatal, &text);
     }
     if let Some((row, _)) = holes.get(HOLES_TOLD) {
         let rest: usize = holes[HOLES_TOLD..].iter().map(|(_, gone)| gone).sum();
-        let text = format!("{} more holes of {:.1} ms in all", holes.len() - HOLES_TOLD, 1e3 * period_s * rest as f64);
+        let text = format!(
+            "{} more holes of {:.1} ms in all",
+            holes.len() - HOLES_TOLD,
+            1e3 * period_s * rest as f64
+        );
         notes.tell_time("gap", Some(*row), fatal, &text);
     }
 }
@@ -170,16 +195,26 @@ fn all_left_out(notes: &Notes, row: usize) -> bool {
 fn jitter(notes: &mut Notes, period_s: f64) {
     let times = notes.record.time_s();
     // Half the spread between the 16 % and 84 % quantiles is a standard deviation; that of a difference has two instants in it.
-    let mut steps: Vec<f64> =
-        times.windows(2).map(|pair| (pair[1] - pair[0]) / period_s).filter(|step| (0.0..1.7).contains(step)).collect();
+    let mut steps: Vec<f64> = times
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) / period_s)
+        .filter(|step| (0.0..1.7).contains(step))
+        .collect();
     let [Some(low), Some(high)] = [quantile(&mut steps, 0.16), quantile(&mut steps, 0.84)] else { return };
     let spread = 0.5 * (high - low) / std::f64::consts::SQRT_2;
     let told = 1e3 * spread * period_s;
     if spread > JITTER[1] {
-        let text = format!("the rows come irregularly, by {told:.3} ms rms: speeds taken from them are as uncertain");
+        let text = format!(
+            "the rows come irregularly, by {told:.3} ms rms: speeds taken from them are as uncertain"
+        );
         notes.tell_time("irregular-sampling", Some(0), false, &text);
     } else if spread > JITTER[0] {
-        notes.tell_time("jitter", Some(0), false, &format!("the rows jitter by {told:.3} ms rms: that is borne"));
+        notes.tell_time(
+            "jitter",
+            Some(0),
+            false,
+            &format!("the rows jitter by {told:.3} ms rms: that is borne"),
+        );
     }
 }
 
@@ -211,13 +246,13 @@ mod tests {
 
     #[test]
     fn a_stamp_that_leaps_ahead_is_alone_in_being_wrong() {
-        assert_eq!(growing(&[0.0, 1.0, 99.0, 2.0, 3.0]), [true, true, false, true, true]);
-        assert_eq!(growing(&[0.0, 1.0, -5.0, 2.0, 3.0]), [true, true, false, true, true]);
+        assert_eq!(growing(&[0.0, 1.0, 99.0, 2.0, 3.0], 0.0), [true, true, false, true, true]);
+        assert_eq!(growing(&[0.0, 1.0, -5.0, 2.0, 3.0], 0.0), [true, true, false, true, true]);
     }
 
     #[test]
     fn of_equal_stamps_the_last_stays() {
-        assert_eq!(growing(&[0.0, 1.0, 1.0, 2.0]), [true, false, true, true]);
-        assert!(growing(&[]).is_empty());
+        assert_eq!(growing(&[0.0, 1.0, 1.0, 2.0], 0.0), [true, false, true, true]);
+        assert!(growing(&[], 0.0).is_empty());
     }
 }

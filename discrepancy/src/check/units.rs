@@ -16,7 +16,8 @@ const BELOW_EXHAUST: f64 = 0.5;
 /// How far beyond the stroke a position may read, shares of it: zeros are set by hand.
 const BEYOND_STROKE: f64 = 0.2;
 /// Units of pressure, Pa each.
-const PRESSURES: [(&str, f64); 5] = [("bar", 1e5), ("kPa", 1e3), ("MPa", 1e6), ("mbar or hPa", 1e2), ("psi", 6894.757)];
+const PRESSURES: [(&str, f64); 5] =
+    [("bar", 1e5), ("kPa", 1e3), ("MPa", 1e6), ("mbar or hPa", 1e2), ("psi", 6894.757)];
 /// Units of length, m each, the largest first: a small one would explain every position.
 const LENGTHS: [(&str, f64); 4] = [("inch", 0.0254), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)];
 
@@ -51,22 +52,24 @@ fn pressure(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
         return;
     }
     let beyond = |value: f64| !fits(value, value);
-    if let Some((unit, factor)) = PRESSURES.into_iter().find(|(_, factor)| fits(low * factor, high * factor)) {
+    if let Some((unit, factor)) = PRESSURES.into_iter().find(|(_, factor)| fits(low * factor, high * factor))
+    {
         let text = format!("{middle} Pa cannot be, it reads as {unit}: multiply the column by {factor}");
         return tell(notes, channel, beyond, &text);
     }
     let atmosphere = supply.atmospheric_pressure_pa;
-    if let Some((unit, factor)) = [("Pa", 1.0)]
-        .into_iter()
-        .chain(PRESSURES)
-        .find(|(_, factor)| low * factor > -0.1 * atmosphere && fits(middle * factor, high * factor + atmosphere))
-    {
+    if let Some((unit, factor)) = [("Pa", 1.0)].into_iter().chain(PRESSURES).find(|(_, factor)| {
+        low * factor > -0.1 * atmosphere && fits(middle * factor, high * factor + atmosphere)
+    }) {
         let text = format!(
             "down to {low}: it reads as a gauge pressure in {unit}: multiply the column by {factor} and add {atmosphere} Pa"
         );
         return tell(notes, channel, beyond, &text);
     }
-    let text = format!("{low} to {high} Pa cannot be with a supply of {} Pa: look at unit and scale", supply.pressure_pa);
+    let text = format!(
+        "{low} to {high} Pa cannot be with a supply of {} Pa: look at unit and scale",
+        supply.pressure_pa
+    );
     tell(notes, channel, beyond, &text);
 }
 
@@ -81,7 +84,9 @@ fn position(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
     let unit = LENGTHS.into_iter().find(|(_, factor)| fits(low * factor) && fits(high * factor));
     let text = match unit {
         Some((unit, factor)) => {
-            format!("{middle} m cannot be on a stroke of {stroke} m, it reads as {unit}: multiply the column by {factor}")
+            format!(
+                "{middle} m cannot be on a stroke of {stroke} m, it reads as {unit}: multiply the column by {factor}"
+            )
         }
         None => format!("{low} to {high} m cannot be on a stroke of {stroke} m: look at unit and zero"),
     };
