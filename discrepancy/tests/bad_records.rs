@@ -279,6 +279,8 @@ fn a_valve_and_a_position_of_the_wrong_sign_are_named() {
     is_fatal(&checked, "valve-sign", "drive_valve", "positive extends the rod");
     let checked = drive().changed("drive_position_m", |_, position| 0.5 - position).checked();
     is_fatal(&checked, "position-sign", "drive_position_m", "counts the wrong way");
+    let checked = drive().changed("drive_position_m", |_, position| -position).checked();
+    is_fatal(&checked, "position-sign", "drive_position_m", "counts the wrong way");
 }
 
 #[test]

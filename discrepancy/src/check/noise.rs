@@ -27,9 +27,9 @@ const LAGS: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 16, 24];
 /// Memories of coloured noise that are tried, in samples.
 const MEMORIES: [f64; 7] = [2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0];
 /// Drift over a block, in standard deviations of the noise, up to which it is quiet.
-const DRIFT: f64 = 0.6;
+const DRIFT: f64 = 1.0;
 /// How far a quiet block's lags may lie above the mean of the quietest.
-const ABOVE: f64 = 1.8;
+const ABOVE: f64 = 2.2;
 
 /// What a block shows.
 #[derive(Clone, Copy, Debug)]

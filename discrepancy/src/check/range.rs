@@ -29,7 +29,11 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
         let values = grid.series(notes, channel);
         let mut bad = vec![false; values.len()];
         let mut at_limit = false;
-        for (limit, lower) in limits(channel, rig, notes) {
+        // A position that is mostly below zero counts the other way, and zero is no limit to it: its sign is asked later.
+        let reversed = channel.quantity() == Quantity::Length
+            && 2 * values.iter().flatten().filter(|value| **value < 0.0).count() > values.len();
+        let limits = if reversed { Vec::new() } else { limits(channel, rig, notes) };
+        for (limit, lower) in limits {
             let beyond = |value: f64| if lower { value <= limit } else { value >= limit };
             for (place, value) in values.iter().enumerate() {
                 if value.is_some_and(beyond) {
@@ -107,8 +111,9 @@ fn at_extremes(values: &[Option<f64>], bad: &mut [bool]) {
     // A channel of few values has its extremes often.
     let Some(longest) = by_chance(&inner) else { return };
     for extreme in [least, most] {
-        let found =
-            runs(values).into_iter().any(|run| values[run.start] == Some(extreme) && run.len() > longest);
+        let found = runs(values)
+            .into_iter()
+            .any(|run| run.samples > longest && values[run.places.start] == Some(extreme));
         if found {
             values
                 .iter()

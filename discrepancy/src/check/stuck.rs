@@ -35,26 +35,26 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
         let present = values.iter().flatten().count();
         let all = runs(&values);
         let constant = present > SURELY && all.len() == 1;
-        let stuck: Vec<Range<usize>> = match by_chance(&values) {
+        let stuck: Vec<Run> = match by_chance(&values) {
             _ if constant && notes.is_of_rig(axis) && is_noisy(channel, rig) => all,
             _ if constant => continue,
-            Some(longest) => all.into_iter().filter(|run| run.len() > longest).collect(),
+            Some(longest) => all.into_iter().filter(|run| run.samples > longest).collect(),
             None => continue,
         };
         tell(notes, grid, channel, &values, &stuck);
     }
 }
 
-fn tell(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>], stuck: &[Range<usize>]) {
+fn tell(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>], stuck: &[Run]) {
     let present = values.iter().flatten().count();
-    let samples: usize = stuck.iter().map(|run| run.len()).sum();
+    let samples: usize = stuck.iter().map(|run| run.samples).sum();
     let fatal = samples as f64 > MOST * present as f64;
     for (number, run) in stuck.iter().enumerate() {
-        let (Some(level), row) = (values[run.start], grid.rows[run.start]) else { continue };
+        let (Some(level), row) = (values[run.places.start], grid.rows[run.places.start]) else { continue };
         if number < TOLD {
             let text = format!(
                 "stuck at {level} for {:.0} ms, longer than its noise permits: {}",
-                1e3 * grid.period_s * run.len() as f64,
+                1e3 * grid.period_s * run.places.len() as f64,
                 if fatal { "look at the sensor and its cable, and record again" } else { "left out there" }
             );
             notes.tell("stuck", Subject { channel: Some(channel), row }, fatal, &text);
@@ -62,7 +62,7 @@ fn tell(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>]
             let text = format!("stuck {} more times: left out there", stuck.len() - TOLD);
             notes.tell("stuck", Subject { channel: Some(channel), row }, fatal, &text);
         }
-        grid.rows[run.clone()].iter().flatten().for_each(|row| notes.leave_out(channel, *row));
+        grid.rows[run.places.clone()].iter().flatten().for_each(|row| notes.leave_out(channel, *row));
     }
 }
 
@@ -77,15 +77,27 @@ fn is_noisy(channel: Channel, rig: &RigParameters) -> bool {
     }
 }
 
-/// Runs of equal values, by places; a missing sample ends none.
-pub(super) fn runs(values: &[Option<f64>]) -> Vec<Range<usize>> {
-    let mut runs: Vec<Range<usize>> = Vec::new();
+/// A run of equal values.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    /// Places from its first sample to its last.
+    pub(super) places: Range<usize>,
+    /// Samples in it: what is missing in between is not known to be equal.
+    pub(super) samples: usize,
+}
+
+/// Runs of equal values; a missing sample ends none.
+pub(super) fn runs(values: &[Option<f64>]) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
     let mut level = None;
     for (place, value) in values.iter().enumerate() {
         let Some(value) = value else { continue };
         match runs.last_mut() {
-            Some(run) if level == Some(*value) => run.end = place + 1,
-            _ => runs.push(place..place + 1),
+            Some(run) if level == Some(*value) => {
+                run.places.end = place + 1;
+                run.samples += 1;
+            }
+            _ => runs.push(Run { places: place..place + 1, samples: 1 }),
         }
         level = Some(*value);
     }
@@ -95,9 +107,9 @@ pub(super) fn runs(values: &[Option<f64>]) -> Vec<Range<usize>> {
 /// Longest run of equal values that noise makes by chance; `None` for a channel that stands still by itself.
 pub(super) fn by_chance(values: &[Option<f64>]) -> Option<usize> {
     let (mut equal, mut pairs) = (0_usize, 0_usize);
-    for run in runs(values).into_iter().filter(|run| run.len() < SURELY) {
-        equal += run.len() - 1;
-        pairs += run.len();
+    for run in runs(values).into_iter().filter(|run| run.samples < SURELY) {
+        equal += run.samples - 1;
+        pairs += run.samples;
     }
     if pairs == 0 {
         return None;
@@ -114,7 +126,8 @@ mod tests {
     #[test]
     fn runs_go_on_over_missing_samples() {
         let values = [Some(1.0), Some(1.0), None, Some(1.0), Some(2.0), None];
-        assert_eq!(runs(&values), [0..4, 4..5]);
+        let run = |places, samples| Run { places, samples };
+        assert_eq!(runs(&values), [run(0..4, 3), run(4..5, 1)]);
     }
 
     #[test]
