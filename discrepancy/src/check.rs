@@ -1,4 +1,5 @@
-//! Whether a record can be used: gaps, jumping time, clipping, stuck channels, units that cannot be, noise and quantum of each channel.
+//! Whether a record can be used: gaps, jumping time, clipping, stuck channels, units that cannot be, noise and quantum of each
+//! channel.
 //!
 //! ```text
 //!   record ──► time ──► grid ──► range, units ──► stuck ──► noise, quantum ──► signs

@@ -47,7 +47,8 @@ impl Grid {
     }
 }
 
-/// Step of time where it goes forward, s: the mean of the usual ones, so that neither holes nor jitter count; `None` when it never does.
+/// Step of time where it goes forward, s: the mean of the usual ones, so that neither holes nor jitter count; `None` when it
+/// never does.
 pub(super) fn period_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> =
         times_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();

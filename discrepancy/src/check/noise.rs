@@ -1,15 +1,15 @@
 //! Standard deviation of a channel's noise, rounding included, from the record alone.
 //!
 //! ```text
-//!   blocks of 200 samples ──► the quietest, by the drift of their thirds ──► V_k = mean (y_t+k - 2 y_t + y_t-k)^2 / 6
+//!   blocks of 200 ──► the quietest, by the drift of their thirds ──► V_k = mean (y_t+k - 2 y_t + y_t-k)^2 / 6
 //!
 //!   V_k = white + coloured (6 - 8 r^k + 2 r^2k) / 6 + motion k^4          r = exp(-1 / memory)
 //! ```
 //!
-//! White noise has the same V at every lag k; noise with a memory grows into its own; a motion that is locally a parabola in speed
-//! grows with k^4. The three are told apart by least squares without negative shares, and the noise is the square root of
-//! white + coloured. Blocks are chosen by their slow drift, which says next to nothing of the noise itself: choosing those with the least
-//! noise would find too little.
+//! White noise has the same V at every lag k; noise with a memory grows into its own; a motion that is locally a parabola in
+//! speed grows with k^4. The three are told apart by least squares without negative shares, and the noise is the square root of
+//! white + coloured. Blocks are chosen by their slow drift, which says next to nothing of the noise itself: choosing those with
+//! the least noise would find too little.
 //!
 //! Source: the lags are those of a variogram of second differences, Cressie 1993, Statistics for Spatial Data, 2.4.
 

@@ -88,7 +88,8 @@ impl<'a> Notes<'a> {
         self.findings.iter().any(|finding| finding.fatal)
     }
 
-    /// Whether the axis is one of the rig's, with a valve: foreign stages and single chambers are not held against the rig's numbers.
+    /// Whether the axis is one of the rig's, with a valve: foreign stages and single chambers are not held against the rig's
+    /// numbers.
     pub(super) fn is_of_rig(&self, axis: Axis) -> bool {
         self.record.channel(Channel::Of(axis, Signal::Valve)).is_some()
     }

@@ -6,9 +6,10 @@
 //!   force sensor     F_s  against  m_carriage a, linked against p_a A_a - p_b A_b
 //! ```
 //!
-//! Each balance is asked as a correlation, of which gains, offsets, lags and every effect of the catalogue leave the sign alone. One
-//! swap turns both of the first two, a sign of the valve turns the flows, a sign of the position turns the forces: each is tried, and told when the
-//! record obeys with it and not without it. A record without motion says nothing here, and no finding follows.
+//! Each balance is asked as a correlation, of which gains, offsets, lags and every effect of the catalogue leave the sign
+//! alone. One swap turns both of the first two, a sign of the valve turns the flows, a sign of the position turns the forces:
+//! each is tried, and told when the record obeys with it and not without it. A record without motion says nothing here, and no
+//! finding follows.
 //!
 //! Source: rig-model.md, One axis, and Masses and linkage; effects.md, Which pairs look alike, r_a and r_F.
 
@@ -333,7 +334,8 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     let by = if linked { "the pressures" } else { "the acceleration" };
     if pairs.correlation() < 0.0 {
         let text = format!(
-            "the force has the wrong sign, it correlates by {:.2} with what {by} ask for: compression is positive; multiply the column by -1",
+            "the force has the wrong sign, it correlates by {:.2} with what {by} ask for: compression is positive; \
+             multiply the column by -1",
             pairs.correlation()
         );
         return notes.tell("force-sign", subject, true, &text);

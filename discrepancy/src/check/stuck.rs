@@ -1,8 +1,9 @@
 //! Stuck channels: runs of one value that are longer than noise permits.
 //!
-//! Where a share f of neighbours are equal by chance, a run of n equal samples comes N f^(n-1) times in a record of N; a run that would
-//! come less than once in a hundred thousand records did not come by chance. A channel whose rounding is coarser than its noise stands still
-//! by itself and tells nothing here, but one that never moves while its sensor should make noise is dead.
+//! Where a share f of neighbours are equal by chance, a run of n equal samples comes N f^(n-1) times in a record of N; a run
+//! that would come less than once in a hundred thousand records did not come by chance. A channel whose rounding is coarser
+//! than its noise stands still by itself and tells nothing here, but one that never moves while its sensor should make noise is
+//! dead.
 
 use super::grid::Grid;
 use super::notes::{Notes, Subject};

@@ -1,8 +1,8 @@
 //! Units that cannot be: pressures in bar, positions in mm, a valve in % or volts.
 //!
-//! What a channel may show follows from the rig file: a chamber's pressure lies between exhaust and supply, a position within the stroke, a command
-//! in [-1, 1]. A channel beyond that is told with the factor that brings it back, if one does. A force has no such bounds and is told from its
-//! signs and sizes elsewhere.
+//! What a channel may show follows from the rig file: a chamber's pressure lies between exhaust and supply, a position within
+//! the stroke, a command in [-1, 1]. A channel beyond that is told with the factor that brings it back, if one does. A force
+//! has no such bounds and is told from its signs and sizes elsewhere.
 
 use super::notes::{Notes, Subject};
 use super::smooth::quantile;
