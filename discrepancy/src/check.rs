@@ -1,9 +1,38 @@
-//! Whether a record can be used: gaps, jumping time, clipping, stuck channels, units that cannot be, noise and quantum of each channel.
+//! Whether a record can be used: gaps, jumping time, clipping, stuck channels, units that cannot be, noise and quantum of each
+//! channel.
+//!
+//! ```text
+//!   record ──► time ──► grid ──► range, units ──► stuck ──► noise, quantum ──► signs
+//!                │                  │               │                            │
+//!                └── findings with line, column and what to do; samples that are left out ──► Checked
+//! ```
+//!
+//! A finding is fatal when the record as a whole would mislead: a channel in another unit, two channels swapped, a sign that is
+//! wrong, time that goes backwards. What is bad in one place is left out there and told. Effects of the catalogue are no
+//! findings: a sensor that is off by a few per cent is for the workflow to name, not for the check to refuse.
+//!
+//! Kinds and their limits: `discrepancy/docs/checks.md`.
 
-use crate::records::{Channel, Record};
+mod grid;
+mod noise;
+mod notes;
+mod quantum;
+mod range;
+mod signs;
+mod smooth;
+mod stuck;
+mod time;
+mod units;
+
+use crate::records::{Channel, Record, Signal};
 use crate::report::{ChannelCheck, RecordCheck};
-use plant::RigParameters;
+use grid::Grid;
+use notes::Notes;
+use plant::{Axis, RigParameters};
 use std::collections::BTreeMap;
+
+/// Kind of the finding that an axis stood at the end of its stroke all the time.
+pub const PARKED: &str = "parked";
 
 /// A record's check with what follows for each of its samples.
 #[derive(Clone, Debug)]
@@ -26,23 +55,60 @@ impl Checked {
     pub fn noise(&self, channel: Channel) -> Option<f64> {
         self.report.channels.get(&channel.column()).and_then(|check| check.noise)
     }
+
+    /// Whether the axis stood at the end of its stroke all the time, its position sensor at its limit: it tells nothing.
+    #[must_use]
+    pub fn is_parked(&self, axis: Axis) -> bool {
+        let column = Channel::Of(axis, Signal::Position).column();
+        self.report
+            .findings
+            .iter()
+            .any(|finding| finding.kind == PARKED && finding.column.as_ref() == Some(&column))
+    }
 }
 
 /// Checks a record of this rig.
 #[must_use]
-pub fn check(record: &Record, _rig: &RigParameters) -> Checked {
-    let time_s = record.time_s();
-    let channels: BTreeMap<String, ChannelCheck> = record
-        .channels()
-        .map(|channel| (channel.column(), ChannelCheck { noise: None, quantum: None, unusable: 0.0 }))
-        .collect();
-    let report = RecordCheck {
-        file: record.file().display().to_string(),
-        usable: true,
-        rows: record.len(),
-        length_s: time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0),
-        findings: Vec::new(),
-        channels,
-    };
-    Checked { report, unusable: vec![Vec::new(); Channel::COUNT] }
+pub fn check(record: &Record, rig: &RigParameters) -> Checked {
+    let mut notes = Notes::new(record);
+    time::check(&mut notes);
+    let grid = Grid::of(record, &notes);
+    units::check(&mut notes, rig);
+    range::check(&mut notes, rig, &grid);
+    stuck::check(&mut notes, rig, &grid);
+    let channels =
+        record.channels().map(|channel| (channel.column(), told(channel, &notes, &grid))).collect();
+    // Signs are asked of numbers that mean what they say.
+    if !notes.is_fatal() {
+        signs::check(&mut notes, rig, &grid);
+    }
+    notes.into_checked(channels)
+}
+
+/// Noise, quantum and share of bad samples of a channel.
+fn told(channel: Channel, notes: &Notes, grid: &Grid) -> ChannelCheck {
+    let values = grid.series(notes, channel);
+    let present: Vec<f64> = values.iter().flatten().copied().collect();
+    // A command is what it is: it has steps and no noise.
+    let noise = if matches!(channel, Channel::Of(_, Signal::Valve)) { None } else { noise::of(&values) };
+    ChannelCheck { noise, quantum: quantum::of(&present), unusable: notes.share_unusable(channel) }
+}
+
+/// A record's channels by their columns.
+type Channels = BTreeMap<String, ChannelCheck>;
+
+impl Notes<'_> {
+    fn into_checked(self, channels: Channels) -> Checked {
+        let record = self.record;
+        let time_s = record.time_s();
+        let report = RecordCheck {
+            file: record.file().display().to_string(),
+            usable: !self.is_fatal(),
+            rows: record.len(),
+            length_s: time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0),
+            findings: self.findings,
+            channels,
+        };
+        Checked { report, unusable: self.unusable }
+    }
 }

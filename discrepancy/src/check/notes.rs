@@ -1,0 +1,96 @@
+//! What a check writes down: findings, and samples that are left out.
+
+use crate::records::{Channel, Record, Signal};
+use crate::report::Finding;
+use plant::Axis;
+
+/// Findings and bad samples of a record.
+#[derive(Debug)]
+pub(super) struct Notes<'a> {
+    pub(super) record: &'a Record,
+    pub(super) findings: Vec<Finding>,
+    pub(super) unusable: Vec<Vec<bool>>,
+}
+
+/// What a finding is about.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Subject {
+    /// The column's channel; `None` for time and for the record as a whole.
+    pub(super) channel: Option<Channel>,
+    /// First row.
+    pub(super) row: Option<usize>,
+}
+
+impl<'a> Notes<'a> {
+    pub(super) fn new(record: &'a Record) -> Self {
+        Notes { record, findings: Vec::new(), unusable: vec![Vec::new(); Channel::COUNT] }
+    }
+
+    /// Writes a finding down; the text gets file, line and column in front.
+    pub(super) fn tell(&mut self, kind: &str, subject: Subject, fatal: bool, text: &str) {
+        let line = subject.row.map(|row| self.record.line(row));
+        let column = subject.channel.map(Channel::column);
+        let file = self.record.file().display();
+        let place = line.map_or_else(|| format!("{file}"), |line| format!("{file}:{line}"));
+        let text = match &column {
+            Some(column) => format!("{place}: {column}: {text}"),
+            None => format!("{place}: {text}"),
+        };
+        self.findings.push(Finding { kind: kind.into(), column, line, fatal, text });
+    }
+
+    /// The same of time.
+    pub(super) fn tell_time(&mut self, kind: &str, row: Option<usize>, fatal: bool, text: &str) {
+        self.tell(kind, Subject { channel: None, row }, fatal, text);
+        if let Some(finding) = self.findings.last_mut() {
+            finding.column = Some("time_s".into());
+        }
+    }
+
+    /// Leaves a sample out.
+    pub(super) fn leave_out(&mut self, channel: Channel, row: usize) {
+        let mask = &mut self.unusable[channel.index()];
+        if mask.is_empty() {
+            mask.resize(self.record.len(), false);
+        }
+        mask[row] = true;
+    }
+
+    /// Leaves all samples of a row out.
+    pub(super) fn leave_row_out(&mut self, row: usize) {
+        let record = self.record;
+        record.channels().for_each(|channel| self.leave_out(channel, row));
+    }
+
+    /// A sample, if it is there and not left out.
+    pub(super) fn value(&self, channel: Channel, row: usize) -> Option<f64> {
+        let bad = self.unusable[channel.index()].get(row).copied().unwrap_or(false);
+        self.record.value(channel, row).filter(|_| !bad)
+    }
+
+    /// Share of a channel's samples that cannot be used, absent ones included.
+    pub(super) fn share_unusable(&self, channel: Channel) -> f64 {
+        let rows = self.record.len();
+        let bad = (0..rows).filter(|row| self.value(channel, *row).is_none()).count();
+        bad as f64 / rows.max(1) as f64
+    }
+
+    /// Channels of which nothing fatal was found yet: in a wrong unit everything would seem clipped.
+    pub(super) fn open_channels(&self) -> Vec<Channel> {
+        let fatal = |column: &str| {
+            self.findings.iter().any(|finding| finding.fatal && finding.column.as_deref() == Some(column))
+        };
+        self.record.channels().filter(|channel| !fatal(&channel.column())).collect()
+    }
+
+    /// Whether something makes the record useless.
+    pub(super) fn is_fatal(&self) -> bool {
+        self.findings.iter().any(|finding| finding.fatal)
+    }
+
+    /// Whether the axis is one of the rig's, with a valve: foreign stages and single chambers are not held against the rig's
+    /// numbers.
+    pub(super) fn is_of_rig(&self, axis: Axis) -> bool {
+        self.record.channel(Channel::Of(axis, Signal::Valve)).is_some()
+    }
+}

@@ -1,0 +1,143 @@
+//! Stuck channels: runs of one value that are longer than noise permits.
+//!
+//! Where a share f of neighbours are equal by chance, a run of n equal samples comes N f^(n-1) times in a record of N; a run
+//! that would come less than once in a hundred thousand records did not come by chance. A channel whose rounding is coarser
+//! than its noise stands still by itself and tells nothing here, but one that never moves while its sensor should make noise is
+//! dead.
+
+use super::grid::Grid;
+use super::notes::{Notes, Subject};
+use crate::records::{Channel, Quantity, Signal};
+use plant::RigParameters;
+use std::ops::Range;
+
+/// Chance of a run, in records.
+const CHANCE: f64 = 1e-5;
+/// Shortest run that is told, samples.
+const SHORTEST: usize = 12;
+/// Share of equal neighbours beyond which a channel stands still by itself.
+const MOSTLY_EQUAL: f64 = 0.6;
+/// Runs that are no chance whatever the noise: left out of the share of equal neighbours.
+const SURELY: usize = 60;
+/// Share of a channel beyond which too little is left of it.
+const MOST: f64 = 0.5;
+/// Runs that are told one by one.
+const TOLD: usize = 5;
+
+pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
+    let channels = notes.open_channels();
+    for channel in channels {
+        let Channel::Of(axis, Signal::Position | Signal::Force | Signal::PressureA | Signal::PressureB) =
+            channel
+        else {
+            continue;
+        };
+        let values = grid.series(notes, channel);
+        let present = values.iter().flatten().count();
+        let all = runs(&values);
+        let constant = present > SURELY && all.len() == 1;
+        let stuck: Vec<Run> = match by_chance(&values) {
+            _ if constant && notes.is_of_rig(axis) && is_noisy(channel, rig) => all,
+            _ if constant => continue,
+            Some(longest) => all.into_iter().filter(|run| run.samples > longest).collect(),
+            None => continue,
+        };
+        tell(notes, grid, channel, &values, &stuck);
+    }
+}
+
+fn tell(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>], stuck: &[Run]) {
+    let present = values.iter().flatten().count();
+    let samples: usize = stuck.iter().map(|run| run.samples).sum();
+    let fatal = samples as f64 > MOST * present as f64;
+    for (number, run) in stuck.iter().enumerate() {
+        let (Some(level), row) = (values[run.places.start], grid.rows[run.places.start]) else { continue };
+        if number < TOLD {
+            let text = format!(
+                "stuck at {level} for {:.0} ms, longer than its noise permits: {}",
+                1e3 * grid.period_s * run.places.len() as f64,
+                if fatal { "look at the sensor and its cable, and record again" } else { "left out there" }
+            );
+            notes.tell("stuck", Subject { channel: Some(channel), row }, fatal, &text);
+        } else if number == TOLD {
+            let text = format!("stuck {} more times: left out there", stuck.len() - TOLD);
+            notes.tell("stuck", Subject { channel: Some(channel), row }, fatal, &text);
+        }
+        grid.rows[run.places.clone()].iter().flatten().for_each(|row| notes.leave_out(channel, *row));
+    }
+}
+
+/// Whether the sensor's noise is larger than its rounding, so that its reading cannot stand still.
+fn is_noisy(channel: Channel, rig: &RigParameters) -> bool {
+    let sensors = rig.sensors();
+    match channel.quantity() {
+        Quantity::Length => sensors.position_noise_m > sensors.position_step_m(),
+        Quantity::Force => sensors.force_noise_n > sensors.force_step_n(),
+        Quantity::Pressure => sensors.pressure_noise_pa > sensors.pressure_step_pa(),
+        Quantity::Opening => false,
+    }
+}
+
+/// A run of equal values.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    /// Places from its first sample to its last.
+    pub(super) places: Range<usize>,
+    /// Samples in it: what is missing in between is not known to be equal.
+    pub(super) samples: usize,
+}
+
+/// Runs of equal values; a missing sample ends none.
+pub(super) fn runs(values: &[Option<f64>]) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    let mut level = None;
+    for (place, value) in values.iter().enumerate() {
+        let Some(value) = value else { continue };
+        match runs.last_mut() {
+            Some(run) if level == Some(*value) => {
+                run.places.end = place + 1;
+                run.samples += 1;
+            }
+            _ => runs.push(Run { places: place..place + 1, samples: 1 }),
+        }
+        level = Some(*value);
+    }
+    runs
+}
+
+/// Longest run of equal values that noise makes by chance; `None` for a channel that stands still by itself.
+pub(super) fn by_chance(values: &[Option<f64>]) -> Option<usize> {
+    let (mut equal, mut pairs) = (0_usize, 0_usize);
+    for run in runs(values).into_iter().filter(|run| run.samples < SURELY) {
+        equal += run.samples - 1;
+        pairs += run.samples;
+    }
+    if pairs == 0 {
+        return None;
+    }
+    let share = (equal as f64 / pairs as f64).max(0.01);
+    let longest = 1.0 + (CHANCE / pairs as f64).ln() / share.ln();
+    (share < MOSTLY_EQUAL).then_some((longest.ceil() as usize).max(SHORTEST))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_go_on_over_missing_samples() {
+        let values = [Some(1.0), Some(1.0), None, Some(1.0), Some(2.0), None];
+        let run = |places, samples| Run { places, samples };
+        assert_eq!(runs(&values), [run(0..4, 3), run(4..5, 1)]);
+    }
+
+    #[test]
+    fn the_rarer_equal_neighbours_are_the_shorter_is_chance() {
+        let often: Vec<_> = (0..9000).map(|at| Some(f64::from(at / 2))).collect();
+        let never: Vec<_> = (0..9000).map(|at| Some(f64::from(at))).collect();
+        // Half of the neighbours: 1 + ln(1e-5 / 9000) / ln(1/2) = 30.7.
+        assert_eq!((by_chance(&often), by_chance(&never)), (Some(31), Some(SHORTEST)));
+        let coarse: Vec<_> = (0..9000).map(|at| Some(f64::from(at / 10))).collect();
+        assert_eq!(by_chance(&coarse), None);
+    }
+}
