@@ -120,7 +120,11 @@ impl Course {
     /// [`CourseError`] when a signal is missing or the record is too short.
     pub fn of(record: &Record, checked: &Checked, rig: &RigParameters) -> Result<Course, CourseError> {
         let file = record.file().display().to_string();
-        let measured = Axis::ALL.map(|axis| record.channel(Channel::Of(axis, Signal::Position)).is_some());
+        // A load that is parked and not linked shows nothing, and its position may be at the end of the sensor's range.
+        let measured = Axis::ALL.map(|axis| {
+            record.channel(Channel::Of(axis, Signal::Position)).is_some()
+                && (record.setup().linked || !checked.is_parked(axis))
+        });
         if measured == [false, false] {
             return Err(CourseError::NoAxis { file });
         }
@@ -184,7 +188,16 @@ impl Course {
         let offset_m = if axis == Axis::Load { sensors.load_position_offset_m } else { 0.0 };
         let mut commands = vec![None; self.len()];
         let valve = Channel::Of(axis, Signal::Valve);
+        let channels = [Signal::Valve].into_iter().chain(SIGNALS).map(|signal| Channel::Of(axis, signal));
+        let channels: Vec<Channel> = channels.collect();
         for (row, place) in places.iter().enumerate() {
+            // A row that says nothing must not take the place of one that does.
+            if !channels
+                .iter()
+                .any(|channel| record.value(*channel, row).is_some() && checked.is_usable(*channel, row))
+            {
+                continue;
+            }
             commands[*place] = record.value(valve, row).filter(|_| checked.is_usable(valve, row));
             for (at, signal) in SIGNALS.into_iter().enumerate() {
                 let channel = Channel::Of(axis, signal);
