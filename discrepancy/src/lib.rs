@@ -5,9 +5,11 @@
 //! | [`records`] | one reader of records, whatever their form: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
 //! | [`check`] | whether a record can be used, and its noise |
 //! | [`course`] | a record on the simulation's grid |
+//! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`report`] | what was found, as data |
 
 pub mod check;
 pub mod course;
+pub mod locate;
 pub mod records;
 pub mod report;

@@ -263,6 +263,8 @@ pub struct Location {
     pub maps: Vec<Curve>,
     /// Series of the unknown inputs, thinned out for a picture.
     pub series: Vec<UnknownInput>,
+    /// Balances that move together as a fault of a sensor would move them, in words; null when none do.
+    pub sensor_ratio: Option<String>,
 }
 
 /// The disagreement of a balance.
