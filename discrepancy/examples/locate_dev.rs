@@ -2,7 +2,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)] // what it is for
 
-use discrepancy::{check, course::Course, locate::locate, records};
+use discrepancy::{check, course::Course, locate::locate, outside::outside, records};
 use plant::RigParameters;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -27,5 +27,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if let Some(note) = &located.location.sensor_ratio {
         println!("{note}");
     }
+    if let Some(outside) = outside(&rig, &courses, &located.unknowns, &mut |_| ()) {
+        let variables = outside.variables.iter().take(4);
+        let told: Vec<String> =
+            variables.map(|own| format!("{} {:.3} (p {:.3})", own.variable, own.r2, own.p_value)).collect();
+        println!(
+            "OUTSIDE {} | {} | {}",
+            outside.balance,
+            told.join(", "),
+            outside.formula.unwrap_or_default()
+        );
+    }
+    eprintln!("{:.2} s", start.elapsed().as_secs_f64());
     Ok(())
 }

@@ -6,10 +6,12 @@
 //! | [`check`] | whether a record can be used, and its noise |
 //! | [`course`] | a record on the simulation's grid |
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
+//! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
 //! | [`report`] | what was found, as data |
 
 pub mod check;
 pub mod course;
 pub mod locate;
+pub mod outside;
 pub mod records;
 pub mod report;

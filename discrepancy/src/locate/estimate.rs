@@ -84,6 +84,8 @@ struct Solved {
     from: usize,
     /// Whether a force moves the window as much as its opposite does.
     smooth: bool,
+    /// Mean of what the force sensor reads in the baseline, N.
+    baseline_force_n: f64,
     /// With and without an offset of the force sensor.
     free: Solution,
     bound: Solution,
@@ -197,8 +199,11 @@ impl Seen<'_> {
         normal.fill_upper_triangle_with_lower_triangle();
         let equations = Equations { normal, right, squares, freedom: (used - NUMBERS) as f64, pressure };
         let bound = equations.solve(NO_OFFSET_N)?;
+        let forces_n = self.looks[0][self.axis].iter().map(|reading| reading[1]);
+        let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
         Some(Solved {
             from: self.from,
+            baseline_force_n,
             smooth: self.is_smooth(),
             free: equations.solve(PRIORS[OFFSET])?,
             bound,
@@ -298,13 +303,18 @@ fn gather(
         .collect();
     let squares = offsets.iter().map(|offset| offset * offset).sum::<f64>() / offsets.len().max(1) as f64;
     let faulty = squares.sqrt() > OFFSET_OVER_NOISE;
-    for Solved { from, smooth, free, bound } in solved {
+    for Solved { from, smooth, baseline_force_n, free, bound } in solved {
         let best = if faulty { free } else { bound };
         let regimes = Regimes::of(rig, course, axis, *from);
         let places = [(best, FLOW_A), (best, FLOW_B), (best, FORCE), (free, OFFSET)];
         for (balance, (solution, number)) in places.into_iter().enumerate() {
-            if !tells(solution, number) || number == FORCE && !smooth {
+            if !tells(solution, number) || !smooth && number != OFFSET {
                 continue;
+            }
+            let mut variables = variables(course, axis, *from, balance);
+            if balance == 3 {
+                // Over what the sensor reads itself, its every error would be a law.
+                variables[9] = *baseline_force_n;
             }
             let scale = if balance < 2 { NORMAL_LITRES_PER_MINUTE } else { 1.0 };
             balances[balance].push(UnknownPoint {
@@ -312,7 +322,7 @@ fn gather(
                 window: from / WINDOW,
                 value: solution.theta[number] * scale,
                 deviation: solution.deviation[number] * scale,
-                variables: variables(course, axis, *from, balance),
+                variables,
                 per_pressure_offset: solution.per_pressure_offset.map(|change| change[number] * scale),
                 regimes,
             });
