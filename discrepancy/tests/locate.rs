@@ -36,7 +36,10 @@ fn course(hidden: &RigParameters, seed: u64) -> Course {
     Course::of(&record, &check(&record, &rig), &rig).expect("both are whole")
 }
 
-fn located(effect: Option<(&str, &str, &[(&str, f64)])>) -> (Located, Option<Outside>) {
+/// Name, place and numbers of an effect.
+type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
+
+fn located(effect: Option<Hidden<'_>>) -> (Located, Option<Outside>) {
     let rig = RigParameters::baseline();
     let hidden = effect.map_or(rig.clone(), |(name, place, numbers)| {
         rig.with_effect(name, place, numbers).expect("numbers of the sheet")

@@ -71,23 +71,20 @@ impl<'a> Pass<'a> {
         });
         plant.go_on_in(&seated(&plant, &points, self.course.measured)).ok()?;
         let flows = nudge.flows_m3_per_s.iter().flatten().any(|flow| *flow != 0.0);
-        let mut readings = [[[0.0; CHANNELS]; WINDOW]; 2];
-        for at in 0..WINDOW {
+        let mut read = [[[0.0; CHANNELS]; 2]; WINDOW];
+        for (at, own) in read.iter_mut().enumerate() {
             let share = (at as f64 + 0.5) / WINDOW as f64 * 2.0 - 1.0;
             let forces = [0, 1].map(|axis| nudge.force_n[axis] + nudge.ramp_n[axis] * share);
             let inputs = self.inputs(from + at, forces);
             // What is read is the contact's force of the instant, what acts over the period the mean of both its ends.
             let contact_n = self.contact_n[from + at];
-            let read = Inputs {
+            let instant = Inputs {
                 hand_force_carriage_n: contact_n + forces[0],
                 hand_force_load_n: -contact_n - forces[1],
                 ..inputs
             };
-            let shown = plant.shown(&plant.truth(&read));
-            for axis in 0..2 {
-                readings[axis][at] = shown[axis];
-                readings[axis][at][1] += forces[axis];
-            }
+            *own = plant.shown(&plant.truth(&instant));
+            own.iter_mut().zip(forces).for_each(|(reading, force_n)| reading[1] += force_n);
             plant.step(&inputs);
             if flows {
                 let mut state = *plant.state();
@@ -99,7 +96,7 @@ impl<'a> Pass<'a> {
                 plant.go_on_in(&state).ok()?;
             }
         }
-        Some(readings)
+        Some([0, 1].map(|axis| read.map(|own| own[axis])))
     }
 
     /// Goes on to the next window, seated where the record was.
