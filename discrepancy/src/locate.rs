@@ -4,9 +4,10 @@
 //!   course ──► windows of 20 ms ──► unknown force, flows, sensor offset ──► bars, regimes, maps, series
 //! ```
 //!
-//! A balance whose unknown input is as large as its propagated noise is closed; one that stands above it lacks something, and the
-//! input's course over position, speed and pressures says what. A chamber that lacks a leak does not lift the force, since windows
-//! start at the measured pressures; a sensor fault does lift two balances, in a ratio that the geometry fixes ([`ratio`]).
+//! A balance whose unknown input is as large as its propagated noise is closed; one that stands above it lacks something, and
+//! the input's course over position, speed and pressures says what. A chamber that lacks a leak does not lift the force, since
+//! windows start at the measured pressures; a sensor fault does lift two balances, in a ratio that the geometry fixes
+//! ([`ratio`]).
 //!
 //! Source: discrepancy-notes.md, 2 and 9, and Pipeline 4. Unknown inputs: Gillijns, De Moor 2007, Automatica 43(1).
 

@@ -184,7 +184,7 @@ pub struct Outside {
 /// Statistical dependence of a disagreement on a variable.
 #[derive(Clone, Debug, Serialize)]
 pub struct Dependence {
-    /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt.
+    /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt, or constant for a term that is always there.
     pub variable: String,
     /// Share of the variance explained on folds it was not fitted on.
     pub r2: f64,

@@ -4,8 +4,9 @@
 //! n_k = phi n_(k-1) + e_k        phi = 3 - var(second differences) / var(first differences)        at rest
 //! ```
 //!
-//! Differences forget the level, and without their mean the drift; with a command that has not changed for a while, mostly at rest,
-//! they are the noise's own; windows that move more than the median's are left out. A second of it tells phi to less than a tenth.
+//! Differences forget the level, and without their mean the drift; with a command that has not changed for a while, mostly at
+//! rest, they are the noise's own; windows that move more than the median's are left out. A second of it tells phi to less than
+//! a tenth.
 //!
 //! Source: Box, Jenkins, Reinsel 2008, Time Series Analysis, 3.2.
 

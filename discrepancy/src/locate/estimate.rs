@@ -6,12 +6,17 @@
 //! ```
 //!
 //! r residuals over the noise of their channel, J sensitivities by finite differences, L weak priors (L_u those of the unknown
-//! inputs). Coloured noise is made white ([`super::colour`]). Where constants do not describe a window, its deviations are widened
-//! by what is left, sqrt(chi2 / degrees of freedom) [Birge 1932]: a break-away inside it is no force. At rest
-//! a force moves nothing, and a window whose posterior is no tighter than a tenth of the prior tells nothing of that input. The ramp takes up what a force does within a window; it is not reported.
+//! inputs). Coloured noise is made white ([`super::colour`]). Where constants do not describe a window, its deviations are
+//! widened by what is left, sqrt(chi2 / degrees of freedom) [Birge 1932]: a break-away inside it is no force. At rest a force
+//! moves nothing, and a window whose posterior is no tighter than a tenth of the prior tells nothing of that input. The ramp
+//! takes up what a force does within a window; it is not reported.
 //!
-//! Position alone tells the force to some newton, the force sensor ten times better. So windows are solved twice, with and without
-//! an offset of the force sensor. Where the offsets of a record are nothing, the force is that of the solution without them.
+//! Where a small force and its opposite do not do the same the other way, a piston stops, breaks away or turns in the window: a
+//! finite difference there is no sensitivity, and the window tells nothing but the offset.
+//!
+//! Position alone tells the force to some newton, the force sensor ten times better. So windows are solved twice, with and
+//! without an offset of the force sensor. Where the offsets of a record are nothing, the force is that of the solution without
+//! them.
 //!
 //! Source: discrepancy-notes.md, 2; Kay 1993, Fundamentals of Statistical Signal Processing I, 4.5 and 11.5.
 

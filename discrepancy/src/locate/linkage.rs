@@ -4,8 +4,9 @@
 //! unknown = F - F_c(d),  in contact:  k (d -+ gap/2) + c dd/dt against the measured force, mean over a window
 //! ```
 //!
-//! Only windows count in which the rods touch on one side throughout: the distance of rods that do not touch is free within the gap.
-//! Two positions of 20 um are some 13 N in a window of 20 ms at 2e6 N/m, whereas the force's own noise is a tenth of a newton.
+//! Only windows count in which the rods touch on one side throughout: the distance of rods that do not touch is free within the
+//! gap. Two positions of 20 um are some 13 N in a window of 20 ms at 2e6 N/m, whereas the force's own noise is a tenth of a
+//! newton.
 //!
 //! Source: rig-model.md, Masses and linkage.
 

@@ -4,8 +4,8 @@
 //! o_F = sum g_F d / s^2 / sum g_F^2 / s^2        of the force, and the same of the chamber's flow
 //! ```
 //!
-//! d unknown input of a window, s its deviation, g what an offset of 1 Pa would make of it: about -A for the force. Two estimates
-//! that each stand out and agree are one fault of a sensor, not two faults of the rig.
+//! d unknown input of a window, s its deviation, g what an offset of 1 Pa would make of it: about -A for the force. Two
+//! estimates that each stand out and agree are one fault of a sensor, not two faults of the rig.
 //!
 //! Source: discrepancy-notes.md, 2.
 

@@ -1,12 +1,12 @@
 //! A window in the simulator, with nudges of its initial state and of its unknown inputs.
 //!
-//! Windows begin where the course was; spool, lagged flows and what effects remember go on from the plant before. When linked, the
-//! contact force is an input of both axes and not simulated: at 2 N per micrometre the positions do not tell it. It acts as a
-//! hand would, so that the force sensors read it as they do in the rig [rig-model.md, Masses and linkage]. So the axes do
-//! not know each other, and one run nudges both.
+//! Windows begin where the course was; spool, lagged flows and what effects remember go on from the plant before. When linked,
+//! the contact force is an input of both axes and not simulated: at 2 N per micrometre the positions do not tell it. It acts as
+//! a hand would, so that the force sensors read it as they do in the rig [rig-model.md, Masses and linkage]. So the axes do not
+//! know each other, and one run nudges both.
 //!
-//! An unknown force acts as a hand too; what the sensor would read of the hand is put back. An unknown flow is added to the stored
-//! air at the end of each period.
+//! An unknown force acts as a hand too; what the sensor would read of the hand is put back. An unknown flow is added to the
+//! stored air at the end of each period.
 
 use super::WINDOW;
 use crate::course::{CHANNELS, Course, PERIOD_S, Point};

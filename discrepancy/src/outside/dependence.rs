@@ -5,8 +5,8 @@
 //! p  = (1 + shifts whose R2 is as large) / (1 + shifts)     200 circular shifts of the input against the variable
 //! ```
 //!
-//! d unknown input, w = 1/deviation^2, 20 bins with equally many windows or of equal width, whichever tells more. A shift keeps how slowly both go, and breaks what ties
-//! them; so a slow drift is not taken for a law.
+//! d unknown input, w = 1/deviation^2, 20 bins with equally many windows or of equal width, whichever tells more. A shift keeps
+//! how slowly both go, and breaks what ties them; so a slow drift is not taken for a law.
 //!
 //! Source: discrepancy-notes.md, 9 and Pipeline 8.
 
