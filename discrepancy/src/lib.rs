@@ -15,6 +15,8 @@
 //! | [`refit`] | effects fitted in the simulator itself |
 //! | [`name`](mod@name) | which effects are missing |
 //! | [`extend`] | the rig file with what was found |
+//! | [`locate`] | unknown inputs of each balance: where model and records disagree |
+//! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
 //! | [`report`] | what was found, as data |
 //! | [`workflow`] | all of it in order |
 //! | [`page`] | the same as one page for people |
@@ -26,7 +28,9 @@ pub mod course;
 pub mod engine;
 pub mod extend;
 pub mod fit;
+pub mod locate;
 pub mod name;
+pub mod outside;
 pub mod page;
 pub mod parameters;
 pub mod records;

@@ -184,7 +184,7 @@ pub struct Outside {
 /// Statistical dependence of a disagreement on a variable.
 #[derive(Clone, Debug, Serialize)]
 pub struct Dependence {
-    /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt.
+    /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt, or constant for a term that is always there.
     pub variable: String,
     /// Share of the variance explained on folds it was not fitted on.
     pub r2: f64,
@@ -263,6 +263,8 @@ pub struct Location {
     pub maps: Vec<Curve>,
     /// Series of the unknown inputs, thinned out for a picture.
     pub series: Vec<UnknownInput>,
+    /// Balances that move together as a fault of a sensor would move them, in words; null when none do.
+    pub sensor_ratio: Option<String>,
 }
 
 /// The disagreement of a balance.

@@ -1,0 +1,181 @@
+//! Where the baseline and the records disagree: unknown inputs of every balance, window by window.
+//!
+//! ```text
+//!   course ──► windows of 20 ms ──► unknown force, flows, sensor offset ──► bars, regimes, maps, series
+//! ```
+//!
+//! A balance whose unknown input is as large as its propagated noise is closed; one that stands above it lacks something, and
+//! the input's course over position, speed and pressures says what. A chamber that lacks a leak does not lift the force, since
+//! windows start at the measured pressures; a sensor fault does lift two balances, in a ratio that the geometry fixes
+//! ([`ratio`]).
+//!
+//! Source: discrepancy-notes.md, 2 and 9, and Pipeline 4. Unknown inputs: Gillijns, De Moor 2007, Automatica 43(1).
+
+pub mod colour;
+pub mod estimate;
+pub mod linkage;
+pub mod maps;
+pub mod ratio;
+pub mod regime;
+pub mod simulated;
+
+use crate::course::{Course, PERIOD_S};
+use crate::report::{BalanceBar, Location, RegimeCell, UnknownInput};
+use estimate::{Unknowns, estimate};
+use plant::{Axis, RigParameters};
+use regime::{REGIMES, Regimes};
+
+/// Periods of a window.
+pub const WINDOW: usize = 20;
+/// What an unknown input may depend on.
+pub const VARIABLES: [&str; 12] =
+    ["x", "v", "|v|", "sign(v)", "p_a", "p_b", "p_a-p_b", "u", "du/dt", "F", "t", "dp/dt"];
+/// Their units.
+pub const VARIABLE_UNITS: [&str; 12] = ["m", "m/s", "m/s", "", "Pa", "Pa", "Pa", "", "1/s", "N", "s", "Pa/s"];
+/// From m^3/s to Nl/min.
+pub const NORMAL_LITRES_PER_MINUTE: f64 = 6e4;
+/// Most points of a series in the report.
+const SERIES: usize = 1500;
+
+/// Where baseline and records disagree.
+#[derive(Clone, Debug)]
+pub struct Located {
+    /// For the report.
+    pub location: Location,
+    /// The unknown inputs themselves, one series for each balance that the records tell something about.
+    pub unknowns: Vec<UnknownSeries>,
+}
+
+/// The unknown input of a balance.
+#[derive(Clone, Debug)]
+pub struct UnknownSeries {
+    /// As in [`BalanceBar::balance`].
+    pub balance: String,
+    /// N or Nl/min.
+    pub unit: &'static str,
+    /// Windows that tell something about it, in the order of the records.
+    pub points: Vec<UnknownPoint>,
+}
+
+/// The unknown input of a window.
+#[derive(Clone, Copy, Debug)]
+pub struct UnknownPoint {
+    /// Which record.
+    pub record: usize,
+    /// Which window of it.
+    pub window: usize,
+    /// Estimate, in the series' unit; positive along the own extension of the axis, or into the chamber.
+    pub(crate) value: f64,
+    /// Its standard deviation when nothing is missing.
+    pub(crate) deviation: f64,
+    /// In the order of [`VARIABLES`], positions and speeds in the own extension of the axis.
+    pub(crate) variables: [f64; VARIABLES.len()],
+    /// Change of the estimate by an offset of the pressure sensors a and b, per Pa.
+    pub(crate) per_pressure_offset: [f64; 2],
+    /// What went on in the window.
+    pub(crate) regimes: Regimes,
+}
+
+impl UnknownPoint {
+    /// The estimate over its standard deviation.
+    #[must_use]
+    pub fn over_noise(&self) -> f64 {
+        self.value / self.deviation
+    }
+}
+
+impl UnknownSeries {
+    /// rms of the estimates over their standard deviations; 1 is nothing. `None` without a point.
+    #[must_use]
+    pub fn over_noise(&self) -> Option<f64> {
+        over_noise(self.points.iter())
+    }
+}
+
+fn over_noise<'a>(points: impl Iterator<Item = &'a UnknownPoint>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    for point in points {
+        sum += point.over_noise().powi(2);
+        count += 1;
+    }
+    (count > 0).then(|| (sum / f64::from(count)).sqrt())
+}
+
+/// Estimates the unknown inputs of all records against a baseline; `progress` hears of each record.
+pub fn locate(rig: &RigParameters, courses: &[Course], progress: &mut dyn FnMut(&str)) -> Located {
+    let mut unknowns = Unknowns::default();
+    for (record, course) in courses.iter().enumerate() {
+        progress(&format!("locate: {} of {}, {:.0} s", record + 1, courses.len(), seconds(course.len())));
+        estimate(rig, course, record, &mut unknowns);
+    }
+    let series = unknowns.into_series();
+    let bars = series.iter().filter_map(bar).collect();
+    let regimes = series.iter().flat_map(cells).collect();
+    let mut notes = Vec::new();
+    for axis in Axis::ALL {
+        notes.extend(ratio::notes(axis, &series));
+    }
+    let location = Location {
+        balances: bars,
+        regimes,
+        maps: maps::maps(&series),
+        series: series.iter().filter(|series| !series.points.is_empty()).map(thinned).collect(),
+        sensor_ratio: (!notes.is_empty()).then(|| notes.join("; ")),
+    };
+    Located { location, unknowns: series }
+}
+
+fn seconds(periods: usize) -> f64 {
+    periods as f64 * PERIOD_S
+}
+
+fn bar(series: &UnknownSeries) -> Option<BalanceBar> {
+    let over_noise = series.over_noise()?;
+    let squares: f64 = series.points.iter().map(|point| point.value.powi(2)).sum();
+    Some(BalanceBar {
+        balance: series.balance.clone(),
+        over_noise,
+        rms: (squares / series.points.len() as f64).sqrt(),
+        unit: series.unit.to_owned(),
+    })
+}
+
+fn cells(series: &UnknownSeries) -> Vec<RegimeCell> {
+    let cell = |regime: &&'static str| {
+        let own = || series.points.iter().filter(|point| point.regimes.contains(regime));
+        Some(RegimeCell {
+            balance: series.balance.clone(),
+            regime: (*regime).to_owned(),
+            windows: own().count(),
+            over_noise: over_noise(own())?,
+        })
+    };
+    REGIMES.iter().filter_map(cell).collect()
+}
+
+/// A series for a picture: neighbours joined by their weighted mean until it is short enough.
+fn thinned(series: &UnknownSeries) -> UnknownInput {
+    let join = series.points.len().div_ceil(SERIES).max(1);
+    let mut thin = UnknownInput {
+        balance: series.balance.clone(),
+        unit: series.unit.to_owned(),
+        time_s: Vec::new(),
+        value: Vec::new(),
+        noise: 0.0,
+    };
+    let mut variances = 0.0;
+    for points in series.points.chunks(join) {
+        let (mut weights, mut values, mut times_s) = (0.0, 0.0, 0.0);
+        for point in points {
+            let weight = point.deviation.powi(-2);
+            weights += weight;
+            values += weight * point.value;
+            times_s += point.variables[10];
+        }
+        thin.time_s.push(times_s / points.len() as f64);
+        thin.value.push(values / weights);
+        variances += 1.0 / weights;
+    }
+    thin.noise = (variances / thin.value.len() as f64).sqrt();
+    thin
+}

@@ -1,0 +1,368 @@
+//! The unknown inputs of a window by least squares around the simulation.
+//!
+//! ```text
+//! r = J theta + noise       theta = x, v, p_a, p_b at the start | force, its ramp | flow a, flow b | offset of the force sensor
+//! P = (J' J + L)^-1         theta^ = P J' r       var(theta^ | no unknown input) = P - P L_u P
+//! ```
+//!
+//! r residuals over the noise of their channel, J sensitivities by finite differences, L weak priors (L_u those of the unknown
+//! inputs). Coloured noise is made white ([`super::colour`]). Where constants do not describe a window, its deviations are
+//! widened by what is left, sqrt(chi2 / degrees of freedom) [Birge 1932]: a break-away inside it is no force. At rest a force
+//! moves nothing, and a window whose posterior is no tighter than a tenth of the prior tells nothing of that input. The ramp
+//! takes up what a force does within a window; it is not reported.
+//!
+//! Where a small force and its opposite do not do the same the other way, a piston stops, breaks away or turns in the window: a
+//! finite difference there is no sensitivity, and the window tells nothing but the offset.
+//!
+//! Position alone tells the force to some newton, the force sensor ten times better. So windows are solved twice, with and
+//! without an offset of the force sensor. Where the offsets of a record are nothing, the force is that of the solution without
+//! them.
+//!
+//! Source: discrepancy-notes.md, 2; Kay 1993, Fundamentals of Statistical Signal Processing I, 4.5 and 11.5.
+
+use super::colour::colours;
+use super::regime::Regimes;
+use super::simulated::{Nudge, Pass, Readings};
+use super::{NORMAL_LITRES_PER_MINUTE, UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
+use crate::course::{CHANNELS, Course, PERIOD_S};
+use nalgebra::{SMatrix, SVector};
+use plant::{Axis, RigParameters};
+
+/// Numbers of a window and axis.
+const NUMBERS: usize = 9;
+/// Places among them.
+const FORCE: usize = 4;
+const FLOW_A: usize = 6;
+const FLOW_B: usize = 7;
+const OFFSET: usize = 8;
+/// Place of the force's opposite nudge among the looks.
+const OPPOSITE: usize = OFFSET + 1;
+/// How far each is nudged: m, m/s, Pa, Pa, N, N, m^3/s, m^3/s; the offset's sensitivity is known.
+const NUDGES: [f64; OFFSET] = [1e-5, 5e-4, 200.0, 200.0, 1.0, 1.0, 3e-5, 3e-5];
+/// Standard deviations of the weak priors, in the same units. A guess: some ten times what points and effects are.
+const PRIORS: [f64; NUMBERS] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 100.0];
+/// Prior of the force sensor's offset in the solution without one, N.
+const NO_OFFSET_N: f64 = 1e-3;
+/// Share of the prior above which a window tells nothing.
+const NOTHING: f64 = 0.1;
+/// Share of a nudge's effect by which its opposite may differ: beyond it a window stands on a kink.
+const KINK: f64 = 0.2;
+/// Windows before a record or what follows a gap counts: memories fill [rig-model.md: judged after 0.1 s].
+const FILLING: usize = 5;
+/// Above this the offsets of the force sensor are something.
+const OFFSET_OVER_NOISE: f64 = 1.15;
+
+type Normal = SMatrix<f64, NUMBERS, NUMBERS>;
+type Theta = SVector<f64, NUMBERS>;
+
+/// The unknown inputs of all balances, as they are gathered.
+#[derive(Debug, Default)]
+pub(super) struct Unknowns {
+    /// flow-a, flow-b, force, force-sensor of each axis.
+    axes: [[Vec<UnknownPoint>; 4]; 2],
+    linkage: Vec<UnknownPoint>,
+}
+
+impl Unknowns {
+    /// One series for each balance that has any point.
+    pub(super) fn into_series(self) -> Vec<UnknownSeries> {
+        let mut all = Vec::new();
+        let mut series = |balance: String, unit, points: Vec<UnknownPoint>| {
+            if !points.is_empty() {
+                all.push(UnknownSeries { balance, unit, points });
+            }
+        };
+        for (axis, balances) in Axis::ALL.into_iter().zip(self.axes) {
+            let names = ["flow-a", "flow-b", "force", "force-sensor"];
+            let units = ["Nl/min", "Nl/min", "N", "N"];
+            for ((points, name), unit) in balances.into_iter().zip(names).zip(units) {
+                series(format!("{}.{name}", axis.name()), unit, points);
+            }
+        }
+        series("linkage".to_owned(), "N", self.linkage);
+        all
+    }
+}
+
+/// A window and axis, solved.
+struct Solved {
+    from: usize,
+    /// Whether a force moves the window as much as its opposite does.
+    smooth: bool,
+    /// Mean of what the force sensor reads in the baseline, N.
+    baseline_force_n: f64,
+    /// With and without an offset of the force sensor.
+    free: Solution,
+    bound: Solution,
+}
+
+/// A solution: estimates, their deviations without unknown inputs, and what a pressure offset would make of them.
+struct Solution {
+    theta: Theta,
+    deviation: Theta,
+    posterior: Theta,
+    per_pressure_offset: [Theta; 2],
+}
+
+/// Estimates the unknown inputs of a record and appends them.
+pub(super) fn estimate(rig: &RigParameters, course: &Course, record: usize, unknowns: &mut Unknowns) {
+    let Some(mut pass) = Pass::new(rig, course) else { return };
+    let axes: Vec<usize> = (0..2).filter(|axis| course.measured[*axis]).collect();
+    let colours =
+        [0, 1].map(|axis| if course.measured[axis] { colours(course, axis) } else { [0.0; CHANNELS] });
+    let nudges = nudges();
+    let mut solved: [Vec<Solved>; 2] = [Vec::new(), Vec::new()];
+    let mut filled = 0;
+    // The last window needs a period behind it.
+    for window in 0..(course.len() - 1) / WINDOW {
+        let from = window * WINDOW;
+        let whole = !course.gaps[from..=from + WINDOW].iter().any(|gap| *gap);
+        filled = if whole { filled + 1 } else { 0 };
+        if filled > FILLING
+            && let Some(looks) = pass.look(from, &nudges)
+        {
+            for axis in &axes {
+                let seen = Seen { course, axis: *axis, from, colours: &colours[*axis], looks: &looks };
+                solved[*axis].extend(seen.solve());
+            }
+        }
+        pass.go_on(from, WINDOW);
+    }
+    for axis in axes {
+        gather(rig, course, record, axis, &solved[axis], &mut unknowns.axes[axis]);
+    }
+    linkage::gather(
+        rig,
+        course,
+        record,
+        pass.contact_n(),
+        [colours[0][0], colours[1][0]],
+        &mut unknowns.linkage,
+    );
+}
+
+/// The baseline, a nudge of each number but the last, and the force's nudge the other way.
+fn nudges() -> Vec<Nudge> {
+    let mut nudges = vec![Nudge::default(); OPPOSITE + 1];
+    for axis in 0..2 {
+        for start in 0..4 {
+            nudges[1 + start].start[axis][start] = NUDGES[start];
+        }
+        nudges[1 + FORCE].force_n[axis] = NUDGES[FORCE];
+        nudges[2 + FORCE].ramp_n[axis] = NUDGES[FORCE + 1];
+        nudges[1 + FLOW_A].flows_m3_per_s[axis][0] = NUDGES[FLOW_A];
+        nudges[1 + FLOW_B].flows_m3_per_s[axis][1] = NUDGES[FLOW_B];
+        nudges[OPPOSITE].force_n[axis] = -NUDGES[FORCE];
+    }
+    nudges
+}
+
+/// A window of an axis beside its looks.
+struct Seen<'a> {
+    course: &'a Course,
+    axis: usize,
+    from: usize,
+    colours: &'a [f64; CHANNELS],
+    looks: &'a [Readings],
+}
+
+impl Seen<'_> {
+    /// Solves the window; `None` when it has too few samples.
+    fn solve(&self) -> Option<Solved> {
+        let mut normal = Normal::zeros();
+        let mut right = Theta::zeros();
+        let mut pressure = [Theta::zeros(), Theta::zeros()];
+        let (mut squares, mut used) = (0.0, 0);
+        for channel in (0..CHANNELS).filter(|channel| *channel != 1 || !self.force_is_input()) {
+            let phi = self.colours[channel];
+            let white = (1.0 - phi * phi).sqrt();
+            let mut before: Option<(Theta, f64)> = None;
+            for at in 0..WINDOW {
+                let Some((row, residual)) = self.row(at, channel) else {
+                    before = None;
+                    continue;
+                };
+                let (mut own, mut left, mut one) = (row, residual, 1.0 / self.noise(channel));
+                if let Some((row, residual)) = before {
+                    own = (own - row * phi) / white;
+                    left = (left - phi * residual) / white;
+                    one *= (1.0 - phi) / white;
+                }
+                before = Some((row, residual));
+                normal.syger(1.0, &own, &own, 1.0);
+                right += own * left;
+                squares += left * left;
+                used += 1;
+                if channel >= 2 {
+                    pressure[channel - 2] += own * one;
+                }
+            }
+        }
+        if used < WINDOW * CHANNELS / 2 {
+            return None;
+        }
+        normal.fill_upper_triangle_with_lower_triangle();
+        let equations = Equations { normal, right, squares, freedom: (used - NUMBERS) as f64, pressure };
+        let bound = equations.solve(NO_OFFSET_N)?;
+        let forces_n = self.looks[0][self.axis].iter().map(|reading| reading[1]);
+        let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
+        Some(Solved {
+            from: self.from,
+            baseline_force_n,
+            smooth: self.is_smooth(),
+            free: equations.solve(PRIORS[OFFSET])?,
+            bound,
+        })
+    }
+
+    /// A reading's sensitivities and residual over its noise.
+    fn row(&self, at: usize, channel: usize) -> Option<(Theta, f64)> {
+        let sample = self.course.samples[self.from + at][self.axis][channel]?;
+        let rests = self.course.points[self.from][self.axis].rod_velocity_m_per_s == 0.0;
+        let weight = 1.0 / self.noise(channel);
+        let baseline = self.looks[0][self.axis][at][channel];
+        let mut row = Theta::zeros();
+        for number in 0..OFFSET {
+            // A speed that is known to be 0 is no unknown.
+            if number != 1 || !rests {
+                row[number] =
+                    (self.looks[number + 1][self.axis][at][channel] - baseline) / NUDGES[number] * weight;
+            }
+        }
+        if channel == 1 {
+            row[OFFSET] = weight;
+        }
+        Some((row, (sample - baseline) * weight))
+    }
+
+    /// Whether a small force and its opposite do the same the other way: not so where a piston stops, breaks away or turns.
+    fn is_smooth(&self) -> bool {
+        let (mut sum, mut difference) = (0.0, 0.0);
+        for at in 0..WINDOW {
+            for channel in 0..CHANNELS {
+                let of = |look: usize| self.looks[look][self.axis][at][channel] / self.noise(channel);
+                let (plus, minus) = (of(1 + FORCE) - of(0), of(OPPOSITE) - of(0));
+                sum += (plus + minus).powi(2);
+                difference += (plus - minus).powi(2);
+            }
+        }
+        sum <= (2.0 * KINK).powi(2) * difference
+    }
+
+    fn noise(&self, channel: usize) -> f64 {
+        self.course.noise[self.axis][channel]
+    }
+
+    /// Whether the contact's force is what this axis' sensor read: then it tells nothing else.
+    fn force_is_input(&self) -> bool {
+        self.course.linked && self.axis == usize::from(self.course.measured[1])
+    }
+}
+
+/// What the readings of a window say.
+struct Equations {
+    normal: Normal,
+    right: Theta,
+    squares: f64,
+    freedom: f64,
+    pressure: [Theta; 2],
+}
+
+impl Equations {
+    fn solve(&self, offset_prior_n: f64) -> Option<Solution> {
+        let prior = |number: usize| if number == OFFSET { offset_prior_n } else { PRIORS[number] };
+        let precision = Theta::from_fn(|number, _| prior(number).powi(-2));
+        let p = (self.normal + Normal::from_diagonal(&precision)).cholesky()?.inverse();
+        let theta = p * self.right;
+        // What stays of the residuals: a window that constants do not describe has wider deviations.
+        let left = self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
+        let birge = (left / self.freedom).max(1.0).sqrt();
+        let mut deviation = Theta::zeros();
+        for number in 0..NUMBERS {
+            // Unknown inputs are 0 here; start values are somewhere within their priors.
+            let unknown: f64 = (FORCE..NUMBERS).map(|at| (p[(number, at)] / prior(at)).powi(2)).sum();
+            deviation[number] = (p[(number, number)] - unknown).max(0.0).sqrt() * birge;
+        }
+        Some(Solution {
+            theta,
+            deviation,
+            posterior: p.diagonal().map(f64::sqrt),
+            per_pressure_offset: self.pressure.map(|pressure| p * pressure),
+        })
+    }
+}
+
+/// Appends what the windows of an axis tell.
+fn gather(
+    rig: &RigParameters,
+    course: &Course,
+    record: usize,
+    axis: usize,
+    solved: &[Solved],
+    balances: &mut [Vec<UnknownPoint>; 4],
+) {
+    let offsets: Vec<f64> = solved
+        .iter()
+        .filter(|solved| tells(&solved.free, OFFSET))
+        .map(|solved| solved.free.theta[OFFSET] / solved.free.deviation[OFFSET])
+        .collect();
+    let squares = offsets.iter().map(|offset| offset * offset).sum::<f64>() / offsets.len().max(1) as f64;
+    let faulty = squares.sqrt() > OFFSET_OVER_NOISE;
+    for Solved { from, smooth, baseline_force_n, free, bound } in solved {
+        let best = if faulty { free } else { bound };
+        let regimes = Regimes::of(rig, course, axis, *from);
+        let places = [(best, FLOW_A), (best, FLOW_B), (best, FORCE), (free, OFFSET)];
+        for (balance, (solution, number)) in places.into_iter().enumerate() {
+            if !tells(solution, number) || !smooth && number != OFFSET {
+                continue;
+            }
+            let mut variables = variables(course, axis, *from, balance);
+            if balance == 3 {
+                // Over what the sensor reads itself, its every error would be a law.
+                variables[9] = *baseline_force_n;
+            }
+            let scale = if balance < 2 { NORMAL_LITRES_PER_MINUTE } else { 1.0 };
+            balances[balance].push(UnknownPoint {
+                record,
+                window: from / WINDOW,
+                value: solution.theta[number] * scale,
+                deviation: solution.deviation[number] * scale,
+                variables,
+                per_pressure_offset: solution.per_pressure_offset.map(|change| change[number] * scale),
+                regimes,
+            });
+        }
+    }
+}
+
+/// Whether a window tells something of an unknown input.
+fn tells(solution: &Solution, number: usize) -> bool {
+    solution.posterior[number] < NOTHING * PRIORS[number] && solution.deviation[number] > 0.0
+}
+
+/// The variables of a window, in the order of [`VARIABLES`].
+pub(super) fn variables(course: &Course, axis: usize, from: usize, balance: usize) -> [f64; VARIABLES.len()] {
+    let points = &course.points[from..from + WINDOW];
+    let n = WINDOW as f64;
+    let mean = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(of).sum::<f64>() / n;
+    let x = mean(&|at| points[at][axis].extension_m);
+    let v = mean(&|at| points[at][axis].rod_velocity_m_per_s);
+    let [a, b] = [0, 1].map(|chamber| mean(&|at| points[at][axis].pressures_pa[chamber]));
+    let command = |at: usize| course.inputs[at].valve[axis];
+    let u = mean(&|at| command(from + at));
+    let before = from.saturating_sub(1);
+    let rate = (command(from + WINDOW - 1) - command(before)) / (n * PERIOD_S);
+    let forces: Vec<f64> =
+        course.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][1]).collect();
+    let force = if forces.is_empty() { 0.0 } else { forces.iter().sum::<f64>() / forces.len() as f64 };
+    let end = &course.points[from + WINDOW][axis];
+    let slope =
+        |chamber: usize| (end.pressures_pa[chamber] - points[0][axis].pressures_pa[chamber]) / (n * PERIOD_S);
+    let dp = match balance {
+        0 => slope(0),
+        1 => slope(1),
+        _ => slope(0) - slope(1),
+    };
+    let sign = if v == 0.0 { 0.0 } else { v.signum() };
+    [x, v, v.abs(), sign, a, b, a - b, u, rate, force, (from as f64 + n / 2.0) * PERIOD_S, dp]
+}

@@ -1,0 +1,91 @@
+//! The linkage as a balance of its own: the rods' distance against the force that it passes.
+//!
+//! ```text
+//! unknown = F - F_c(d),  in contact:  k (d -+ gap/2) + c dd/dt against the measured force, mean over a window
+//! ```
+//!
+//! Only windows count in which the rods touch on one side throughout: the distance of rods that do not touch is free within the
+//! gap. Two positions of 20 um are some 13 N in a window of 20 ms at 2e6 N/m, whereas the force's own noise is a tenth of a
+//! newton.
+//!
+//! Source: rig-model.md, Masses and linkage.
+
+use super::colour::widens;
+use super::estimate::variables;
+use super::regime::Regimes;
+use super::{UnknownPoint, VARIABLES, WINDOW};
+use crate::course::{Course, PERIOD_S};
+use plant::RigParameters;
+
+/// Force above which the rods touch beyond doubt, over the noise of its sensor.
+const TOUCHING: f64 = 10.0;
+
+/// Appends the linkage's windows of a record with both axes.
+pub(super) fn gather(
+    rig: &RigParameters,
+    course: &Course,
+    record: usize,
+    contact_n: &[f64],
+    position_colours: [f64; 2],
+    points: &mut Vec<UnknownPoint>,
+) {
+    if !course.linked || course.measured != [true, true] {
+        return;
+    }
+    let linkage = rig.linkage();
+    let least_n = TOUCHING * course.noise[1][1];
+    for window in 0..(course.len() - 1) / WINDOW {
+        let from = window * WINDOW;
+        let forces = &contact_n[from..from + WINDOW];
+        let side = forces[0].signum();
+        let touching = forces.iter().all(|force| force * side > least_n);
+        if !touching || course.gaps[from..=from + WINDOW].iter().any(|gap| *gap) {
+            continue;
+        }
+        let mut sum_n = 0.0;
+        let mut count = 0.0;
+        let mut ends_m = Vec::with_capacity(WINDOW);
+        for (at, force_n) in forces.iter().enumerate() {
+            let samples = &course.samples[from + at];
+            let (Some(drive_m), Some(load_m)) = (samples[0][0], samples[1][0]) else { continue };
+            let distance_m = load_m - drive_m;
+            ends_m.push(distance_m);
+            sum_n += force_n - linkage.stiffness_n_per_m * (distance_m - side * 0.5 * linkage.gap_m);
+            count += 1.0;
+        }
+        if count < WINDOW as f64 / 2.0 {
+            continue;
+        }
+        let parted_m_per_s = slope(&ends_m) / PERIOD_S;
+        let [drive_m, load_m] = [0, 1].map(|axis| course.noise[axis][0] * widens(position_colours[axis]));
+        let noise_m = drive_m.hypot(load_m);
+        let n = count;
+        // The damping takes the slope of the same distances; both are independent about the middle of a window.
+        let slope_noise_m_per_s = noise_m * (12.0 / (n * n * n)).sqrt() / PERIOD_S;
+        let stiff_n = linkage.stiffness_n_per_m * noise_m / n.sqrt();
+        let damped_n = linkage.damping_n_s_per_m * slope_noise_m_per_s;
+        let mut variables: [f64; VARIABLES.len()] = variables(course, 0, from, 2);
+        variables[9] = forces.iter().sum::<f64>() / WINDOW as f64;
+        points.push(UnknownPoint {
+            record,
+            window,
+            value: sum_n / count - linkage.damping_n_s_per_m * parted_m_per_s,
+            deviation: stiff_n.hypot(damped_n).hypot(course.noise[1][1] / n.sqrt()),
+            variables,
+            per_pressure_offset: [0.0; 2],
+            regimes: Regimes::of(rig, course, 0, from),
+        });
+    }
+}
+
+/// Slope of a straight line through equally spaced values, per space.
+fn slope(values: &[f64]) -> f64 {
+    let middle = (values.len() as f64 - 1.0) / 2.0;
+    let (mut above, mut below) = (0.0, 0.0);
+    for (at, value) in values.iter().enumerate() {
+        let from_middle = at as f64 - middle;
+        above += from_middle * value;
+        below += from_middle * from_middle;
+    }
+    if below > 0.0 { above / below } else { 0.0 }
+}

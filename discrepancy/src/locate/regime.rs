@@ -1,0 +1,48 @@
+//! What went on in a window: at rest, just broken away, moving out or in, near an end, after a valve edge.
+//!
+//! A window is in one of hold, onset, motion-out and motion-in, and besides in near-ends and valve-edge where it is so.
+
+use super::WINDOW;
+use crate::course::{Course, Point};
+use plant::RigParameters;
+
+/// The regimes, in the order of the report.
+pub const REGIMES: [&str; 6] = ["hold", "onset", "motion-out", "motion-in", "near-ends", "valve-edge"];
+/// How long after leaving rest the onset lasts, periods.
+const ONSET: usize = 100;
+/// How far from an end of the stroke is near, m.
+const NEAR_M: f64 = 0.03;
+/// Change of the command in a period that is an edge, share of full opening.
+const EDGE: f64 = 0.2;
+/// How long after an edge, periods.
+const AFTER_EDGE: usize = 20;
+
+/// The regimes of a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Regimes {
+    in_regime: [bool; REGIMES.len()],
+}
+
+impl Regimes {
+    /// The regimes of an axis in a window that starts at a period.
+    pub(super) fn of(rig: &RigParameters, course: &Course, axis: usize, from: usize) -> Self {
+        let point = |period: usize| -> &Point { &course.points[period.min(course.len() - 1)][axis] };
+        let rests = |period: usize| point(period).rod_velocity_m_per_s == 0.0;
+        let hold = (from..=from + WINDOW).all(rests);
+        let onset = !hold && (from.saturating_sub(ONSET)..from + WINDOW).any(rests);
+        let out = point(from + WINDOW / 2).rod_velocity_m_per_s >= 0.0;
+        let middle_m = point(from + WINDOW / 2).extension_m;
+        let near = middle_m.min(rig.cylinder().stroke_m - middle_m) < NEAR_M;
+        let command = |period: usize| course.inputs[period].valve[axis];
+        let edge = (from.saturating_sub(AFTER_EDGE).max(1)..from + WINDOW)
+            .any(|period| (command(period) - command(period - 1)).abs() > EDGE);
+        let moving = !hold && !onset;
+        Regimes { in_regime: [hold, onset, moving && out, moving && !out, near, edge] }
+    }
+
+    /// Whether the window is in a regime.
+    #[must_use]
+    pub fn contains(&self, regime: &str) -> bool {
+        REGIMES.iter().zip(self.in_regime).any(|(name, within)| *name == regime && within)
+    }
+}

@@ -1,0 +1,167 @@
+//! A window in the simulator, with nudges of its initial state and of its unknown inputs.
+//!
+//! Windows begin where the course was; spool, lagged flows and what effects remember go on from the plant before. When linked,
+//! the contact force is an input of both axes and not simulated: at 2 N per micrometre the positions do not tell it. It acts as
+//! a hand would, so that the force sensors read it as they do in the rig [rig-model.md, Masses and linkage]. So the axes do not
+//! know each other, and one run nudges both.
+//!
+//! An unknown force acts as a hand too; what the sensor would read of the hand is put back. An unknown flow is added to the
+//! stored air at the end of each period.
+
+use super::WINDOW;
+use crate::course::{CHANNELS, Course, PERIOD_S, Point};
+use plant::{Inputs, Plant, RigParameters, Setup, State};
+
+/// Readings of a window, as whoever has no noise sees them.
+pub(super) type Readings = [[[f64; CHANNELS]; WINDOW]; 2];
+
+/// A change of a window, in the own extension of each axis.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Nudge {
+    /// Of extension, m; rod velocity, m/s; pressures a and b, Pa.
+    pub(super) start: [[f64; 4]; 2],
+    /// Force through the whole window, N.
+    pub(super) force_n: [f64; 2],
+    /// Force that grows from its negative to itself, N.
+    pub(super) ramp_n: [f64; 2],
+    /// Normal flow into a and b, m^3/s.
+    pub(super) flows_m3_per_s: [[f64; 2]; 2],
+}
+
+/// The plant that goes along a record.
+pub(super) struct Pass<'a> {
+    course: &'a Course,
+    contact_n: Vec<f64>,
+    plant: Plant,
+}
+
+impl<'a> Pass<'a> {
+    /// A plant at the beginning of a record; `None` when the rig cannot be in such a state.
+    pub(super) fn new(rig: &RigParameters, course: &'a Course) -> Option<Self> {
+        let setup = Setup { added_mass_kg: course.added_mass_kg, ..Setup::default() };
+        let mut plant = Plant::new(rig, &setup).ok()?;
+        let mut state = *plant.state();
+        for (axis, own) in state.axes.iter_mut().enumerate() {
+            own.spool = course.inputs[0].valve[axis];
+        }
+        plant.go_on_in(&state).ok()?;
+        Some(Pass { course, contact_n: contact_forces(rig, course), plant })
+    }
+
+    /// F_c over the record, N, in +x on the carriage; all 0 when not linked.
+    pub(super) fn contact_n(&self) -> &[f64] {
+        &self.contact_n
+    }
+
+    /// The readings of the window at a period with each nudge; `None` when it is a state that the rig cannot be in.
+    pub(super) fn look(&self, from: usize, nudges: &[Nudge]) -> Option<Vec<Readings>> {
+        nudges.iter().map(|nudge| self.run(from, nudge)).collect()
+    }
+
+    fn run(&self, from: usize, nudge: &Nudge) -> Option<Readings> {
+        let mut plant = self.plant.clone();
+        let points = [0, 1].map(|axis| {
+            let mut point = self.course.points[from][axis];
+            let [x, v, a, b] = nudge.start[axis];
+            point.extension_m += x;
+            point.rod_velocity_m_per_s += v;
+            point.pressures_pa[0] += a;
+            point.pressures_pa[1] += b;
+            point
+        });
+        plant.go_on_in(&seated(&plant, &points, self.course.measured)).ok()?;
+        let flows = nudge.flows_m3_per_s.iter().flatten().any(|flow| *flow != 0.0);
+        let mut read = [[[0.0; CHANNELS]; 2]; WINDOW];
+        for (at, own) in read.iter_mut().enumerate() {
+            let share = (at as f64 + 0.5) / WINDOW as f64 * 2.0 - 1.0;
+            let forces = [0, 1].map(|axis| nudge.force_n[axis] + nudge.ramp_n[axis] * share);
+            let inputs = self.inputs(from + at, forces);
+            // What is read is the contact's force of the instant, what acts over the period the mean of both its ends.
+            let contact_n = self.contact_n[from + at];
+            let instant = Inputs {
+                hand_force_carriage_n: contact_n + forces[0],
+                hand_force_load_n: -contact_n - forces[1],
+                ..inputs
+            };
+            *own = plant.shown(&plant.truth(&instant));
+            own.iter_mut().zip(forces).for_each(|(reading, force_n)| reading[1] += force_n);
+            plant.step(&inputs);
+            if flows {
+                let mut state = *plant.state();
+                for (own, flow) in state.axes.iter_mut().zip(nudge.flows_m3_per_s) {
+                    let air_j = plant.rig().gas().normal_pressure_pa * PERIOD_S;
+                    own.stored_air_a_j += air_j * flow[0];
+                    own.stored_air_b_j += air_j * flow[1];
+                }
+                plant.go_on_in(&state).ok()?;
+            }
+        }
+        Some([0, 1].map(|axis| read.map(|own| own[axis])))
+    }
+
+    /// Goes on to the next window, seated where the record was.
+    pub(super) fn go_on(&mut self, from: usize, periods: usize) {
+        if !self.course.gaps[from] {
+            let start = seated(&self.plant, &self.course.points[from], self.course.measured);
+            // Points that the rig cannot have come of a broken record; the plant then goes on alone.
+            let _ = self.plant.go_on_in(&start);
+        }
+        for at in from..from + periods {
+            let inputs = self.inputs(at, [0.0; 2]);
+            self.plant.step(&inputs);
+        }
+    }
+
+    /// What acts over a period: commands, the contact's force, and unknown forces along the own extensions, N.
+    fn inputs(&self, at: usize, forces_n: [f64; 2]) -> Inputs {
+        let contact_n = 0.5 * (self.contact_n[at] + self.contact_n[(at + 1).min(self.contact_n.len() - 1)]);
+        Inputs {
+            valve: self.course.inputs[at].valve,
+            hand_force_carriage_n: contact_n + forces_n[0],
+            hand_force_load_n: -contact_n - forces_n[1],
+        }
+    }
+}
+
+/// The contact's force from what the sensors read: -F of the load, or of the drive without what its carriage takes.
+fn contact_forces(rig: &RigParameters, course: &Course) -> Vec<f64> {
+    if !course.linked {
+        return vec![0.0; course.len()];
+    }
+    let axis = usize::from(course.measured[1]);
+    let behind_kg = rig.mass().carriage_kg + course.added_mass_kg;
+    let mut last_n = 0.0;
+    (0..course.len())
+        .map(|at| {
+            let inertia_n = if axis == 0 { behind_kg * acceleration(course, at) } else { 0.0 };
+            last_n = course.samples[at][axis][1].map_or(last_n, |force_n| inertia_n - force_n);
+            last_n
+        })
+        .collect()
+}
+
+/// Acceleration of the drive from the speeds 5 ms before and after, m/s^2.
+fn acceleration(course: &Course, at: usize) -> f64 {
+    let (from, to) = (at.saturating_sub(5), (at + 5).min(course.len() - 1));
+    let speed = |at: usize| course.points[at][0].rod_velocity_m_per_s;
+    (speed(to) - speed(from)) / ((to - from) as f64 * PERIOD_S)
+}
+
+/// A plant's state with the mechanical state and the pressures of the measured axes; the rest stays its own.
+fn seated(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
+    let mut state = *plant.state();
+    let truth = plant.truth(&Inputs::default());
+    let cylinder = plant.rig().cylinder();
+    for axis in (0..2).filter(|axis| measured[*axis]) {
+        let (own, point, truth) = (&mut state.axes[axis], &points[axis], &truth.axes[axis]);
+        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+        // The volumes are the plant's own: an effect may have changed them.
+        let volume_a = truth.stored_air_a_j / truth.pressure_a_pa + cylinder.piston_area_m2 * way_m;
+        let volume_b = truth.stored_air_b_j / truth.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
+        own.extension_m += way_m;
+        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
+        own.stored_air_a_j = point.pressures_pa[0] * volume_a;
+        own.stored_air_b_j = point.pressures_pa[1] * volume_b;
+    }
+    state
+}

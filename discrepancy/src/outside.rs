@@ -1,0 +1,161 @@
+//! What the catalogue does not have: the balance that disagrees most, what its unknown input depends on, its curve, a formula.
+//!
+//! ```text
+//!   unknown inputs ──► balance ──► dependence on each variable ──► pairs ──► parsimony ──► curve ──► formula
+//! ```
+//!
+//! It is made from the disagreement with the model as it stands: after calibration, and with what was named already in the rig.
+//! Nothing is said of a balance whose windows are within their noise and follow no variable.
+//!
+//! Of variables that do nearly as well the simplest is told first; where two together do much better than any alone, as in a
+//! friction over position, both lead the list. A constant is told as the variable `constant`.
+//!
+//! Source: discrepancy-notes.md, 9 and Pipeline 8.
+
+pub mod dependence;
+pub mod formula;
+
+use crate::course::Course;
+use crate::locate::maps::map;
+use crate::locate::{UnknownSeries, VARIABLES};
+use crate::report::{Curve, Dependence, Outside};
+use dependence::{Bins, SHIFTS, Sample};
+use plant::RigParameters;
+
+/// How much a variable costs: of those nearly as good the cheapest is told first.
+const COSTS: [usize; VARIABLES.len()] = [0, 0, 1, 0, 0, 0, 1, 0, 2, 1, 3, 2];
+/// Share of the best variable's R2 that is nearly as good.
+const NEARLY: f64 = 0.9;
+/// R2 by which a pair must do better than its better half.
+const PAIR: f64 = 0.15;
+/// R2 below which a variable is no half of a pair: its bins only learned single windows.
+const HALF: f64 = -0.1;
+/// R2 above which a variable goes before the constant: a law through 0 has a mean too.
+const STRONG: f64 = 0.5;
+/// over_noise from which windows alone say that something is missing.
+const LIFTED: f64 = 1.15;
+/// Standard deviations of shifted R2 by which a variable must stand out where the windows alone say nothing: one in a billion for
+/// one test, for some hundred tests of tails that are not quite Gaussian.
+const STANDS_OUT: f64 = 7.0;
+/// Standard errors from 0 of a mean that is something.
+const MEAN: f64 = 6.0;
+/// Windows that a balance needs.
+const LEAST: usize = 100;
+
+/// A balance with what was found of it.
+struct Found<'a> {
+    series: &'a UnknownSeries,
+    sample: Sample,
+    /// For each variable R2, p value, and how far R2 stands out of shifted ones.
+    tests: Vec<(f64, f64, f64)>,
+}
+
+/// What is missing that the catalogue does not have; `None` where nothing is.
+pub fn outside(
+    _rig: &RigParameters,
+    _courses: &[Course],
+    unknowns: &[UnknownSeries],
+    progress: &mut dyn FnMut(&str),
+) -> Option<Outside> {
+    let mut best: Option<(f64, Found<'_>)> = None;
+    for series in unknowns.iter().filter(|series| series.points.len() >= LEAST) {
+        progress(&format!("outside: {}", series.balance));
+        let sample = Sample::of(series);
+        let tests: Vec<_> = (0..VARIABLES.len()).map(|variable| sample.test(variable)).collect();
+        let stands_out = tests.iter().map(|test| test.2).fold(0.0, f64::max);
+        let lifted = series.over_noise().is_some_and(|over| over > LIFTED);
+        if !lifted && stands_out < STANDS_OUT && sample.mean_over_error().abs() < MEAN {
+            continue;
+        }
+        let excess = sample.excess();
+        if best.as_ref().is_none_or(|(most, _)| excess > *most) {
+            best = Some((excess, Found { series, sample, tests }));
+        }
+    }
+    best.map(|(_, found)| found.told())
+}
+
+impl Found<'_> {
+    fn told(&self) -> Outside {
+        let order = self.order();
+        let constant = self.sample.constant_share();
+        let explained = order.first().map_or(0.0, |first| self.tests[*first].0);
+        let mut variables: Vec<Dependence> = order
+            .iter()
+            .map(|variable| {
+                let (r2, p_value, _) = self.tests[*variable];
+                Dependence { variable: VARIABLES[*variable].to_owned(), r2, p_value }
+            })
+            .collect();
+        let mean = self.sample.mean_over_error().abs();
+        if mean > MEAN && constant > explained * (1.0 - constant) {
+            let p_value = 1.0 / (SHIFTS as f64 + 1.0);
+            let place = usize::from(explained > STRONG);
+            variables.insert(place, Dependence { variable: "constant".to_owned(), r2: constant, p_value });
+        }
+        let formula =
+            if variables.is_empty() { None } else { formula::formula(&self.sample, self.series.unit) };
+        Outside {
+            balance: self.series.balance.clone(),
+            curve: order.first().map(|first| smooth(map(self.series, *first), VARIABLES[*first])),
+            formula,
+            variables,
+        }
+    }
+
+    /// Variables that explain something, the strongest first, the simplest first among those nearly as strong.
+    fn order(&self) -> Vec<usize> {
+        let r2 = |variable: &usize| self.tests[*variable].0;
+        let mut order: Vec<usize> = (0..VARIABLES.len()).filter(|variable| r2(variable) > 0.0).collect();
+        order.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
+        let Some(most) = order.first().map(r2) else { return order };
+        let near = order.iter().take_while(|variable| r2(variable) >= NEARLY * most).count();
+        order[..near].sort_by_key(|variable| COSTS[*variable]);
+        if let Some((pair, together)) = self.pair()
+            && together > most + PAIR
+        {
+            let mut pair = pair;
+            pair.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
+            order.retain(|variable| !pair.contains(variable));
+            order.splice(0..0, pair);
+        }
+        order
+    }
+
+    /// The pair of variables that explains most, time left out: with another it is but a name of each window.
+    fn pair(&self) -> Option<([usize; 2], f64)> {
+        let mut best: Option<([usize; 2], f64)> = None;
+        for left in 0..VARIABLES.len() {
+            for right in left + 1..VARIABLES.len() {
+                let is_half = |at: usize| at != dependence::TIME && self.tests[at].0 > HALF;
+                if !is_half(left) || !is_half(right) {
+                    continue;
+                }
+                let r2 = self.sample.explained(&Bins::of_pair(&self.sample, left, right), 0);
+                if best.is_none_or(|(_, most)| r2 > most) {
+                    best = Some(([left, right], r2));
+                }
+            }
+        }
+        best
+    }
+}
+
+/// A map with each bin drawn to its neighbours by their weights, and a band that is narrower for it.
+fn smooth(mut curve: Curve, variable: &str) -> Curve {
+    let weights: Vec<f64> = curve.band.iter().map(|band| band.powi(-2)).collect();
+    let values = curve.value.clone();
+    for at in 0..values.len() {
+        let (mut sum, mut weight, mut squares) = (0.0, 0.0, 0.0);
+        for near in at.saturating_sub(1)..(at + 2).min(values.len()) {
+            let own = weights[near] * if near == at { 2.0 } else { 1.0 };
+            sum += own * values[near];
+            weight += own;
+            squares += own * own / weights[near];
+        }
+        curve.value[at] = sum / weight;
+        curve.band[at] = squares.sqrt() / weight;
+    }
+    variable.clone_into(&mut curve.variable);
+    curve
+}

@@ -1,0 +1,171 @@
+//! Statistical dependence of an unknown input on a variable.
+//!
+//! ```text
+//! R2 = 1 - sum w (d - m(bin))^2 / sum w (d - mean)^2        m from the other fold, folds of alternate fifths of a second
+//! p  = (1 + shifts whose R2 is as large) / (1 + shifts)     200 circular shifts of the input against the variable
+//! ```
+//!
+//! d unknown input, w = 1/deviation^2, 20 bins with equally many windows or of equal width, whichever tells more. A shift keeps
+//! how slowly both go, and breaks what ties them; so a slow drift is not taken for a law.
+//!
+//! Source: discrepancy-notes.md, 9 and Pipeline 8.
+
+use crate::locate::maps::{BINS, bins};
+use crate::locate::{UnknownSeries, VARIABLES};
+
+/// Circular shifts.
+pub const SHIFTS: usize = 200;
+/// Place of time among the variables.
+pub const TIME: usize = 10;
+/// Windows of a block of a fold: 0.2 s, so that both folds see each stroke in all its parts.
+const BLOCK: usize = 10;
+/// Bins to each side of a pair.
+const PAIR_BINS: usize = 6;
+
+/// An unknown input without what is not needed for its law.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    values: Vec<f64>,
+    weights: Vec<f64>,
+    variables: Vec<[f64; VARIABLES.len()]>,
+    folds: Vec<usize>,
+}
+
+/// Which bin each window is in.
+#[derive(Clone, Debug)]
+pub struct Bins {
+    places: Vec<usize>,
+    count: usize,
+}
+
+impl Bins {
+    /// Bins of a variable.
+    #[must_use]
+    pub fn of(sample: &Sample, variable: usize) -> Self {
+        let values: Vec<f64> = sample.variables.iter().map(|own| own[variable]).collect();
+        Bins { places: bins(&values), count: BINS }
+    }
+
+    /// Bins of equal width: a pulse that few windows have stands in bins of its own.
+    #[must_use]
+    pub fn even(sample: &Sample, variable: usize) -> Self {
+        let values = || sample.variables.iter().map(|own| own[variable]);
+        let least = values().fold(f64::INFINITY, f64::min);
+        let width = (values().fold(f64::NEG_INFINITY, f64::max) - least) / BINS as f64;
+        let place = |value: f64| if width > 0.0 { ((value - least) / width) as usize } else { 0 };
+        Bins { places: values().map(|value| place(value).min(BINS - 1)).collect(), count: BINS }
+    }
+
+    /// Bins of a pair of variables.
+    #[must_use]
+    pub fn of_pair(sample: &Sample, left: usize, right: usize) -> Self {
+        let coarse = |place: &usize| place * PAIR_BINS / BINS;
+        let places = Bins::of(sample, left)
+            .places
+            .iter()
+            .zip(&Bins::of(sample, right).places)
+            .map(|(left, right)| coarse(left) * PAIR_BINS + coarse(right))
+            .collect();
+        Bins { places, count: PAIR_BINS * PAIR_BINS }
+    }
+}
+
+impl Sample {
+    /// A series without what is not needed.
+    #[must_use]
+    pub fn of(series: &UnknownSeries) -> Self {
+        let points = &series.points;
+        Sample {
+            values: points.iter().map(|point| point.value).collect(),
+            weights: points.iter().map(|point| point.deviation.powi(-2)).collect(),
+            variables: points.iter().map(|point| point.variables).collect(),
+            folds: points.iter().map(|point| (point.window / BLOCK) % 2).collect(),
+        }
+    }
+
+    /// Value, weight and variables of each window.
+    pub fn rows(&self) -> impl Iterator<Item = (f64, f64, &[f64; VARIABLES.len()])> {
+        self.values
+            .iter()
+            .zip(&self.weights)
+            .zip(&self.variables)
+            .map(|((value, weight), own)| (*value, *weight, own))
+    }
+
+    /// R2 over a variable, its p value, and by how many standard deviations it stands out of shifted ones.
+    #[must_use]
+    pub fn test(&self, variable: usize) -> (f64, f64, f64) {
+        let both = [Bins::of(self, variable), Bins::even(self, variable)];
+        let most = |shift: usize| {
+            both.iter().map(|bins| self.explained(bins, shift)).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let r2 = most(0);
+        let n = self.values.len();
+        let shifted: Vec<f64> = (1..=SHIFTS).map(|at| most(at * n / (SHIFTS + 1))).collect();
+        let reached = shifted.iter().filter(|other| **other >= r2).count();
+        let mean = shifted.iter().sum::<f64>() / SHIFTS as f64;
+        let variance = shifted.iter().map(|other| (other - mean).powi(2)).sum::<f64>() / (SHIFTS - 1) as f64;
+        let stands_out = if variance > 0.0 { (r2 - mean) / variance.sqrt() } else { 0.0 };
+        (r2, (1 + reached) as f64 / (1 + SHIFTS) as f64, stands_out)
+    }
+
+    /// R2 of bin means on the fold that they are not from, with the input shifted by some windows.
+    #[must_use]
+    pub fn explained(&self, bins: &Bins, shift: usize) -> f64 {
+        let n = self.values.len();
+        let from = |at: usize| (at + shift) % n;
+        let mut sums = vec![[[0.0; 2]; 2]; bins.count];
+        let mut all = [[0.0; 2]; 2];
+        for at in 0..n {
+            let (value, weight) = (self.values[from(at)], self.weights[from(at)]);
+            let fold = self.folds[at];
+            for sum in [&mut sums[bins.places[at]][fold], &mut all[fold]] {
+                sum[0] += weight * value;
+                sum[1] += weight;
+            }
+        }
+        let mean = |sum: &[f64; 2]| if sum[1] > 0.0 { sum[0] / sum[1] } else { 0.0 };
+        let (mut left, mut whole) = (0.0, 0.0);
+        for at in 0..n {
+            let (value, weight) = (self.values[from(at)], self.weights[from(at)]);
+            let other = 1 - self.folds[at];
+            let own = &sums[bins.places[at]][other];
+            let middle = mean(&all[other]);
+            let told = if own[1] > 0.0 { mean(own) } else { middle };
+            left += weight * (value - told).powi(2);
+            whole += weight * (value - middle).powi(2);
+        }
+        if whole > 0.0 { 1.0 - left / whole } else { 0.0 }
+    }
+
+    /// Weighted squares beyond those of noise.
+    #[must_use]
+    pub fn excess(&self) -> f64 {
+        self.squares() - self.values.len() as f64
+    }
+
+    /// The weighted mean over its standard error.
+    #[must_use]
+    pub fn mean_over_error(&self) -> f64 {
+        let (sum, weight) = self.mean();
+        sum / weight.sqrt()
+    }
+
+    /// Share of the squares that the mean explains.
+    #[must_use]
+    pub fn constant_share(&self) -> f64 {
+        let (sum, weight) = self.mean();
+        sum * sum / weight / self.squares()
+    }
+
+    /// Weighted sum of squares.
+    #[must_use]
+    pub fn squares(&self) -> f64 {
+        self.values.iter().zip(&self.weights).map(|(value, weight)| weight * value * value).sum()
+    }
+
+    fn mean(&self) -> (f64, f64) {
+        let sum = self.values.iter().zip(&self.weights).map(|(value, weight)| weight * value).sum();
+        (sum, self.weights.iter().sum())
+    }
+}

@@ -1,0 +1,122 @@
+//! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
+
+use discrepancy::check::check;
+use discrepancy::course::Course;
+use discrepancy::locate::{Located, locate};
+use discrepancy::outside::outside;
+use discrepancy::records::{ReadOptions, read};
+use discrepancy::report::Outside;
+use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
+use std::fmt::Write;
+
+/// Twelve seconds of the drive: a second of rest, then strokes over most of its way and rests between.
+fn course(hidden: &RigParameters, seed: u64) -> Course {
+    let mut plant = Plant::new(hidden, &Setup::default()).expect("a setup of the rig");
+    let mut sensors = Sensors::new(hidden, seed);
+    let mut text = String::from(
+        "time_s,drive_valve,drive_position_m,drive_force_N,drive_pressure_a_Pa,drive_pressure_b_Pa\n",
+    );
+    for cycle in 0..12_000 {
+        let at_s = f64::from(cycle) * 1e-3;
+        let [shown, _] = sensors.sample(&plant, &Inputs::default());
+        let aim_m = 0.1 + 0.3 * (0.5 - 0.5 * (1.3 * (at_s - 1.0).max(0.0)).cos());
+        // A pause in every fourth second.
+        let valve = if at_s < 1.0 || at_s % 4.0 > 3.3 { 0.0 } else { 8.0 * (aim_m - shown.position.value) };
+        let valve = quantise_valve(valve.clamp(-1.0, 1.0));
+        let [position, force, a, b] =
+            [shown.position, shown.force, shown.pressure_a, shown.pressure_b].map(|reading| reading.value);
+        writeln!(text, "{at_s:.3},{valve},{position},{force},{a},{b}").expect("a string takes all");
+        plant.step(&Inputs { valve: [valve, 0.0], ..Inputs::default() });
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("measurement.csv");
+    std::fs::write(&file, text).expect("the folder is ours");
+    let record = read(&file, &ReadOptions::default()).expect("a record");
+    let rig = RigParameters::baseline();
+    Course::of(&record, &check(&record, &rig), &rig).expect("both are whole")
+}
+
+/// Name, place and numbers of an effect.
+type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
+
+fn located(effect: Option<Hidden<'_>>) -> (Located, Option<Outside>) {
+    let rig = RigParameters::baseline();
+    let hidden = effect.map_or(rig.clone(), |(name, place, numbers)| {
+        rig.with_effect(name, place, numbers).expect("numbers of the sheet")
+    });
+    let courses = [course(&hidden, 11)];
+    let located = locate(&rig, &courses, &mut |_| ());
+    let outside = outside(&rig, &courses, &located.unknowns, &mut |_| ());
+    (located, outside)
+}
+
+fn over_noise(located: &Located, balance: &str) -> f64 {
+    let bar = located.location.balances.iter().find(|bar| bar.balance == balance);
+    bar.unwrap_or_else(|| panic!("{balance} is told")).over_noise
+}
+
+#[test]
+fn where_nothing_is_missing_every_balance_is_noise_and_nothing_is_outside() {
+    let (located, outside) = located(None);
+    for bar in &located.location.balances {
+        // Some 500 windows: three standard errors of an rms are 0.1; the deviations themselves are good to a tenth.
+        assert!((0.85..1.15).contains(&bar.over_noise), "{bar:?}");
+    }
+    assert!(outside.is_none(), "{outside:?}");
+    assert_eq!(located.location.sensor_ratio, None);
+}
+
+#[test]
+fn a_hidden_inclination_lifts_the_force_alone_and_is_a_constant() {
+    let (located, outside) = located(Some(("inclination", "drive", &[("force_n", 20.0)])));
+    assert!(over_noise(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
+    for flow in ["drive.flow-a", "drive.flow-b"] {
+        assert!(over_noise(&located, flow) < 1.15, "{:?}", located.location.balances);
+    }
+    let outside = outside.expect("something is missing");
+    assert_eq!(outside.balance, "drive.force");
+    assert_eq!(outside.variables[0].variable, "constant");
+    let force = located.unknowns.iter().find(|series| series.balance == "drive.force").expect("it is told");
+    // Its size: mean of some hundred windows of a newton each.
+    let text = outside.formula.expect("a constant is short");
+    let value: f64 =
+        text.split_whitespace().next().and_then(|word| word.parse().ok()).expect("a number first");
+    assert!((value - 20.0).abs() < 1.0, "{text}, {} windows", force.points.len());
+}
+
+#[test]
+fn a_hidden_leak_lifts_its_chamber_and_not_the_force() {
+    let (located, outside) = located(Some(("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)])));
+    assert!(over_noise(&located, "drive.flow-b") > 1.5, "{:?}", located.location.balances);
+    assert!(over_noise(&located, "drive.flow-a") < 1.15, "{:?}", located.location.balances);
+    assert!(over_noise(&located, "drive.force") < 1.15, "{:?}", located.location.balances);
+    assert_eq!(outside.expect("something is missing").balance, "drive.flow-b");
+}
+
+#[test]
+fn a_hidden_spring_is_a_force_over_x() {
+    let numbers = [("spring_n", 40.0)];
+    let (located, outside) = located(Some(("position-dependent-force", "drive", &numbers)));
+    assert!(over_noise(&located, "drive.force") > 3.0, "{:?}", located.location.balances);
+    let outside = outside.expect("something is missing");
+    assert_eq!((outside.balance.as_str(), outside.variables[0].variable.as_str()), ("drive.force", "x"));
+    let curve = outside.curve.expect("there is a variable");
+    // -40 (x - 250 mm) / 250 mm at every bin, within five standard errors.
+    for ((x, value), band) in curve.at.iter().zip(&curve.value).zip(&curve.band) {
+        let law = -40.0 * (x - 0.25) / 0.25;
+        assert!((value - law).abs() < 2.5 * band + 1.0, "{x}: {value} for {law}, band {band}");
+    }
+}
+
+#[test]
+fn a_pressure_sensors_offset_moves_two_balances_in_the_ratio_of_geometry() {
+    let (located, _) = located(Some(("pressure-sensor-offset", "drive.a", &[("offset_mbar", 60.0)])));
+    let note = located.location.sensor_ratio.expect("both stand out");
+    assert!(note.contains("pressure sensor a"), "{note}");
+}
+
+#[test]
+fn the_same_records_give_the_same_bits() {
+    let tell = || format!("{:?}", located(None).0.location);
+    assert_eq!(tell(), tell());
+}
