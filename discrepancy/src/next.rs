@@ -4,15 +4,16 @@
 //!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair ──► most pairs apart, then largest least T
 //! ```
 //!
-//! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude (`next/divergence.rs`); 25, five
-//! standard deviations, are wanted. Repetitions add up: an experiment that reaches 25 in [`MOST_REPETITIONS`] is proposed with so
-//! many. Where none does, [`otherwise`] says what would and the controller cannot do: tilting, uncoupling, a locked piston.
+//! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude, against noise and against what no
+//! model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise: an experiment that
+//! reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`otherwise`] says what would and the controller cannot do: tilting, uncoupling, a locked piston.
 //!
 //! | file | holds |
 //! |---|---|
 //! | [`menu`] | the experiments |
 //! | [`driven`] | one of them in closed loop with an explanation's rig |
 //! | [`divergence`] | how far explanations lie apart in it |
+//! | [`nuisance`] | numbers of the baseline that are refitted beside |
 //! | [`otherwise`] | what would separate effects where no experiment does |
 //!
 //! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner 1965.
@@ -20,10 +21,11 @@
 pub mod divergence;
 pub mod driven;
 pub mod menu;
+pub mod nuisance;
 pub mod otherwise;
 
 use crate::report::Next;
-use divergence::divergences;
+use divergence::{Divergence, divergences};
 use driven::drive;
 use menu::{Entry, MENU};
 use plant::RigParameters;
@@ -54,8 +56,8 @@ impl Explanation {
 pub struct Judged {
     /// The entry.
     pub name: &'static str,
-    /// T of each ordered pair: one, its rival, T in squared standard deviations.
-    pub pairs: Vec<(usize, usize, f64)>,
+    /// Each ordered pair: the true one, its rival, how they differ.
+    pub pairs: Vec<(usize, usize, Divergence)>,
 }
 
 /// What is proposed.
@@ -70,22 +72,21 @@ pub struct Proposal {
 }
 
 impl Judged {
-    /// The smallest divergence of its pairs.
+    /// The smallest T of its pairs, in one repetition.
     #[must_use]
     pub fn least(&self) -> f64 {
-        self.pairs.iter().map(|(_, _, value)| *value).fold(f64::INFINITY, f64::min)
+        self.pairs.iter().map(|pair| pair.2.in_repetitions(1)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Pairs that reach what is wanted in so many repetitions.
-    fn apart(&self, repetitions: u32) -> usize {
-        self.pairs.iter().filter(|(_, _, value)| value * f64::from(repetitions) >= WANTED).count()
+    /// T of the pairs that reach what is wanted in [`MOST_REPETITIONS`], in so many.
+    fn apart(&self, times: u32) -> impl Iterator<Item = f64> {
+        let enough = self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= WANTED);
+        enough.map(move |pair| pair.2.in_repetitions(times))
     }
 
-    /// The smallest divergence of those pairs; 0 without one.
-    fn least_apart(&self, repetitions: u32) -> f64 {
-        let enough =
-            self.pairs.iter().map(|pair| pair.2).filter(|value| value * f64::from(repetitions) >= WANTED);
-        let least = enough.fold(f64::INFINITY, f64::min);
+    /// The smallest of those; 0 without one.
+    fn least_apart(&self, times: u32) -> f64 {
+        let least = self.apart(times).fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 0.0 }
     }
 }
@@ -118,23 +119,20 @@ pub fn judge(
     explanations: &[Explanation],
     axes_measured: [bool; 2],
 ) -> Option<Judged> {
+    let named = |name: &&str| explanations.iter().any(|one| one.names.iter().any(|own| own == name));
+    let numbers = nuisance::NAMES.iter().filter(|name| !named(name));
+    let numbers: Vec<_> = numbers.filter_map(|name| nuisance::off(baseline, name).ok()).collect();
     let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
         .into_par_iter()
         .map(|own| {
             let driven = drive(entry, baseline, &explanations[own].rig).ok()?;
             let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != own).collect();
             let rigs: Vec<_> = [own].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
-            let values = divergences(&driven, baseline, &rigs, axes_measured);
+            let values = divergences(&driven, baseline, &rigs, &numbers, axes_measured);
             Some(rivals.into_iter().zip(values).map(|(rival, value)| (own, rival, value)).collect())
         })
         .collect();
     Some(Judged { name: entry.name, pairs: pairs?.concat() })
-}
-
-/// Repetitions with which this least divergence reaches what is wanted.
-fn repetitions(least: f64) -> u32 {
-    // At most MOST_REPETITIONS by the choice of the pairs.
-    (WANTED / least).ceil().clamp(1.0, f64::from(MOST_REPETITIONS)) as u32
 }
 
 fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<String>) {
@@ -142,7 +140,7 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
     let alike = format!("{} explain the records alike", listed(&titles));
     // Of equals the first of the menu.
     let better = |one: &Judged, other: &Judged| {
-        let key = |judged: &Judged| (judged.apart(MOST_REPETITIONS), judged.least_apart(MOST_REPETITIONS));
+        let key = |judged: &Judged| (judged.apart(1).count(), judged.least_apart(1));
         key(one) > key(other)
     };
     let best = table.iter().fold(None, |best: Option<&Judged>, one| match best {
@@ -161,12 +159,11 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
     let left: Vec<(usize, usize)> = best
         .pairs
         .iter()
-        .filter(|(_, _, value)| value * f64::from(MOST_REPETITIONS) < WANTED)
+        .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < WANTED)
         .map(|(one, other, _)| (*one.min(other), *one.max(other)))
         .collect();
     let otherwise = otherwise::of_pairs(explanations, &left);
-    let least = best.least_apart(MOST_REPETITIONS);
-    if least == 0.0 {
+    if left.len() == best.pairs.len() {
         let reason = format!(
             "{alike}, and no experiment of this rig separates them: the best, {}, is expected to by {:.1}, and {WANTED} are wanted",
             best.name,
@@ -174,10 +171,11 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
         );
         return (Next { reason, experiment: None, divergence: Some(best.least()), otherwise }, None);
     }
-    let times = repetitions(least);
+    let times = (1..MOST_REPETITIONS).find(|times| best.least_apart(*times) >= WANTED);
+    let times = times.unwrap_or(MOST_REPETITIONS);
     let how_often = if times > 1 { format!(" in {times} repetitions") } else { String::new() };
     let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
-    let total = least * f64::from(times);
+    let total = best.least_apart(times);
     let reason = format!(
         "{alike}; {}, which serves to tell apart {}, is expected to separate them by {total:.0}{how_often} ({WANTED} are wanted){rest}",
         entry.name, entry.serves

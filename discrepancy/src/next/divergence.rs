@@ -1,14 +1,17 @@
 //! How far two explanations of one record lie apart in another experiment.
 //!
 //! ```text
-//! J_i = M (readings of explanation i - readings of the baseline) / noise      in windows of 100 ms, driven as if i were true
-//! M   = 1 - S S^+                                      S: what the readings change with x, v, p_a, p_b at the start of the window
-//! T_ij = min over a of |J_i - a J_j|^2 = |J_i|^2 (1 - cos_ij^2)               the rival's amplitude a >= 0 is refitted
+//! J_i  = M (readings of explanation i - readings of the baseline) / noise     in windows of 100 ms, driven as if i were true
+//! M    = 1 - S S^+                                     S: what the readings change with x, v, p_a, p_b at the start of the window
+//! D_ij = min over a of |J_i - a J_j|^2 = |J_i|^2 (1 - cos_ij^2)               the rival's amplitude a >= 0 is refitted
+//! T_ij = D_ij / (1 + e^2 |J_i|^2)                                             e = 1/16: no model is better than that
 //! ```
 //!
-//! T is the expected gain in chi2 of the true explanation over its rival: 25 are five standard deviations. The amplitude is
-//! refitted although the first record bounds it: T is rather too small than too large. Against that the baseline's own numbers are
-//! held, whose refit would take some of it.
+//! D is the expected gain in chi2 of the true explanation over its rival; lengths and cosines leave out what numbers of the baseline
+//! explain (`nuisance.rs`). Where signatures are hundreds of standard deviations long, D is large for any two that are not equal; but
+//! forms that differ from the catalogue's and numbers that are a little off leave a share of the signature itself. T counts that
+//! share e as noise: it is D while a signature is weak, and of strong ones T >= 25 means a cosine below 0.95, which is what the
+//! workflow calls different. The amplitude is refitted although the first record bounds it: T is rather too small than too large.
 //!
 //! Windows begin at the true x, v, p_a, p_b of the run; what else moves (spool, lagged flow, memories of effects) goes on from the window
 //! before, of each plant its own. The first window is left out: memories fill in it. Readings of the force next to a stop, a
@@ -18,8 +21,11 @@
 //! between two rival models.
 
 use super::driven::{Driven, seated};
+use super::nuisance::{Product, dot};
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
+/// Share of a signature that forms and numbers leave unexplained: 25 = (1 - 0.95^2) / e^2.
+const MODEL_ERROR: f64 = 1.0 / 16.0;
 /// Periods of a window.
 const WINDOW: usize = 100;
 /// Readings of an axis: position, force, pressures a and b.
@@ -47,22 +53,46 @@ struct Run {
     starts: Vec<State>,
 }
 
-/// Divergence of the first of `rigs`, which the run was driven by, from each of the others: T of the module's head.
+/// How one explanation differs from a rival.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Divergence {
+    /// |J|^2 of the true one, squared standard deviations.
+    pub square: f64,
+    /// Cosine of the two signatures, 0 to 1.
+    pub cosine: f64,
+}
+
+impl Divergence {
+    /// T of so many repetitions, in squared standard deviations.
+    #[must_use]
+    pub fn in_repetitions(&self, times: u32) -> f64 {
+        let square = self.square * f64::from(times);
+        square * (1.0 - self.cosine * self.cosine) / (1.0 + MODEL_ERROR * MODEL_ERROR * square)
+    }
+}
+
+/// Divergence of the first of `rigs`, which the run was driven by, from each of the others. `numbers` are baselines whose numbers
+/// are off by a prior standard deviation each.
 #[must_use]
 pub fn divergences(
     driven: &Driven,
     baseline: &RigParameters,
     rigs: &[&RigParameters],
+    numbers: &[RigParameters],
     measured: [bool; 2],
-) -> Vec<f64> {
-    let signatures = signatures(driven, baseline, rigs, measured);
+) -> Vec<Divergence> {
+    let all: Vec<&RigParameters> = rigs.iter().copied().chain(numbers).collect();
+    let signatures = signatures(driven, baseline, &all, measured);
+    let (signatures, numbers) = signatures.split_at(rigs.len());
+    let product = Product::new(numbers);
     let Some((own, rivals)) = signatures.split_first() else { return Vec::new() };
-    let square = dot(own, own);
+    let square = product.of(own, own).max(0.0);
     let from = |rival: &Vec<f64>| {
-        let (along, length) = (dot(own, rival), dot(rival, rival));
-        if length > 0.0 { square - along.max(0.0).powi(2) / length } else { square }
+        let lengths = (square * product.of(rival, rival).max(0.0)).sqrt();
+        let cosine = if lengths > 0.0 { (product.of(own, rival) / lengths).clamp(0.0, 1.0) } else { 0.0 };
+        Divergence { square, cosine }
     };
-    rivals.iter().map(|rival| from(rival).max(0.0)).collect()
+    rivals.iter().map(from).collect()
 }
 
 /// M J of each rig.
@@ -256,8 +286,4 @@ fn basis(columns: Vec<Vec<f64>>, out: &[bool]) -> Vec<Vec<f64>> {
 fn take_off(vector: &mut [f64], direction: &[f64]) {
     let share = dot(vector, direction);
     vector.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
-}
-
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
 }

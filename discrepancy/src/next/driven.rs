@@ -9,10 +9,12 @@
 
 use super::menu::{Entry, program};
 use crate::course::Point;
+use controller::axis::AxisRecord;
 use controller::rehearsal::{Rehearsal, RehearsalParts};
 use controller::run::RunError;
 use controller::setup::{Inputs as Files, Mode};
 use plant::{Axis, Inputs, Plant, RigParameters, Scene, SceneError, SetupError, State, Truth};
+use protocol::frames::MainChainState;
 
 /// Longest run, periods: what is behind it is not looked at.
 const LONGEST: usize = 30_000;
@@ -53,6 +55,8 @@ pub struct Driven {
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.
     pub points: Vec<[Point; 2]>,
+    /// Period in which the experiment began, behind the initial positioning; `None` when it never did.
+    pub began: Option<usize>,
     /// Whether the experiment came to its end.
     pub done: bool,
 }
@@ -71,15 +75,20 @@ pub fn drive(entry: &Entry, baseline: &RigParameters, rig: &RigParameters) -> Re
         Axis::ALL.into_iter().map(|axis| files.controller(axis, mode)).collect::<Result<_, _>>()?;
     let mut rehearsal = Rehearsal::new(RehearsalParts { rig, scene: &scene, seed: SEED, controllers })?;
     let start = *rehearsal.plant().state();
-    let (mut inputs, mut points) = (Vec::new(), Vec::new());
+    let (mut inputs, mut points, mut began) = (Vec::new(), Vec::new(), None);
     let stroke_m = rig.cylinder().stroke_m;
     while inputs.len() < LONGEST && !rehearsal.ended() {
-        let cycle = rehearsal.step(|_, _| {}).cycle;
+        let rehearsed = rehearsal.step(|_, _| {});
+        let in_experiment = |record: &AxisRecord| record.main == MainChainState::Experiment;
+        if began.is_none() && rehearsed.axes.iter().flatten().any(in_experiment) {
+            began = Some(inputs.len());
+        }
+        let cycle = rehearsed.cycle;
         inputs.push(Inputs { valve: cycle.valve, ..Inputs::default() });
         points.push(points_of(&cycle.truth, stroke_m));
     }
     let done = rehearsal.station().done();
-    Ok(Driven { linked: scene.linked, start, inputs, points, done })
+    Ok(Driven { linked: scene.linked, start, inputs, points, began, done })
 }
 
 /// Where both axes are.
