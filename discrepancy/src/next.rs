@@ -1,12 +1,16 @@
 //! What to measure next: the experiment that best separates what a record leaves ambiguous.
 //!
 //! ```text
-//!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair ──► most pairs apart, then largest least T
+//!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair ──► most pairs apart, then
+//! largest least T
 //! ```
 //!
-//! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude, against noise and against what no
-//! model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise: an experiment that
-//! reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`otherwise`] says what would and the controller cannot do: tilting, uncoupling, a locked piston.
+//! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude, against noise and against
+//! what no
+//! model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise: an
+//! experiment that
+//! reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`otherwise`] says what would and the
+//! controller cannot do: tilting, uncoupling, a locked piston.
 //!
 //! | file | holds |
 //! |---|---|
@@ -16,7 +20,8 @@
 //! | [`nuisance`] | numbers of the baseline that are refitted beside |
 //! | [`otherwise`] | what would separate effects where no experiment does |
 //!
-//! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner 1965.
+//! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner
+//! 1965.
 
 pub mod divergence;
 pub mod driven;
@@ -165,7 +170,8 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
     let otherwise = otherwise::of_pairs(explanations, &left);
     if left.len() == best.pairs.len() {
         let reason = format!(
-            "{alike}, and no experiment of this rig separates them: the best, {}, is expected to by {:.1}, and {WANTED} are wanted",
+            "{alike}, and no experiment of this rig separates them: \
+             the best, {}, is expected to by {:.1}, and {WANTED} are wanted",
             best.name,
             best.least()
         );
@@ -177,7 +183,8 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
     let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
     let total = best.least_apart(times);
     let reason = format!(
-        "{alike}; {}, which serves to tell apart {}, is expected to separate them by {total:.0}{how_often} ({WANTED} are wanted){rest}",
+        "{alike}; {}, which serves to tell apart {}, is expected to separate them by {total:.0}{how_often} \
+         ({WANTED} are wanted){rest}",
         entry.name, entry.serves
     );
     let experiment = Some(format!("next-{}.toml", entry.name));

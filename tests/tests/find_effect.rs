@@ -1,4 +1,5 @@
-//! `scripts/find-effect`: help, arguments that cannot be used, and one sealed effect found in lockstep, from the draw to the opened seal.
+//! `scripts/find-effect`: help, arguments that cannot be used, and one sealed effect found in lockstep, from the draw to the
+//! opened seal.
 
 use std::fs;
 use std::path::Path;

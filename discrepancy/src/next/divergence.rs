@@ -2,18 +2,22 @@
 //!
 //! ```text
 //! J_i  = M (readings of explanation i - readings of the baseline) / noise     in windows of 100 ms, driven as if i were true
-//! M    = 1 - S S^+                                     S: what the readings change with x, v, p_a, p_b at the start of the window
+//! M    = 1 - S S^+                                     S: what the readings change with x, v, p_a, p_b at the start of the
+//! window
 //! D_ij = min over a of |J_i - a J_j|^2 = |J_i|^2 (1 - cos_ij^2)               the rival's amplitude a >= 0 is refitted
 //! T_ij = D_ij / (1 + e^2 |J_i|^2)                                             e = 1/16: no model is better than that
 //! ```
 //!
-//! D is the expected gain in chi2 of the true explanation over its rival; lengths and cosines leave out what numbers of the baseline
-//! explain (`nuisance.rs`). Where signatures are hundreds of standard deviations long, D is large for any two that are not equal; but
+//! D is the expected gain in chi2 of the true explanation over its rival; lengths and cosines leave out what numbers of the
+//! baseline
+//! explain (`nuisance.rs`). Where signatures are hundreds of standard deviations long, D is large for any two that are not
+//! equal; but
 //! forms that differ from the catalogue's and numbers that are a little off leave a share of the signature itself. T counts that
 //! share e as noise: it is D while a signature is weak, and of strong ones T >= 25 means a cosine below 0.95, which is what the
 //! workflow calls different. The amplitude is refitted although the first record bounds it: T is rather too small than too large.
 //!
-//! Windows begin at the true x, v, p_a, p_b of the run; what else moves (spool, lagged flow, memories of effects) goes on from the window
+//! Windows begin at the true x, v, p_a, p_b of the run; what else moves (spool, lagged flow, memories of effects) goes on
+//! from the window
 //! before, of each plant its own. The first window is left out: memories fill in it. Readings of the force next to a stop, a
 //! break-away or a contact count for nothing: a difference of microseconds there is one of hundreds of newtons in a sample.
 //!

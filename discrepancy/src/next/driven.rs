@@ -4,7 +4,8 @@
 //!   experiment ──► controllers with the baseline's numbers ──► rehearsal of the explanation's rig ──► commands, true points
 //! ```
 //!
-//! The run is what the experiment would be if the explanation were true: another rig is driven otherwise, and what its controllers
+//! The run is what the experiment would be if the explanation were true: another rig is driven otherwise, and what its
+//! controllers
 //! do then is part of what it shows. The sensors' noise is that of one seed.
 
 use super::menu::{Entry, program};
