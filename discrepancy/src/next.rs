@@ -1,16 +1,14 @@
 //! What to measure next: the experiment that best separates what a record leaves ambiguous.
 //!
 //! ```text
-//!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair ──► most pairs apart, then
-//! largest least T
+//!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair
+//!                                                 ──► most pairs apart, then the largest least T
 //! ```
 //!
 //! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude, against noise and against
-//! what no
-//! model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise: an
-//! experiment that
-//! reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`otherwise`] says what would and the
-//! controller cannot do: tilting, uncoupling, a locked piston.
+//! what no model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise:
+//! an experiment that reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`otherwise`] says what
+//! would and the controller cannot do: tilting, uncoupling, a locked piston.
 //!
 //! | file | holds |
 //! |---|---|

@@ -1,8 +1,8 @@
 //! How far runs lie from the first of them: a gap as a picture and as rms values, for a measured rig and its simulations.
 //!
-//! A gap is a difference of means over 20 ms, which leave what models differ by and take the sensors' noise away but for a fifth;
-//! time begins with the experiment. What two runs with equal models differ by (noise, the play of two controllers) is no gap
-//! and is not taken off.
+//! A gap is a difference of means over 20 ms, which leave what models differ by and take the sensors' noise away but for a
+//! fifth; time begins with the experiment. What two runs with equal models differ by (noise, the play of two controllers) is
+//! no gap and is not taken off.
 
 use super::change;
 use crate::drawing::{COLOURS, Curve, Panel, Picture};

@@ -9,17 +9,16 @@
 //! ```
 //!
 //! D is the expected gain in chi2 of the true explanation over its rival; lengths and cosines leave out what numbers of the
-//! baseline
-//! explain (`nuisance.rs`). Where signatures are hundreds of standard deviations long, D is large for any two that are not
-//! equal; but
-//! forms that differ from the catalogue's and numbers that are a little off leave a share of the signature itself. T counts that
-//! share e as noise: it is D while a signature is weak, and of strong ones T >= 25 means a cosine below 0.95, which is what the
-//! workflow calls different. The amplitude is refitted although the first record bounds it: T is rather too small than too large.
+//! baseline explain (`nuisance.rs`). Where signatures are hundreds of standard deviations long, D is large for any two that
+//! are not equal; but forms that differ from the catalogue's and numbers that are a little off leave a share of the signature
+//! itself. T counts that share e as noise: it is D while a signature is weak, and of strong ones T >= 25 means a cosine below
+//! 0.95, which is what the workflow calls different. The amplitude is refitted although the first record bounds it: T is
+//! rather too small than too large.
 //!
 //! Windows begin at the true x, v, p_a, p_b of the run; what else moves (spool, lagged flow, memories of effects) goes on
-//! from the window
-//! before, of each plant its own. The first window is left out: memories fill in it. Readings of the force next to a stop, a
-//! break-away or a contact count for nothing: a difference of microseconds there is one of hundreds of newtons in a sample.
+//! from the window before, of each plant its own. The first window is left out: memories fill in it. Readings of the force
+//! next to a stop, a break-away or a contact count for nothing: a difference of microseconds there is one of hundreds of
+//! newtons in a sample.
 //!
 //! Source: discrepancy-notes.md, 1 and pipeline 9; Hunter and Reiner 1965, Technometrics 7(3): designs for discriminating
 //! between two rival models.

@@ -5,8 +5,7 @@
 //! ```
 //!
 //! The run is what the experiment would be if the explanation were true: another rig is driven otherwise, and what its
-//! controllers
-//! do then is part of what it shows. The sensors' noise is that of one seed.
+//! controllers do then is part of what it shows. The sensors' noise is that of one seed.
 
 use super::menu::{Entry, program};
 use crate::course::Point;

@@ -1,8 +1,7 @@
 //! The menu: experiments that the controller can run and that tell effects apart, as files of `discrepancy/experiments`.
 //!
 //! Each drives both axes, so that it serves whichever has the effect, takes 13 to 20 s, and stays away from the ends of the
-//! stroke.
-//! Tests hold every file to that, with the baseline and with the controllers' own reader.
+//! stroke. Tests hold every file to that, with the baseline and with the controllers' own reader.
 
 /// An experiment of the menu.
 #[derive(Clone, Copy, Debug)]
