@@ -2,8 +2,7 @@
 //!
 //! ```text
 //! J_i  = M (readings of explanation i - readings of the baseline) / noise     in windows of 100 ms, driven as if i were true
-//! M    = 1 - S S^+                                     S: what the readings change with x, v, p_a, p_b at the start of the
-//! window
+//! M    = 1 - S S^+                       S: what the readings change with x, v, p_a, p_b at the start of the window
 //! D_ij = min over a of |J_i - a J_j|^2 = |J_i|^2 (1 - cos_ij^2)               the rival's amplitude a >= 0 is refitted
 //! T_ij = D_ij / (1 + e^2 |J_i|^2)                                             e = 1/16: no model is better than that
 //! ```
