@@ -17,6 +17,7 @@
 //! | [`extend`] | the rig file with what was found |
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
+//! | [`next`] | the experiment that would tell apart what a record does not |
 //! | [`report`] | what was found, as data |
 //! | [`workflow`] | all of it in order |
 //! | [`page`] | the same as one page for people |
@@ -30,6 +31,7 @@ pub mod extend;
 pub mod fit;
 pub mod locate;
 pub mod name;
+pub mod next;
 pub mod outside;
 pub mod page;
 pub mod parameters;
