@@ -154,12 +154,29 @@ pub fn close(
     test: Option<&Path>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Report, BalanceError> {
+    let tests: Vec<&Path> = test.into_iter().collect();
+    close_on(model_file, train, &tests, progress)
+}
+
+/// As [`close`], with any number of held-out records: the residuals are those over all of them.
+///
+/// # Errors
+/// As [`close`].
+pub fn close_on(
+    model_file: &Path,
+    train: &[PathBuf],
+    tests: &[&Path],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Report, BalanceError> {
     let study = Study::of(model_file, train, progress)?;
     let mut report = study.report(model_file);
-    if let Some(test) = test {
+    let mut held_out = Vec::new();
+    for test in tests {
         progress(&format!("held out: {}", test.display()));
-        let run = read(&study.model, study.rig.as_ref(), test)?.1;
-        study.verify(&run, &mut report)?;
+        held_out.push(read(&study.model, study.rig.as_ref(), test)?.1);
+    }
+    if !held_out.is_empty() {
+        study.verify(&held_out, &mut report)?;
     }
     Ok(report)
 }
@@ -200,20 +217,9 @@ impl Study {
         if runs.is_empty() {
             return Err(BalanceError::NoRecord);
         }
-        let over_all = |of: &dyn Fn(&Run) -> Vec<f64>| -> Vec<f64> {
-            runs.iter().flat_map(|run| run.rows(&of(run))).collect()
-        };
-        let mut ranges = Vec::new();
-        for run in &runs {
-            let start = ranges.last().map_or(0, |range: &std::ops::Range<usize>| range.end);
-            ranges.push(start..start + run.kept.len());
-        }
-        let rows = Rows {
-            target: over_all(&|run| run.target.clone()),
-            judged: runs.iter().flat_map(|run| run.judged.iter().copied()).collect(),
-            records: ranges,
-        };
+        let rows = rows_of(&runs);
         let base = base_columns(&model, &runs)?;
+        let plain = base[..terms::baseline(&model).len()].to_vec();
         let base_fit = rows.fit(&base).ok_or_else(|| BalanceError::NotExcited {
             columns: terms::baseline(&model).iter().map(|column| column.name).collect::<Vec<_>>().join(", "),
         })?;
@@ -243,7 +249,7 @@ impl Study {
             let columns = family.variants.iter().map(|variant| term_columns(&model, variant, &runs));
             families.push(Prepared { columns: columns.collect::<Result<_, _>>()?, family });
         }
-        let found = select::search(&rows, &cuts, &base, &families, &selection, progress);
+        let found = select::search(&rows, &cuts, [&plain, &base], &families, &selection, progress);
         let mut own = base.clone();
         for taken in &found.taken {
             own.extend(families[taken.judged.place].columns[taken.judged.variant].iter().cloned());
@@ -255,6 +261,20 @@ impl Study {
     /// rms of the residual of baseline and extended model on the training records, ends included.
     fn trained_rms(&self) -> [f64; 2] {
         [rms(&self.base_fit.residual), rms(&self.own_fit.residual)]
+    }
+}
+
+/// The rows of runs, one after the other.
+fn rows_of(runs: &[Run]) -> Rows {
+    let mut records: Vec<std::ops::Range<usize>> = Vec::new();
+    for run in runs {
+        let start = records.last().map_or(0, |range| range.end);
+        records.push(start..start + run.kept.len());
+    }
+    Rows {
+        target: runs.iter().flat_map(|run| run.rows(&run.target)).collect(),
+        judged: runs.iter().flat_map(|run| run.judged.iter().copied()).collect(),
+        records,
     }
 }
 

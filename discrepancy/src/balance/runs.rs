@@ -251,7 +251,8 @@ fn modelled_flow(
     let follow = |time_constant_s: f64| 1.0 - (-period_s / time_constant_s).exp();
     let (spool_share, flow_share) =
         (follow(valve.spool_time_constant_s), follow(valve.flow_lag_time_constant_s));
-    let (mut spool, mut flow) = (commands.first().copied().unwrap_or(0.0).clamp(-1.0, 1.0), None);
+    let mut spool = commands.first().copied().unwrap_or(0.0).clamp(-1.0, 1.0);
+    let mut before: Option<(f64, f64)> = None;
     let mut flows = Vec::with_capacity(commands.len());
     for at in 0..commands.len() {
         let mut state = start;
@@ -260,9 +261,11 @@ fn modelled_flow(
         state.axes[0].stored_air_b_j = other_pa[at].max(1e3) * other_m3;
         plant.go_on_in(&state).map_err(unusable)?;
         let edge = plant.truth(&Inputs::default()).axes[0].edge_flow_a_m3_per_s;
-        let lagged = flow.get_or_insert(edge);
-        flows.push(*lagged);
-        *lagged += flow_share * (edge - *lagged);
+        // The mean of both ends of a period: either end alone would be half a period off, and be found as a lag.
+        let lagged =
+            before.map_or(edge, |(lagged, last)| lagged + flow_share * (0.5 * (last + edge) - lagged));
+        flows.push(lagged);
+        before = Some((lagged, edge));
         spool += spool_share * (commands[at].clamp(-1.0, 1.0) - spool);
     }
     Ok(flows)

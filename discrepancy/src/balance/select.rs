@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | sign | a number that cannot be negative is not | a Stribeck curve that rises is another law |
 //! | penalty | `n_eff ln(P_0 / P_1) > k ln n_eff + 2 ln(variants tried)` | scans find something in any residual |
-//! | folds in time | takes `share_floor` of the power left out, at 3 clustered standard errors | size and significance |
+//! | folds in time | takes `share_floor` of the power that the baseline leaves out, at 3 clustered standard errors | size and significance; a small rest of a small rest is no finding |
 //! | folds in bands of position, of speed | half of that share, at 2 | a record that repeats its path repeats its error in every block of time: what was fitted there must hold at places, and at speeds, that it has not seen |
 //!
 //! Bands are asked of shapes that reach beyond a band, and of speed only when it varies by more than a factor of 3 (deciles). The best of
@@ -24,6 +24,8 @@ const T_TIME: f64 = 3.0;
 const T_BANDS: f64 = 2.0;
 /// Clustered standard errors by which two effects are told apart.
 const T_APART: f64 = 3.0;
+/// Twice the difference of log likelihoods that does the same: "very strong" is 10 [Kass, Raftery 1995, JASA 90(430)].
+const GAIN_APART: f64 = 10.0;
 
 /// A family with its columns over the training rows.
 pub(super) struct Prepared {
@@ -59,7 +61,11 @@ pub(super) struct Judged {
     /// The gate that decided.
     pub(super) gate: String,
     pub(super) passes: bool,
+    /// Squares left out of each fold in time.
     left: Vec<f64>,
+    /// Power that its fit leaves, and how many rows that is worth.
+    power: f64,
+    effective: f64,
     /// Other forms that do no worse.
     pub(super) ties: Vec<usize>,
 }
@@ -83,21 +89,22 @@ pub(super) struct Found {
     pub(super) decoy: Option<Judged>,
 }
 
-/// Searches; `base` are the baseline's columns.
+/// Searches beside `base`; sizes count in what `plain`, the baseline without terms that were added before, leaves out.
 pub(super) fn search(
     rows: &Rows,
     cuts: &Cuts,
-    base: &Columns,
+    [plain, base]: [&Columns; 2],
     families: &[Prepared],
     selection: &Selection,
     progress: &mut dyn FnMut(&str),
 ) -> Found {
     let mut found = Found { taken: Vec::new(), first: Vec::new(), last: Vec::new(), decoy: None };
     let mut columns = base.clone();
+    let excess = Excess::of(rows, cuts, plain);
     loop {
         let round: Vec<Judged> = (0..families.len())
             .filter(|place| found.taken.iter().all(|taken| taken.judged.place != *place))
-            .map(|place| judge(rows, cuts, &columns, families, place, selection))
+            .map(|place| judge(rows, cuts, &columns, (families, place), selection, &excess))
             .collect();
         if found.first.is_empty() {
             found.first.clone_from(&round);
@@ -122,8 +129,28 @@ pub(super) fn search(
     }
 }
 
-/// Whether the same folds are left better by one than by the other.
+/// Power that the plain baseline leaves out, by cut.
+struct Excess(Vec<(&'static str, f64)>);
+
+impl Excess {
+    fn of(rows: &Rows, cuts: &Cuts, plain: &Columns) -> Self {
+        let all = [Some(&cuts.time), Some(&cuts.position), cuts.speed.as_ref()];
+        let power = |cut: &Cut| Some((cut.name, rows.left_out(plain, cut)?.iter().sum()));
+        Excess(all.into_iter().flatten().filter_map(power).collect())
+    }
+
+    /// A power as a share of it; of `left` where the baseline's own columns cannot be told on this cut.
+    fn share(&self, cut: &Cut, power: f64, left: f64) -> f64 {
+        let own = self.0.iter().find(|(name, _)| *name == cut.name).map_or(left, |(_, own)| *own);
+        power / own.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Whether one is better than the other beyond doubt: on the same folds, or by its likelihood.
 fn apart(best: &Judged, other: &Judged) -> bool {
+    if best.effective * (other.power / best.power).ln() > GAIN_APART {
+        return true;
+    }
     let differences: Vec<f64> = other.left.iter().zip(&best.left).map(|(other, best)| other - best).collect();
     clustered_t(&differences) > T_APART
 }
@@ -139,9 +166,9 @@ fn judge(
     rows: &Rows,
     cuts: &Cuts,
     columns: &Columns,
-    families: &[Prepared],
-    place: usize,
+    (families, place): (&[Prepared], usize),
     selection: &Selection,
+    excess: &Excess,
 ) -> Judged {
     let Prepared { family, columns: variants } = &families[place];
     let refused = |gate: String, variant: usize, number: f64| Judged {
@@ -153,6 +180,8 @@ fn judge(
         gate,
         passes: false,
         left: Vec::new(),
+        power: f64::INFINITY,
+        effective: 0.0,
         ties: Vec::new(),
     };
     let Some(before) = rows.fit(columns) else {
@@ -171,12 +200,12 @@ fn judge(
     }
     let number_of = |fit: &super::fit::Fit| fit.numbers[columns.len()];
     let allowed = tried.iter().filter(|(_, fit, _)| !family.positive || number_of(fit) >= 0.0);
-    let Some((best, fit, power)) = allowed.min_by(|a, b| a.2.total_cmp(&b.2)) else {
+    let Some((best, best_fit, least)) = allowed.min_by(|a, b| a.2.total_cmp(&b.2)) else {
         let (variant, fit, _) = &tried[0];
         return refused("its number would be negative".into(), *variant, number_of(fit));
     };
-    let effective = rows.effective(&fit.residual);
-    let same = |other: f64| effective * (other / power).ln() < 2.0;
+    let effective = rows.effective(&best_fit.residual);
+    let same = |other: f64| effective * (other / least).ln() < 2.0;
     let mut ties: Vec<usize> = if family.ordered {
         let no_worse =
             |(_, fit, other): &&(usize, super::fit::Fit, f64)| number_of(fit) >= 0.0 && same(*other);
@@ -209,7 +238,7 @@ fn judge(
             continue;
         };
         let differences: Vec<f64> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
-        let taken = differences.iter().sum::<f64>() / before.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let taken = excess.share(cut, differences.iter().sum(), before.iter().sum());
         let t = clustered_t(&differences);
         let words = |what: String| format!("folds in {}: {what}", cut.name);
         let percent = taken * 100.0;
@@ -224,7 +253,19 @@ fn judge(
     }
     let (score, gate) =
         gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is one gate at least");
-    Judged { place, variant, number, share, score, gate, passes: score > 1.0, left, ties }
+    Judged {
+        place,
+        variant,
+        number,
+        share,
+        score,
+        gate,
+        passes: score > 1.0,
+        left,
+        power: *power,
+        effective,
+        ties,
+    }
 }
 
 #[cfg(test)]
@@ -265,8 +306,8 @@ mod tests {
             free("decoy:drift", (0..count).map(|at| at as f64).collect()),
         ];
         let cuts = Cuts { time: rows.in_time(10), position: rows.in_bands("position", &x, 10), speed: None };
-        let found =
-            search(&rows, &cuts, &vec![vec![1.0; count], v], &families, &Selection::default(), &mut |_| {});
+        let base = vec![vec![1.0; count], v];
+        let found = search(&rows, &cuts, [&base, &base], &families, &Selection::default(), &mut |_| {});
         let mut names: Vec<String> = found
             .taken
             .iter()

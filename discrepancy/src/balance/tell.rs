@@ -385,17 +385,17 @@ impl Study {
         })
     }
 
-    /// Both models, frozen, on a record that was not used.
-    pub(super) fn verify(&self, run: &Run, report: &mut Report) -> Result<(), BalanceError> {
-        let runs = std::slice::from_ref(run);
+    /// Both models, frozen, on records that were not used.
+    pub(super) fn verify(&self, runs: &[Run], report: &mut Report) -> Result<(), BalanceError> {
         let mut columns = base_columns(&self.model, runs)?;
-        let target = run.rows(&run.target);
-        let before = residual(&target, &columns, &self.base_fit.numbers);
+        let rows = super::rows_of(runs);
+        let target = &rows.target;
+        let before = residual(target, &columns, &self.base_fit.numbers);
         for taken in &self.found.taken {
             let entry = &self.families[taken.judged.place].family.variants[taken.judged.variant];
             columns.extend(term_columns(&self.model, entry, runs)?);
         }
-        let after = residual(&target, &columns, &self.own_fit.numbers);
+        let after = residual(target, &columns, &self.own_fit.numbers);
         let signal = match self.model.kind {
             Kind::Chamber => "drive_flow_a_m3_per_s".to_owned(),
             _ => self.model.channels["force"].column(),
@@ -403,11 +403,6 @@ impl Study {
         let [before_rms, after_rms] = [rms(&before), rms(&after)];
         let closed = (before_rms > 0.0).then(|| 1.0 - (after_rms / before_rms).powi(2));
         report.gap.insert(signal.clone(), Gap { before: before_rms, after: after_rms, floor: 0.0, closed });
-        let rows = super::Rows {
-            target,
-            judged: run.judged.clone(),
-            records: std::iter::once(0..run.kept.len()).collect(),
-        };
         let cut = rows.in_time(self.model.selection.blocks);
         let squares = |residual: &[f64]| -> Vec<f64> {
             cut.folds.iter().map(|fold| fold.iter().map(|row| residual[*row].powi(2)).sum()).collect()
@@ -423,7 +418,7 @@ impl Study {
             self.time.folds.iter().map(|fold| fold_power(&self.own_fit.residual, fold) / trained).collect();
         folds.sort_by(f64::total_cmp);
         report.verification = Some(Verification {
-            record: run.name.clone(),
+            record: runs.iter().map(|run| run.name.clone()).collect::<Vec<_>>().join(", "),
             chi2_before: before_rms.powi(2) / trained,
             chi2_after: after_rms.powi(2) / trained,
             chi2_null: [folds[0], folds[folds.len() - 1]],

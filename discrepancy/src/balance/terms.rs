@@ -121,8 +121,9 @@ pub(super) fn families(model: &Model, [from_m, to_m]: [f64; 2]) -> Vec<Family> {
     }
     for effect in ["position-dependent-friction", "position-dependent-force"] {
         families.push(plain(effect, "slope"));
-        let bumps = (1..10).flat_map(|tenth| {
-            [0.1, 0.2].map(|width| {
+        // A bump that is seen whole; half of one at an end of the path may be anything.
+        let bumps = [(0.1, 2..=8), (0.2, 4..=6)].into_iter().flat_map(|(width, tenths)| {
+            tenths.map(move |tenth| {
                 let centre = from_m * 1e3 + span_mm * f64::from(tenth) / 10.0;
                 term(effect, "bump", &[("centre_mm", centre), ("width_mm", width * span_mm)])
             })
@@ -139,8 +140,8 @@ pub(super) fn families(model: &Model, [from_m, to_m]: [f64; 2]) -> Vec<Family> {
 /// Pitches from 1 mm to a third of the span, a quarter of a period over the span apart, 2.5 mm among them.
 fn pitches(span_mm: f64) -> impl Iterator<Item = f64> {
     let (least, step) = (3.0 / span_mm, 0.25 / span_mm);
-    let count = ((1.0 - least) / step).max(0.0) as usize;
-    (0..=count).map(move |at| 1.0 / (least + at as f64 * step)).chain([2.5])
+    let count = if least < 1.0 { ((1.0 - least) / step) as usize + 1 } else { 0 };
+    (0..count).map(move |at| 1.0 / (least + at as f64 * step)).chain([2.5])
 }
 
 fn signs(run: &Run) -> Vec<f64> {

@@ -60,7 +60,6 @@ fn closed(rig: &RigParameters) -> (Report, String) {
 
 #[test]
 fn a_hidden_dead_volume_is_named_in_the_flow_of_its_chamber() {
-    
     let rig = RigParameters::baseline();
     let rig = rig.with_effect("dead-volume", "drive", &[("volume_cm3", 50.0)]).unwrap();
     let (report, extended) = closed(&rig);
