@@ -245,7 +245,8 @@ impl Study {
             model.terms.iter().any(|term| term.effect == variant.effect && term.form == variant.form)
         };
         let mut families = Vec::new();
-        for family in terms::families(&model, span).into_iter().filter(|family| !known(family)) {
+        let searched = model.selection.most > 0;
+        for family in terms::families(&model, span).into_iter().filter(|family| searched && !known(family)) {
             let columns = family.variants.iter().map(|variant| term_columns(&model, variant, &runs));
             families.push(Prepared { columns: columns.collect::<Result<_, _>>()?, family });
         }

@@ -4,7 +4,8 @@
 //! them, since the next run fits it again on its own records.
 
 use super::BalanceError;
-use super::tell::entry_of;
+use super::model::TermEntry;
+use super::terms::{shown, term};
 use crate::report::{Quantity, Report};
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
@@ -60,9 +61,39 @@ fn entry(effect: &str, parameters: &[Quantity], records: &str) -> Table {
         let name = quantity.name.replace("parameter:", "");
         fitted.insert(&name, quantity.value.into());
         if let Some(error) = quantity.standard_error {
-            fitted.insert(&format!("{name}_standard_error"), error.into());
+            fitted.insert(format!("{name}_standard_error"), error.into());
         }
     }
     table["fitted"] = value(fitted);
     table
+}
+
+/// The term that a named effect of a report is, by the names of its numbers.
+fn entry_of(effect: &str, parameters: &[Quantity]) -> TermEntry {
+    let forms = ["viscous", "root", "linear", "slope", "bump", "ripple"];
+    let has = |name: &str| parameters.iter().any(|quantity| quantity.name == name);
+    let form = forms.into_iter().find(|form| {
+        let (name, ..) = shown(&term(effect, form, &[]));
+        let (plain, ..) = shown(&term(effect, "", &[]));
+        // The straight line over pressure has the name that a form without a name would have.
+        has(name)
+            && (name != plain || (*form == "linear") == (effect == "pressure-dependent-friction"))
+            && allowed(effect, form)
+    });
+    let keys = ["velocity_mm_per_s", "exponent", "deflection_mm", "centre_mm", "width_mm", "pitch_mm"];
+    let shape = parameters.iter().filter(|quantity| keys.contains(&quantity.name.as_str()));
+    let shape: Vec<(&str, f64)> = shape.map(|quantity| (quantity.name.as_str(), quantity.value)).collect();
+    term(effect, form.unwrap_or(""), &shape)
+}
+
+/// Which forms an effect has.
+fn allowed(effect: &str, form: &str) -> bool {
+    match effect {
+        "friction-asymmetry" => form == "viscous",
+        "pressure-dependent-friction" => ["root", "linear"].contains(&form),
+        "position-dependent-friction" | "position-dependent-force" => {
+            ["slope", "bump", "ripple"].contains(&form)
+        }
+        _ => false,
+    }
 }

@@ -99,13 +99,15 @@ pub struct Selection {
     pub bands: usize,
     /// Least share of the residual's power that a term must take on folds in time; half of it on bands.
     pub share_floor: f64,
-    /// Most terms.
+    /// Most terms; 0 searches for none, and tells the residuals of the model as it is.
     pub most: usize,
+    /// Pitches that the machine has, of a screw or of teeth, mm: candidates for ripples of their own, beside the scan.
+    pub pitches_mm: Vec<f64>,
 }
 
 impl Default for Selection {
     fn default() -> Self {
-        Self { blocks: 10, bands: 10, share_floor: 0.1, most: 3 }
+        Self { blocks: 10, bands: 10, share_floor: 0.1, most: 3, pitches_mm: Vec::new() }
     }
 }
 

@@ -7,7 +7,7 @@ use super::fit::{clustered_t, residual, rms};
 use super::model::{Kind, TermEntry};
 use super::runs::Run;
 use super::select::{Judged, told};
-use super::terms::{self, shape_unit, shown, term};
+use super::terms::{self, shape_unit, shown};
 use super::{BalanceError, Study, base_columns, term_columns};
 use crate::report::{
     BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, Finding, Gap, InputFiles, Location,
@@ -471,35 +471,5 @@ fn alias(entry: &TermEntry, own: &[Quantity], study: &Study) -> Vec<NamedEffect>
             vec![named("force-sensor-offset", vec![offset]), sliding]
         }
         _ => Vec::new(),
-    }
-}
-
-/// The term that a named effect of a report is, by the names of its numbers.
-pub(super) fn entry_of(effect: &str, parameters: &[Quantity]) -> TermEntry {
-    let forms = ["viscous", "root", "linear", "slope", "bump", "ripple"];
-    let has = |name: &str| parameters.iter().any(|quantity| quantity.name == name);
-    let form = forms.into_iter().find(|form| {
-        let (name, ..) = shown(&term(effect, form, &[]));
-        let (plain, ..) = shown(&term(effect, "", &[]));
-        // The straight line over pressure has the name that a form without a name would have.
-        has(name)
-            && (name != plain || (*form == "linear") == (effect == "pressure-dependent-friction"))
-            && allowed(effect, form)
-    });
-    let keys = ["velocity_mm_per_s", "exponent", "deflection_mm", "centre_mm", "width_mm", "pitch_mm"];
-    let shape = parameters.iter().filter(|quantity| keys.contains(&quantity.name.as_str()));
-    let shape: Vec<(&str, f64)> = shape.map(|quantity| (quantity.name.as_str(), quantity.value)).collect();
-    term(effect, form.unwrap_or(""), &shape)
-}
-
-/// Which forms an effect has.
-fn allowed(effect: &str, form: &str) -> bool {
-    match effect {
-        "friction-asymmetry" => form == "viscous",
-        "pressure-dependent-friction" => ["root", "linear"].contains(&form),
-        "position-dependent-friction" | "position-dependent-force" => {
-            ["slope", "bump", "ripple"].contains(&form)
-        }
-        _ => false,
     }
 }

@@ -129,7 +129,10 @@ pub(super) fn families(model: &Model, [from_m, to_m]: [f64; 2]) -> Vec<Family> {
             })
         });
         families.push(Family { over_position: false, ..free(bumps.collect()) });
-        families.push(free(pitches(span_mm).map(|mm| term(effect, "ripple", &[("pitch_mm", mm)])).collect()));
+        let ripple = |mm: f64| term(effect, "ripple", &[("pitch_mm", mm)]);
+        families.push(free(pitches(span_mm).map(ripple).collect()));
+        // One that is known pays for no search.
+        families.extend(model.selection.pitches_mm.iter().map(|mm| free(vec![ripple(*mm)])));
     }
     families.extend(
         ["decoy:drift", "decoy:speed-squared", "decoy:acceleration-sign"].map(|name| plain(name, "")),
@@ -137,11 +140,11 @@ pub(super) fn families(model: &Model, [from_m, to_m]: [f64; 2]) -> Vec<Family> {
     families
 }
 
-/// Pitches from 1 mm to a third of the span, a quarter of a period over the span apart, 2.5 mm among them.
+/// Pitches from 1 mm to a third of the span, a quarter of a period over the span apart.
 fn pitches(span_mm: f64) -> impl Iterator<Item = f64> {
     let (least, step) = (3.0 / span_mm, 0.25 / span_mm);
     let count = if least < 1.0 { ((1.0 - least) / step) as usize + 1 } else { 0 };
-    (0..count).map(move |at| 1.0 / (least + at as f64 * step)).chain([2.5])
+    (0..count).map(move |at| 1.0 / (least + at as f64 * step))
 }
 
 fn signs(run: &Run) -> Vec<f64> {
@@ -284,14 +287,11 @@ mod tests {
     fn pitches_are_close_enough_that_none_lies_between_them() {
         let all: Vec<f64> = pitches(220.0).collect();
         // Two neighbours are a quarter of a period apart at the far end of the span.
-        for pair in all[..all.len() - 1].windows(2) {
+        for pair in all.windows(2) {
             assert!((220.0 / pair[1] - 220.0 / pair[0] - 0.25).abs() < 1e-9);
         }
-        assert!(all.iter().any(|pitch| *pitch == 2.5) && all[0] > 70.0);
-        assert!(
-            pitches(2.0).count() <= 1,
-            "a span shorter than three pitches has none but the one that is asked for"
-        );
+        assert!(all[0] > 70.0 && all[all.len() - 1] < 1.01);
+        assert!(pitches(2.0).count() == 0, "a span shorter than three pitches has none");
     }
 
     #[test]
