@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Somebody's record seldom holds a whole rig. What can be said of one balance is said here: there is nothing to simulate, each term is a
-//! column, and selection is that of [`select`]. Nothing of the held-out record is read before the terms are chosen and fitted.
+//! column, and selection is that of `select`. Nothing of the held-out record is read before the terms are chosen and fitted.
 //!
 //! | file | holds |
 //! |---|---|

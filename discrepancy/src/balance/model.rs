@@ -60,9 +60,9 @@ pub struct Processing {
     /// Its order.
     pub decimate_order: usize,
     /// Its ripple, dB.
-    pub decimate_ripple_decibel: f64,
+    pub(super) decimate_ripple_decibel: f64,
     /// Its edge over the Nyquist frequency of the rows.
-    pub decimate_edge: f64,
+    pub(super) decimate_edge: f64,
     /// Rows that are slower are left out, mm/s.
     pub speed_above_mm_per_s: f64,
     /// Rows outside are left out, mm.
@@ -98,7 +98,7 @@ pub struct Selection {
     /// Bands of position, and of speed, that are folds as well.
     pub bands: usize,
     /// Least share of the residual's power that a term must take on folds in time; half of it on bands.
-    pub share_floor: f64,
+    pub(super) share_floor: f64,
     /// Most terms; 0 searches for none, and tells the residuals of the model as it is.
     pub most: usize,
     /// Pitches that the machine has, of a screw or of teeth, mm: candidates for ripples of their own, beside the scan.
