@@ -5,7 +5,8 @@
 //!                                                                                   held-out record, frozen ─► both residuals
 //! ```
 //!
-//! Somebody's record seldom holds a whole rig. What can be said of one balance is said here: there is nothing to simulate, each term is a
+//! Somebody's record seldom holds a whole rig. What can be said of one balance is said here: there is nothing to simulate,
+//! each term is a
 //! column, and selection is that of `select`. Nothing of the held-out record is read before the terms are chosen and fitted.
 //!
 //! | file | holds |

@@ -1,4 +1,5 @@
-//! The real records beside the project closed by the models that ship: figures of effects.md, names, held-out ratios; skipped aloud
+//! The real records beside the project closed by the models that ship: figures of effects.md, names, held-out ratios;
+//! skipped aloud
 //! where the records are not there.
 
 use discrepancy::balance::{close_on, extended_model_text};
@@ -175,7 +176,8 @@ fn an_x_ring_does_too_but_at_seven_bar_it_rubs_more_than_any_law_of_the_others_s
         report.gap["drive_force_N"].clone()
     };
     let (three, seven) = (gap(3), gap(7));
-    // At 3 bar both models are right to a newton; at 7 bar the term takes a third, and leaves thirteen times what it left in training.
+    // At 3 bar both models are right to a newton; at 7 bar the term takes a third, and leaves thirteen times what it left in
+    // training.
     assert!(three.before < 1.0 && three.after < 1.0, "{three:?}");
     assert!(seven.after < 0.70 * seven.before && seven.after > 5.0, "{seven:?}");
 }

@@ -1,6 +1,7 @@
 //! The model file with what was found: the terms join the baseline, and are fitted with it when it runs again.
 //!
-//! Everything of the old file stays, comments too. A term's numbers stand in it for people, under `fitted`; a linear term has no use for
+//! Everything of the old file stays, comments too. A term's numbers stand in it for people, under `fitted`; a linear term
+//! has no use for
 //! them, since the next run fits it again on its own records.
 
 use super::BalanceError;

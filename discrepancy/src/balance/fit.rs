@@ -4,8 +4,10 @@
 //!   c = (X' X)^-1 X' y          cov c = (X' X)^-1 (sum_g X_g' r_g r_g' X_g) (X' X)^-1  G / (G - 1)
 //! ```
 //!
-//! g are blocks of time: the residual of a model that lacks something is no noise, and rows beside each other say the same twice. For
-//! the same reason a count of rows is replaced by n / (1 + 2 sum rho_k), the sum ending where the autocorrelation first is not positive.
+//! g are blocks of time: the residual of a model that lacks something is no noise, and rows beside each other say the same
+//! twice. For
+//! the same reason a count of rows is replaced by n / (1 + 2 sum rho_k), the sum ending where the autocorrelation first is
+//! not positive.
 //!
 //! Source: Liang, Zeger 1986, Biometrika 73(1) (clusters); Geyer 1992, Statistical Science 7(4) (the sum's end).
 
@@ -93,7 +95,8 @@ impl Rows {
         Some(Fit { numbers, residual })
     }
 
-    /// Squares of what each fold has left when it is not fitted, judged rows alone; `None` where a fold's rest cannot tell columns apart.
+    /// Squares of what each fold has left when it is not fitted, judged rows alone; `None` where a fold's rest cannot tell
+    /// columns apart.
     pub(super) fn left_out(&self, columns: &Columns, cut: &Cut) -> Option<Vec<f64>> {
         let scales = scales(columns);
         let all = normal(columns, &scales, &self.target, 0..self.target.len());

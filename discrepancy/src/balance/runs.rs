@@ -5,7 +5,8 @@
 //!          ─► zero-phase Chebyshev I and every n-th sample, columns and target alike ─► rows that are fast and inside
 //! ```
 //!
-//! A chamber's target is what its flow balance lacks, `d(p (A x + V_0))/dt / p_N - q`, with q the baseline's: edge flow of the plant
+//! A chamber's target is what its flow balance lacks, `d(p (A x + V_0))/dt / p_N - q`, with q the baseline's: edge flow of
+//! the plant
 //! at the measured pressures, behind both lags.
 //!
 //! Source: Janot, Gautier, Brunot 2019 (processing of EMPS); effects.md, Real records; rig-model.md, One axis.

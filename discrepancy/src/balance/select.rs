@@ -6,14 +6,18 @@
 //! |---|---|---|
 //! | sign | a number that cannot be negative is not | a Stribeck curve that rises is another law |
 //! | penalty | `n_eff ln(P_0 / P_1) > k ln n_eff + 2 ln(variants tried)` | scans find something in any residual |
-//! | folds in time | takes `share_floor` of the power that the baseline leaves out, at 3 clustered standard errors | size and significance; a small rest of a small rest is no finding |
-//! | folds in bands of position, of speed | half of that share, at 2 | a record that repeats its path repeats its error in every block of time: what was fitted there must hold at places, and at speeds, that it has not seen |
+//! | folds in time | takes `share_floor` of what the baseline leaves out, at 3 clustered standard errors | size, significance |
+//! | folds in bands of position, of speed | half of that share, at 2 | it must hold where it was not fitted |
 //!
-//! Bands are asked of shapes that reach beyond a band, and of speed only when it varies by more than a factor of 3 (deciles). The best of
-//! what passes is taken; another effect that passes and leaves no more on the same folds (3 clustered standard errors) explains the
+//! A record that repeats its path repeats its error in every block of time; bands ask for places and speeds not seen.
+//! They are asked of shapes that reach beyond a band, and of speed only when it varies by more than a factor of 3
+//! (deciles). The best of
+//! what passes is taken; another effect that passes and leaves no more on the same folds (3 clustered standard errors)
+//! explains the
 //! records as well.
 //!
-//! Source: Schwarz 1978 (penalty); discrepancy-notes.md, 3, 5 and Pipeline 5; Roberts et al. 2017, Ecography 40(8) (blocked folds).
+//! Source: Schwarz 1978 (penalty); discrepancy-notes.md, 3, 5 and Pipeline 5; Roberts et al. 2017, Ecography 40(8) (blocked
+//! folds).
 
 use super::fit::{Columns, Cut, Rows, clustered_t};
 use super::model::{Selection, TermEntry};
@@ -336,7 +340,8 @@ mod tests {
 
     #[test]
     fn an_error_that_repeats_with_the_path_but_not_over_places_is_not_taken() {
-        // A wiggle in one tenth of the stroke, the same in every block of time: only folds over places see that no slope is there.
+        // A wiggle in one tenth of the stroke, the same in every block of time: only folds over places see that no slope is
+        // there.
         let (x, _, noise) = path();
         let wiggle: Vec<f64> =
             (0..2000).map(|at| if x[at] > 0.9 { 1.0 } else { 0.0 } + 0.2 * noise[at]).collect();

@@ -1,6 +1,7 @@
 //! The report of a balance: what was named and what was not, and the held-out record.
 //!
-//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the same reason
+//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the
+//! same reason
 //! `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their folds.
 
 use super::fit::{clustered_t, residual, rms};

@@ -1,4 +1,5 @@
-//! One balance on records that the plant made: a chamber with a hidden volume, one with nothing hidden, a file that makes no sense.
+//! One balance on records that the plant made: a chamber with a hidden volume, one with nothing hidden, a file that makes no
+//! sense.
 
 use super::*;
 use crate::report::Verdict;
@@ -35,7 +36,8 @@ fn record(rig: &RigParameters, seed: u64) -> String {
 fn model(folder: &Path) -> PathBuf {
     let file = folder.join("chamber.toml");
     let text = format!(
-        "kind = \"chamber\"\nrig = {:?}\n[processing]\nlow_pass_hz = 40.0\ndecimate = 5\nends_s = 0.1\nposition_mm = [5.0, 495.0]\n",
+        "kind = \"chamber\"\nrig = {:?}\n[processing]\nlow_pass_hz = 40.0\n\
+         decimate = 5\nends_s = 0.1\nposition_mm = [5.0, 495.0]\n",
         baseline_file().display().to_string()
     );
     std::fs::write(&file, text).unwrap();
@@ -67,7 +69,8 @@ fn a_hidden_dead_volume_is_named_in_the_flow_of_its_chamber() {
     let volume = &report.named[0].parameters[0];
     assert!((volume.value - 50.0).abs() < 5.0, "{volume:?}");
     assert_eq!(volume.before, Some(20.0));
-    // In one chamber an offset of the position is the same column; which of the two it is stays open, and what would tell is said.
+    // In one chamber an offset of the position is the same column; which of the two it is stays open, and what would tell is
+    // said.
     assert_eq!(report.named[0].alternatives[0].effect, "position-sensor-offset");
     assert_eq!((report.named.len(), report.verdict), (1, Verdict::Ambiguous));
     assert!(report.next.unwrap().otherwise.unwrap().contains("other chamber"));
