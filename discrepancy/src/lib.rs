@@ -3,6 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`records`] | one reader of records, whatever their form: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
+//! | [`balance`] | a model that is one balance alone, and the real records |
 //! | [`check`] | whether a record can be used, and its noise |
 //! | [`course`] | a record on the simulation's grid |
 //! | [`windows`] | a record in windows, each simulated from its own start |
@@ -22,6 +23,7 @@
 //! | [`workflow`] | all of it in order |
 //! | [`page`] | the same as one page for people |
 
+pub mod balance;
 pub mod calibrate;
 pub mod candidates;
 pub mod check;
