@@ -76,9 +76,9 @@ pub struct CloseArguments {
     /// Model and training records.
     #[command(flatten)]
     pub records: RecordArguments,
-    /// The record that the model never sees before it is judged on it.
-    #[arg(long)]
-    pub test: Option<PathBuf>,
+    /// The record that the model never sees before it is judged on it; a model of one balance takes several.
+    #[arg(long, num_args = 1..)]
+    pub test: Vec<PathBuf>,
 }
 
 /// What a rig file is extended by.

@@ -5,14 +5,14 @@
 
 use crate::calibrate::calibrate;
 use crate::cli::{
-    CloseArguments, Cli, Command, ExtendArguments, NextArguments, RecordArguments, VerifyArguments,
+    Cli, CloseArguments, Command, ExtendArguments, NextArguments, RecordArguments, VerifyArguments,
 };
 use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::Around;
 use crate::report::{NamedEffect, Quantity, Report, Verdict, Verification};
 use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
-use crate::{balance, locate, next, page, verify};
+use crate::{balance, locate, page, verify};
 use protocol::exit::Exit;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -70,7 +70,7 @@ pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
         }
         Command::Name(arguments) => {
             threads(arguments.threads);
-            close_command(&CloseArguments { records: arguments.clone(), test: None })
+            close_command(&CloseArguments { records: arguments.clone(), test: Vec::new() })
         }
         Command::Check(arguments) => check_command(arguments),
         Command::Calibrate(arguments) => {
@@ -109,14 +109,15 @@ fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
     let text = std::fs::read_to_string(&records.rig)
         .map_err(|why| CommandError::File { file: records.rig.clone(), why })?;
     let outcome = if balance::is_model_file(&text) {
-        let report = balance::close(&records.rig, &records.train, arguments.test.as_deref(), &mut progress)?;
-        let extended = balance::extended_model_text(&text, &report).ok();
+        let tests: Vec<&Path> = arguments.test.iter().map(PathBuf::as_path).collect();
+        let report = balance::close_on(&records.rig, &records.train, &tests, &mut progress)?;
+        let extended = balance::extended_model_text(&records.rig, &report).ok();
         Outcome { report, extended, pictures: page::Pictures::default(), experiment: None }
     } else {
         let task = Task {
             rig: records.rig.clone(),
             train: records.train.clone(),
-            test: arguments.test.clone(),
+            test: one_test(arguments)?,
             options: records.options(),
             without: records.without.clone(),
         };
@@ -129,12 +130,25 @@ fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
     if let Some(extended) = extended {
         write(&out.join(model), extended)?;
     }
-    if let Some(experiment) = experiment {
-        write(&out.join(next::FILE), experiment)?;
+    let proposed = report.next.as_ref().and_then(|next| next.experiment.as_ref());
+    if let Some((name, experiment)) = proposed.zip(experiment.as_ref()) {
+        write(&out.join(name), experiment)?;
     }
     progress(&format!("{} and report.html are in {}", "report.json", out.display()));
     print(&in_words(report));
     Ok(if report.verdict == Verdict::BadData { Exit::BadInput } else { Exit::Good })
+}
+
+/// The held-out record of a rig: one at a time.
+fn one_test(arguments: &CloseArguments) -> Result<Option<PathBuf>, CommandError> {
+    match arguments.test.as_slice() {
+        [] => Ok(None),
+        [one] => Ok(Some(one.clone())),
+        many => Err(CommandError::BadData(format!(
+            "--test: {} records: a rig is judged on one at a time; judge the others with verify",
+            many.len()
+        ))),
+    }
 }
 
 fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
@@ -142,8 +156,7 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let mut all = Vec::new();
     let mut text = String::new();
     for path in &arguments.train {
-        let record =
-            crate::records::read(path, &arguments.options()).map_err(WorkflowError::from)?;
+        let record = crate::records::read(path, &arguments.options()).map_err(WorkflowError::from)?;
         let report = crate::check::check(&record, &rig).report;
         let fit = if report.usable { "can be used" } else { "cannot be used" };
         let _ = writeln!(text, "{}: {} rows, {:.3} s: {fit}", report.file, report.rows, report.length_s);
@@ -209,8 +222,11 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let located = locate::locate(&rig_file.rig, &courses, &mut progress);
     let mut text = String::new();
     for bar in &located.location.balances {
-        let _ =
-            writeln!(text, "{}: {:.2} times its noise, rms {:.4} {}", bar.balance, bar.over_noise, bar.rms, bar.unit);
+        let _ = writeln!(
+            text,
+            "{}: {:.2} times its noise, rms {:.4} {}",
+            bar.balance, bar.over_noise, bar.rms, bar.unit
+        );
     }
     print(&text);
     if let Some(out) = &arguments.out {
@@ -230,8 +246,7 @@ fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
 
 fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     let [before, after] = [RigFile::read(&arguments.rig)?.rig, RigFile::read(&arguments.extended)?.rig];
-    let options =
-        crate::records::ReadOptions { mapping: arguments.mapping.clone(), ..Default::default() };
+    let options = crate::records::ReadOptions { mapping: arguments.mapping.clone(), ..Default::default() };
     let opened = open(&arguments.test, &options, &before)?;
     let Some(course) = opened.course else {
         return Err(CommandError::BadData(format!("{} cannot be used: see check", arguments.test.display())));
@@ -291,8 +306,7 @@ fn courses(arguments: &RecordArguments) -> Result<(RigFile, Vec<crate::course::C
 }
 
 fn read_report(path: &Path) -> Result<workflow::Told, CommandError> {
-    let bytes =
-        std::fs::read(path).map_err(|why| CommandError::File { file: path.to_owned(), why })?;
+    let bytes = std::fs::read(path).map_err(|why| CommandError::File { file: path.to_owned(), why })?;
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }
 

@@ -21,12 +21,15 @@
 //! | [`next`] | the experiment that would tell apart what a record does not |
 //! | [`report`] | what was found, as data |
 //! | [`workflow`] | all of it in order |
+//! | [`commands`], [`cli`] | the program |
 //! | [`page`] | the same as one page for people |
 
 pub mod balance;
 pub mod calibrate;
 pub mod candidates;
 pub mod check;
+pub mod cli;
+pub mod commands;
 pub mod course;
 pub mod engine;
 pub mod extend;
@@ -41,5 +44,6 @@ pub mod records;
 pub mod refit;
 pub mod report;
 pub mod screen;
+pub mod verify;
 pub mod windows;
 pub mod workflow;

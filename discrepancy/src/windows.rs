@@ -16,12 +16,17 @@
 //! Source: discrepancy-notes.md, 1 (windows of 100 to 200 ms judge best), 6.
 
 use crate::course::{CHANNELS, Course, PERIOD_S, Point};
+use nalgebra::{DMatrix, DVector};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
 
 /// Periods of a window.
 pub const WINDOW: usize = 100;
 /// Place of the force among the readings.
 const FORCE: usize = 1;
+/// How far a start may move at a time.
+const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
+/// How often the starts of a linked record are moved.
+const LINKED_PASSES: usize = 3;
 /// Steps of a period where only a difference is wanted.
 const COARSE_SUBSTEPS: u32 = 5;
 /// Readings to each side that a reading of the force is compared with.
@@ -40,6 +45,8 @@ pub struct Windows<'a> {
     rig: RigParameters,
     /// First period of each window.
     starts: Vec<usize>,
+    /// Where each window begins, those that are not judged included.
+    points: Vec<[Point; 2]>,
     /// Axis and channel of each lane.
     lanes: Vec<(usize, usize)>,
     /// Readings over their noise, window by window, period by period, lane by lane; 0 where there is none.
@@ -73,14 +80,71 @@ impl<'a> Windows<'a> {
                 }
             }
         }
+        let points = (0..course.len() / WINDOW).map(|window| course.points[window * WINDOW]).collect();
         let mut drifts = Vec::with_capacity(readings.len());
         for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
             drifts.extend(lanes.iter().map(|(axis, channel)| drift(course, at, *axis, *channel)));
         }
-        let mut windows =
-            Windows { course, rig: rig.clone(), starts, lanes, readings, valid, drifts, bases: Vec::new() };
-        windows.bases = windows.sensitivities();
+        let mut windows = Windows {
+            course,
+            rig: rig.clone(),
+            starts,
+            points,
+            lanes,
+            readings,
+            valid,
+            drifts,
+            bases: Vec::new(),
+        };
+        windows.bases = windows.sensitivities().into_iter().map(orthonormal).collect();
+        // A micrometre of the eye in its gap is two newtons: where the rods are linked, the record's points are too coarse.
+        for _ in 0..if course.linked { LINKED_PASSES } else { 0 } {
+            windows.settle();
+        }
         windows
+    }
+
+    /// Moves each window's start to where its readings say that it was, and takes its sensitivities anew.
+    fn settle(&mut self) {
+        let rows = self.rows();
+        let all = self.sensitivities();
+        let simulated = self.simulate(&self.rig);
+        let mut left: Vec<f64> =
+            self.readings.iter().zip(&simulated).map(|(reading, own)| reading - own).collect();
+        for (value, _) in left.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
+            *value = 0.0;
+        }
+        let measured: Vec<usize> = (0..2).filter(|axis| self.course.measured[*axis]).collect();
+        for (at, columns) in all.iter().enumerate() {
+            let own = &mut left[at * rows..][..rows];
+            self.flatten_spikes(own);
+            self.whiten(at, own);
+            let count = columns.len();
+            // What is known of a start beforehand, in units of its doubt.
+            let mut matrix = DMatrix::<f64>::identity(count, count);
+            for row in 0..count {
+                for column in 0..count {
+                    matrix[(row, column)] += dot(&columns[row], &columns[column]);
+                }
+            }
+            let right = DVector::from_iterator(count, columns.iter().map(|column| dot(column, own)));
+            let Some(moved) = matrix.cholesky().map(|factor| factor.solve(&right)) else { continue };
+            for (place, axis) in measured.iter().enumerate() {
+                let part = |number: usize| {
+                    let most = FARTHEST[number];
+                    (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
+                };
+                let point = &mut self.points[self.starts[at] / WINDOW][*axis];
+                point.extension_m += part(0);
+                // What rests, rests: a speed of its own would only let it slide and stick again.
+                if point.rod_velocity_m_per_s != 0.0 {
+                    point.rod_velocity_m_per_s += part(1);
+                }
+                point.pressures_pa[0] += part(2);
+                point.pressures_pa[1] += part(3);
+            }
+        }
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
     }
 
     /// The baseline rig.
@@ -247,7 +311,7 @@ impl<'a> Windows<'a> {
 
     /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
     fn seat(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
-        let mut points = self.course.points[start];
+        let mut points = self.points[start / WINDOW];
         if let Some((axis, number)) = nudged {
             let point = &mut points[axis];
             match number {
@@ -260,13 +324,13 @@ impl<'a> Windows<'a> {
         seat(plant, self.course, &points);
     }
 
-    /// An orthonormal basis of what each window's start explains.
+    /// What a change of each number of a window's start changes, by as much as it is doubted.
     fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
         let mut plant = self.plant(&self.rig);
         let rows = self.rows();
-        let mut bases = Vec::with_capacity(self.starts.len());
+        let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
         for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
-            let place = self.starts.get(bases.len()).is_some_and(|own| *own == start);
+            let place = self.starts.get(all.len()).is_some_and(|own| *own == start);
             let before = plant.clone();
             self.seat(&mut plant, start, None);
             let mut straight = Vec::with_capacity(rows);
@@ -277,8 +341,8 @@ impl<'a> Windows<'a> {
             if !place {
                 continue;
             }
-            let valid = &self.valid[bases.len() * rows..][..rows];
-            let mut basis: Vec<Vec<f64>> = Vec::new();
+            let valid = &self.valid[all.len() * rows..][..rows];
+            let mut columns: Vec<Vec<f64>> = Vec::new();
             for axis in (0..2).filter(|axis| self.course.measured[*axis]) {
                 for (number, nudge) in NUDGES.iter().enumerate() {
                     let mut nudged = before.clone();
@@ -293,20 +357,13 @@ impl<'a> Windows<'a> {
                         *own = if *valid { (*own - straight) * scale } else { 0.0 };
                     }
                     self.flatten_jumps(&mut own, scale);
-                    self.whiten(bases.len(), &mut own);
-                    // Twice, as rounding asks for.
-                    project(&mut own, &basis);
-                    project(&mut own, &basis);
-                    let length = dot(&own, &own).sqrt();
-                    if length > 1.0 {
-                        own.iter_mut().for_each(|own| *own /= length);
-                        basis.push(own);
-                    }
+                    self.whiten(all.len(), &mut own);
+                    columns.push(own);
                 }
             }
-            bases.push(basis);
+            all.push(columns);
         }
-        bases
+        all
     }
 
     /// A sensitivity is scaled up from a small change: a jump that moves by a sample is no part of it.
@@ -389,6 +446,22 @@ pub fn seat(plant: &mut Plant, course: &Course, points: &[Point; 2]) {
         own.extension_m = own.extension_m.clamp(0.0, cylinder.stroke_m);
     }
     plant.go_on_in(&state).expect("the points of a record are states of the rig");
+}
+
+/// An orthonormal basis of some columns, those left out that are worth less than one standard deviation.
+fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut own in columns {
+        // Twice, as rounding asks for.
+        project(&mut own, &basis);
+        project(&mut own, &basis);
+        let length = dot(&own, &own).sqrt();
+        if length > 1.0 {
+            own.iter_mut().for_each(|own| *own /= length);
+            basis.push(own);
+        }
+    }
+    basis
 }
 
 /// Takes out what an orthonormal basis explains.
