@@ -42,6 +42,8 @@ const CONTENDS: f64 = 0.35;
 const NUMBER_COSTS: f64 = 8.0;
 /// Multiple of the threshold of nothing that is asked for, since a model is never exact.
 const SAFETY: f64 = 3.0;
+/// Share of what the parameters leave that the first effect must take.
+const TAKES_FIRST: f64 = 0.1;
 /// Share of what a model leaves that one more effect must take.
 const TAKES: f64 = 0.3;
 /// Share of the smallest change that occurs below which an effect is none.
@@ -224,7 +226,8 @@ fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
 fn accepted(before: &Refit, after: &Refit, threshold: f64) -> bool {
     let gain = before.loss - after.loss;
     let Some(joined) = after.placed.last() else { return false };
-    let takes = gain > TAKES * before.loss.max(0.0);
+    let share = if before.placed.is_empty() { TAKES_FIRST } else { TAKES };
+    let takes = gain > share * before.loss.max(0.0);
     gain > SAFETY * threshold && takes && is_large(joined)
 }
 

@@ -16,6 +16,7 @@
 //! Source: discrepancy-notes.md, 1 (windows of 100 to 200 ms judge best), 6.
 
 use crate::course::{CHANNELS, Course, PERIOD_S, Point};
+use crate::seats::Seats;
 use nalgebra::{DMatrix, DVector};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
 
@@ -209,10 +210,12 @@ impl<'a> Windows<'a> {
 
     fn run(&self, mut plant: Plant) -> Vec<f64> {
         let mut simulated = Vec::with_capacity(self.readings.len());
+        let seats = Seats::of(plant.rig());
         let mut next = 0;
         // Windows that are not judged are simulated as well: memories go on.
         for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
-            self.seat(&mut plant, start, None);
+            let points = seats.points(self.course, start, &self.points[start / WINDOW]);
+            seat(&mut plant, self.course, &points);
             let judged = self.starts.get(next) == Some(&start);
             next += usize::from(judged);
             for inputs in &self.course.inputs[start..start + WINDOW] {
