@@ -17,6 +17,7 @@
 //! | [`extend`] | the rig file with what was found |
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
+//! | [`verify`] | the held-out record: both models, frozen |
 //! | [`report`] | what was found, as data |
 //! | [`workflow`] | all of it in order |
 //! | [`page`] | the same as one page for people |
@@ -37,5 +38,6 @@ pub mod records;
 pub mod refit;
 pub mod report;
 pub mod screen;
+pub mod verify;
 pub mod windows;
 pub mod workflow;

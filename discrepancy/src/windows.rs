@@ -17,6 +17,9 @@
 
 use crate::course::{CHANNELS, Course, PERIOD_S, Point};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+use std::f64::consts::TAU;
 
 /// Periods of a window.
 pub const WINDOW: usize = 100;
@@ -125,6 +128,46 @@ impl<'a> Windows<'a> {
         let rows = self.rows();
         let valid = self.valid.chunks_exact(rows).map(|valid| valid.iter().filter(|valid| **valid).count());
         valid.zip(&self.bases).map(|(valid, basis)| valid.saturating_sub(basis.len()).max(1) as f64).collect()
+    }
+
+    /// Samples of each window and lane, window by window.
+    #[must_use]
+    pub fn samples(&self) -> Vec<usize> {
+        let width = self.lanes.len();
+        let window = |valid: &[bool]| -> Vec<usize> {
+            (0..width)
+                .map(|lane| valid.iter().skip(lane).step_by(width).filter(|valid| **valid).count())
+                .collect()
+        };
+        self.valid.chunks_exact(self.rows().max(1)).flat_map(window).collect()
+    }
+
+    /// Readings over their noise, window by window, period by period, lane by lane; `None` where there is none.
+    pub fn readings(&self) -> impl Iterator<Item = Option<f64>> {
+        self.readings.iter().zip(&self.valid).map(|(reading, valid)| valid.then_some(*reading))
+    }
+
+    /// The residual of a model that lacks nothing: noise as the course has it, its memory and the sampling instants' errors
+    /// included, treated as a residual is.
+    #[must_use]
+    pub fn noise(&self, random: &mut Pcg64) -> Vec<f64> {
+        let width = self.lanes.len();
+        let memories: Vec<f64> =
+            self.lanes.iter().map(|(axis, channel)| self.course.memory[*axis][*channel]).collect();
+        let mut noise = Vec::with_capacity(self.readings.len());
+        for drifts in self.drifts.chunks_exact(self.rows().max(1)) {
+            let mut own = vec![0.0; width];
+            for (period, drifts) in drifts.chunks_exact(width).enumerate() {
+                for (own, memory) in own.iter_mut().zip(&memories) {
+                    let kept = if period == 0 { 0.0 } else { *memory };
+                    *own = kept * *own + (1.0 - kept * kept).sqrt() * gaussian(random);
+                }
+                let instant = gaussian(random);
+                noise.extend(own.iter().zip(drifts).map(|(own, drift)| own + drift * instant));
+            }
+        }
+        self.reduce(&mut noise);
+        noise
     }
 
     /// Readings over their noise that this rig would have given, without noise and rounding.
@@ -397,6 +440,14 @@ pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
         let share = dot(values, direction);
         values.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
     }
+}
+
+/// A number of mean 0 and variance 1 [Box, Muller 1958, Ann. Math. Stat. 29(2), eq. 1].
+fn gaussian(random: &mut Pcg64) -> f64 {
+    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+    let never_zero = ((random.next_u64() >> 11) + 1) as f64 * STEP;
+    let turn = (random.next_u64() >> 11) as f64 * STEP;
+    (-2.0 * never_zero.ln()).sqrt() * (TAU * turn).cos()
 }
 
 /// Sum of products, in four lanes that are added in one order.
