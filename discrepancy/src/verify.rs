@@ -124,8 +124,8 @@ pub(crate) struct Model<'a> {
 impl<'a> Model<'a> {
     /// Each model has the freedom of its own windows' starts.
     fn new(course: &'a Course, rig: &RigParameters) -> Self {
-        let windows = Windows::new(course, rig);
-        let simulated = windows.simulate(rig);
+        let mut windows = Windows::new(course, rig);
+        let simulated = windows.settle();
         let residual = windows.residual(&simulated);
         Model { windows, simulated, residual }
     }

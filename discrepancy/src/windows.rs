@@ -16,6 +16,7 @@
 //! Source: discrepancy-notes.md, 1 (windows of 100 to 200 ms judge best), 6.
 
 use crate::course::{CHANNELS, Course, PERIOD_S, Point};
+use nalgebra::{DMatrix, DVector};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
@@ -33,6 +34,8 @@ const SPIKE_REACH: usize = 4;
 const SPIKE: f64 = 6.0;
 /// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
 const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
+/// Steps in which starts are moved.
+const SETTLING: usize = 2;
 /// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
 const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 
@@ -52,6 +55,17 @@ pub struct Windows<'a> {
     drifts: Vec<f64>,
     /// Orthonormal, per window.
     bases: Vec<Vec<Vec<f64>>>,
+    /// What the directions of each basis are made of.
+    directions: Vec<Directions>,
+    /// By how much each window starts off the record's points: x, v, p_a, p_b; of all windows, judged or not.
+    shifts: Vec<[[f64; 4]; 2]>,
+}
+
+/// Numbers of a start, axis and place in [`NUDGES`], and for each what its sensitivity has in each direction of the basis.
+#[derive(Clone, Debug, Default)]
+struct Directions {
+    numbers: Vec<(usize, usize)>,
+    shares: Vec<Vec<f64>>,
 }
 
 impl<'a> Windows<'a> {
@@ -80,9 +94,10 @@ impl<'a> Windows<'a> {
         for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
             drifts.extend(lanes.iter().map(|(axis, channel)| drift(course, at, *axis, *channel)));
         }
+        let shifts = vec![[[0.0; 4]; 2]; course.len() / WINDOW];
         let mut windows =
-            Windows { course, rig: rig.clone(), starts, lanes, readings, valid, drifts, bases: Vec::new() };
-        windows.bases = windows.sensitivities();
+            Windows { course, rig: rig.clone(), starts, lanes, readings, valid, drifts, bases: Vec::new(), directions: Vec::new(), shifts };
+        (windows.bases, windows.directions) = windows.sensitivities();
         windows
     }
 
@@ -221,15 +236,72 @@ impl<'a> Windows<'a> {
         differs
     }
 
+    /// Moves each window's start to where its readings are met best under the baseline rig, and gives the simulation from there.
+    ///
+    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
+    /// window: where the points are far off, as those of a sensor that lags, both need the start itself. A window that is not met
+    /// better from its new start keeps the old one.
+    pub fn settle(&mut self) -> Vec<f64> {
+        let mut simulated = self.simulate(&self.rig);
+        let mut squares = self.squares(&simulated);
+        for _ in 0..SETTLING {
+            let before = self.shifts.clone();
+            self.shift(&simulated);
+            let tried = self.squares(&self.simulate(&self.rig));
+            for (at, start) in self.starts.iter().enumerate() {
+                if tried[at] > squares[at] {
+                    self.shifts[start / WINDOW] = before[start / WINDOW];
+                }
+            }
+            simulated = self.simulate(&self.rig);
+            squares = self.squares(&simulated);
+        }
+        simulated
+    }
+
+    fn squares(&self, simulated: &[f64]) -> Vec<f64> {
+        self.residual(simulated).chunks_exact(self.rows()).map(|own| dot(own, own)).collect()
+    }
+
+    /// One step of Gauss and Newton of all starts, each number held to its point by [`DOUBT`].
+    fn shift(&mut self, simulated: &[f64]) {
+        let mut left: Vec<f64> =
+            self.readings.iter().zip(simulated).map(|(reading, own)| reading - own).collect();
+        self.treat(&mut left);
+        let rows = self.rows();
+        for (at, own) in left.chunks_exact(rows).enumerate() {
+            let directions = &self.directions[at];
+            let count = directions.numbers.len();
+            let along = DVector::from_iterator(count, self.bases[at].iter().map(|basis| dot(own, basis)));
+            let upper = DMatrix::from_fn(count, count, |row, column| {
+                directions.shares[column].get(row).copied().unwrap_or(0.0)
+            });
+            let normal = upper.transpose() * &upper + DMatrix::identity(count, count);
+            let Some(solved) = normal.cholesky() else { continue };
+            let step = solved.solve(&(upper.transpose() * along));
+            let shifts = &mut self.shifts[self.starts[at] / WINDOW];
+            for ((axis, number), step) in directions.numbers.iter().zip(step.iter()) {
+                shifts[*axis][*number] += step * DOUBT[*number];
+            }
+        }
+    }
+
     fn reduce(&self, values: &mut [f64]) {
+        self.treat(values);
+        for (window, basis) in values.chunks_exact_mut(self.rows()).zip(&self.bases) {
+            project(window, basis);
+        }
+    }
+
+    /// Takes out single jumps of the force and whitens.
+    fn treat(&self, values: &mut [f64]) {
         for (value, _) in values.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
             *value = 0.0;
         }
         let rows = self.rows();
-        for (at, (window, basis)) in values.chunks_exact_mut(rows).zip(&self.bases).enumerate() {
+        for (at, window) in values.chunks_exact_mut(rows).enumerate() {
             self.flatten_spikes(window);
             self.whiten(at, window);
-            project(window, basis);
         }
     }
 
@@ -291,6 +363,12 @@ impl<'a> Windows<'a> {
     /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
     fn seat(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
         let mut points = self.course.points[start];
+        for (point, shift) in points.iter_mut().zip(&self.shifts[start / WINDOW]) {
+            point.extension_m += shift[0];
+            point.rod_velocity_m_per_s += shift[1];
+            point.pressures_pa[0] += shift[2];
+            point.pressures_pa[1] += shift[3];
+        }
         if let Some((axis, number)) = nudged {
             let point = &mut points[axis];
             match number {
@@ -304,10 +382,11 @@ impl<'a> Windows<'a> {
     }
 
     /// An orthonormal basis of what each window's start explains.
-    fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
+    fn sensitivities(&self) -> (Vec<Vec<Vec<f64>>>, Vec<Directions>) {
         let mut plant = self.plant(&self.rig);
         let rows = self.rows();
         let mut bases = Vec::with_capacity(self.starts.len());
+        let mut all_directions = Vec::with_capacity(self.starts.len());
         for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
             let place = self.starts.get(bases.len()).is_some_and(|own| *own == start);
             let before = plant.clone();
@@ -322,6 +401,7 @@ impl<'a> Windows<'a> {
             }
             let valid = &self.valid[bases.len() * rows..][..rows];
             let mut basis: Vec<Vec<f64>> = Vec::new();
+            let mut directions = Directions::default();
             for axis in (0..2).filter(|axis| self.course.measured[*axis]) {
                 for (number, nudge) in NUDGES.iter().enumerate() {
                     let mut nudged = before.clone();
@@ -337,6 +417,7 @@ impl<'a> Windows<'a> {
                     }
                     self.flatten_jumps(&mut own, scale);
                     self.whiten(bases.len(), &mut own);
+                    let mut shares: Vec<f64> = basis.iter().map(|direction| dot(&own, direction)).collect();
                     // Twice, as rounding asks for.
                     project(&mut own, &basis);
                     project(&mut own, &basis);
@@ -344,12 +425,16 @@ impl<'a> Windows<'a> {
                     if length > 1.0 {
                         own.iter_mut().for_each(|own| *own /= length);
                         basis.push(own);
+                        shares.push(length);
+                        directions.numbers.push((axis, number));
+                        directions.shares.push(shares);
                     }
                 }
             }
             bases.push(basis);
+            all_directions.push(directions);
         }
-        bases
+        (bases, all_directions)
     }
 
     /// A sensitivity is scaled up from a small change: a jump that moves by a sample is no part of it.
