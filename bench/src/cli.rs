@@ -69,6 +69,9 @@ pub struct CompareArguments {
     /// Compare runs of different experiments too.
     #[arg(long)]
     pub anyway: bool,
+    /// Tell and draw how far each signal lies from the first run, instead of figures and curves.
+    #[arg(long)]
+    pub differences: bool,
 }
 
 /// Which runs are repetitions of each other.

@@ -1,10 +1,12 @@
 //! Runs of one experiment side by side: a table of all figures, and their curves over each other.
 //!
-//! Time begins with the experiment, so that runs whose waiting took longer lie on each other.
+//! [`differences`] draws how far the others lie from the first instead. Time begins with the experiment, so that runs whose waiting took longer lie on each other.
 
+pub mod differences;
 mod overlay;
 
 use crate::SummaryError;
+use crate::drawing::Picture;
 use crate::grid::Grid;
 use crate::page_style::{document, escaped};
 use crate::runs::{Run, rows};
@@ -50,12 +52,18 @@ fn change(first: Option<f64>, other: Option<f64>) -> String {
     }
 }
 
-/// The page: heading, runs, table, overlays, all in one file.
+/// The curves of the runs over each other.
+#[must_use]
+pub fn pictures(runs: &[Run]) -> Vec<Picture> {
+    overlay::pictures(runs)
+}
+
+/// The page: heading, runs, table, pictures, all in one file.
 ///
 /// # Errors
 /// [`SummaryError::Write`] when a picture cannot be drawn.
-pub fn page(runs: &[Run], grid: &Grid) -> Result<String, SummaryError> {
-    let pictures = overlay::pictures(runs).into_iter().map(|picture| {
+pub fn page(runs: &[Run], grid: &Grid, pictures: &[Picture]) -> Result<String, SummaryError> {
+    let pictures = pictures.iter().map(|picture| {
         picture.svg().map_err(|error| SummaryError::write(Path::new("the page's picture"), error))
     });
     let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
@@ -83,13 +91,13 @@ fn entry(run: &Run) -> String {
 ///
 /// # Errors
 /// [`SummaryError::Write`]
-pub fn write(runs: &[Run], grid: &Grid, out: &Path) -> Result<PathBuf, SummaryError> {
+pub fn write(runs: &[Run], grid: &Grid, pictures: &[Picture], out: &Path) -> Result<PathBuf, SummaryError> {
     let is_page = out.extension().is_some_and(|extension| extension == "html");
     let page_path = if is_page { out.into() } else { out.join("compare.html") };
     let folder = page_path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).map_err(|error| SummaryError::write(folder, error))?;
     let markdown_path = page_path.with_extension("md");
-    for (path, text) in [(&page_path, page(runs, grid)?), (&markdown_path, grid.markdown())] {
+    for (path, text) in [(&page_path, page(runs, grid, pictures)?), (&markdown_path, grid.markdown())] {
         std::fs::write(path, text).map_err(|error| SummaryError::write(path, error))?;
     }
     Ok(page_path)
@@ -110,7 +118,7 @@ mod tests {
         let row = grid.rows.iter().find(|row| row[0] == "position error dynamic").unwrap();
         assert_eq!(row[1..], ["2.000 mm", "1.000 mm", "-50.0 %"]);
         assert!(grid.rows.iter().all(|row| row[0] != "force settling"), "nobody has it");
-        let page = write(&runs, &grid, &parent.path().join("new")).unwrap();
+        let page = write(&runs, &grid, &pictures(&runs), &parent.path().join("new")).unwrap();
         let text = std::fs::read_to_string(&page).unwrap();
         for part in ["ramp: 2 runs", "two&lt;", "<svg", "-50.0 %"] {
             assert!(text.contains(part), "{part}");

@@ -87,10 +87,14 @@ fn read_runs(folders: &[PathBuf], anyway: bool) -> Result<Vec<Run>, RunsError> {
 
 fn compare_runs(arguments: &CompareArguments) -> Result<Exit, RunsError> {
     let runs = read_runs(&arguments.folders, arguments.anyway)?;
-    let grid = compare::table(&runs);
+    let (grid, pictures) = if arguments.differences {
+        (compare::differences::table(&runs), compare::differences::pictures(&runs))
+    } else {
+        (compare::table(&runs), compare::pictures(&runs))
+    };
     print(&grid.markdown());
     if let Some(out) = &arguments.out {
-        let page = compare::write(&runs, &grid, out)?;
+        let page = compare::write(&runs, &grid, &pictures, out)?;
         print(&format!("\n  page in {}", page.display()));
     }
     Ok(Exit::Good)

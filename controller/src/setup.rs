@@ -90,6 +90,32 @@ impl Inputs {
         Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
     }
 
+    /// The same for texts that no file holds: an experiment under a name for messages, and the text of a program by its name.
+    ///
+    /// # Errors
+    /// [`RunError::Input`] as for files, and for a program that `text_of` does not know.
+    pub fn of_texts(
+        rig: &RigParameters,
+        (name, experiment_toml): (&str, &str),
+        text_of: impl Fn(&str) -> Option<String>,
+        set: &[&str],
+    ) -> Result<Self, RunError> {
+        let experiment_file = PathBuf::from(name);
+        let experiment = Experiment::from_toml(experiment_toml, &experiment_file, rig.cylinder().stroke_m)
+            .map_err(RunError::input)?;
+        let mut programs = [None, None];
+        for (axis, section) in sections(&experiment) {
+            let written = &section.program.written;
+            let text = text_of(written)
+                .ok_or_else(|| RunError::Input(format!("{name}: no program {written} is known here")))?;
+            programs[axis.index()] = Some(Source { path: written.into(), title: written.clone(), text });
+        }
+        let overrides = set.iter().map(|text| parse_override(text)).collect::<Result<Vec<_>, _>>()?;
+        let (rig, experiment_toml) = (rig.clone(), experiment_toml.to_owned());
+        let rig_toml = String::new();
+        Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
+    }
+
     /// The controller of `axis`.
     ///
     /// # Errors

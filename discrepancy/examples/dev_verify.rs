@@ -24,7 +24,7 @@ fn main() {
         let c = check::check(&rec, &base);
         let course = Course::of(&rec, &c, &base).unwrap();
         let t = std::time::Instant::now();
-        let v = verify(&base, &rig, &course, None, &mut |_| ());
+        let v = verify(&base, &rig, &course, &mut |_| ());
         let took = t.elapsed().as_secs_f64();
         let x = &v.verification;
         let inside = x.chi2_after >= x.chi2_null[0] && x.chi2_after <= x.chi2_null[1];

@@ -3,6 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`records`] | one reader of records, whatever their form: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
+//! | [`balance`] | a model that is one balance alone, and the real records |
 //! | [`check`] | whether a record can be used, and its noise |
 //! | [`course`] | a record on the simulation's grid |
 //! | [`windows`] | a record in windows, each simulated from its own start |
@@ -17,20 +18,26 @@
 //! | [`extend`] | the rig file with what was found |
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
+//! | [`next`] | the experiment that would tell apart what a record does not |
 //! | [`verify`] | the held-out record: both models, frozen |
 //! | [`report`] | what was found, as data |
 //! | [`workflow`] | all of it in order |
+//! | [`commands`], [`cli`] | the program |
 //! | [`page`] | the same as one page for people |
 
+pub mod balance;
 pub mod calibrate;
 pub mod candidates;
 pub mod check;
+pub mod cli;
+pub mod commands;
 pub mod course;
 pub mod engine;
 pub mod extend;
 pub mod fit;
 pub mod locate;
 pub mod name;
+pub mod next;
 pub mod outside;
 pub mod page;
 pub mod parameters;

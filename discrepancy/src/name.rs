@@ -18,7 +18,7 @@ use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{Around, Placed, Refit, refit, refit_steps, rig_of};
+use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
 use crate::screen::{Columns, Screened};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -28,6 +28,14 @@ use rayon::prelude::*;
 const MOST: usize = 3;
 /// Candidates that are fitted in the simulator at most, in each round.
 const CONTENDERS: usize = 6;
+/// Share of a screened gain that the simulator may deny before other amplitudes are tried.
+const BELIEVED: f64 = 0.2;
+/// Amplitudes that are tried then.
+const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
+/// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
+const EXCESS: f64 = 0.08;
+/// Screened gain below which nothing is fitted: the best of some forty candidates gains half of it by chance.
+const WORTH_A_FIT: f64 = 25.0;
 /// Share of the best screened gain below which a candidate is not fitted.
 const CONTENDS: f64 = 0.35;
 /// What each number of an effect costs: it must be worth more than one more candidate tried.
@@ -94,7 +102,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
     let mut model = calibrated.fit.clone();
-    let mut threshold = Nothing::new(engine, &columns, &calibrated.around, &model).threshold();
+    let mut threshold = 0.0;
     let mut fitted = Vec::new();
     let mut rounds: Vec<(Vec<Placed>, Vec<Refit>)> = Vec::new();
     for round in 0..MOST {
@@ -111,7 +119,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         contenders.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let Some(best) = contenders.first() else { break };
         let most = own_nothing - best.loss;
-        if most < threshold {
+        if most < WORTH_A_FIT {
             break;
         }
         contenders.truncate(CONTENDERS);
@@ -121,8 +129,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         let mut refits: Vec<Refit> = contenders
             .par_iter()
             .filter_map(|screened| {
-                let mut start = model.placed.clone();
-                start.push(screened.start.clone());
+                let start = best_start(engine, &point, &model.placed, screened, own_nothing);
                 refit_steps(engine, &point, &start, NUMBER_COSTS, if round == 0 { 5 } else { 3 })
             })
             .collect();
@@ -137,21 +144,22 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         if round == 0 {
             fitted = refits.clone();
         }
-        if !accepted(&model, best, threshold) {
+        // What nothing gains is told by what the best model leaves: what it explains is no noise.
+        let own = Nothing::new(engine, &columns, &around_of(engine, best), best).threshold();
+        if !accepted(&model, best, own) {
             break;
         }
+        threshold = own;
         rounds.push((model.placed.clone(), refits.clone()));
         model = best.clone();
-        threshold = Nothing::new(engine, &columns, &around_of(engine, &model), &model).threshold();
-        if model.loss < threshold {
-            break;
-        }
     }
     drop_unneeded(engine, &calibrated, &mut model, &mut rounds, threshold);
     let left = Nothing::new(engine, &columns, &around_of(engine, &model), &model);
-    let limits = left.limits(columns.candidates.len(), left.threshold());
+    threshold = left.threshold();
+    let limits = left.limits(columns.candidates.len(), threshold);
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
-    let inadequate = model.loss > STAYS * calibrated.fit.loss && model.loss > 2.0 * threshold;
+    let level = model.loss / engine.freedom().iter().sum::<f64>();
+    let inadequate = level > EXCESS && model.loss > STAYS * calibrated.fit.loss;
     let alternatives = model.placed.iter().map(|placed| alternatives(placed, &calibrated, &rounds)).collect();
     let shares = shares(&model, &rounds, &calibrated, excess);
     Found {
@@ -168,6 +176,34 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         limits,
         inadequate,
     }
+}
+
+/// Where a candidate's fit begins: where screening says, unless the simulator finds it far worse there than screening does; then
+/// at the best of some amplitudes.
+fn best_start(
+    engine: &Engine<'_>,
+    point: &Around,
+    model: &[Placed],
+    screened: &Screened,
+    nothing: f64,
+) -> Vec<Placed> {
+    let with = |amplitude: f64| {
+        let mut placed = model.to_vec();
+        let mut own = screened.start.clone();
+        own.coordinates[0] = amplitude;
+        placed.push(own);
+        placed
+    };
+    let told = screened.start.coordinates[0];
+    let own = loss_at(engine, point, &with(told));
+    if own < screened.loss + BELIEVED * (nothing - screened.loss) {
+        return with(told);
+    }
+    let [least, most] = screened.start.candidate.range(0);
+    let tried = AMPLITUDES.iter().map(|size| size * told.signum()).filter(|z| *z >= least && *z <= most);
+    let losses = tried.map(|z| (loss_at(engine, point, &with(z)), z));
+    let (_, best) = losses.chain([(own, told)]).min_by(|a, b| a.0.total_cmp(&b.0)).expect("one at least");
+    with(best)
 }
 
 /// Sensitivities of the parameters at a model.

@@ -25,6 +25,8 @@ const SETTLED: f64 = 0.3;
 /// Standard deviations of coordinates before anything is measured: amplitudes, shapes.
 const AMPLITUDE_TOLERANCE: f64 = 3.0;
 const SHAPE_TOLERANCE: f64 = 0.7;
+/// By how much a parameter may be off at most: one that is off by more is another rig.
+const MOST_OFF: f64 = 0.3;
 /// Coordinates beyond which nothing is looked for: a half more than the strongest that occurs.
 const FARTHEST: f64 = 1.5;
 
@@ -88,6 +90,16 @@ fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
         .enumerate()
         .flat_map(|(at, placed)| (0..placed.coordinates.len()).map(move |key| (at, key)))
         .collect()
+}
+
+/// The loss of some effects where they are, the parameters fitted beside; infinite where the rig cannot have them.
+#[must_use]
+pub fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
+    let Some(rig) = rig_of(engine.rig(), placed, &around.factors) else { return f64::INFINITY };
+    let residual = engine.residual(&engine.simulate_coarsely(&rig));
+    let columns: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).collect();
+    let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
+    products.fit(&(0..COUNT).collect::<Vec<_>>(), &parameter_ridges()).loss
 }
 
 /// A point of a fit: where, and what is left there.
@@ -204,7 +216,9 @@ pub fn refit_steps(
     };
     let errors = (COUNT..chosen.len()).chain(0..COUNT).map(error).collect();
     let mut factors = around.factors;
-    factors.iter_mut().zip(&point.fit.coefficients).for_each(|(own, change)| *own += change);
+    for (own, change) in factors.iter_mut().zip(&point.fit.coefficients) {
+        *own = (*own + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
+    }
     let loss = point.fit.loss + prior(&point.placed) + penalty * moved.len() as f64;
     Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
 }

@@ -4,7 +4,7 @@
 //! the same bytes. Only `gap` and `verification` know the held-out record.
 
 use plant::effects::sheet::{Part, Place};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the schema; a new optional field does not change it.
@@ -64,7 +64,7 @@ pub struct Report {
 }
 
 /// Files of a run of the workflow.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct InputFiles {
     /// The rig file.
     pub rig: String,
@@ -73,7 +73,7 @@ pub struct InputFiles {
 }
 
 /// Where an effect is.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Where {
     /// drive, load, linkage or supply.
     pub axis: String,
@@ -92,7 +92,7 @@ impl From<Place> for Where {
 }
 
 /// A number with its unit and its standard error.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Quantity {
     /// Key of the effect's sheet, or `parameter:…`.
     pub name: String,
@@ -107,7 +107,7 @@ pub struct Quantity {
 }
 
 /// A missing effect with what is known of it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct NamedEffect {
     /// Name in the catalogue.
     pub effect: String,

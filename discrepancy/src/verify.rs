@@ -58,13 +58,10 @@ pub struct Verified {
 }
 
 /// Judges both models on a record that nothing was fitted on.
-///
-/// `null_range` is the 95 % range of chi2 per degree of freedom for nothing missing, where it is already known.
 pub fn verify(
     before: &RigParameters,
     after: &RigParameters,
     course: &Course,
-    null_range: Option<[f64; 2]>,
     progress: &mut dyn FnMut(&str),
 ) -> Verified {
     progress("held-out record in windows, before and after");
@@ -96,13 +93,12 @@ pub fn verify(
         let of = |model: &Model<'_>| power::neighbours(&model.residual, lane, lanes, &all_kept);
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
-    let range = null_range.unwrap_or(nothing.range);
     let worse = gap.values().any(|gap| gap.after > WORSE * gap.before);
     let verification = Verification {
         record: course.name.clone(),
         chi2_before: pooled(&own_before.joint(), &all_kept),
         chi2_after: pooled(&own_after.joint(), &all_kept),
-        chi2_null: range,
+        chi2_null: nothing.range,
         free_run_nrmse_percent: free_run::both(&run_before, &run_after, &column),
         whiteness,
         physical: run_after.unphysical,
@@ -124,8 +120,8 @@ pub(crate) struct Model<'a> {
 impl<'a> Model<'a> {
     /// Each model has the freedom of its own windows' starts.
     fn new(course: &'a Course, rig: &RigParameters) -> Self {
-        let mut windows = Windows::new(course, rig);
-        let simulated = windows.settle();
+        let windows = Windows::new(course, rig).settled();
+        let simulated = windows.simulate(rig);
         let residual = windows.residual(&simulated);
         Model { windows, simulated, residual }
     }

@@ -26,6 +26,12 @@ use std::f64::consts::TAU;
 pub const WINDOW: usize = 100;
 /// Place of the force among the readings.
 const FORCE: usize = 1;
+/// How far a start may move at a time.
+const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
+/// How often the starts of a linked record are moved.
+const LINKED_PASSES: usize = 3;
+/// The same of others, where it is asked for.
+const SETTLING: usize = 2;
 /// Steps of a period where only a difference is wanted.
 const COARSE_SUBSTEPS: u32 = 5;
 /// Readings to each side that a reading of the force is compared with.
@@ -34,8 +40,6 @@ const SPIKE_REACH: usize = 4;
 const SPIKE: f64 = 6.0;
 /// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
 const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
-/// Steps in which starts are moved.
-const SETTLING: usize = 2;
 /// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
 const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 
@@ -46,6 +50,8 @@ pub struct Windows<'a> {
     rig: RigParameters,
     /// First period of each window.
     starts: Vec<usize>,
+    /// Where each window begins, those that are not judged included.
+    points: Vec<[Point; 2]>,
     /// Axis and channel of each lane.
     lanes: Vec<(usize, usize)>,
     /// Readings over their noise, window by window, period by period, lane by lane; 0 where there is none.
@@ -55,17 +61,6 @@ pub struct Windows<'a> {
     drifts: Vec<f64>,
     /// Orthonormal, per window.
     bases: Vec<Vec<Vec<f64>>>,
-    /// What the directions of each basis are made of.
-    directions: Vec<Directions>,
-    /// By how much each window starts off the record's points: x, v, p_a, p_b; of all windows, judged or not.
-    shifts: Vec<[[f64; 4]; 2]>,
-}
-
-/// Numbers of a start, axis and place in [`NUDGES`], and for each what its sensitivity has in each direction of the basis.
-#[derive(Clone, Debug, Default)]
-struct Directions {
-    numbers: Vec<(usize, usize)>,
-    shares: Vec<Vec<f64>>,
 }
 
 impl<'a> Windows<'a> {
@@ -90,15 +85,71 @@ impl<'a> Windows<'a> {
                 }
             }
         }
+        let points = (0..course.len() / WINDOW).map(|window| course.points[window * WINDOW]).collect();
         let mut drifts = Vec::with_capacity(readings.len());
         for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
             drifts.extend(lanes.iter().map(|(axis, channel)| drift(course, at, *axis, *channel)));
         }
-        let shifts = vec![[[0.0; 4]; 2]; course.len() / WINDOW];
-        let mut windows =
-            Windows { course, rig: rig.clone(), starts, lanes, readings, valid, drifts, bases: Vec::new(), directions: Vec::new(), shifts };
-        (windows.bases, windows.directions) = windows.sensitivities();
+        let mut windows = Windows {
+            course,
+            rig: rig.clone(),
+            starts,
+            points,
+            lanes,
+            readings,
+            valid,
+            drifts,
+            bases: Vec::new(),
+        };
+        windows.bases = windows.sensitivities().into_iter().map(orthonormal).collect();
+        // A micrometre of the eye in its gap is two newtons: where the rods are linked, the record's points are too coarse.
+        for _ in 0..if course.linked { LINKED_PASSES } else { 0 } {
+            windows.settle();
+        }
         windows
+    }
+
+    /// Moves each window's start to where its readings say that it was, and takes its sensitivities anew.
+    fn settle(&mut self) {
+        let rows = self.rows();
+        let all = self.sensitivities();
+        let simulated = self.simulate(&self.rig);
+        let mut left: Vec<f64> =
+            self.readings.iter().zip(&simulated).map(|(reading, own)| reading - own).collect();
+        for (value, _) in left.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
+            *value = 0.0;
+        }
+        let measured: Vec<usize> = (0..2).filter(|axis| self.course.measured[*axis]).collect();
+        for (at, columns) in all.iter().enumerate() {
+            let own = &mut left[at * rows..][..rows];
+            self.flatten_spikes(own);
+            self.whiten(at, own);
+            let count = columns.len();
+            // What is known of a start beforehand, in units of its doubt.
+            let mut matrix = DMatrix::<f64>::identity(count, count);
+            for row in 0..count {
+                for column in 0..count {
+                    matrix[(row, column)] += dot(&columns[row], &columns[column]);
+                }
+            }
+            let right = DVector::from_iterator(count, columns.iter().map(|column| dot(column, own)));
+            let Some(moved) = matrix.cholesky().map(|factor| factor.solve(&right)) else { continue };
+            for (place, axis) in measured.iter().enumerate() {
+                let part = |number: usize| {
+                    let most = FARTHEST[number];
+                    (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
+                };
+                let point = &mut self.points[self.starts[at] / WINDOW][*axis];
+                point.extension_m += part(0);
+                // What rests, rests: a speed of its own would only let it slide and stick again.
+                if point.rod_velocity_m_per_s != 0.0 {
+                    point.rod_velocity_m_per_s += part(1);
+                }
+                point.pressures_pa[0] += part(2);
+                point.pressures_pa[1] += part(3);
+            }
+        }
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
     }
 
     /// The baseline rig.
@@ -145,23 +196,6 @@ impl<'a> Windows<'a> {
         valid.zip(&self.bases).map(|(valid, basis)| valid.saturating_sub(basis.len()).max(1) as f64).collect()
     }
 
-    /// Samples of each window and lane, window by window.
-    #[must_use]
-    pub fn samples(&self) -> Vec<usize> {
-        let width = self.lanes.len();
-        let window = |valid: &[bool]| -> Vec<usize> {
-            (0..width)
-                .map(|lane| valid.iter().skip(lane).step_by(width).filter(|valid| **valid).count())
-                .collect()
-        };
-        self.valid.chunks_exact(self.rows().max(1)).flat_map(window).collect()
-    }
-
-    /// Readings over their noise, window by window, period by period, lane by lane; `None` where there is none.
-    pub fn readings(&self) -> impl Iterator<Item = Option<f64>> {
-        self.readings.iter().zip(&self.valid).map(|(reading, valid)| valid.then_some(*reading))
-    }
-
     /// The residual of a model that lacks nothing: noise as the course has it, its memory and the sampling instants' errors
     /// included, treated as a residual is.
     #[must_use]
@@ -183,6 +217,18 @@ impl<'a> Windows<'a> {
         }
         self.reduce(&mut noise);
         noise
+    }
+
+    /// The same windows with starts where the readings are met best, as linked ones have them anyway.
+    ///
+    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
+    /// window: where the points are far off, as those of a sensor that lags, both need the start itself.
+    #[must_use]
+    pub fn settled(mut self) -> Self {
+        for _ in 0..if self.course.linked { 0 } else { SETTLING } {
+            self.settle();
+        }
+        self
     }
 
     /// Readings over their noise that this rig would have given, without noise and rounding.
@@ -236,72 +282,15 @@ impl<'a> Windows<'a> {
         differs
     }
 
-    /// Moves each window's start to where its readings are met best under the baseline rig, and gives the simulation from there.
-    ///
-    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
-    /// window: where the points are far off, as those of a sensor that lags, both need the start itself. A window that is not met
-    /// better from its new start keeps the old one.
-    pub fn settle(&mut self) -> Vec<f64> {
-        let mut simulated = self.simulate(&self.rig);
-        let mut squares = self.squares(&simulated);
-        for _ in 0..SETTLING {
-            let before = self.shifts.clone();
-            self.shift(&simulated);
-            let tried = self.squares(&self.simulate(&self.rig));
-            for (at, start) in self.starts.iter().enumerate() {
-                if tried[at] > squares[at] {
-                    self.shifts[start / WINDOW] = before[start / WINDOW];
-                }
-            }
-            simulated = self.simulate(&self.rig);
-            squares = self.squares(&simulated);
-        }
-        simulated
-    }
-
-    fn squares(&self, simulated: &[f64]) -> Vec<f64> {
-        self.residual(simulated).chunks_exact(self.rows()).map(|own| dot(own, own)).collect()
-    }
-
-    /// One step of Gauss and Newton of all starts, each number held to its point by [`DOUBT`].
-    fn shift(&mut self, simulated: &[f64]) {
-        let mut left: Vec<f64> =
-            self.readings.iter().zip(simulated).map(|(reading, own)| reading - own).collect();
-        self.treat(&mut left);
-        let rows = self.rows();
-        for (at, own) in left.chunks_exact(rows).enumerate() {
-            let directions = &self.directions[at];
-            let count = directions.numbers.len();
-            let along = DVector::from_iterator(count, self.bases[at].iter().map(|basis| dot(own, basis)));
-            let upper = DMatrix::from_fn(count, count, |row, column| {
-                directions.shares[column].get(row).copied().unwrap_or(0.0)
-            });
-            let normal = upper.transpose() * &upper + DMatrix::identity(count, count);
-            let Some(solved) = normal.cholesky() else { continue };
-            let step = solved.solve(&(upper.transpose() * along));
-            let shifts = &mut self.shifts[self.starts[at] / WINDOW];
-            for ((axis, number), step) in directions.numbers.iter().zip(step.iter()) {
-                shifts[*axis][*number] += step * DOUBT[*number];
-            }
-        }
-    }
-
     fn reduce(&self, values: &mut [f64]) {
-        self.treat(values);
-        for (window, basis) in values.chunks_exact_mut(self.rows()).zip(&self.bases) {
-            project(window, basis);
-        }
-    }
-
-    /// Takes out single jumps of the force and whitens.
-    fn treat(&self, values: &mut [f64]) {
         for (value, _) in values.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
             *value = 0.0;
         }
         let rows = self.rows();
-        for (at, window) in values.chunks_exact_mut(rows).enumerate() {
+        for (at, (window, basis)) in values.chunks_exact_mut(rows).zip(&self.bases).enumerate() {
             self.flatten_spikes(window);
             self.whiten(at, window);
+            project(window, basis);
         }
     }
 
@@ -362,13 +351,7 @@ impl<'a> Windows<'a> {
 
     /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
     fn seat(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
-        let mut points = self.course.points[start];
-        for (point, shift) in points.iter_mut().zip(&self.shifts[start / WINDOW]) {
-            point.extension_m += shift[0];
-            point.rod_velocity_m_per_s += shift[1];
-            point.pressures_pa[0] += shift[2];
-            point.pressures_pa[1] += shift[3];
-        }
+        let mut points = self.points[start / WINDOW];
         if let Some((axis, number)) = nudged {
             let point = &mut points[axis];
             match number {
@@ -381,14 +364,13 @@ impl<'a> Windows<'a> {
         seat(plant, self.course, &points);
     }
 
-    /// An orthonormal basis of what each window's start explains.
-    fn sensitivities(&self) -> (Vec<Vec<Vec<f64>>>, Vec<Directions>) {
+    /// What a change of each number of a window's start changes, by as much as it is doubted.
+    fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
         let mut plant = self.plant(&self.rig);
         let rows = self.rows();
-        let mut bases = Vec::with_capacity(self.starts.len());
-        let mut all_directions = Vec::with_capacity(self.starts.len());
+        let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
         for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
-            let place = self.starts.get(bases.len()).is_some_and(|own| *own == start);
+            let place = self.starts.get(all.len()).is_some_and(|own| *own == start);
             let before = plant.clone();
             self.seat(&mut plant, start, None);
             let mut straight = Vec::with_capacity(rows);
@@ -399,9 +381,8 @@ impl<'a> Windows<'a> {
             if !place {
                 continue;
             }
-            let valid = &self.valid[bases.len() * rows..][..rows];
-            let mut basis: Vec<Vec<f64>> = Vec::new();
-            let mut directions = Directions::default();
+            let valid = &self.valid[all.len() * rows..][..rows];
+            let mut columns: Vec<Vec<f64>> = Vec::new();
             for axis in (0..2).filter(|axis| self.course.measured[*axis]) {
                 for (number, nudge) in NUDGES.iter().enumerate() {
                     let mut nudged = before.clone();
@@ -416,25 +397,13 @@ impl<'a> Windows<'a> {
                         *own = if *valid { (*own - straight) * scale } else { 0.0 };
                     }
                     self.flatten_jumps(&mut own, scale);
-                    self.whiten(bases.len(), &mut own);
-                    let mut shares: Vec<f64> = basis.iter().map(|direction| dot(&own, direction)).collect();
-                    // Twice, as rounding asks for.
-                    project(&mut own, &basis);
-                    project(&mut own, &basis);
-                    let length = dot(&own, &own).sqrt();
-                    if length > 1.0 {
-                        own.iter_mut().for_each(|own| *own /= length);
-                        basis.push(own);
-                        shares.push(length);
-                        directions.numbers.push((axis, number));
-                        directions.shares.push(shares);
-                    }
+                    self.whiten(all.len(), &mut own);
+                    columns.push(own);
                 }
             }
-            bases.push(basis);
-            all_directions.push(directions);
+            all.push(columns);
         }
-        (bases, all_directions)
+        all
     }
 
     /// A sensitivity is scaled up from a small change: a jump that moves by a sample is no part of it.
@@ -517,6 +486,22 @@ pub fn seat(plant: &mut Plant, course: &Course, points: &[Point; 2]) {
         own.extension_m = own.extension_m.clamp(0.0, cylinder.stroke_m);
     }
     plant.go_on_in(&state).expect("the points of a record are states of the rig");
+}
+
+/// An orthonormal basis of some columns, those left out that are worth less than one standard deviation.
+fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut own in columns {
+        // Twice, as rounding asks for.
+        project(&mut own, &basis);
+        project(&mut own, &basis);
+        let length = dot(&own, &own).sqrt();
+        if length > 1.0 {
+            own.iter_mut().for_each(|own| *own /= length);
+            basis.push(own);
+        }
+    }
+    basis
 }
 
 /// Takes out what an orthonormal basis explains.

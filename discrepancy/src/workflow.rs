@@ -12,15 +12,19 @@ use crate::check::{Checked, check};
 use crate::course::{Course, CourseError};
 use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, extend};
-use crate::name::{Found, is_large, name};
+use crate::locate::locate;
+use crate::name::{Found, name};
+use crate::next::{self, Explanation, Proposal};
+use crate::outside::outside;
 use crate::page::Pictures;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::records::{self, ReadError, ReadOptions};
-use crate::refit::{Placed, Refit, rig_of};
+use crate::refit::{Placed, Refit};
 use crate::report::{
     self, DetectionLimit, EffectPlace, InputFiles, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict,
     Where,
 };
+use crate::verify::verify;
 use plant::{ParameterError, RigParameters};
 use std::path::{Path, PathBuf};
 
@@ -160,10 +164,151 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     let mut report = report_of(&engine, &found);
     report.inputs = inputs;
     report.checks = checks;
-    let records: Vec<String> = report.inputs.train.clone();
-    let additions: Vec<Addition> = report.named.iter().map(addition).collect();
-    let extended = extend(&rig_file.text, &rig_file.file, &additions, &report.parameters, &records)?;
-    Ok(Outcome { report, extended: Some(extended), pictures: Pictures::default(), experiment: None })
+    progress("locating");
+    report.location = Some(locate(rig, &courses, progress).location);
+    if report.verdict == Verdict::OutsideCatalogue {
+        // Beside what the parameters explain: a wrong mass is no unknown force.
+        let calibrated = found.calibrated.rig(rig);
+        let unknowns = locate(&calibrated, &courses, progress).unknowns;
+        report.outside = outside(&calibrated, &courses, &unknowns, progress);
+    }
+    let told = Told {
+        named: report.named.clone(),
+        parameters: report.parameters.clone(),
+        inputs: report.inputs.clone(),
+    };
+    let mut experiment = None;
+    if report.verdict == Verdict::Ambiguous
+        && let Some(proposal) = proposal_for(&rig_file, &told, courses[0].measured, progress)
+    {
+        experiment = proposal.experiment_toml;
+        report.next = Some(proposal.next);
+    }
+    report.summary = summary(&report);
+    let text = extended(&rig_file, &told)?;
+    let after = RigParameters::from_toml(&text, "extended rig.toml")?;
+    let pictures = held_out(task, rig, &after, &courses, &mut report, progress)?;
+    Ok(Outcome { report, extended: Some(text), pictures, experiment })
+}
+
+/// Judges the extended model on the held-out record, which is opened here and nowhere else; without one, draws the training record.
+fn held_out(
+    task: &Task,
+    rig: &RigParameters,
+    after: &RigParameters,
+    courses: &[Course],
+    report: &mut Report,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Pictures, WorkflowError> {
+    let Some(test) = &task.test else {
+        let verified = verify(rig, after, &courses[0], progress);
+        return Ok(Pictures { record: courses[0].name.clone(), held_out: false, traces: verified.traces });
+    };
+    progress(&format!("judging on {}", test.display()));
+    let opened = open(test, &task.options, rig)?;
+    let Some(course) = opened.course else {
+        progress(&format!("{} cannot be used: the model is not judged", test.display()));
+        return Ok(Pictures::default());
+    };
+    let verified = verify(rig, after, &course, progress);
+    report.gap = verified.gap;
+    report.verification = Some(verified.verification);
+    Ok(Pictures { record: course.name.clone(), held_out: true, traces: verified.traces })
+}
+
+/// What a report says of effects and parameters, as other steps need it.
+#[derive(Clone, Debug, serde::Deserialize)]
+pub struct Told {
+    /// Effects, the best first.
+    pub named: Vec<NamedEffect>,
+    /// Parameters that were off.
+    pub parameters: Vec<Quantity>,
+    /// Files.
+    pub inputs: InputFiles,
+}
+
+/// The rig file with what a report names.
+///
+/// # Errors
+/// [`ExtendError`] when it names what a rig cannot have.
+pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> {
+    let additions: Vec<Addition> = told.named.iter().map(addition).collect();
+    extend(&rig_file.text, &rig_file.file, &additions, &told.parameters, &told.inputs.train)
+}
+
+/// The experiment that tells apart what a report could not; `None` when there is nothing to tell apart.
+#[must_use]
+pub fn proposal(rig_file: &RigFile, told: &Told, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
+    let on = |axis: &str| told.named.iter().any(|own| own.place.axis == axis);
+    let both = on("linkage") || on("supply");
+    proposal_for(rig_file, told, [both || on("drive"), both || on("load")], progress)
+}
+
+fn proposal_for(
+    rig_file: &RigFile,
+    told: &Told,
+    measured: [bool; 2],
+    progress: &mut dyn FnMut(&str),
+) -> Option<Proposal> {
+    let at = told.named.iter().position(|own| !own.alternatives.is_empty())?;
+    let others = &told.named[at].alternatives;
+    let explanations: Vec<Explanation> = std::iter::once(&told.named[at])
+        .chain(others)
+        .filter_map(|own| {
+            let mut with = told.clone();
+            with.named[at] = own.clone();
+            let rig = RigParameters::from_toml(&extended(rig_file, &with).ok()?, &rig_file.file).ok()?;
+            let names = with.named.iter().map(|own| format!("{} {}", own.effect, place_name(&own.place)));
+            Some(Explanation { rig, names: names.collect() })
+        })
+        .collect();
+    (explanations.len() > 1).then(|| next::propose(&rig_file.rig, &explanations, measured, progress))
+}
+
+/// The verdict in a sentence or two.
+fn summary(report: &Report) -> String {
+    let one = |own: &NamedEffect| format!("{} ({})", own.effect, place_name(&own.place));
+    let parameters = report.parameters.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+    let off =
+        if parameters.is_empty() { String::new() } else { format!(" Off in the rig file: {parameters}.") };
+    match report.verdict {
+        Verdict::NothingMissing => {
+            "Nothing is missing above the detection limits of these records.".to_owned()
+        }
+        Verdict::ParametersOnly => format!("No effect is missing.{off}"),
+        Verdict::Named => {
+            format!("Missing: {}.{off}", report.named.iter().map(one).collect::<Vec<_>>().join(" and "))
+        }
+        Verdict::Ambiguous => {
+            let told = report.named.iter().map(|own| {
+                std::iter::once(own).chain(&own.alternatives).map(one).collect::<Vec<_>>().join(" or ")
+            });
+            format!(
+                "Missing, and not to be told apart by these records: {}.{off}",
+                told.collect::<Vec<_>>().join("; and ")
+            )
+        }
+        Verdict::OutsideCatalogue => match &report.outside {
+            Some(outside) => {
+                let on = outside
+                    .variables
+                    .first()
+                    .map_or("nothing that was measured", |own| own.variable.as_str());
+                format!("Not in the catalogue: something in {} that depends on {on}.{off}", outside.balance)
+            }
+            None => format!("Something is missing that the catalogue does not explain.{off}"),
+        },
+        Verdict::BadData => report.summary.clone(),
+    }
+}
+
+/// A place as rig files name it.
+#[must_use]
+pub fn place_name(place: &Where) -> String {
+    match &place.element {
+        Some(element) => format!("{}.{element}", place.axis),
+        None => place.axis.clone(),
+    }
 }
 
 fn open_all(
@@ -315,10 +460,7 @@ fn parameters_off(engine: &Engine<'_>, found: &Found) -> Vec<Quantity> {
 }
 
 fn addition(named: &NamedEffect) -> Addition {
-    let place = match &named.place.element {
-        Some(element) => format!("{}.{element}", named.place.axis),
-        None => named.place.axis.clone(),
-    };
+    let place = place_name(&named.place);
     let numbers =
         named.parameters.iter().map(|own| (own.name.clone(), own.value, own.standard_error)).collect();
     Addition { effect: named.effect.clone(), place, numbers }
@@ -390,11 +532,4 @@ fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
         }
     }
     (not_excited, limits)
-}
-
-/// The rig that a model is.
-#[must_use]
-pub fn model_rig(rig: &RigParameters, model: &Refit) -> Option<RigParameters> {
-    let kept: Vec<Placed> = model.placed.iter().filter(|placed| is_large(placed)).cloned().collect();
-    rig_of(rig, &kept, &model.factors)
 }

@@ -134,6 +134,7 @@ fn location(size: f64) -> Location {
     let over = |size_of: f64, share: f64| 1.0 + size * (size_of - 1.0) * share;
     let time_s: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-2).collect();
     Location {
+        sensor_ratio: Some("drive.force is 1.96e-3 m^2 times an offset of pressure sensor a".into()),
         balances: balances
             .map(|(balance, value)| BalanceBar {
                 balance: balance.to_owned(),

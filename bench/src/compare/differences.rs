@@ -1,0 +1,130 @@
+//! How far runs lie from the first of them: a gap as a picture and as rms values, for a measured rig and its simulations.
+//!
+//! A gap is a difference of means over 20 ms, which leave what models differ by and take the sensors' noise away but for a
+//! fifth; time begins with the experiment. What two runs with equal models differ by (noise, the play of two controllers) is
+//! no gap and is not taken off.
+
+use super::change;
+use crate::drawing::{COLOURS, Curve, Panel, Picture};
+use crate::grid::Grid;
+use crate::record::MEASURED;
+use crate::runs::Run;
+use crate::series::{Series, Span};
+use crate::table::in_use;
+
+/// Length of the means, s.
+const MEAN_S: f64 = 0.02;
+
+/// A quantity as it is shown.
+struct Shown {
+    /// Column of `measurement.csv`.
+    column: &'static str,
+    title: String,
+    unit: &'static str,
+    unit_in_si: f64,
+}
+
+fn shown() -> impl Iterator<Item = Shown> {
+    MEASURED.iter().map(|column| {
+        let (name, unit, unit_in_si, drawn) = if let Some(name) = column.strip_suffix("_m") {
+            (name, "m", 1e-3, "mm")
+        } else if let Some(name) = column.strip_suffix("_Pa") {
+            (name, "Pa", 1e2, "mbar")
+        } else if let Some(name) = column.strip_suffix("_N") {
+            (name, "N", 1.0, "N")
+        } else {
+            (*column, "1", 1e-2, "%")
+        };
+        let title = format!("{}, {drawn}", name.replace('_', " "));
+        Shown { column, title, unit, unit_in_si }
+    })
+}
+
+/// Difference of a run from the first, in SI, over the time since the experiment's begin.
+fn difference(first: &Run, run: &Run, column: &str) -> Series {
+    let of = |run: &Run| {
+        let spans = run.record.experiments();
+        let series = run.record.measured.numbers(column).smoothed(MEAN_S);
+        series.within_all(&spans).shifted(-run.start_s())
+    };
+    of(run).minus(&of(first))
+}
+
+/// The rms of each signal's difference from the first run; changes are against the second.
+#[must_use]
+pub fn table(runs: &[Run]) -> Grid {
+    let Some((first, others)) = runs.split_first() else { return Grid::default() };
+    let mut head = vec![format!("rms difference from {}", first.name)];
+    for (place, run) in others.iter().enumerate() {
+        head.push(run.name.clone());
+        if place > 0 {
+            head.push("change".to_owned());
+        }
+    }
+    let rows = shown().map(|quantity| {
+        let rms: Vec<_> = others.iter().map(|run| difference(first, run, quantity.column).rms()).collect();
+        let mut row = vec![
+            quantity.column.rsplit_once('_').map_or(quantity.column, |(name, _)| name).replace('_', " "),
+        ];
+        if quantity.unit == "1" {
+            row[0] = quantity.column.replace('_', " ");
+        }
+        for (place, value) in rms.iter().enumerate() {
+            row.push(value.map_or_else(|| "-".to_owned(), |value| in_use(value, quantity.unit)));
+            if place > 0 {
+                row.push(change(rms[0], *value));
+            }
+        }
+        row
+    });
+    Grid { head, rows: rows.collect() }
+}
+
+/// The picture: a panel for each signal, a curve for each run but the first.
+#[must_use]
+pub fn pictures(runs: &[Run]) -> Vec<Picture> {
+    let Some((first, others)) = runs.split_first() else { return Vec::new() };
+    let length = |run: &Run| run.record.experiments().last().map(|span| span.to_s - run.start_s());
+    let longest_s = runs.iter().filter_map(length).fold(1e-3, f64::max);
+    let panels = shown().map(|quantity| {
+        let curves = others.iter().enumerate().map(|(place, run)| Curve {
+            name: format!("{} - {}", run.name, first.name),
+            // The second run lies over the first and must be seen beside it.
+            colour: COLOURS[(place + 1) % COLOURS.len()],
+            width: if place == 0 { 2 } else { 1 },
+            samples: difference(first, run, quantity.column).map(|value| value / quantity.unit_in_si),
+        });
+        Panel { title: quantity.title.clone(), curves: curves.collect() }
+    });
+    vec![Picture {
+        title: format!("{}: differences from {}", first.title(), first.name),
+        caption: String::new(),
+        time_name: "time since the experiment's begin, s".into(),
+        range: Span { from_s: 0.0, to_s: longest_s },
+        mark_s: None,
+        bands: Vec::new(),
+        panels: panels.collect(),
+    }]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runs::{self, made};
+
+    #[test]
+    fn a_run_differs_from_itself_by_nothing_and_each_other_has_its_curve() {
+        let parent = tempfile::tempdir().unwrap();
+        let folders = [("measured", 0.002), ("before", 0.001), ("after", 0.002)]
+            .map(|(name, error_m)| made::folder(parent.path(), name, "title = \"ramp\"", error_m));
+        let runs = runs::read(&folders).unwrap();
+        let grid = table(&runs);
+        assert_eq!(grid.head, ["rms difference from measured", "before", "after", "change"]);
+        let row = grid.rows.iter().find(|row| row[0] == "drive position").unwrap();
+        assert_eq!(row[1..], ["1.000 mm", "0 m", "-100.0 %"]);
+        let [picture] = &pictures(&runs)[..] else { panic!("one picture") };
+        let panel = picture.panels.iter().find(|panel| panel.title == "drive position, mm").unwrap();
+        let names: Vec<_> = panel.curves.iter().map(|curve| curve.name.as_str()).collect();
+        assert_eq!(names, ["before - measured", "after - measured"]);
+    }
+}

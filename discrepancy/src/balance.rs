@@ -1,0 +1,330 @@
+//! A model that is one balance alone: one mass with a measured force, slow strokes of a cylinder, one chamber.
+//!
+//! ```text
+//!   model file ─► records as rows ─► baseline by least squares ─► candidates on folds of the training records ─► named
+//!                                                                                   held-out record, frozen ─► both residuals
+//! ```
+//!
+//! Somebody's record seldom holds a whole rig. What can be said of one balance is said here: there is nothing to simulate,
+//! each term is a
+//! column, and selection is that of `select`. Nothing of the held-out record is read before the terms are chosen and fitted.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `model` | the model file |
+//! | `filter` | zero-phase low passes |
+//! | `runs` | a record as rows |
+//! | `terms` | columns of baseline, candidates and decoys |
+//! | `fit` | least squares, folds, clustered errors |
+//! | `select` | which terms are taken |
+//! | `tell` | the report |
+//! | `extended` | the model file with what was found |
+//!
+//! Keys, processing and figures on real records: `discrepancy/docs/one-balance.md`.
+
+mod extended;
+mod filter;
+mod fit;
+pub mod model;
+mod runs;
+mod select;
+mod tell;
+mod terms;
+
+pub use extended::extended_model_text;
+pub use filter::LowPass;
+pub use model::{Kind, Model};
+
+use crate::records::{self, ReadError, ReadOptions, Record};
+use crate::report::Report;
+use fit::{Columns, Cut, Fit, Rows, rms};
+use plant::RigParameters;
+use runs::Run;
+use select::{Cuts, Found, Prepared};
+use std::path::{Path, PathBuf};
+
+/// Ratio of the deciles of speed below which folds over speed would ask for another experiment.
+const SPEEDS_APART: f64 = 3.0;
+
+/// Why a balance cannot be closed.
+#[derive(Debug, thiserror::Error)]
+pub enum BalanceError {
+    /// The model file is missing or not readable.
+    #[error("cannot read the model {}: {reason}", file.display())]
+    Open {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// Not TOML, a key that is unknown or missing.
+    #[error("{}: {reason}", file.display())]
+    Syntax {
+        /// The file.
+        file: PathBuf,
+        /// What the parser said, with line and column.
+        reason: String,
+    },
+    /// A value that makes no sense.
+    #[error("{}: {key} = {value}; allowed is {allowed}", file.display())]
+    Value {
+        /// The file.
+        file: PathBuf,
+        /// The key with its table.
+        key: String,
+        /// Its value.
+        value: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// A term that no balance of this kind has.
+    #[error("this kind of model has no term '{effect}' of form '{form}', or its shape lacks a number")]
+    Term {
+        /// The effect.
+        effect: String,
+        /// The form.
+        form: String,
+    },
+    /// A chamber without a rig file.
+    #[error("{name}: a chamber needs rig = \"…/rig.toml\" for its area, volume, valve tables and lags")]
+    NoRig {
+        /// The model's name.
+        name: String,
+    },
+    /// A rig file that cannot be used.
+    #[error("the model's rig: {reason}")]
+    Rig {
+        /// Why.
+        reason: String,
+    },
+    /// A record that cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A column that a record lacks.
+    #[error("{file}: no values of {column}, which the model's balance needs: see [channels] of the model")]
+    Missing {
+        /// The record.
+        file: String,
+        /// The channel.
+        column: String,
+    },
+    /// Time that stands or jumps back.
+    #[error("{file}:{line}: time does not grow: sort the rows, or split the record there")]
+    Time {
+        /// The record.
+        file: String,
+        /// Line from 1.
+        line: u64,
+    },
+    /// A record without enough rows.
+    #[error(
+        "{file}: {rows} rows pass the model's [processing], 50 are needed: are position_mm, speed_above_mm_per_s right?"
+    )]
+    Few {
+        /// The record.
+        file: String,
+        /// How many there are.
+        rows: usize,
+    },
+    /// No training record.
+    #[error("a balance needs one training record at least")]
+    NoRecord,
+    /// Columns of the baseline that the records cannot tell apart.
+    #[error(
+        "the training records cannot tell {columns} apart: add one in which they differ, or switch one off under [baseline]"
+    )]
+    NotExcited {
+        /// Their names.
+        columns: String,
+    },
+}
+
+/// Whether a text is a model file: TOML with a `kind` at its top. A rig file has none.
+#[must_use]
+pub fn is_model_file(text: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("kind"))
+}
+
+/// Closes a balance: names what it lacks by the training records, and compares both models on the held-out one.
+///
+/// # Errors
+/// [`BalanceError`] for a model or record that cannot be used.
+pub fn close(
+    model_file: &Path,
+    train: &[PathBuf],
+    test: Option<&Path>,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Report, BalanceError> {
+    let tests: Vec<&Path> = test.into_iter().collect();
+    close_on(model_file, train, &tests, progress)
+}
+
+/// As [`close`], with any number of held-out records: the residuals are those over all of them.
+///
+/// # Errors
+/// As [`close`].
+pub fn close_on(
+    model_file: &Path,
+    train: &[PathBuf],
+    tests: &[&Path],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Report, BalanceError> {
+    let study = Study::of(model_file, train, progress)?;
+    let mut report = study.report(model_file);
+    let mut held_out = Vec::new();
+    for test in tests {
+        progress(&format!("held out: {}", test.display()));
+        held_out.push(read(&study.model, study.rig.as_ref(), test)?.1);
+    }
+    if !held_out.is_empty() {
+        study.verify(&held_out, &mut report)?;
+    }
+    Ok(report)
+}
+
+/// The training records with all that was found in them.
+struct Study {
+    model: Model,
+    rig: Option<RigParameters>,
+    records: Vec<Record>,
+    runs: Vec<Run>,
+    rows: Rows,
+    /// Columns of the baseline, terms of the model file among them.
+    base: Columns,
+    base_fit: Fit,
+    time: Cut,
+    families: Vec<Prepared>,
+    found: Found,
+    /// Columns of the baseline and of what was taken.
+    own: Columns,
+    own_fit: Fit,
+}
+
+impl Study {
+    fn of(
+        model_file: &Path,
+        train: &[PathBuf],
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Self, BalanceError> {
+        let model = Model::read(model_file)?;
+        let rig = model.rig.as_ref().map(|file| read_rig(file)).transpose()?;
+        let (mut records, mut runs) = (Vec::new(), Vec::new());
+        for file in train {
+            progress(&format!("reads {}", file.display()));
+            let (record, run) = read(&model, rig.as_ref(), file)?;
+            records.push(record);
+            runs.push(run);
+        }
+        if runs.is_empty() {
+            return Err(BalanceError::NoRecord);
+        }
+        let rows = rows_of(&runs);
+        let base = base_columns(&model, &runs)?;
+        let plain = base[..terms::baseline(&model).len()].to_vec();
+        let base_fit = rows.fit(&base).ok_or_else(|| BalanceError::NotExcited {
+            columns: terms::baseline(&model).iter().map(|column| column.name).collect::<Vec<_>>().join(", "),
+        })?;
+        let at_rows = |of: &dyn Fn(&Run) -> &Vec<f64>| -> Vec<f64> {
+            runs.iter().flat_map(|run| run.kept.iter().map(|at| of(run)[*at])).collect()
+        };
+        let positions = at_rows(&|run| &run.x_m);
+        let speeds: Vec<f64> = at_rows(&|run| &run.v_m_per_s).iter().map(|v| v.abs()).collect();
+        let selection = model.selection.clone();
+        let time = rows.in_time(selection.blocks);
+        let cuts = Cuts {
+            time: time.clone(),
+            position: rows.in_bands("bands of position", &positions, selection.bands),
+            speed: speeds_apart(&speeds)
+                .then(|| rows.in_bands("bands of speed", &speeds, selection.bands / 2)),
+        };
+        let span = positions
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| [x.min(least), x.max(most)]);
+        progress("columns of the candidates");
+        let known = |family: &terms::Family| {
+            let variant = &family.variants[0];
+            model.terms.iter().any(|term| term.effect == variant.effect && term.form == variant.form)
+        };
+        let mut families = Vec::new();
+        let searched = model.selection.most > 0;
+        for family in terms::families(&model, span).into_iter().filter(|family| searched && !known(family)) {
+            let columns = family.variants.iter().map(|variant| term_columns(&model, variant, &runs));
+            families.push(Prepared { columns: columns.collect::<Result<_, _>>()?, family });
+        }
+        let found = select::search(&rows, &cuts, [&plain, &base], &families, &selection, progress);
+        let mut own = base.clone();
+        for taken in &found.taken {
+            own.extend(families[taken.judged.place].columns[taken.judged.variant].iter().cloned());
+        }
+        let own_fit = rows.fit(&own).unwrap_or_else(|| base_fit.clone());
+        Ok(Self { model, rig, records, runs, rows, base, base_fit, time, families, found, own, own_fit })
+    }
+
+    /// rms of the residual of baseline and extended model on the training records, ends included.
+    fn trained_rms(&self) -> [f64; 2] {
+        [rms(&self.base_fit.residual), rms(&self.own_fit.residual)]
+    }
+}
+
+/// The rows of runs, one after the other.
+fn rows_of(runs: &[Run]) -> Rows {
+    let mut records: Vec<std::ops::Range<usize>> = Vec::new();
+    for run in runs {
+        let start = records.last().map_or(0, |range| range.end);
+        records.push(start..start + run.kept.len());
+    }
+    Rows {
+        target: runs.iter().flat_map(|run| run.rows(&run.target)).collect(),
+        judged: runs.iter().flat_map(|run| run.judged.iter().copied()).collect(),
+        records,
+    }
+}
+
+/// Whether folds in bands of speed leave a speed out that the others can tell.
+fn speeds_apart(speeds: &[f64]) -> bool {
+    let mut sorted = speeds.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() * 9 / 10] > SPEEDS_APART * sorted[sorted.len() / 10]
+}
+
+fn base_columns(model: &Model, runs: &[Run]) -> Result<Columns, BalanceError> {
+    let mut columns: Columns = terms::baseline(model)
+        .iter()
+        .map(|column| runs.iter().flat_map(|run| run.rows(&(column.of)(run))).collect())
+        .collect();
+    for term in &model.terms {
+        columns.extend(term_columns(model, term, runs)?);
+    }
+    Ok(columns)
+}
+
+/// The columns of a term over the rows of all runs.
+fn term_columns(model: &Model, term: &model::TermEntry, runs: &[Run]) -> Result<Columns, BalanceError> {
+    let mut all: Columns = Vec::new();
+    for run in runs {
+        for (place, column) in terms::columns(model, term, run)?.iter().enumerate() {
+            if all.len() <= place {
+                all.push(Vec::new());
+            }
+            all[place].extend(run.rows(column));
+        }
+    }
+    Ok(all)
+}
+
+fn read(model: &Model, rig: Option<&RigParameters>, file: &Path) -> Result<(Record, Run), BalanceError> {
+    let record =
+        records::read(file, &ReadOptions { mapping: model.mapping.clone(), ..ReadOptions::default() })?;
+    let run = Run::of(&record, model, rig)?;
+    Ok((record, run))
+}
+
+fn read_rig(file: &Path) -> Result<RigParameters, BalanceError> {
+    let text = std::fs::read_to_string(file)
+        .map_err(|error| BalanceError::Open { file: file.into(), reason: error.to_string() })?;
+    RigParameters::from_toml(&text, &file.display().to_string())
+        .map_err(|error| BalanceError::Rig { reason: error.to_string() })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,476 @@
+//! The report of a balance: what was named and what was not, and the held-out record.
+//!
+//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the
+//! same reason
+//! `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their folds.
+
+use super::fit::{clustered_t, residual, rms};
+use super::model::{Kind, TermEntry};
+use super::runs::Run;
+use super::select::{Judged, told};
+use super::terms::{self, shape_unit, shown};
+use super::{BalanceError, Study, base_columns, term_columns};
+use crate::report::{
+    BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, Finding, Gap, InputFiles, Location,
+    NamedEffect, Next, Outside, Quantity, RecordCheck, Report, SCHEMA_VERSION, Verdict, Verification, Where,
+};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Bins of the residual over speed.
+const BINS: usize = 20;
+
+fn drive() -> Where {
+    Where { axis: "drive".into(), element: None }
+}
+
+/// Where an effect of a balance is: a chamber's is chamber a's.
+fn place(effect: &str) -> Where {
+    let element = ["rod-leakage", "pressure-sensor-offset"].contains(&effect).then(|| "a".to_owned());
+    let element = if effect == "position-sensor-offset" { Some("position".into()) } else { element };
+    Where { element, ..drive() }
+}
+
+impl Study {
+    pub(super) fn report(&self, model_file: &Path) -> Report {
+        let named: Vec<NamedEffect> = self.named();
+        let parameters = self.parameters();
+        let other =
+            |effect: &NamedEffect| effect.alternatives.iter().any(|twin| twin.effect != effect.effect);
+        let verdict = match () {
+            () if self.found.decoy.is_some() => Verdict::OutsideCatalogue,
+            () if named.iter().any(other) => Verdict::Ambiguous,
+            () if !named.is_empty() => Verdict::Named,
+            () if !parameters.is_empty() => Verdict::ParametersOnly,
+            () => Verdict::NothingMissing,
+        };
+        let [before, after] = self.trained_rms();
+        let unit = self.unit();
+        let names: Vec<&str> = named.iter().map(|effect| effect.effect.as_str()).collect();
+        let found = match verdict {
+            Verdict::NothingMissing => "No term of the catalogue passes on the training records.".to_owned(),
+            Verdict::OutsideCatalogue => {
+                "A term that is in no catalogue does better than every effect.".to_owned()
+            }
+            Verdict::ParametersOnly => "Numbers of the model are off.".to_owned(),
+            _ => format!("{} {} missing.", names.join(" and "), if names.len() == 1 { "is" } else { "are" }),
+        };
+        let summary = format!(
+            "{}: {found} Residual of the training records {before:.4} {unit} rms, {after:.4} {unit} after; baseline: {}.",
+            self.model.name,
+            self.baseline_numbers()
+        );
+        let next = self.next(&named);
+        Report {
+            schema_version: SCHEMA_VERSION,
+            verdict,
+            summary,
+            inputs: InputFiles {
+                rig: model_file.display().to_string(),
+                train: self.runs.iter().map(|run| run.name.clone()).collect(),
+            },
+            named,
+            parameters,
+            outside: self.outside(),
+            gap: BTreeMap::new(),
+            verification: None,
+            candidates: self.candidates(),
+            not_excited: self.not_excited(),
+            detection_limits: self.detection_limits(),
+            location: Some(Location { maps: self.map().into_iter().collect(), ..Location::default() }),
+            checks: self.checks(),
+            next,
+        }
+    }
+
+    fn unit(&self) -> &'static str {
+        if self.model.kind == Kind::Chamber { "m^3/s" } else { "N" }
+    }
+
+    fn balance_name(&self) -> &'static str {
+        if self.model.kind == Kind::Chamber { "drive.flow-a" } else { "drive.force" }
+    }
+
+    /// The baseline's numbers beside what was taken, in words.
+    fn baseline_numbers(&self) -> String {
+        let columns = terms::baseline(&self.model);
+        let each = columns.iter().zip(&self.own_fit.numbers);
+        let each: Vec<String> = each
+            .map(|(column, number)| match column.name {
+                // Newton per pascal is square metres; people know square millimetres.
+                "area" => format!("area {:.2} mm2", number * 1e6),
+                name => format!("{name} {number:.3} {}", column.unit),
+            })
+            .collect();
+        if each.is_empty() { "the rig file's".into() } else { each.join(", ") }
+    }
+
+    /// Numbers of a term that stands at `first` among the columns of a fit.
+    fn quantities(&self, entry: &TermEntry, first: usize, numbers: &[f64], errors: &[f64]) -> Vec<Quantity> {
+        let (name, unit, factor) = shown(entry);
+        let quantity = |name: &str, unit: &str, value: f64, standard_error: Option<f64>| Quantity {
+            name: name.into(),
+            value,
+            unit: unit.into(),
+            standard_error,
+            before: None,
+        };
+        let mut all = Vec::new();
+        let value =
+            if entry.form == "ripple" { numbers[first].hypot(numbers[first + 1]) } else { numbers[first] };
+        let base = terms::baseline(&self.model);
+        let viscous = base.iter().position(|column| column.name == "viscous").map(|at| numbers[at]);
+        if let Some(viscous) = viscous.filter(|b| entry.effect == "friction-asymmetry" && *b != 0.0) {
+            let [percent, error] = [value, errors[first]].map(|number| 100.0 * number / viscous);
+            all.push(quantity("asymmetry_percent", "%", percent, Some(error.abs())));
+            all.push(quantity("viscous_outward_n_s_per_m", "N s/m", viscous + value, None));
+            all.push(quantity("viscous_inward_n_s_per_m", "N s/m", viscous - value, None));
+        }
+        let before = match entry.effect.as_str() {
+            "parameter:kv-scale" => Some(1.0),
+            "parameter:flow-lag" => {
+                self.rig.as_ref().map(|rig| rig.valve().flow_lag_time_constant_s * factor)
+            }
+            "dead-volume" => self.rig.as_ref().map(|rig| rig.cylinder().dead_volume_m3 * factor),
+            _ => None,
+        };
+        let told = value * factor + before.unwrap_or(0.0);
+        let error = Some(errors[first] * factor);
+        all.push(Quantity { before, ..quantity(name, unit, told, error) });
+        all.extend(entry.shape.iter().map(|(key, value)| quantity(key, shape_unit(key), *value, None)));
+        all
+    }
+
+    /// Clustered standard errors of a fit over these columns; none known counts as infinite, and is told as none.
+    fn errors(&self, columns: &super::Columns, fit: &super::Fit) -> Vec<f64> {
+        self.rows.covariance(columns, fit, &self.time).map_or_else(
+            || vec![f64::NAN; columns.len()],
+            |c| c.diagonal().iter().map(|v| v.sqrt()).collect(),
+        )
+    }
+
+    fn named(&self) -> Vec<NamedEffect> {
+        let errors = self.errors(&self.own, &self.own_fit);
+        let (mut first, mut named) = (self.base.len(), Vec::new());
+        for taken in &self.found.taken {
+            let judged = &taken.judged;
+            let prepared = &self.families[judged.place];
+            let entry = &prepared.family.variants[judged.variant];
+            let at = first;
+            first += prepared.columns[judged.variant].len();
+            if entry.effect.starts_with("parameter:") {
+                continue;
+            }
+            let forms = judged.ties.iter().map(|variant| (judged.place, *variant));
+            let mut alternatives: Vec<_> =
+                forms.chain(taken.alternatives.iter().copied()).map(|twin| self.alternative(twin)).collect();
+            alternatives.extend(alias(
+                entry,
+                &self.quantities(entry, at, &self.own_fit.numbers, &errors),
+                self,
+            ));
+            named.push(NamedEffect {
+                effect: entry.effect.clone(),
+                place: place(&entry.effect),
+                parameters: finite(self.quantities(entry, at, &self.own_fit.numbers, &errors)),
+                share_explained: judged.share,
+                alternatives,
+            });
+        }
+        named
+    }
+
+    /// What explains the records as well, fitted beside the baseline alone.
+    fn alternative(&self, (place_of, variant): (usize, usize)) -> NamedEffect {
+        let prepared = &self.families[place_of];
+        let entry = &prepared.family.variants[variant];
+        let columns: super::Columns = self.base.iter().chain(&prepared.columns[variant]).cloned().collect();
+        let first = self.found.first.iter().find(|judged| judged.place == place_of);
+        let parameters = self.rows.fit(&columns).map_or_else(Vec::new, |fit| {
+            let errors = self.errors(&columns, &fit);
+            finite(self.quantities(entry, self.base.len(), &fit.numbers, &errors))
+        });
+        NamedEffect {
+            effect: entry.effect.clone(),
+            place: place(&entry.effect),
+            parameters,
+            share_explained: first.map_or(0.0, |judged| judged.share),
+            alternatives: Vec::new(),
+        }
+    }
+
+    fn parameters(&self) -> Vec<Quantity> {
+        let errors = self.errors(&self.own, &self.own_fit);
+        let (mut first, mut parameters) = (self.base.len(), Vec::new());
+        for taken in &self.found.taken {
+            let prepared = &self.families[taken.judged.place];
+            let entry = &prepared.family.variants[taken.judged.variant];
+            if entry.effect.starts_with("parameter:") {
+                let own = self.quantities(entry, first, &self.own_fit.numbers, &errors);
+                let own = finite(own).into_iter().take(1);
+                parameters.extend(own.map(|quantity| Quantity { name: entry.effect.clone(), ..quantity }));
+            }
+            first += prepared.columns[taken.judged.variant].len();
+        }
+        parameters
+    }
+
+    fn candidates(&self) -> Vec<Candidate> {
+        let taken = |own: &Judged| self.found.taken.iter().position(|taken| taken.judged.place == own.place);
+        let mut candidates: Vec<Candidate> = self
+            .found
+            .first
+            .iter()
+            .map(|judged| {
+                let entry = &self.families[judged.place].family.variants[judged.variant];
+                let (_, unit, factor) = shown(entry);
+                let last = self.found.last.iter().find(|last| last.place == judged.place);
+                let fate = match (taken(judged), last) {
+                    (Some(round), _) => {
+                        format!("taken {} ({})", ["first", "second", "third"][round.min(2)], told(entry))
+                    }
+                    (None, Some(last)) if last.passes => {
+                        format!("passes, but another was better ({})", told(entry))
+                    }
+                    (None, Some(last)) => {
+                        let entry = &self.families[last.place].family.variants[last.variant];
+                        format!("rejected: {} ({})", last.gate, told(entry))
+                    }
+                    (None, None) => "not tried".to_owned(),
+                };
+                Candidate {
+                    effect: entry.effect.clone(),
+                    place: place(&entry.effect),
+                    score: judged.score,
+                    share_explained: Some(judged.share),
+                    amplitude: judged.number * factor,
+                    unit: unit.into(),
+                    fate,
+                }
+            })
+            .collect();
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        candidates
+    }
+
+    /// Families that no fit can tell from the baseline.
+    fn not_excited(&self) -> Vec<EffectPlace> {
+        let told =
+            self.found.first.iter().filter(|judged| judged.gate.contains("cannot tell it from the baseline"));
+        let effects = told.map(|judged| self.families[judged.place].family.variants[0].effect.clone());
+        effects.map(|effect| EffectPlace { place: place(&effect), effect }).collect()
+    }
+
+    /// The number that would take the asked share of what is left now.
+    fn detection_limits(&self) -> Vec<DetectionLimit> {
+        let power = self.rows.power(&self.own_fit.residual);
+        let mut limits = Vec::new();
+        for judged in &self.found.last {
+            let prepared = &self.families[judged.place];
+            let entry = &prepared.family.variants[judged.variant];
+            let (name, unit, factor) = shown(entry);
+            if entry.effect.starts_with("decoy:") || judged.gate.contains("cannot tell it") {
+                continue;
+            }
+            let column =
+                super::Rows { target: prepared.columns[judged.variant][0].clone(), ..self.rows.clone() };
+            let Some(alone) = column.fit(&self.own) else { continue };
+            let own = column.power(&alone.residual);
+            if own > 0.0 {
+                let value = (self.model.selection.share_floor * power / own).sqrt() * factor;
+                limits.push(DetectionLimit {
+                    effect: entry.effect.clone(),
+                    place: place(&entry.effect),
+                    name: name.into(),
+                    value,
+                    unit: unit.into(),
+                });
+            }
+        }
+        limits
+    }
+
+    /// What the baseline leaves, over speed.
+    fn map(&self) -> Option<Curve> {
+        let speeds: Vec<f64> =
+            self.runs.iter().flat_map(|run| run.kept.iter().map(|at| run.v_m_per_s[*at])).collect();
+        let cut = self.rows.in_bands("speed", &speeds, BINS);
+        let mut curve = Curve {
+            variable: "v".into(),
+            variable_unit: "m/s".into(),
+            unit: self.unit().into(),
+            at: Vec::new(),
+            value: Vec::new(),
+            band: Vec::new(),
+        };
+        for fold in cut.folds.iter().filter(|fold| fold.len() > 2) {
+            let mean = |of: &[f64]| fold.iter().map(|row| of[*row]).sum::<f64>() / fold.len() as f64;
+            let value = mean(&self.base_fit.residual);
+            let square = fold.iter().map(|row| (self.base_fit.residual[*row] - value).powi(2)).sum::<f64>();
+            let rows = fold.len() as f64;
+            curve.at.push(mean(&speeds));
+            curve.value.push(value);
+            curve.band.push(2.0 * (square / (rows - 1.0) / rows).sqrt());
+        }
+        Some(curve)
+    }
+
+    fn outside(&self) -> Option<Outside> {
+        self.found.decoy.as_ref()?;
+        let balance = self.balance_name().into();
+        Some(Outside { balance, variables: Vec::new(), curve: self.map(), formula: None })
+    }
+
+    fn checks(&self) -> Vec<RecordCheck> {
+        let check = |record: &crate::records::Record| {
+            let times = record.time_s();
+            let hole = times.windows(2).enumerate().map(|(row, pair)| (row, pair[1] - pair[0]));
+            let hole = hole.max_by(|a, b| a.1.total_cmp(&b.1));
+            let hole = hole.filter(|(_, length_s)| *length_s > 5.0 * self.model.processing.period_s);
+            let mut findings: Vec<Finding> = record
+                .warnings()
+                .iter()
+                .map(|warning| Finding {
+                    kind: "reader".into(),
+                    column: None,
+                    line: warning.line,
+                    fatal: false,
+                    text: warning.text.clone(),
+                })
+                .collect();
+            findings.extend(hole.map(|(row, length_s)| Finding {
+                kind: "gap".into(),
+                column: None,
+                line: Some(record.line(row + 1)),
+                fatal: false,
+                text: format!("the longest hole has {length_s:.3} s; bridged by a straight line"),
+            }));
+            RecordCheck {
+                file: record.file().display().to_string(),
+                usable: true,
+                rows: record.len(),
+                length_s: times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0),
+                findings,
+                channels: BTreeMap::new(),
+            }
+        };
+        self.records.iter().map(check).collect()
+    }
+
+    fn next(&self, named: &[NamedEffect]) -> Option<Next> {
+        let twins: Vec<&NamedEffect> = named.iter().flat_map(|effect| &effect.alternatives).collect();
+        let first = named.iter().find(|effect| !effect.alternatives.is_empty())?;
+        let otherwise = match first.effect.as_str() {
+            "pressure-dependent-friction" => "the same strokes at three levels of pressure or more",
+            "dead-volume" => {
+                "the other chamber of the same strokes: an offset of the position takes from it what it gives here"
+            }
+            "inclination" => "the same strokes with the axis tilted, or with the force sensor unloaded",
+            _ => "strokes at other speeds and other levels of pressure",
+        };
+        let names: Vec<String> = twins
+            .iter()
+            .map(|twin| {
+                if twin.effect == first.effect {
+                    format!("another form of {}", twin.effect)
+                } else {
+                    twin.effect.clone()
+                }
+            })
+            .collect();
+        Some(Next {
+            reason: format!("{} fits these records as well as {}", names.join(", "), first.effect),
+            experiment: None,
+            divergence: None,
+            otherwise: Some(otherwise.into()),
+        })
+    }
+
+    /// Both models, frozen, on records that were not used.
+    pub(super) fn verify(&self, runs: &[Run], report: &mut Report) -> Result<(), BalanceError> {
+        let mut columns = base_columns(&self.model, runs)?;
+        let rows = super::rows_of(runs);
+        let target = &rows.target;
+        let before = residual(target, &columns, &self.base_fit.numbers);
+        for taken in &self.found.taken {
+            let entry = &self.families[taken.judged.place].family.variants[taken.judged.variant];
+            columns.extend(term_columns(&self.model, entry, runs)?);
+        }
+        let after = residual(target, &columns, &self.own_fit.numbers);
+        let signal = match self.model.kind {
+            Kind::Chamber => "drive_flow_a_m3_per_s".to_owned(),
+            _ => self.model.channels["force"].column(),
+        };
+        let [before_rms, after_rms] = [rms(&before), rms(&after)];
+        let closed = (before_rms > 0.0).then(|| 1.0 - (after_rms / before_rms).powi(2));
+        report.gap.insert(signal.clone(), Gap { before: before_rms, after: after_rms, floor: 0.0, closed });
+        let cut = rows.in_time(self.model.selection.blocks);
+        let squares = |residual: &[f64]| -> Vec<f64> {
+            cut.folds.iter().map(|fold| fold.iter().map(|row| residual[*row].powi(2)).sum()).collect()
+        };
+        let differences: Vec<f64> =
+            squares(&before).iter().zip(squares(&after)).map(|(before, after)| before - after).collect();
+        let trained = rms(&self.own_fit.residual).powi(2).max(f64::MIN_POSITIVE);
+        let lag = |residual: &[f64]| {
+            let products: f64 = residual.windows(2).map(|pair| pair[0] * pair[1]).sum();
+            products / residual.iter().map(|r| r * r).sum::<f64>().max(f64::MIN_POSITIVE)
+        };
+        let mut folds: Vec<f64> =
+            self.time.folds.iter().map(|fold| fold_power(&self.own_fit.residual, fold) / trained).collect();
+        folds.sort_by(f64::total_cmp);
+        report.verification = Some(Verification {
+            record: runs.iter().map(|run| run.name.clone()).collect::<Vec<_>>().join(", "),
+            chi2_before: before_rms.powi(2) / trained,
+            chi2_after: after_rms.powi(2) / trained,
+            chi2_null: [folds[0], folds[folds.len() - 1]],
+            free_run_nrmse_percent: BTreeMap::new(),
+            whiteness: BTreeMap::from([(signal, BeforeAfter { before: lag(&before), after: lag(&after) })]),
+            physical: Vec::new(),
+            confirmed: !self.found.taken.is_empty() && clustered_t(&differences) > 3.0,
+        });
+        Ok(())
+    }
+}
+
+fn fold_power(residual: &[f64], fold: &[usize]) -> f64 {
+    fold.iter().map(|row| residual[*row].powi(2)).sum::<f64>() / fold.len().max(1) as f64
+}
+
+/// No standard error rather than one that is no number.
+fn finite(mut quantities: Vec<Quantity>) -> Vec<Quantity> {
+    for quantity in &mut quantities {
+        quantity.standard_error = quantity.standard_error.filter(|error| error.is_finite());
+    }
+    quantities
+}
+
+/// What is the same column by construction, and so told without a fit.
+fn alias(entry: &TermEntry, own: &[Quantity], study: &Study) -> Vec<NamedEffect> {
+    let named = |effect: &str, parameters: Vec<Quantity>| NamedEffect {
+        effect: effect.into(),
+        place: place(effect),
+        parameters,
+        share_explained: 0.0,
+        alternatives: Vec::new(),
+    };
+    match (entry.effect.as_str(), &study.rig, own.first()) {
+        ("dead-volume", Some(rig), Some(volume)) => {
+            // A position that is read o too long makes the volume A o too large.
+            let per_mm_cm3 = rig.cylinder().piston_area_m2 * 1e3;
+            let offset = Quantity {
+                name: "offset_mm".into(),
+                unit: "mm".into(),
+                value: (volume.before.unwrap_or(0.0) - volume.value) / per_mm_cm3,
+                standard_error: volume.standard_error.map(|error| error / per_mm_cm3),
+                before: None,
+            };
+            vec![named("position-sensor-offset", vec![offset])]
+        }
+        ("inclination", _, Some(force)) => {
+            let sliding = named("friction-asymmetry", Vec::new());
+            let offset = Quantity { name: "offset_n".into(), ..force.clone() };
+            vec![named("force-sensor-offset", vec![offset]), sliding]
+        }
+        _ => Vec::new(),
+    }
+}

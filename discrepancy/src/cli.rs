@@ -1,0 +1,127 @@
+//! The command line: the whole workflow, and its steps alone.
+
+use crate::records::{ReadOptions, Unknown};
+use clap::{Args, Parser, Subcommand};
+use protocol::exit::EXIT_CODE_HELP;
+use std::path::PathBuf;
+
+/// Finds where model and records disagree, names the missing effect, adds it to the model and shows the gap shrink.
+#[derive(Debug, Parser)]
+#[command(name = "discrepancy", version, about, after_help = EXIT_CODE_HELP)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The workflow and its steps.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The whole workflow: report.json, report.html, the extended rig.toml, and next.toml where an experiment is proposed.
+    Close(CloseArguments),
+    /// Whether records can be used, and their noise.
+    Check(RecordArguments),
+    /// The baseline's own parameters from records, with errors, and what the records cannot tell.
+    Calibrate(RecordArguments),
+    /// Which balance disagrees, in which regime, over which variables.
+    Locate(RecordArguments),
+    /// Names what is missing; as close without a held-out record and without files beside report.json.
+    Name(RecordArguments),
+    /// Writes the rig file with what a report names.
+    Extend(ExtendArguments),
+    /// Judges an extended rig file on a record that it was not fitted on.
+    Verify(VerifyArguments),
+    /// Proposes the experiment that tells apart what a report could not.
+    Next(NextArguments),
+}
+
+/// Records and the model.
+#[derive(Args, Clone, Debug)]
+pub struct RecordArguments {
+    /// Rig file: the model. Or a model file of one balance alone.
+    #[arg(long)]
+    pub rig: PathBuf,
+    /// Training records: measurement.csv, bus.log, or any CSV with --mapping.
+    #[arg(long, required = true, num_args = 1..)]
+    pub train: Vec<PathBuf>,
+    /// Folder for the results, made if missing.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Mapping file of foreign CSV records.
+    #[arg(long)]
+    pub mapping: Option<PathBuf>,
+    /// Refuse records with columns that the measurement file does not know.
+    #[arg(long)]
+    pub strict: bool,
+    /// An effect that is no candidate; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
+    /// Threads; the results do not depend on them. Default: all cores.
+    #[arg(long)]
+    pub threads: Option<usize>,
+}
+
+impl RecordArguments {
+    /// How the records are read.
+    #[must_use]
+    pub fn options(&self) -> ReadOptions {
+        let unknown = if self.strict { Unknown::Refused } else { Unknown::Ignored };
+        ReadOptions { unknown, mapping: self.mapping.clone(), ..ReadOptions::default() }
+    }
+}
+
+/// What the whole workflow is given.
+#[derive(Args, Clone, Debug)]
+pub struct CloseArguments {
+    /// Model and training records.
+    #[command(flatten)]
+    pub records: RecordArguments,
+    /// The record that the model never sees before it is judged on it; a model of one balance takes several.
+    #[arg(long, num_args = 1..)]
+    pub test: Vec<PathBuf>,
+}
+
+/// What a rig file is extended by.
+#[derive(Args, Clone, Debug)]
+pub struct ExtendArguments {
+    /// Rig file that the report was made with.
+    #[arg(long)]
+    pub rig: PathBuf,
+    /// report.json.
+    #[arg(long)]
+    pub report: PathBuf,
+    /// The new rig file.
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// What is judged on what.
+#[derive(Args, Clone, Debug)]
+pub struct VerifyArguments {
+    /// Rig file before.
+    #[arg(long)]
+    pub rig: PathBuf,
+    /// Rig file after.
+    #[arg(long)]
+    pub extended: PathBuf,
+    /// The held-out record.
+    #[arg(long)]
+    pub test: PathBuf,
+    /// Mapping file of a foreign CSV record.
+    #[arg(long)]
+    pub mapping: Option<PathBuf>,
+}
+
+/// What is to be told apart.
+#[derive(Args, Clone, Debug)]
+pub struct NextArguments {
+    /// Rig file that the report was made with.
+    #[arg(long)]
+    pub rig: PathBuf,
+    /// report.json with the verdict ambiguous.
+    #[arg(long)]
+    pub report: PathBuf,
+    /// The experiment file.
+    #[arg(long)]
+    pub out: PathBuf,
+}

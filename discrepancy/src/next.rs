@@ -1,0 +1,213 @@
+//! What to measure next: the experiment that best separates what a record leaves ambiguous.
+//!
+//! ```text
+//!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair
+//!                                                 ──► most pairs apart, then the largest least T
+//! ```
+//!
+//! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude, against noise and against
+//! what no model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise:
+//! an experiment that reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`otherwise`] says what
+//! would and the controller cannot do: tilting, uncoupling, a locked piston.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`menu`] | the experiments |
+//! | [`driven`] | one of them in closed loop with an explanation's rig |
+//! | [`divergence`] | how far explanations lie apart in it |
+//! | [`nuisance`] | numbers of the baseline that are refitted beside |
+//! | [`otherwise`] | what would separate effects where no experiment does |
+//!
+//! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner
+//! 1965.
+
+pub mod divergence;
+pub mod driven;
+pub mod menu;
+pub mod nuisance;
+pub mod otherwise;
+
+use crate::report::Next;
+use divergence::{Divergence, divergences};
+use driven::drive;
+use menu::{Entry, MENU};
+use plant::RigParameters;
+use rayon::prelude::*;
+
+/// Divergence that is wanted: five standard deviations.
+pub const WANTED: f64 = 25.0;
+/// Most repetitions that are proposed.
+pub const MOST_REPETITIONS: u32 = 6;
+
+/// A rig that explains the records.
+#[derive(Clone, Debug)]
+pub struct Explanation {
+    /// The baseline with what is missing, in fitted numbers.
+    pub rig: RigParameters,
+    /// What is missing, as `line-delay drive` or `parameter:mass`.
+    pub names: Vec<String>,
+}
+
+impl Explanation {
+    fn title(&self) -> String {
+        if self.names.is_empty() { "nothing".to_owned() } else { self.names.join(" with ") }
+    }
+}
+
+/// How an entry of the menu does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judged {
+    /// The entry.
+    pub name: &'static str,
+    /// Each ordered pair: the true one, its rival, how they differ.
+    pub pairs: Vec<(usize, usize, Divergence)>,
+}
+
+/// What is proposed.
+#[derive(Clone, Debug)]
+pub struct Proposal {
+    /// For the report; [`Next::experiment`] is the file's name.
+    pub next: Next,
+    /// Text of the experiment file, if one is proposed.
+    pub experiment_toml: Option<String>,
+    /// All entries of the menu, in its order; those that cannot be rehearsed are left out.
+    pub table: Vec<Judged>,
+}
+
+impl Judged {
+    /// The smallest T of its pairs, in one repetition.
+    #[must_use]
+    pub fn least(&self) -> f64 {
+        self.pairs.iter().map(|pair| pair.2.in_repetitions(1)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// T of the pairs that reach what is wanted in [`MOST_REPETITIONS`], in so many.
+    fn apart(&self, times: u32) -> impl Iterator<Item = f64> {
+        let enough = self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= WANTED);
+        enough.map(move |pair| pair.2.in_repetitions(times))
+    }
+
+    /// The smallest of those; 0 without one.
+    fn least_apart(&self, times: u32) -> f64 {
+        let least = self.apart(times).fold(f64::INFINITY, f64::min);
+        if least.is_finite() { least } else { 0.0 }
+    }
+}
+
+/// The experiment that best separates these explanations, and what would where none does.
+///
+/// `axes_measured` are drive and load. `progress` gets a line for each entry of the menu.
+pub fn propose(
+    baseline: &RigParameters,
+    explanations: &[Explanation],
+    axes_measured: [bool; 2],
+    progress: &mut dyn FnMut(&str),
+) -> Proposal {
+    let mut table = Vec::new();
+    if explanations.len() > 1 {
+        for entry in MENU {
+            progress(&format!("rehearsing {}", entry.name));
+            table.extend(judge(entry, baseline, explanations, axes_measured));
+        }
+    }
+    let (next, experiment_toml) = choose(explanations, &table);
+    Proposal { next, experiment_toml, table }
+}
+
+/// T of all ordered pairs in an entry; `None` when it cannot be rehearsed with one of the rigs.
+#[must_use]
+pub fn judge(
+    entry: &Entry,
+    baseline: &RigParameters,
+    explanations: &[Explanation],
+    axes_measured: [bool; 2],
+) -> Option<Judged> {
+    let named = |name: &&str| explanations.iter().any(|one| one.names.iter().any(|own| own == name));
+    let numbers = nuisance::NAMES.iter().filter(|name| !named(name));
+    let numbers: Vec<_> = numbers.filter_map(|name| nuisance::off(baseline, name).ok()).collect();
+    let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
+        .into_par_iter()
+        .map(|own| {
+            let driven = drive(entry, baseline, &explanations[own].rig).ok()?;
+            let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != own).collect();
+            let rigs: Vec<_> = [own].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
+            let values = divergences(&driven, baseline, &rigs, &numbers, axes_measured);
+            Some(rivals.into_iter().zip(values).map(|(rival, value)| (own, rival, value)).collect())
+        })
+        .collect();
+    Some(Judged { name: entry.name, pairs: pairs?.concat() })
+}
+
+fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<String>) {
+    let titles: Vec<String> = explanations.iter().map(Explanation::title).collect();
+    let alike = format!("{} explain the records alike", listed(&titles));
+    // Of equals the first of the menu.
+    let better = |one: &Judged, other: &Judged| {
+        let key = |judged: &Judged| (judged.apart(1).count(), judged.least_apart(1));
+        key(one) > key(other)
+    };
+    let best = table.iter().fold(None, |best: Option<&Judged>, one| match best {
+        Some(best) if !better(one, best) => Some(best),
+        _ => Some(one),
+    });
+    let Some(best) = best else {
+        let reason = if explanations.len() < 2 {
+            "nothing is ambiguous".to_owned()
+        } else {
+            format!("{alike}, and no experiment of the menu can be rehearsed with them")
+        };
+        return (Next { reason, experiment: None, divergence: None, otherwise: None }, None);
+    };
+    let entry = MENU.iter().find(|entry| entry.name == best.name).expect("it is of the menu");
+    let left: Vec<(usize, usize)> = best
+        .pairs
+        .iter()
+        .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < WANTED)
+        .map(|(one, other, _)| (*one.min(other), *one.max(other)))
+        .collect();
+    let otherwise = otherwise::of_pairs(explanations, &left);
+    if left.len() == best.pairs.len() {
+        let reason = format!(
+            "{alike}, and no experiment of this rig separates them: \
+             the best, {}, is expected to by {:.1}, and {WANTED} are wanted",
+            best.name,
+            best.least()
+        );
+        return (Next { reason, experiment: None, divergence: Some(best.least()), otherwise }, None);
+    }
+    let times = (1..MOST_REPETITIONS).find(|times| best.least_apart(*times) >= WANTED);
+    let times = times.unwrap_or(MOST_REPETITIONS);
+    let how_often = if times > 1 { format!(" in {times} repetitions") } else { String::new() };
+    let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
+    let total = best.least_apart(times);
+    let reason = format!(
+        "{alike}; {}, which serves to tell apart {}, is expected to separate them by {total:.0}{how_often} \
+         ({WANTED} are wanted){rest}",
+        entry.name, entry.serves
+    );
+    let experiment = Some(format!("next-{}.toml", entry.name));
+    (Next { reason, experiment, divergence: Some(total), otherwise }, Some(text(entry, times)))
+}
+
+/// The file of an entry with so many repetitions.
+fn text(entry: &Entry, times: u32) -> String {
+    let how = "# Proposed by 'discrepancy next'. Run it as it is: scripts/run FILE\n";
+    let toml = if times > 1 {
+        entry.toml.replacen("[run]\n", &format!("[run]\nrepetitions = {times}\n"), 1)
+    } else {
+        entry.toml.to_owned()
+    };
+    format!("{how}{toml}")
+}
+
+/// `a, b and c`.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => "no explanations".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests;

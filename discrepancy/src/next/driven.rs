@@ -1,0 +1,124 @@
+//! A rig driven through an experiment of the menu in closed loop, by the rehearsal of the controller.
+//!
+//! ```text
+//!   experiment ──► controllers with the baseline's numbers ──► rehearsal of the explanation's rig ──► commands, true points
+//! ```
+//!
+//! The run is what the experiment would be if the explanation were true: another rig is driven otherwise, and what its
+//! controllers do then is part of what it shows. The sensors' noise is that of one seed.
+
+use super::menu::{Entry, program};
+use crate::course::Point;
+use controller::axis::AxisRecord;
+use controller::rehearsal::{Rehearsal, RehearsalParts};
+use controller::run::RunError;
+use controller::setup::{Inputs as Files, Mode};
+use plant::{Axis, Inputs, Plant, RigParameters, Scene, SceneError, SetupError, State, Truth};
+use protocol::frames::MainChainState;
+
+/// Longest run, periods: what is behind it is not looked at.
+const LONGEST: usize = 30_000;
+/// Seed of the sensors' noise.
+const SEED: u64 = 1;
+/// The experiment begins when the initial positioning is over, whatever an effect does to standstill and error.
+const UNSETTLED: [&str; 6] = [
+    "drive.settled.still_m=0.1",
+    "drive.settled.position_error_m=0.5",
+    "drive.settled.force_error_n=2000",
+    "load.settled.still_m=0.1",
+    "load.settled.position_error_m=0.5",
+    "load.settled.force_error_n=2000",
+];
+
+/// Why an experiment cannot be rehearsed.
+#[derive(Debug, thiserror::Error)]
+pub enum DriveError {
+    /// The experiment or a program is none.
+    #[error(transparent)]
+    Files(#[from] RunError),
+    /// `[rig]` of the experiment is none.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The rig cannot be set up so.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+}
+
+/// What a run left.
+#[derive(Clone, Debug)]
+pub struct Driven {
+    /// Whether the rods were linked.
+    pub linked: bool,
+    /// State at the start.
+    pub start: State,
+    /// What acted over each period.
+    pub inputs: Vec<Inputs>,
+    /// True mechanical state and pressures at the start of each period.
+    pub points: Vec<[Point; 2]>,
+    /// Period in which the experiment began, behind the initial positioning; `None` when it never did.
+    pub began: Option<usize>,
+    /// Whether the experiment came to its end.
+    pub done: bool,
+}
+
+/// Drives `rig` through an experiment; the controllers have the baseline's numbers.
+///
+/// # Errors
+/// [`DriveError`]
+pub fn drive(entry: &Entry, baseline: &RigParameters, rig: &RigParameters) -> Result<Driven, DriveError> {
+    let file = format!("{}.toml", entry.name);
+    let nominal = baseline.without_effects();
+    let files = Files::of_texts(&nominal, (&file, entry.toml), program, &UNSETTLED)?;
+    let scene = Scene::from_toml(entry.toml, &file, &nominal)?;
+    let mode = Mode { partner_needed: true, real_time: false, forever: false };
+    let controllers =
+        Axis::ALL.into_iter().map(|axis| files.controller(axis, mode)).collect::<Result<_, _>>()?;
+    let mut rehearsal = Rehearsal::new(RehearsalParts { rig, scene: &scene, seed: SEED, controllers })?;
+    let start = *rehearsal.plant().state();
+    let (mut inputs, mut points, mut began) = (Vec::new(), Vec::new(), None);
+    let stroke_m = rig.cylinder().stroke_m;
+    while inputs.len() < LONGEST && !rehearsal.ended() {
+        let rehearsed = rehearsal.step(|_, _| {});
+        let in_experiment = |record: &AxisRecord| record.main == MainChainState::Experiment;
+        if began.is_none() && rehearsed.axes.iter().flatten().any(in_experiment) {
+            began = Some(inputs.len());
+        }
+        let cycle = rehearsed.cycle;
+        inputs.push(Inputs { valve: cycle.valve, ..Inputs::default() });
+        points.push(points_of(&cycle.truth, stroke_m));
+    }
+    let done = rehearsal.station().done();
+    Ok(Driven { linked: scene.linked, start, inputs, points, began, done })
+}
+
+/// Where both axes are.
+fn points_of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
+    std::array::from_fn(|i| {
+        let axis = &truth.axes[i];
+        let extension_m = if i == 0 { axis.position_m } else { stroke_m - axis.position_m };
+        Point {
+            extension_m: extension_m.clamp(0.0, stroke_m),
+            rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
+            pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
+        }
+    })
+}
+
+/// A plant's state with the mechanical state and the pressures of a run; the rest stays its own.
+#[must_use]
+pub fn seated(plant: &Plant, points: &[Point; 2]) -> State {
+    let mut state = *plant.state();
+    let truth = plant.truth(&Inputs::default());
+    let cylinder = plant.rig().cylinder();
+    for ((own, point), axis) in state.axes.iter_mut().zip(points).zip(&truth.axes) {
+        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+        // The volumes are the plant's own: an effect may have changed them.
+        let volume_a = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
+        let volume_b = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
+        own.extension_m += way_m;
+        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
+        own.stored_air_a_j = point.pressures_pa[0] * volume_a;
+        own.stored_air_b_j = point.pressures_pa[1] * volume_b;
+    }
+    state
+}

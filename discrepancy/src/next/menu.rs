@@ -1,0 +1,51 @@
+//! The menu: experiments that the controller can run and that tell effects apart, as files of `discrepancy/experiments`.
+//!
+//! Each drives both axes, so that it serves whichever has the effect, takes 13 to 20 s, and stays away from the ends of the
+//! stroke. Tests hold every file to that, with the baseline and with the controllers' own reader.
+
+/// An experiment of the menu.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// Its title, and its file without `.toml`.
+    pub name: &'static str,
+    /// What it tells apart, as the end of "to tell ... apart".
+    pub serves: &'static str,
+    /// Its file.
+    pub toml: &'static str,
+}
+
+macro_rules! menu {
+    ($($name:literal: $serves:literal,)*) => {
+        /// All of them; of equals the first is proposed.
+        pub const MENU: &[Entry] = &[
+            $(Entry { name: $name, serves: $serves, toml: include_str!(concat!("../../experiments/", $name, ".toml")) },)*
+        ];
+    };
+}
+
+menu! {
+    "shut-and-hold": "leakage and an offset of the valve",
+    "chirps": "delays and lags",
+    "ends": "volume, position offset and what the gas does with its heat",
+    "two-pressures": "friction that grows with the speed and friction that grows with the pressure",
+    "valve-null": "dead zone, hysteresis, offset and leakage of the valve",
+    "valve-steps": "rate limit, second order and delay of the spool",
+    "full-exhaust": "silencer, restrictions and exhaust edges",
+    "rests": "break-away that grows at rest",
+    "slow-reversals": "bristles, Stribeck's curve and what turns with the direction",
+    "weights": "inertia and gains of sensors",
+    "load-steps": "gap and stiffness of the linkage, droop of the supply",
+    "pressed-hold": "leakage across the piston and at the valve's null",
+}
+
+/// Text of a shipped program that the menu uses.
+#[must_use]
+pub fn program(name: &str) -> Option<String> {
+    let text = match name {
+        "position-pid" => include_str!("../../../controller/programs/position-pid.toml"),
+        "position-linked" => include_str!("../../../controller/programs/position-linked.toml"),
+        "force-pid-map" => include_str!("../../../controller/programs/force-pid-map.toml"),
+        _ => return None,
+    };
+    Some(text.to_owned())
+}

@@ -1,0 +1,123 @@
+//! Numbers of the baseline that may be off as well: what their refit would explain separates nothing.
+//!
+//! ```text
+//! <a, b> = a.b - (N'a).(1 + N'N)^-1 (N'b)          N: change of the readings with one prior standard deviation of each number
+//! ```
+//!
+//! Each number is known to its prior's 3 %, a guess of what data sheets and a calibration leave; the product is that of the
+//! readings whitened by noise and numbers together. Source: Kay 1998, Fundamentals of Statistical Signal Processing II, 7.8
+//! (nuisance with a prior); the names are those of effects.md.
+
+use nalgebra::{DMatrix, DVector};
+use plant::{ParameterError, RigParameters};
+
+/// One prior standard deviation of a number, relative.
+const TOLERANCE: f64 = 0.03;
+/// All of them.
+pub const NAMES: [&str; 8] = [
+    "parameter:mass",
+    "parameter:viscous-friction",
+    "parameter:sliding-friction",
+    "parameter:break-away-force",
+    "parameter:supply-pressure",
+    "parameter:spool-time-constant",
+    "parameter:flow-lag",
+    "parameter:kv-scale",
+];
+
+/// The rig with one of [`NAMES`] larger by one standard deviation.
+///
+/// # Errors
+/// [`ParameterError`] when it leaves its range, or there is no such number.
+pub fn off(rig: &RigParameters, name: &str) -> Result<RigParameters, ParameterError> {
+    let factor = 1.0 + TOLERANCE;
+    let (friction, valve, mass) = (rig.friction(), rig.valve(), rig.mass());
+    let scaled = |numbers: &[f64]| -> Vec<f64> { numbers.iter().map(|number| number * factor).collect() };
+    match name {
+        "parameter:mass" => rig
+            .with("mass.drive_kg", &[mass.drive_kg * factor])?
+            .with("mass.carriage_kg", &[mass.carriage_kg * factor])?
+            .with("mass.load_kg", &[mass.load_kg * factor]),
+        "parameter:viscous-friction" => {
+            rig.with("friction.viscous_n_per_mm_per_s", &[friction.viscous_n_s_per_m / 1e3 * factor])
+        }
+        "parameter:sliding-friction" => {
+            rig.with("friction.sliding_force_n", &[friction.sliding_force_n * factor])
+        }
+        "parameter:break-away-force" => {
+            rig.with("friction.break_away_force_n", &[friction.break_away_force_n * factor])
+        }
+        "parameter:supply-pressure" => {
+            rig.with("supply.pressure_bar", &[rig.supply().pressure_pa / 1e5 * factor])
+        }
+        "parameter:spool-time-constant" => {
+            rig.with("valve.spool_time_constant_ms", &[valve.spool_time_constant_s * 1e3 * factor])
+        }
+        "parameter:flow-lag" => {
+            rig.with("valve.flow_lag_time_constant_ms", &[valve.flow_lag_time_constant_s * 1e3 * factor])
+        }
+        _ => rig
+            .with("valve.kv_supply_m3_per_h", &scaled(&valve.kv_supply_m3_per_h))?
+            .with("valve.kv_exhaust_m3_per_h", &scaled(&valve.kv_exhaust_m3_per_h)),
+    }
+}
+
+/// The product of signatures that leaves out what the numbers explain.
+#[derive(Debug)]
+pub struct Product<'a> {
+    numbers: &'a [Vec<f64>],
+    inverse: DMatrix<f64>,
+}
+
+impl<'a> Product<'a> {
+    /// The product for these changes of the readings.
+    #[must_use]
+    pub fn new(numbers: &'a [Vec<f64>]) -> Self {
+        let count = numbers.len();
+        let gram = DMatrix::from_fn(count, count, |row, column| {
+            f64::from(u8::from(row == column)) + dot(&numbers[row], &numbers[column])
+        });
+        // One more than positive semidefinite in every direction.
+        let inverse = gram.cholesky().map_or_else(|| DMatrix::zeros(count, count), |factor| factor.inverse());
+        Product { numbers, inverse }
+    }
+
+    /// The product of two signatures.
+    #[must_use]
+    pub fn of(&self, left: &[f64], right: &[f64]) -> f64 {
+        let along = |signature: &[f64]| {
+            DVector::from_iterator(
+                self.numbers.len(),
+                self.numbers.iter().map(|number| dot(number, signature)),
+            )
+        };
+        dot(left, right) - along(left).dot(&(&self.inverse * along(right)))
+    }
+}
+
+pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
+    left.iter().zip(right).map(|(left, right)| left * right).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_number_explains_counts_by_no_more_than_its_prior() {
+        let numbers = [vec![10.0, 0.0, 0.0]];
+        let product = Product::new(&numbers);
+        // Along the number: 1 / (1 + 100) of its square is left; across it, all.
+        assert!((product.of(&[1.0, 0.0, 0.0], &[1.0, 0.0, 0.0]) - 1.0 / 101.0).abs() < 1e-12);
+        assert_eq!(product.of(&[0.0, 2.0, 0.0], &[0.0, 2.0, 0.0]), 4.0);
+        assert_eq!(Product::new(&[]).of(&[3.0], &[3.0]), 9.0);
+    }
+
+    #[test]
+    fn every_number_can_be_off() {
+        let rig = RigParameters::baseline();
+        for name in NAMES {
+            assert_ne!(off(&rig, name).expect(name), rig, "{name}");
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! `scripts/find-effect`: help, arguments that cannot be used, and one sealed effect found in lockstep, from the draw to the
+//! opened seal.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::process::{Ended, Running};
+use system_tests::records::json;
+
+/// Draws a leakage of 5.9 Nl/min across the load's piston: far above its detection limit.
+const SEED: &str = "9";
+const HIDDEN: &str = "piston-leakage at load";
+
+fn find_effect(arguments: &[&str]) -> Ended {
+    let bench = executable(Program::Bench, Build::Shipped);
+    let mut command = Command::new(workspace().join("scripts/find-effect"));
+    command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
+    Running::start("scripts/find-effect", &mut command).wait_within(Duration::from_secs(300))
+}
+
+/// A program in place of the workflow's: finds nothing and leaves the rig as it is, or what `said` says.
+fn stand_in(folder: &Path, said: &str) -> String {
+    let (program, report) = (folder.join("stand-in"), folder.join("said.json"));
+    fs::write(&report, said).expect("a folder that can be written");
+    let text = format!(
+        "#!/usr/bin/env bash\nset -eu\n[ \"$1 $2 $4 $6 $8\" = 'close --rig --train --test --out' ]\n\
+         cp \"$3\" \"$9/rig.toml\"\ncp '{}' \"$9/report.json\"\n",
+        report.display()
+    );
+    fs::write(&program, text).expect("a folder that can be written");
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+    fs::set_permissions(&program, mode).expect("a file of our own");
+    program.display().to_string()
+}
+
+#[test]
+fn help_tells_options_files_and_exit_codes() {
+    let ended = find_effect(&["--help"]).expect_code(0);
+    for part in ["--seed", "--lockstep", "--expect-right", "gap.html", "Exit codes: 0 done", "130 interrupted"] {
+        assert!(ended.stdout.contains(part), "'{part}' is missing in: {}", ended.stdout);
+    }
+}
+
+#[test]
+fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
+    let wrong: [(&[&str], &str); 9] = [
+        (&["--fly"], "unknown argument --fly"),
+        (&["--seed"], "--seed needs a value"),
+        (&["--seed", "x"], "whole number"),
+        (&["--count", "0"], "from 1 to 1000"),
+        (&["--axis", "supply"], "drive, load, both"),
+        (&["--bus", "vcan0"], "can://IFACE"),
+        (&["--lockstep", "--bus", "can://vcan0"], "embedded"),
+        (&["--experiment", "nothing-of-this-name"], "scripts/run --list"),
+        (&["--discrepancy", "/nowhere"], "no program"),
+    ];
+    for (arguments, hint) in wrong {
+        let _ = find_effect(arguments).expect_code(2).expect_said(&[hint]);
+    }
+}
+
+#[test]
+fn what_was_named_is_held_against_the_seal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = r#"{ "axis": "load", "element": null }"#;
+    let named = |effect: &str, alternatives: &str| {
+        format!(
+            r#"{{ "verdict": "named", "named": [{{ "effect": "{effect}", "where": {place}, "parameters": [{{ "name":
+            "leakage_nl_per_min", "value": 5.91234, "unit": "Nl/min", "standard_error": 0.0512 }}],
+            "alternatives": [{alternatives}] }}], "not_excited": [] }}"#
+        )
+    };
+    let other = format!(r#"{{ "effect": "piston-leakage", "where": {place}, "parameters": [] }}"#);
+    let nothing = r#"{ "verdict": "nothing-missing", "named": [], "not_excited": [] }"#.to_owned();
+    let cases = [
+        (named("piston-leakage", ""), 0, "\n  right\n"),
+        (named("valve-offset", &other), 0, "right, among those"),
+        (named("valve-offset", ""), 1, "\n  wrong\n"),
+        (nothing, 1, "named: nothing (nothing-missing)"),
+    ];
+    let short = ["--experiment", "point-to-point", "--held-out", "point-to-point"];
+    for (place, (report, code, told)) in cases.iter().enumerate() {
+        let (out, program) = (folder.path().join(place.to_string()), stand_in(folder.path(), report));
+        let out = out.to_str().expect("a path in ASCII");
+        let options = ["--lockstep", "--seed", SEED, "--expect-right", "--discrepancy", &program, "--out", out];
+        let ended = find_effect(&[&options[..], &short].concat()).expect_code(*code);
+        let hidden = format!("hidden: {HIDDEN} (leakage_nl_per_min 5.89");
+        for part in [*told, &hidden] {
+            assert!(ended.stdout.contains(part), "'{part}' is missing in: {}{}", ended.stdout, ended.stderr);
+        }
+        if *code == 0 {
+            assert!(ended.stdout.contains("(leakage_nl_per_min 5.912 +- 0.051 Nl/min)"), "{}", ended.stdout);
+        }
+        // What names the hidden terms lies where only the last step looks.
+        let run = Path::new(out).join("seed-9/fitted/measured");
+        assert!(run.join("measurement.csv").exists() && !run.join("truth.csv").exists());
+    }
+}
+
+#[test]
+fn a_sealed_effect_is_found_over_the_bus_added_and_the_gap_shrinks() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("found");
+    let out = out.to_str().expect("a path in ASCII");
+    let ended = find_effect(&["--lockstep", "--seed", SEED, "--expect-right", "--out", out]).expect_code(0);
+    let told = format!("named: {HIDDEN}");
+    assert!(ended.stdout.contains(&told), "'{told}' is missing in: {}{}", ended.stdout, ended.stderr);
+    let folder = Path::new(out).join("seed-9");
+    for file in ["gap.html", "told.txt", "workflow/report.html", "workflow/rig.toml", "hidden/sealed.toml"] {
+        assert!(folder.join(file).exists(), "{file}");
+    }
+    let rig = fs::read_to_string(folder.join("workflow/rig.toml")).expect("the extended rig");
+    assert!(rig.contains("[effects.piston-leakage.load]"), "{rig}");
+    let report = json(&folder.join("workflow/report.json"));
+    let closed = report["gap"]["load_pressure_a_pa"]["closed"].as_f64();
+    assert!(closed.is_some_and(|closed| closed > 0.8), "{}", report["gap"]);
+}
