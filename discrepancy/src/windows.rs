@@ -26,7 +26,7 @@ use std::f64::consts::TAU;
 pub const WINDOW: usize = 100;
 /// Place of the force among the readings.
 const FORCE: usize = 1;
-/// How far a start may move at a time.
+/// How far a start may move at a time where the rods are linked.
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
 /// How often the starts of a linked record are moved.
 const LINKED_PASSES: usize = 3;
@@ -136,7 +136,7 @@ impl<'a> Windows<'a> {
             let Some(moved) = matrix.cholesky().map(|factor| factor.solve(&right)) else { continue };
             for (place, axis) in measured.iter().enumerate() {
                 let part = |number: usize| {
-                    let most = FARTHEST[number];
+                    let most = if self.course.linked { FARTHEST[number] } else { DOUBT[number] };
                     (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
@@ -226,9 +226,22 @@ impl<'a> Windows<'a> {
     #[must_use]
     pub fn settled(mut self) -> Self {
         for _ in 0..if self.course.linked { 0 } else { SETTLING } {
+            let (points, squares) = (self.points.clone(), self.squares());
             self.settle();
+            // A start from which readings are met worse, as around a break-away, stays where it was.
+            let worse: Vec<bool> = self.squares().iter().zip(&squares).map(|(new, old)| new > old).collect();
+            for (start, _) in self.starts.iter().zip(&worse).filter(|(_, worse)| **worse) {
+                self.points[start / WINDOW] = points[start / WINDOW];
+            }
         }
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
         self
+    }
+
+    /// Squares of what each window leaves under the baseline rig.
+    fn squares(&self) -> Vec<f64> {
+        let left = self.residual(&self.simulate(&self.rig));
+        left.chunks_exact(self.rows().max(1)).map(|own| dot(own, own)).collect()
     }
 
     /// Readings over their noise that this rig would have given, without noise and rounding.
