@@ -38,45 +38,47 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let quiet = ["sensors.position_noise_um", "sensors.force_noise_n", "sensors.pressure_noise_pa"]
         .iter()
         .try_fold(baseline, |rig, key| rig.with(key, &[0.0]))?;
-    let driven = drive(&STEP, &quiet, &quiet)?;
+    let quiet = &quiet;
+    let driven = drive(&STEP, quiet, quiet)?;
     let began = driven.began.ok_or("the baseline does not come to its step")?;
     let edge = edge(&driven, began).ok_or("no edge of the valve")?;
-    let own = changes(&quiet, &driven, edge)?;
+    let own = changes(quiet, &driven, edge)?;
     let last = own[COMPARED - 1];
-    println!("Baseline after 50 ms: {:.0} mm/s, p_a {:+.0} kPa, p_b {:+.0} kPa.\n", last[0], last[1], last[2]);
+    println!(
+        "Baseline after 50 ms: {:.0} mm/s, p_a {:+.0} kPa, p_b {:+.0} kPa.\n",
+        last[0], last[1], last[2]
+    );
     println!(
         "| effect | place | amplitude | v, mm/s (noise) | p_a, kPa (noise) | p_b, kPa (noise) | valve the same for | v | pressures |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
 
-    let effects = Candidate::all([true, false], false, &[])
-        .into_iter()
-        .flat_map(|candidate| {
-            let sizes: &[f64] = match (candidate.is_anchored(), candidate.is_two_sided()) {
-                (false, _) => &[0.7],
-                (true, false) => &[0.5],
-                (true, true) => &[0.5, -0.5],
-            };
-            sizes.iter().map(move |size| {
-                let mut at = candidate.origin();
-                at[0] = *size;
-                let key = &candidate.sheet.keys[0];
-                let amplitude = short(candidate.numbers(&at)[0], key.unit.name());
-                let head = format!("| {} | {} | {amplitude} |", candidate.sheet.name, candidate.place);
-                candidate.rig(&quiet, &at).map(|rig| (head, rig))
-            })
-        });
+    let effects = Candidate::all([true, false], false, &[]).into_iter().flat_map(|candidate| {
+        let sizes: &[f64] = match (candidate.is_anchored(), candidate.is_two_sided()) {
+            (false, _) => &[0.7],
+            (true, false) => &[0.5],
+            (true, true) => &[0.5, -0.5],
+        };
+        sizes.iter().map(move |size| {
+            let mut at = candidate.origin();
+            at[0] = *size;
+            let key = &candidate.sheet.keys[0];
+            let amplitude = short(candidate.numbers(&at)[0], key.unit.name());
+            let head = format!("| {} | {} | {amplitude} |", candidate.sheet.name, candidate.place);
+            candidate.rig(quiet, &at).map(|rig| (head, rig))
+        })
+    });
     // Numbers that are merely wrong, by twice their tolerance.
     let parameters = PARAMETERS.iter().flat_map(|parameter| {
         [1.0 - 2.0 * parameter.tolerance, 1.0 + 2.0 * parameter.tolerance].map(|factor| {
             let head = format!("| {} | | times {factor} |", parameter.name);
-            parameter.scaled(&quiet, factor).map(|rig| (head, rig))
+            parameter.scaled(quiet, factor).map(|rig| (head, rig))
         })
     });
     let cases: Vec<(String, RigParameters)> = effects.chain(parameters).collect::<Result<_, _>>()?;
     let mut rows: Vec<(f64, String)> = cases
         .par_iter()
-        .map(|(head, rig)| row(&quiet, head, rig, (&driven, edge), &own, &noise))
+        .map(|(head, rig)| row(quiet, head, rig, (&driven, edge), &own, &noise))
         .collect::<Result<_, _>>()?;
     rows.sort_by(|left, right| right.0.total_cmp(&left.0));
     rows.iter().for_each(|(_, row)| println!("{row}"));
@@ -135,8 +137,8 @@ fn row(
         .map(|what| {
             let towards = own[COMPARED - 1][what].signum();
             let differs = changed.iter().zip(own).map(|(changed, own)| towards * (changed[what] - own[what]));
-            let (most, least) = differs
-                .fold((0.0_f64, 0.0_f64), |(most, least), own| (most.max(own), least.min(own)));
+            let (most, least) =
+                differs.fold((0.0_f64, 0.0_f64), |(most, least), own| (most.max(own), least.min(own)));
             let peak = if most >= -least { most } else { least };
             (most / noise[what], least / noise[what], format!("{peak:+.1} ({:+.0})", peak / noise[what]))
         })

@@ -47,10 +47,7 @@ pub(super) fn free_run(course: &Course, rig: &RigParameters) -> FreeRun {
                     "a pressure more than a tenth above the supply's",
                     pressures_pa.iter().any(|own| *own > highest_pa),
                 ),
-                (
-                    "the piston beyond its stroke",
-                    !(-BEYOND_M..=stroke_m + BEYOND_M).contains(&extension_m),
-                ),
+                ("the piston beyond its stroke", !(-BEYOND_M..=stroke_m + BEYOND_M).contains(&extension_m)),
             ];
             for (what, _) in found.into_iter().filter(|(_, found)| *found) {
                 unphysical.entry((i, what)).or_insert(period);

@@ -44,8 +44,7 @@ impl Nothing {
             .collect();
         let mut nothing = Nothing { expected, quiet, spreads: Vec::new(), range: [1.0; 2] };
         // Every draw is treated as a record is: its levels are told from itself, its worst windows are left out.
-        let powers: Vec<Power> =
-            powers.iter().map(|power| power.over(&levels(power, &nothing))).collect();
+        let powers: Vec<Power> = powers.iter().map(|power| power.over(&levels(power, &nothing))).collect();
         let of_lane = |power: &Power, lane: usize| {
             let own = power.lane(lane);
             pooled(&own, &kept(&own))

@@ -44,8 +44,11 @@ pub(super) fn sums(residual: &[f64], lanes: usize) -> Vec<f64> {
 impl Power {
     /// Sums of squares where noise alone has `expected`.
     pub(super) fn new(sums: &[f64], expected: &[f64], lanes: usize) -> Self {
-        let squares =
-            sums.iter().zip(expected).map(|(own, expected)| Squares { own: *own, expected: *expected }).collect();
+        let squares = sums
+            .iter()
+            .zip(expected)
+            .map(|(own, expected)| Squares { own: *own, expected: *expected })
+            .collect();
         Power { lanes, squares }
     }
 

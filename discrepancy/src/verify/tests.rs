@@ -31,7 +31,8 @@ fn course(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> Course {
         gaps: vec![false; PERIODS],
     };
     for (period, inputs) in course.inputs.iter_mut().enumerate() {
-        inputs.valve[0] = plant::quantise_valve(0.5 * (period as f64 * 1e-3 * std::f64::consts::TAU / 0.75).sin());
+        inputs.valve[0] =
+            plant::quantise_valve(0.5 * (period as f64 * 1e-3 * std::f64::consts::TAU / 0.75).sin());
     }
     let mut plant = Plant::in_state(rig, &first_state(&course, rig)).unwrap();
     let mut sampled = Sensors::new(rig, seed);

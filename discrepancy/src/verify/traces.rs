@@ -21,7 +21,8 @@ pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {
             let offset = if *at == 0 && Axis::ALL[*axis] == Axis::Load { load_offset_m } else { 0.0 };
             let joined = |values: &[f64], offset: f64| {
                 let mut own = vec![f64::NAN; course.len()];
-                for (start, window) in windows.starts().iter().zip(values.chunks_exact(WINDOW * lanes.len())) {
+                for (start, window) in windows.starts().iter().zip(values.chunks_exact(WINDOW * lanes.len()))
+                {
                     let lane = window.iter().skip(lane).step_by(lanes.len());
                     own[*start..].iter_mut().zip(lane).for_each(|(own, value)| *own = value * noise + offset);
                 }
@@ -34,9 +35,10 @@ pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {
                 .collect();
             let residual = |model: &Model<'_>| {
                 let mut own = joined(&model.residual, 0.0);
-                own.iter_mut().zip(&measured).filter(|(_, measured)| measured.is_nan()).for_each(
-                    |(own, _)| *own = f64::NAN,
-                );
+                own.iter_mut()
+                    .zip(&measured)
+                    .filter(|(_, measured)| measured.is_nan())
+                    .for_each(|(own, _)| *own = f64::NAN);
                 own
             };
             Trace {
