@@ -20,6 +20,7 @@
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
 //! | [`next`] | the experiment that would tell apart what a record does not |
+//! | [`verify`] | the held-out record: both models, frozen |
 //! | [`report`] | what was found, as data |
 //! | [`workflow`] | all of it in order |
 //! | [`commands`], [`cli`] | the program |

@@ -19,15 +19,20 @@ use crate::course::{CHANNELS, Course, PERIOD_S, Point};
 use crate::seats::Seats;
 use nalgebra::{DMatrix, DVector};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+use std::f64::consts::TAU;
 
 /// Periods of a window.
 pub const WINDOW: usize = 100;
 /// Place of the force among the readings.
 const FORCE: usize = 1;
-/// How far a start may move at a time.
+/// How far a start may move at a time where the rods are linked.
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
 /// How often the starts of a linked record are moved.
 const LINKED_PASSES: usize = 3;
+/// The same of others, where it is asked for.
+const SETTLING: usize = 2;
 /// Steps of a period where only a difference is wanted.
 const COARSE_SUBSTEPS: u32 = 5;
 /// Readings to each side that a reading of the force is compared with.
@@ -132,7 +137,7 @@ impl<'a> Windows<'a> {
             let Some(moved) = matrix.cholesky().map(|factor| factor.solve(&right)) else { continue };
             for (place, axis) in measured.iter().enumerate() {
                 let part = |number: usize| {
-                    let most = FARTHEST[number];
+                    let most = if self.course.linked { FARTHEST[number] } else { DOUBT[number] };
                     (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
@@ -190,6 +195,54 @@ impl<'a> Windows<'a> {
         let rows = self.rows();
         let valid = self.valid.chunks_exact(rows).map(|valid| valid.iter().filter(|valid| **valid).count());
         valid.zip(&self.bases).map(|(valid, basis)| valid.saturating_sub(basis.len()).max(1) as f64).collect()
+    }
+
+    /// The residual of a model that lacks nothing: noise as the course has it, its memory and the sampling instants' errors
+    /// included, treated as a residual is.
+    #[must_use]
+    pub fn noise(&self, random: &mut Pcg64) -> Vec<f64> {
+        let width = self.lanes.len();
+        let memories: Vec<f64> =
+            self.lanes.iter().map(|(axis, channel)| self.course.memory[*axis][*channel]).collect();
+        let mut noise = Vec::with_capacity(self.readings.len());
+        for drifts in self.drifts.chunks_exact(self.rows().max(1)) {
+            let mut own = vec![0.0; width];
+            for (period, drifts) in drifts.chunks_exact(width).enumerate() {
+                for (own, memory) in own.iter_mut().zip(&memories) {
+                    let kept = if period == 0 { 0.0 } else { *memory };
+                    *own = kept * *own + (1.0 - kept * kept).sqrt() * gaussian(random);
+                }
+                let instant = gaussian(random);
+                noise.extend(own.iter().zip(drifts).map(|(own, drift)| own + drift * instant));
+            }
+        }
+        self.reduce(&mut noise);
+        noise
+    }
+
+    /// The same windows with starts where the readings are met best, as linked ones have them anyway.
+    ///
+    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
+    /// window: where the points are far off, as those of a sensor that lags, both need the start itself.
+    #[must_use]
+    pub fn settled(mut self) -> Self {
+        for _ in 0..if self.course.linked { 0 } else { SETTLING } {
+            let (points, squares) = (self.points.clone(), self.squares());
+            self.settle();
+            // A start from which readings are met worse, as around a break-away, stays where it was.
+            let worse: Vec<bool> = self.squares().iter().zip(&squares).map(|(new, old)| new > old).collect();
+            for (start, _) in self.starts.iter().zip(&worse).filter(|(_, worse)| **worse) {
+                self.points[start / WINDOW] = points[start / WINDOW];
+            }
+        }
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+        self
+    }
+
+    /// Squares of what each window leaves under the baseline rig.
+    fn squares(&self) -> Vec<f64> {
+        let left = self.residual(&self.simulate(&self.rig));
+        left.chunks_exact(self.rows().max(1)).map(|own| dot(own, own)).collect()
     }
 
     /// Readings over their noise that this rig would have given, without noise and rounding.
@@ -473,6 +526,14 @@ pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
         let share = dot(values, direction);
         values.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
     }
+}
+
+/// A number of mean 0 and variance 1 [Box, Muller 1958, Ann. Math. Stat. 29(2), eq. 1].
+fn gaussian(random: &mut Pcg64) -> f64 {
+    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+    let never_zero = ((random.next_u64() >> 11) + 1) as f64 * STEP;
+    let turn = (random.next_u64() >> 11) as f64 * STEP;
+    (-2.0 * never_zero.ln()).sqrt() * (TAU * turn).cos()
 }
 
 /// Sum of products, in four lanes that are added in one order.
