@@ -1,9 +1,12 @@
-//! The baseline's own parameters from records: what fits best when nothing is missing, with errors, and what the records cannot tell.
+//! The baseline's own parameters from records: what fits best when nothing is missing, with errors, and what the records
+//! cannot tell.
 //!
-//! Gauss-Newton over all factors at once, sensitivities taken anew at each point. A record cannot tell a parameter whose error is not
+//! Gauss-Newton over all factors at once, sensitivities taken anew at each point. A record cannot tell a parameter whose
+//! error is not
 //! clearly below its tolerance, nor two whose errors hang together.
 //!
-//! Source: Neugebauer 2011, section 3.2 (identification of the model's parameters); effects.md, Parameters that may merely be wrong.
+//! Source: Neugebauer 2011, section 3.2 (identification of the model's parameters); effects.md, Parameters that may merely be
+//! wrong.
 
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};

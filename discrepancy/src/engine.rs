@@ -6,7 +6,8 @@
 //!   C_j    = effect j at a probe - baseline
 //! ```
 //!
-//! All in windows, whitened, with what the windows' starts explain taken out ([`crate::windows`]). Simulations run on all cores; what
+//! All in windows, whitened, with what the windows' starts explain taken out ([`crate::windows`]). Simulations run on all
+//! cores; what
 //! they give is gathered in the order of the candidates, so that two runs have the same bits.
 
 use crate::course::Course;

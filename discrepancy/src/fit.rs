@@ -8,7 +8,8 @@
 //! an effect that is seen in few of them, do not drown the others; where a window is within its noise it is least squares.
 //! Minimised by reweighting: each window's weight is f_k / |e_k - C_k a|^2.
 //!
-//! What the columns give is kept as products, window by window: any selection of them is solved without touching the samples again.
+//! What the columns give is kept as products, window by window: any selection of them is solved without touching the samples
+//! again.
 //!
 //! Source: discrepancy-notes.md, 3, 6 (clustered scores, weights on windows and not on samples). Lange, Little, Taylor 1989, JASA
 //! 84(408): the likelihood of windows whose scale nobody knows.

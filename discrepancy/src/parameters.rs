@@ -77,7 +77,8 @@ impl Parameter {
     }
 }
 
-/// The rig with all factors applied; a factor that would leave a range, or the break-away force below the sliding one, is held there.
+/// The rig with all factors applied; a factor that would leave a range, or the break-away force below the sliding one, is
+/// held there.
 #[must_use]
 pub fn with_factors(rig: &RigParameters, factors: &[f64; COUNT]) -> RigParameters {
     let mut rig = rig.clone();

@@ -1,6 +1,7 @@
 //! `report.json`: what the workflow found, as data. Schema: `discrepancy/docs/report.md`.
 //!
-//! Every list has an order that follows from the records alone, and nothing in it depends on time, threads or machine: two runs write
+//! Every list has an order that follows from the records alone, and nothing in it depends on time, threads or machine: two
+//! runs write
 //! the same bytes. Only `gap` and `verification` know the held-out record.
 
 use plant::effects::sheet::{Part, Place};
@@ -218,7 +219,8 @@ pub struct Gap {
     pub after: f64,
     /// Noise of the sensor alone.
     pub floor: f64,
-    /// Share of the excess power over the floor that went, 1 - (after^2 - floor^2) / (before^2 - floor^2), at most 1; null when there was none.
+    /// Share of the excess power over the floor that went, 1 - (after^2 - floor^2) / (before^2 - floor^2), at most 1; null
+    /// when there was none.
     pub closed: Option<f64>,
 }
 

@@ -17,7 +17,10 @@ fn found(hidden: &RigParameters, without: &[&str]) -> Found {
     name(&engine, Candidate::all([true, false], false, &without), &mut |_| ())
 }
 
-fn with(effects: &[(&str, &str, &[(&str, f64)])]) -> RigParameters {
+/// Name, place and numbers of an effect.
+type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
+
+fn with(effects: &[Hidden<'_>]) -> RigParameters {
     effects.iter().fold(RigParameters::baseline(), |rig, (name, place, numbers)| {
         rig.with_effect(name, place, numbers).expect("numbers of the sheet")
     })

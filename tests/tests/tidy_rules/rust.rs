@@ -255,6 +255,44 @@ const DIMENSIONLESS: &[&str] = &[
     "off_ratio",             // error over truth
     "error_ratio",           // standard error over truth
     "quantiles",             // of a spread, whose field has the unit
+    "samples",               // readings, in the units of their sensors
+    "memory",                // share of a noise that lasts
+    "shape",                 // of a regressor
+    "coefficients",          // of whitened columns
+    "squares",               // in squared standard deviations
+    "square",                // the same
+    "weights",               // of windows
+    "shares",                // of an excess
+    "threshold",             // of a log-likelihood
+    "nothing",               // the same
+    "limits",                // in coordinates of an effect's keys
+    "tolerance",             // of a factor
+    "coordinates",           // of an effect's keys, 1 the strongest that occurs
+    "factors",               // on numbers of a rig file
+    "errors",                // of coordinates and factors
+    "inflation",             // of a variance
+    "columns",               // in standard deviations
+    "probes",                // coordinates
+    "standard_error",        // of a quantity, whose unit is a field beside it
+    "before",                // the same, and of a figure of two models
+    "after",                 // the same
+    "floor",                 // the same
+    "closed",                // share of a gap
+    "share_explained",       // share of an excess
+    "score",                 // over a threshold
+    "amplitude",             // whose unit is a field beside it
+    "r2",                    // share of a variance
+    "p_value",               // probability
+    "at",                    // of a curve, whose units are fields beside it
+    "band",                  // the same
+    "chi2_before",           // per degree of freedom
+    "chi2_after",            // the same
+    "chi2_null",             // the same
+    "over_noise",            // in units of noise
+    "rms",                   // whose unit is a field beside it
+    "quantum",               // of a channel, in its unit
+    "unusable",              // share of samples
+    "divergence",            // in squared standard deviations
 ];
 
 /// A public number says its unit in its name.
