@@ -1,7 +1,7 @@
 //! Runs of one experiment side by side: a table of all figures, and their curves over each other.
 //!
-//! [`differences`] draws how far the others lie from the first instead. Time begins with the experiment, so that runs whose
-//! waiting took longer lie on each other.
+//! [`differences`] draws how far the others lie from the first instead. Time begins with the experiment, so that runs
+//! whose waiting took longer lie on each other.
 
 pub mod differences;
 mod overlay;

@@ -1,10 +1,10 @@
 //! Which effects make a rig faster than its simulation right after a step, as a Markdown table.
 //!
-//! The paper's rig was: pressures and velocity rose sooner than its simulation said. Each effect of the catalogue, at half of the
-//! strongest change that occurs, and each number that may be wrong, is driven through the closed-loop step of Fig. 7 by the
-//! controller's rehearsal without sensor
-//! noise, its numbers the baseline's. What the sensors show in the first 50 ms after the valve's edge is compared with the
-//! baseline's, each as a change since the edge, counted in the direction in which the baseline goes: positive is faster.
+//! The paper's rig was: pressures and velocity rose sooner than its simulation said. Each effect of the catalogue, at
+//! half of the strongest change that occurs, and each number that may be wrong, is driven through the closed-loop step of
+//! Fig. 7 by the controller's rehearsal without sensor noise, its numbers the baseline's. What the sensors show in the
+//! first 50 ms after the valve's edge is compared with the baseline's, each as a change since the edge, counted in the
+//! direction in which the baseline goes: positive is faster.
 //!
 //! `cargo run --release -p discrepancy --example faster_after_a_step`; document: `docs/faster-after-a-step.md`.
 

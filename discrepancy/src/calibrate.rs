@@ -2,11 +2,10 @@
 //! cannot tell.
 //!
 //! Gauss-Newton over all factors at once, sensitivities taken anew at each point. A record cannot tell a parameter whose
-//! error is not
-//! clearly below its tolerance, nor two whose errors hang together.
+//! error is not clearly below its tolerance, nor two whose errors hang together.
 //!
-//! Source: Neugebauer 2011, section 3.2 (identification of the model's parameters); effects.md, Parameters that may merely be
-//! wrong.
+//! Source: Neugebauer 2011, section 3.2 (identification of the model's parameters); effects.md, Parameters that may
+//! merely be wrong.
 
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};

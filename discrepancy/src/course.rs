@@ -256,8 +256,8 @@ impl Course {
     }
 }
 
-/// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1 -
-/// share).
+/// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1
+/// - share).
 fn memory(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
     let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / MEMORY_BLOCK)
         .filter_map(|block| {

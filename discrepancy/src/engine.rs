@@ -7,8 +7,7 @@
 //! ```
 //!
 //! All in windows, whitened, with what the windows' starts explain taken out ([`crate::windows`]). Simulations run on all
-//! cores; what
-//! they give is gathered in the order of the candidates, so that two runs have the same bits.
+//! cores; what they give is gathered in the order of the candidates, so that two runs have the same bits.
 
 use crate::course::Course;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};

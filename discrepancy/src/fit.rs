@@ -4,9 +4,9 @@
 //!   minimise  sum_k f_k ln(|e_k - C_k a|^2 / f_k) + sum_j (a_j / tolerance_j)^2         window k, f_k degrees of freedom
 //! ```
 //!
-//! The logarithm makes each window count by how many times its noise it is off, so that a few windows around a break-away, or
-//! an effect that is seen in few of them, do not drown the others; where a window is within its noise it is least squares.
-//! Minimised by reweighting: each window's weight is f_k / |e_k - C_k a|^2.
+//! The logarithm makes each window count by how many times its noise it is off, so that a few windows around a
+//! break-away, or an effect that is seen in few of them, do not drown the others; where a window is within its noise it
+//! is least squares. Minimised by reweighting: each window's weight is f_k / |e_k - C_k a|^2.
 //!
 //! What the columns give is kept as products, window by window: any selection of them is solved without touching the samples
 //! again.

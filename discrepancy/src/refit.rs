@@ -5,9 +5,8 @@
 //!   fit of the columns to e(z) -> step of z, halved until the loss falls; parameters start from 0 each time
 //! ```
 //!
-//! Derivatives are differences of a twentieth of the coordinate's unit, never exact ones: through stick and slip those of a
-//! single
-//! trajectory say nothing. Source: discrepancy-notes.md, pipeline 6.
+//! Derivatives are differences of a twentieth of the coordinate's unit, never exact ones: through stick and slip those of
+//! a single trajectory say nothing. Source: discrepancy-notes.md, pipeline 6.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;

@@ -1,8 +1,7 @@
 //! `report.json`: what the workflow found, as data. Schema: `discrepancy/docs/report.md`.
 //!
-//! Every list has an order that follows from the records alone, and nothing in it depends on time, threads or machine: two
-//! runs write
-//! the same bytes. Only `gap` and `verification` know the held-out record.
+//! Every list has an order that follows from the records alone, and nothing in it depends on time, threads or machine:
+//! two runs write the same bytes. Only `gap` and `verification` know the held-out record.
 
 use plant::effects::sheet::{Part, Place};
 use serde::{Deserialize, Serialize};

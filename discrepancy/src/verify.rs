@@ -7,11 +7,10 @@
 //!
 //! Figures of windows are robust in two ways, which both models and the draws of nothing share:
 //!
-//! - *Left out* are the 2 % of the windows, at least one, in which the extended model is worst: around a stop or a break-away
-//! microseconds decide, and one such window would outweigh all others. Both models leave out the same windows; for a gap they
-//! are
-//!   those of its signal, for chi2 and whiteness those of all signals together. Whether the extended model is better is asked of
-//!   all windows.
+//! - *Left out* are the 2 % of the windows, at least one, in which the extended model is worst: around a stop or a
+//!   break-away microseconds decide, and one such window would outweigh all others. Both models leave out the same
+//!   windows; for a gap they are those of its signal, for chi2 and whiteness those of all signals together. Whether the
+//!   extended model is better is asked of all windows.
 //! - *Level*: the noise of a channel is known to some per cent only. The tenth of the windows in which the better of both models
 //!   leaves least tells it anew, within [`LEVELS`].
 //!
@@ -19,11 +18,9 @@
 //! of its own: as in [`crate::fit`], a window counts by how many times its noise it is off. An effect that fewer than ten windows
 //! show cannot pass, whatever its size.
 //!
-//! The range of nothing comes from simulated residuals of noise alone, with memory and errors of the sampling instant as the
-//! course
-//! has them. Source: discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s). Cameron, Gelbach,
-//! Miller
-//! 2008, Rev. Econ. Stat. 90(3): clusters.
+//! The range of nothing comes from simulated residuals of noise alone, with memory and errors of the sampling instant as
+//! the course has them. Source: discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s).
+//! Cameron, Gelbach, Miller 2008, Rev. Econ. Stat. 90(3): clusters.
 
 mod free_run;
 mod nothing;
