@@ -44,7 +44,8 @@ pub struct RecordArguments {
     /// Training records: measurement.csv, bus.log, or any CSV with --mapping.
     #[arg(long, required = true, num_args = 1..)]
     pub train: Vec<PathBuf>,
-    /// Folder for the results, made if missing.
+    /// Folder for the results, made if missing. Where none is given, close and name write into this folder: discrepancy; the
+    /// other steps write no files.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Mapping file of foreign CSV records.
