@@ -255,6 +255,45 @@ const DIMENSIONLESS: &[&str] = &[
     "off_ratio",             // error over truth
     "error_ratio",           // standard error over truth
     "quantiles",             // of a spread, whose field has the unit
+    // Of the report and its parts, whose unit is a field beside, or that are readings over their noise.
+    "amplitude",       // of an effect, whose unit is a field beside it
+    "standard_error",  // of a number, whose unit is a field beside it
+    "before",          // of a number, or of a figure of a signal, in the unit of its name
+    "after",           // the same
+    "floor",           // the same
+    "rms",             // of an unknown input, whose unit is a field beside it
+    "at",              // of a curve, whose units are fields beside it
+    "band",            // the same
+    "quantum",         // of a channel, in the unit of its name
+    "memory",          // correlation of neighbours
+    "samples",         // readings, in the units of their channels
+    "closed",          // share of a gap
+    "unusable",        // share of samples
+    "share_explained", // share of an excess
+    "shares",          // the same
+    "over_noise",      // in units of noise
+    "r2",              // share of a variance
+    "p_value",         // probability
+    "chi2_before",     // over degrees of freedom
+    "chi2_after",      // the same
+    "chi2_null",       // the same
+    "score",           // gain over a threshold of gains
+    "threshold",       // of a gain in likelihood
+    "nothing",         // loss of a model, a likelihood
+    "limits",          // coordinates of effects, 1 the strongest that occurs
+    "coordinates",     // the same
+    "probes",          // the same
+    "coefficients",    // of columns
+    "columns",         // readings over their noise
+    "squares",         // the same, squared
+    "square",          // the same
+    "weights",         // of windows
+    "factors",         // on numbers of the rig file
+    "tolerance",       // of a factor
+    "errors",          // of coordinates and factors
+    "inflation",       // of a variance
+    "divergence",      // gain in chi2
+    "shape",           // of a term, whose unit follows from its form
 ];
 
 /// A public number says its unit in its name.
