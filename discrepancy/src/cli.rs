@@ -25,7 +25,7 @@ pub enum Command {
     Calibrate(RecordArguments),
     /// Which balance disagrees, in which regime, over which variables.
     Locate(RecordArguments),
-    /// Names what is missing; as close without a held-out record and without files beside report.json.
+    /// Names what is missing: a close without a held-out record.
     Name(RecordArguments),
     /// Writes the rig file with what a report names.
     Extend(ExtendArguments),
