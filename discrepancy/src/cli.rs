@@ -25,7 +25,7 @@ pub enum Command {
     Calibrate(RecordArguments),
     /// Which balance disagrees, in which regime, over which variables.
     Locate(RecordArguments),
-    /// Names what is missing; as close without a held-out record and without files beside report.json.
+    /// Names what is missing: a close without a held-out record.
     Name(RecordArguments),
     /// Writes the rig file with what a report names.
     Extend(ExtendArguments),
@@ -44,7 +44,8 @@ pub struct RecordArguments {
     /// Training records: measurement.csv, bus.log, or any CSV with --mapping.
     #[arg(long, required = true, num_args = 1..)]
     pub train: Vec<PathBuf>,
-    /// Folder for the results, made if missing.
+    /// Folder for the results, made if missing. Where none is given, close and name write into this folder: discrepancy; the
+    /// other steps write no files.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Mapping file of foreign CSV records.

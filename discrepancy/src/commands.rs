@@ -13,6 +13,7 @@ use crate::refit::Around;
 use crate::report::{NamedEffect, Quantity, Report, Verdict, Verification};
 use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
 use crate::{balance, locate, page, verify};
+use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -48,6 +49,14 @@ pub enum CommandError {
     /// A record cannot be used.
     #[error("{0}")]
     BadData(String),
+    /// The catalogue does not have what is to be left out.
+    #[error("--without {name}: unknown effect; the catalogue has {known}")]
+    UnknownEffect {
+        /// As given.
+        name: String,
+        /// All names.
+        known: String,
+    },
 }
 
 impl CommandError {
@@ -104,6 +113,8 @@ fn progress() -> impl FnMut(&str) {
 fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
     let records = &arguments.records;
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy"));
+    known_effects(&records.without)?;
+    arguments.test.iter().try_for_each(|test| is_there(test))?;
     std::fs::create_dir_all(&out).map_err(|why| CommandError::File { file: out.clone(), why })?;
     let mut progress = progress();
     let text = std::fs::read_to_string(&records.rig)
@@ -139,6 +150,19 @@ fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
     Ok(if report.verdict == Verdict::BadData { Exit::BadInput } else { Exit::Good })
 }
 
+/// An effect that is not left out because its name was mistyped would be found.
+fn known_effects(without: &[String]) -> Result<(), CommandError> {
+    let Some(name) = without.iter().find(|name| sheet(name).is_none()) else { return Ok(()) };
+    let known = SHEETS.iter().map(|sheet| sheet.name).collect::<Vec<_>>().join(", ");
+    Err(CommandError::UnknownEffect { name: name.clone(), known })
+}
+
+/// A held-out record that is missing is told before a minute of work, without being opened.
+fn is_there(file: &Path) -> Result<(), CommandError> {
+    std::fs::metadata(file)
+        .map_or_else(|why| Err(CommandError::File { file: file.to_owned(), why }), |_| Ok(()))
+}
+
 /// The held-out record of a rig: one at a time.
 fn one_test(arguments: &CloseArguments) -> Result<Option<PathBuf>, CommandError> {
     match arguments.test.as_slice() {
@@ -164,7 +188,7 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
             let _ = writeln!(text, "  {}{}", if finding.fatal { "fatal: " } else { "" }, finding.text);
         }
         for (channel, check) in &report.channels {
-            let told = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.4}"));
+            let told = |value: Option<f64>| value.map_or("unknown".to_owned(), significant);
             let (noise, quantum) = (told(check.noise), told(check.quantum));
             let _ = writeln!(
                 text,
@@ -190,16 +214,10 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     let quantities = calibrate(&engine, &around).quantities(&engine);
     let mut text = String::new();
     for own in &quantities {
-        let _ = match own.standard_error {
-            Some(error) => writeln!(
-                text,
-                "{}: {:.5} +- {error:.5} {} (rig file: {})",
-                own.name,
-                own.value,
-                own.unit,
-                own.before.unwrap_or(f64::NAN)
-            ),
-            None => writeln!(text, "{}: these records cannot tell", own.name),
+        let _ = match (own.standard_error, own.before) {
+            (Some(_), Some(before)) => writeln!(text, "{} (rig file: {before})", quantity_in_words(own)),
+            (Some(_), None) => writeln!(text, "{}", quantity_in_words(own)),
+            (None, _) => writeln!(text, "{}: these records cannot tell", own.name),
         };
     }
     print(&text);
@@ -351,7 +369,20 @@ fn effect_in_words(named: &NamedEffect) -> String {
     format!("{} {place}: {}", named.effect, numbers.join(", "))
 }
 
+/// Four digits that count.
+fn significant(value: f64) -> String {
+    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    format!("{value:.digits$}", digits = (3.0 - magnitude).clamp(0.0, 12.0) as usize)
+}
+
+/// `leakage_nl_per_min = 2.513 +- 0.041 Nl/min`: rounded to the second digit of the standard error.
 fn quantity_in_words(own: &Quantity) -> String {
-    let error = own.standard_error.map_or(String::new(), |error| format!(" +- {error:.3}"));
-    format!("{} = {:.4}{error} {}", own.name, own.value, own.unit).trim_end().to_owned()
+    let value = match own.standard_error.filter(|error| *error > 0.0) {
+        Some(error) => {
+            let digits = (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize;
+            format!("{:.digits$} +- {error:.digits$}", own.value)
+        }
+        None => significant(own.value),
+    };
+    format!("{} = {value} {}", own.name, own.unit).trim_end().to_owned()
 }

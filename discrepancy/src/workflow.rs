@@ -7,6 +7,7 @@
 //!
 //! Everything but [`Report::gap`] and [`Report::verification`] is done before the held-out record is opened.
 
+use crate::balance::is_model_file;
 use crate::candidates::Candidate;
 use crate::check::{Checked, check};
 use crate::course::{Course, CourseError};
@@ -75,6 +76,12 @@ pub enum WorkflowError {
     /// The rig file is no rig.
     #[error(transparent)]
     Parameters(#[from] ParameterError),
+    /// The rig file is a model of one balance.
+    #[error("{file}: a model of one balance (it has a kind): only close and name take one; give a rig file here")]
+    OneBalance {
+        /// The file.
+        file: String,
+    },
     /// A record cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -114,6 +121,9 @@ impl RigFile {
         let file = path.display().to_string();
         let text =
             std::fs::read_to_string(path).map_err(|why| WorkflowError::Rig { file: file.clone(), why })?;
+        if is_model_file(&text) {
+            return Err(WorkflowError::OneBalance { file });
+        }
         let rig = RigParameters::from_toml(&text, &file)?;
         Ok(RigFile { file, text, rig })
     }

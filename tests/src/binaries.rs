@@ -1,8 +1,8 @@
 //! Where the programs under test are: given by the environment, else built once as they ship.
 //!
 //! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped,
-//! `bench`; a script that has built them sets these. Without them cargo builds the release profile, and says itself where
-//! the results are.
+//! `bench` and `discrepancy`; a script that has built them sets these. Without them cargo builds the release profile, and
+//! says itself where the results are.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -17,6 +17,8 @@ pub enum Program {
     Controller,
     /// What sums runs up.
     Bench,
+    /// The workflow that names what a model is missing.
+    Discrepancy,
 }
 
 impl Program {
@@ -27,6 +29,7 @@ impl Program {
             Self::Emulator => "emulator",
             Self::Controller => "controller",
             Self::Bench => "bench",
+            Self::Discrepancy => "discrepancy",
         }
     }
 }
@@ -77,8 +80,10 @@ fn folder(variable: &str, features: &[&str]) -> PathBuf {
 fn build(features: &[&str]) -> PathBuf {
     let mut cargo = Command::new(option_env!("CARGO").unwrap_or("cargo"));
     cargo.current_dir(workspace()).args(["build", "--release", "--message-format=json-render-diagnostics"]);
-    let all = [Program::Emulator, Program::Controller, Program::Bench];
-    for program in all.into_iter().filter(|program| features.is_empty() || *program != Program::Bench) {
+    // Only these two count their allocations.
+    let counting = [Program::Emulator, Program::Controller];
+    let all = [counting[0], counting[1], Program::Bench, Program::Discrepancy];
+    for program in if features.is_empty() { &all[..] } else { &counting[..] } {
         cargo.args(["--package", program.name(), "--bin", program.name()]);
     }
     if !features.is_empty() {

@@ -334,7 +334,7 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     let by = if linked { "the pressures" } else { "the acceleration" };
     if pairs.correlation() < 0.0 {
         let text = format!(
-            "the force has the wrong sign, it correlates by {:.2} with what {by} ask for: compression is positive; \
+            "the force has the wrong sign, it correlates by {:.2} with what {by} would have it be: compression is positive; \
              multiply the column by -1",
             pairs.correlation()
         );
@@ -343,7 +343,7 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     let told = FORCES.into_iter().find(|(_, factor)| (0.8..1.25).contains(&(pairs.slope() * factor)));
     if let Some((unit, factor)) = told.filter(|_| !linked) {
         let text = format!(
-            "a share of {:.4} of what {by} ask for: it reads as {unit}: multiply the column by {factor}",
+            "a share of {:.4} of what {by} would have it be: it reads as {unit}: multiply the column by {factor}",
             pairs.slope()
         );
         notes.tell("wrong-unit", subject, true, &text);

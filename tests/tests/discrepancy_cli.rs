@@ -1,0 +1,371 @@
+//! `discrepancy` as a program: a hidden effect is named from a blind record, the same bytes come out whatever the threads and
+//! whether or not a held-out record is given, each step runs alone, bad records are survived or refused, and what cannot be
+//! read is told with file, line and what is allowed.
+//!
+//! The record is the record maker's, whose integrator and laws are not the plant's.
+
+use plant::RigParameters;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::launch::Pace;
+use system_tests::process::{Ended, Running};
+use system_tests::record_maker::{Experiment, Hidden, Recipe, simulate, write};
+use system_tests::records::json;
+use system_tests::scene::{SHORT, Scene};
+use tempfile::TempDir;
+
+const GOOD: i32 = 0;
+const BAD_INPUT: i32 = 2;
+
+/// A constant force: some 14 degrees at 5 kg.
+const EFFECT: &str = "inclination";
+const FORCE_N: f64 = 12.0;
+
+/// 8 s: rests, ramps, steps and half a chirp.
+const ROWS: usize = 8000;
+/// Line of the first row in a measurement file: a comment and the head stand before it.
+const FIRST_ROW: usize = 3;
+
+/// A blind record of the drive and another one to judge on, made once.
+struct Records {
+    folder: TempDir,
+    train: PathBuf,
+    test: PathBuf,
+}
+
+fn records() -> &'static Records {
+    static RECORDS: OnceLock<Records> = OnceLock::new();
+    RECORDS.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let sheet = plant::effects::sheet(EFFECT).expect("an effect of the catalogue");
+        let place = sheet.place_named("drive").expect("the drive can be inclined");
+        let hidden = vec![Hidden { name: sheet.name, place, numbers: vec![FORCE_N] }];
+        let make = |name: &str, experiment, seed| {
+            let recipe = Recipe { seed, experiment, hidden: hidden.clone(), ..Recipe::default() };
+            let mut record = simulate(&recipe, &RigParameters::baseline()).expect("a record");
+            record.rows.truncate(ROWS);
+            let out = folder.path().join(name);
+            write(&record, &out, &folder.path().join("truth").join(name))
+                .expect("a folder that can be written");
+            out.join("measurement.csv")
+        };
+        let train = make("train", Experiment::Train, 1);
+        let test = make("test", Experiment::HeldOut(0), 2);
+        Records { folder, train, test }
+    })
+}
+
+fn rig() -> PathBuf {
+    workspace().join("plant/rig.toml")
+}
+
+fn discrepancy(arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Ended {
+    let mut command = Command::new(executable(Program::Discrepancy, Build::Shipped));
+    command.args(arguments.iter().map(|argument| argument.as_ref()));
+    Running::start("discrepancy", &mut command).wait_within(std::time::Duration::from_secs(120))
+}
+
+/// A step on a training record.
+fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> Ended {
+    let rig = rig();
+    let mut all: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&step, &"--rig", &rig, &"--train", &record];
+    all.extend([&"--out" as &dyn AsRef<std::ffi::OsStr>, &out]);
+    all.extend(more.iter().map(|own| own as &dyn AsRef<std::ffi::OsStr>));
+    discrepancy(&all)
+}
+
+/// The training record with its lines changed: `change` gets the number of the row and its cells, and hands back none to lose it.
+fn spoilt(folder: &Path, change: impl Fn(usize, Vec<&str>) -> Option<String>) -> PathBuf {
+    let text = fs::read_to_string(&records().train).expect("the record");
+    let mut lines = text.lines();
+    let mut spoilt: Vec<String> = lines.by_ref().take(FIRST_ROW - 1).map(str::to_owned).collect();
+    spoilt.extend(lines.enumerate().filter_map(|(row, line)| change(row, line.split(',').collect())));
+    let path = folder.join("measurement.csv");
+    fs::write(&path, spoilt.join("\n") + "\n").expect("a folder that can be written");
+    path
+}
+
+/// Cells: time, valve, position, force, pressure a, pressure b.
+fn swap_pressures(mut cells: Vec<&str>) -> String {
+    cells.swap(4, 5);
+    cells.join(",")
+}
+
+fn turn_force(cells: &[&str]) -> String {
+    let mut cells: Vec<String> = cells.iter().map(|cell| (*cell).to_owned()).collect();
+    cells[3] = match cells[3].strip_prefix('-') {
+        Some(positive) => positive.to_owned(),
+        None => format!("-{}", cells[3]),
+    };
+    cells.join(",")
+}
+
+fn effects(report: &Value, list: &str) -> Vec<String> {
+    let all = report[list].as_array().unwrap_or_else(|| panic!("no {list}"));
+    all.iter().map(|own| own["effect"].as_str().expect("a name").to_owned()).collect()
+}
+
+#[test]
+fn a_hidden_effect_is_named_in_the_same_bytes_whatever_the_threads_and_the_held_out_record_changes_gap_alone()
+{
+    let own = records();
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = |name: &str| folder.path().join(name);
+    let test = own.test.to_str().expect("a path in ASCII");
+    let one = on("close", &own.train, &out("one"), &["--threads", "1", "--test", test]).expect_code(GOOD);
+    on("close", &own.train, &out("two"), &["--threads", "2", "--test", test]).expect_code(GOOD);
+    for file in ["report.json", "report.html", "rig.toml"] {
+        let [one, two] =
+            ["one", "two"].map(|name| fs::read(out(name).join(file)).expect("a file of a close"));
+        assert!(one == two, "{file} differs between one thread and two");
+    }
+
+    let mut report = json(&out("one/report.json"));
+    assert_eq!(report["named"][0]["effect"], EFFECT, "{}{:#}", one.stdout, report["named"]);
+    assert_eq!(report["named"][0]["where"]["axis"], "drive");
+    assert!(one.stdout.contains(EFFECT), "{}", one.stdout);
+    assert!(one.stderr.contains(" s: "), "no progress: {}", one.stderr);
+    let told = &report["named"][0]["parameters"][0];
+    let (value, error) = (told["value"].as_f64().unwrap(), told["standard_error"].as_f64().unwrap());
+    assert!((value - FORCE_N).abs() < (4.0 * error).max(0.1 * FORCE_N), "{told}");
+
+    // `name` is a close without a held-out record.
+    on("name", &own.train, &out("name"), &["--threads", "2"]).expect_code(GOOD);
+    let without = json(&out("name/report.json"));
+    assert!(
+        report["gap"].as_object().is_some_and(|gap| gap.contains_key("drive_position_m")),
+        "{}",
+        report["gap"]
+    );
+    assert!(report["verification"].is_object());
+    assert_eq!(without["gap"], serde_json::json!({}));
+    for field in ["gap", "verification"] {
+        report[field] = without[field].clone();
+    }
+    assert_eq!(report, without, "the held-out record changed more than gap and verification");
+
+    the_extended_rig_is_one(&out("one/rig.toml"));
+    the_steps_after_a_report(&out("one"));
+}
+
+/// Rehearsal and emulator take the extended rig as it is.
+fn the_extended_rig_is_one(rig: &Path) {
+    let text = fs::read_to_string(rig).expect("the extended rig");
+    assert!(text.contains(&format!("[effects.{EFFECT}.drive]")), "{text}");
+    let scene = Scene::new(SHORT);
+    let _ = scene.rehearsal().rig(rig).start().wait().expect_code(GOOD);
+    let _ = scene.emulator(Pace::Real).rig(rig).with("--seconds 0.5").start().wait().expect_code(GOOD);
+}
+
+/// `extend`, `verify` and `next` from what a close left.
+fn the_steps_after_a_report(closed: &Path) {
+    let (rig, report) = (rig(), closed.join("report.json"));
+    let (extended, proposed) = (closed.join("again.toml"), closed.join("proposed.toml"));
+    discrepancy(&[&"extend", &"--rig", &rig, &"--report", &report, &"--out", &extended]).expect_code(GOOD);
+    let read = |path: &Path| fs::read_to_string(path).expect("a rig file");
+    assert_eq!(read(&extended), read(&closed.join("rig.toml")));
+
+    let verified =
+        discrepancy(&[&"verify", &"--rig", &rig, &"--extended", &extended, &"--test", &records().test]);
+    let confirmed = json(&report)["verification"]["confirmed"].as_bool().expect("a verification");
+    let verified = verified.expect_code(i32::from(!confirmed));
+    for part in ["drive_position_m: before", "chi2", if confirmed { ": confirmed" } else { "not confirmed" }]
+    {
+        assert!(verified.stdout.contains(part), "'{part}' is missing in: {}", verified.stdout);
+    }
+
+    let next =
+        discrepancy(&[&"next", &"--rig", &rig, &"--report", &report, &"--out", &proposed]).expect_code(GOOD);
+    let ambiguous = json(&report)["verdict"] == "ambiguous";
+    assert!(ambiguous || next.stdout.contains("nothing that cannot be told apart"), "{}", next.stdout);
+    let experiment = &json(&report)["next"]["experiment"];
+    assert_eq!(proposed.exists(), ambiguous && experiment.is_string(), "{}", next.stdout);
+}
+
+#[test]
+fn the_steps_before_a_report_run_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let train = &records().train;
+    let check = on("check", train, folder.path(), &[]).expect_code(GOOD);
+    for part in ["8000 rows", "can be used", "drive_force_N: noise 0.5"] {
+        assert!(check.stdout.contains(part), "'{part}' is missing in: {}", check.stdout);
+    }
+    assert_eq!(json(&folder.path().join("checks.json"))[0]["usable"], true);
+
+    let calibrate = on("calibrate", train, folder.path(), &[]).expect_code(GOOD);
+    assert!(calibrate.stdout.contains("parameter:mass = "), "{}", calibrate.stdout);
+    let parameters = json(&folder.path().join("parameters.json"));
+    let mass = &parameters[0];
+    assert_eq!(mass["name"], "parameter:mass");
+    assert!(mass["standard_error"].as_f64().is_some_and(|error| error > 0.0), "{mass}");
+    assert!(
+        fs::read_to_string(folder.path().join("rig.toml")).expect("a rig file").contains("parameter:mass")
+    );
+
+    let locate = on("locate", train, folder.path(), &[]).expect_code(GOOD);
+    assert!(locate.stdout.contains("times its noise"), "{}", locate.stdout);
+    let location = json(&folder.path().join("location.json"));
+    let bars = location["balances"].as_array().expect("bars");
+    let most = bars.iter().max_by(|one, other| {
+        one["over_noise"].as_f64().unwrap().total_cmp(&other["over_noise"].as_f64().unwrap())
+    });
+    assert_eq!(most.expect("a bar")["balance"], "drive.force", "{bars:#?}");
+}
+
+#[test]
+fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = spoilt(folder.path(), |row, mut cells| {
+        // 1 % of the rows here and there, 50 ms in one piece.
+        let lost = row.wrapping_mul(2_654_435_761) % 100_000 < 1000 || (5000..5050).contains(&row);
+        let saturated = (6000..6400).contains(&row);
+        if saturated {
+            cells[4] = "1000000";
+        }
+        (!lost).then(|| cells.join(","))
+    });
+    let check = on("check", &record, folder.path(), &[]).expect_code(GOOD);
+    let checks = json(&folder.path().join("checks.json"));
+    let findings = checks[0]["findings"].as_array().expect("findings");
+    for kind in ["lost-samples", "gap"] {
+        let own = findings.iter().find(|own| own["kind"] == kind);
+        let own = own.unwrap_or_else(|| panic!("no {kind} in: {}", check.stdout));
+        assert!(own["line"].is_u64() && own["fatal"] == false, "{own}");
+    }
+    let saturated = findings.iter().any(|own| {
+        (own["kind"] == "clipped" || own["kind"] == "stuck") && own["column"] == "drive_pressure_a_Pa"
+    });
+    assert!(saturated, "{}", check.stdout);
+
+    let _ = on("name", &record, folder.path(), &[]).expect_code(GOOD);
+    let report = json(&folder.path().join("report.json"));
+    assert!(effects(&report, "named").iter().any(|name| name == EFFECT), "{:#}", report["named"]);
+}
+
+#[test]
+fn columns_that_mean_something_else_make_the_verdict_bad_data() {
+    let cases: [(&str, &str, fn(Vec<&str>) -> String); 2] = [
+        ("swapped-pressures", "pressures a and b are swapped", swap_pressures),
+        ("force-sign", "drive_force_N", |cells| turn_force(&cells)),
+    ];
+    for (kind, told, change) in cases {
+        let folder = tempfile::tempdir().expect("a folder");
+        let record = spoilt(folder.path(), |_, cells| Some(change(cells)));
+        let ended = on("close", &record, folder.path(), &[]).expect_code(BAD_INPUT);
+        let report = json(&folder.path().join("report.json"));
+        assert_eq!(report["verdict"], "bad-data");
+        assert!(effects(&report, "named").is_empty());
+        let findings = report["checks"][0]["findings"].as_array().expect("findings");
+        let own = findings.iter().find(|own| own["kind"] == kind).unwrap_or_else(|| panic!("{findings:#?}"));
+        assert_eq!(own["fatal"], true);
+        let line = own["line"].as_u64().unwrap_or_else(|| panic!("no line in {own}"));
+        for part in [told, &format!("{}:{line}: ", record.display())] {
+            assert!(ended.stdout.contains(part), "'{part}' is missing in: {}", ended.stdout);
+        }
+        assert!(folder.path().join("report.html").exists());
+        assert!(!folder.path().join("rig.toml").exists(), "a model out of a record that cannot be used");
+        // The steps alone refuse it too, with the same words.
+        let ended = on("calibrate", &record, folder.path(), &[]).expect_code(BAD_INPUT);
+        assert!(ended.stderr.contains(told), "{}", ended.stderr);
+    }
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_with_file_and_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let write = |name: &str, text: &str| {
+        fs::write(path(name), text).expect("a folder that can be written");
+        path(name)
+    };
+    let nan = spoilt(folder.path(), |row, mut cells| {
+        if row == 4708 {
+            cells[3] = "NaN";
+        }
+        Some(cells.join(","))
+    });
+    let empty = write("empty.csv", "");
+    let headless = write("headless.csv", "time_s,drive_valve\n");
+    let missing = path("nowhere.csv");
+    for (record, words) in [
+        (&missing, &["nowhere.csv", "No such file"][..]),
+        (&nan, &["measurement.csv:4711: ", "drive_force_N", "NaN", "finite number"]),
+        (&empty, &["empty.csv"]),
+    ] {
+        for step in ["close", "check", "calibrate", "locate", "name"] {
+            let ended = on(step, record, &path("out"), &[]).expect_code(BAD_INPUT);
+            let _ = ended.expect_said(words);
+        }
+    }
+    let _ = on("close", &headless, &path("out"), &[]).expect_code(BAD_INPUT);
+    let train = &records().train;
+    // What is missing is missed before anything is computed.
+    let nowhere = missing.to_str().expect("a path in ASCII");
+    let began = std::time::Instant::now();
+    let _ = on("close", train, &path("out"), &["--test", nowhere])
+        .expect_code(BAD_INPUT)
+        .expect_said(&["nowhere.csv"]);
+    assert!(began.elapsed().as_secs_f64() < 2.0, "a missing --test is told after {:?}", began.elapsed());
+    let _ = on("close", train, &path("out"), &["--without", "no-such-effect"])
+        .expect_code(BAD_INPUT)
+        .expect_said(&["no-such-effect", "inclination"]);
+
+    let text = fs::read_to_string(rig()).expect("the rig file");
+    let wrong = write("wrong.toml", &text.replacen("pressure_bar = 7.0", "pressure_bar = 70.0", 1));
+    let line =
+        1 + fs::read_to_string(&wrong).unwrap().lines().position(|line| line.contains("70.0")).unwrap();
+    let place = format!("wrong.toml:{line}:");
+    for (model, words) in [
+        (&wrong, &[place.as_str(), "supply.pressure_bar = 70.0", "3 to 12 bar"][..]),
+        (&path("nowhere.toml"), &["nowhere.toml", "No such file"]),
+    ] {
+        let step =
+            |step: &str| discrepancy(&[&step, &"--rig", &model, &"--train", &train, &"--out", &path("out")]);
+        for name in ["close", "check", "locate"] {
+            let _ = step(name).expect_code(BAD_INPUT).expect_said(words);
+        }
+    }
+    let no_report = write("report.json", "{}");
+    for step in ["extend", "next"] {
+        let ended =
+            discrepancy(&[&step, &"--rig", &rig(), &"--report", &no_report, &"--out", &path("x.toml")]);
+        let _ = ended.expect_code(BAD_INPUT).expect_said(&["report.json", "named"]);
+    }
+}
+
+#[test]
+fn help_tells_every_step_every_option_and_the_exit_codes() {
+    let whole = discrepancy(&[&"--help"]).expect_code(GOOD);
+    for part in ["close", "check", "calibrate", "locate", "name", "extend", "verify", "next", "Exit codes"] {
+        assert!(whole.stdout.contains(part), "'{part}' is missing in: {}", whole.stdout);
+    }
+    for (step, parts) in [
+        (
+            "close",
+            &[
+                "--rig",
+                "--train",
+                "--test",
+                "--out",
+                "--mapping",
+                "--without",
+                "--threads",
+                "this folder: discrepancy",
+            ][..],
+        ),
+        ("check", &["--rig", "--train", "--out", "--mapping"]),
+        ("verify", &["--rig", "--extended", "--test"]),
+        ("next", &["--rig", "--report", "--out"]),
+    ] {
+        let help = discrepancy(&[&step, &"--help"]).expect_code(GOOD);
+        for part in parts {
+            assert!(help.stdout.contains(part), "'{part}' is missing in {step}: {}", help.stdout);
+        }
+    }
+    let _ = discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_said(&["--rig", "--train"]);
+    assert!(records().folder.path().exists());
+}
