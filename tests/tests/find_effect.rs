@@ -38,9 +38,7 @@ fn stand_in(folder: &Path, said: &str) -> String {
 #[test]
 fn help_tells_options_files_and_exit_codes() {
     let ended = find_effect(&["--help"]).expect_code(0);
-    for part in
-        ["--seed", "--lockstep", "--expect-right", "gap.html", "Exit codes: 0 done", "130 interrupted"]
-    {
+    for part in ["--seed", "--lockstep", "--expect-right", "gap.html", "Exit codes: 0 done", "130 interrupted"] {
         assert!(ended.stdout.contains(part), "'{part}' is missing in: {}", ended.stdout);
     }
 }
@@ -86,8 +84,7 @@ fn what_was_named_is_held_against_the_seal() {
     for (place, (report, code, told)) in cases.iter().enumerate() {
         let (out, program) = (folder.path().join(place.to_string()), stand_in(folder.path(), report));
         let out = out.to_str().expect("a path in ASCII");
-        let options =
-            ["--lockstep", "--seed", SEED, "--expect-right", "--discrepancy", &program, "--out", out];
+        let options = ["--lockstep", "--seed", SEED, "--expect-right", "--discrepancy", &program, "--out", out];
         let ended = find_effect(&[&options[..], &short].concat()).expect_code(*code);
         let hidden = format!("hidden: {HIDDEN} (leakage_nl_per_min 5.89");
         for part in [*told, &hidden] {
