@@ -6,6 +6,7 @@
 //! | [`balance`] | a model that is one balance alone, and the real records |
 //! | [`check`] | whether a record can be used, and its noise |
 //! | [`course`] | a record on the simulation's grid |
+//! | [`seats`] | where the pistons were, by sensors that lie |
 //! | [`windows`] | a record in windows, each simulated from its own start |
 //! | [`engine`] | all records with everything that is simulated of them |
 //! | [`fit`] | what some columns explain of the windows |
@@ -19,6 +20,7 @@
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
 //! | [`next`] | the experiment that would tell apart what a record does not |
+//! | [`verify`] | the held-out record: both models, frozen |
 //! | [`report`] | what was found, as data |
 //! | [`workflow`] | all of it in order |
 //! | [`commands`], [`cli`] | the program |
@@ -44,6 +46,7 @@ pub mod records;
 pub mod refit;
 pub mod report;
 pub mod screen;
+pub mod seats;
 pub mod verify;
 pub mod windows;
 pub mod workflow;

@@ -28,6 +28,8 @@ use rayon::prelude::*;
 const MOST: usize = 3;
 /// Candidates that are fitted in the simulator at most, in each round.
 const CONTENDERS: usize = 6;
+/// Steps of a candidate's first fit.
+const STEPS: usize = 5;
 /// Share of a screened gain that the simulator may deny before other amplitudes are tried.
 const BELIEVED: f64 = 0.2;
 /// Amplitudes that are tried then.
@@ -40,8 +42,12 @@ const WORTH_A_FIT: f64 = 25.0;
 const CONTENDS: f64 = 0.35;
 /// What each number of an effect costs: it must be worth more than one more candidate tried.
 const NUMBER_COSTS: f64 = 8.0;
+/// What came close in a round, that is tried again when another effect has joined.
+const SWAPPED: usize = 3;
 /// Multiple of the threshold of nothing that is asked for, since a model is never exact.
 const SAFETY: f64 = 3.0;
+/// Share of what the parameters leave that the first effect must take.
+const TAKES_FIRST: f64 = 0.1;
 /// Share of what a model leaves that one more effect must take.
 const TAKES: f64 = 0.3;
 /// Share of the smallest change that occurs below which an effect is none.
@@ -130,7 +136,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
             .par_iter()
             .filter_map(|screened| {
                 let start = best_start(engine, &point, &model.placed, screened, own_nothing);
-                refit_steps(engine, &point, &start, NUMBER_COSTS, if round == 0 { 5 } else { 3 })
+                refit_steps(engine, &point, &start, NUMBER_COSTS, STEPS)
             })
             .collect();
         refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
@@ -152,6 +158,9 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         threshold = own;
         rounds.push((model.placed.clone(), refits.clone()));
         model = best.clone();
+        if round > 0 {
+            swap(engine, &mut model, &rounds, progress);
+        }
     }
     drop_unneeded(engine, &calibrated, &mut model, &mut rounds, threshold);
     let left = Nothing::new(engine, &columns, &around_of(engine, &model), &model);
@@ -224,7 +233,8 @@ fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
 fn accepted(before: &Refit, after: &Refit, threshold: f64) -> bool {
     let gain = before.loss - after.loss;
     let Some(joined) = after.placed.last() else { return false };
-    let takes = gain > TAKES * before.loss.max(0.0);
+    let share = if before.placed.is_empty() { TAKES_FIRST } else { TAKES };
+    let takes = gain > share * before.loss.max(0.0);
     gain > SAFETY * threshold && takes && is_large(joined)
 }
 
@@ -324,6 +334,34 @@ impl Nothing {
             }
         }
         limits
+    }
+}
+
+/// Puts what came close in an earlier round in the place of what won it: beside the effects that joined since, it may win.
+fn swap(
+    engine: &Engine<'_>,
+    model: &mut Refit,
+    rounds: &[(Vec<Placed>, Vec<Refit>)],
+    progress: &mut dyn FnMut(&str),
+) {
+    let point = around_of(engine, model);
+    let mut tried = Vec::new();
+    for (at, (_, refits)) in rounds.iter().enumerate().take(model.placed.len() - 1) {
+        for other in refits.iter().skip(1).take(SWAPPED).filter_map(|own| own.placed.last()) {
+            let mut placed = model.placed.clone();
+            placed[at] = other.clone();
+            tried.push(placed);
+        }
+    }
+    progress(&format!("trying {} other combinations", tried.len()));
+    let best = tried
+        .par_iter()
+        .filter_map(|placed| refit_steps(engine, &point, placed, NUMBER_COSTS, STEPS))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .min_by(|left, right| left.loss.total_cmp(&right.loss));
+    if let Some(best) = best.filter(|best| best.loss < model.loss) {
+        *model = refine(engine, &best);
     }
 }
 

@@ -116,10 +116,9 @@ impl Columns {
                 let coefficient = fit.coefficients[always];
                 let amplitude = coefficient * probe[0];
                 // On the wrong side of the baseline it explains nothing.
-                if amplitude <= least.max(-10.0) || amplitude >= most.min(10.0) {
-                    if amplitude.signum() != probe[0].signum() {
-                        continue;
-                    }
+                let outside = amplitude <= least.max(-10.0) || amplitude >= most.min(10.0);
+                if outside && amplitude.signum() != probe[0].signum() {
+                    continue;
                 }
                 coordinates[0] = amplitude.clamp(least.max(-1.3), most.min(1.3));
                 for ((probe, _), coefficient) in with.iter().zip(&fit.coefficients[always + 1..]) {

@@ -1,0 +1,99 @@
+//! The whole record in open loop: started from its first samples at rest, moved by its commands, judged after 0.1 s.
+
+use crate::course::{CHANNELS, Course, Point};
+use crate::report::BeforeAfter;
+use crate::windows::{first_state, seat};
+use plant::{Axis, Plant, RigParameters};
+use std::collections::BTreeMap;
+
+/// Periods that are not judged: memories and lags fill [rig-model.md, Accuracy].
+const FILLING: usize = 100;
+/// Pressure that air from the supply does not exceed by much in a chamber, over the supply's.
+const HIGHEST: f64 = 1.1;
+/// How far a rod may be beyond its stops, m: rounding.
+const BEYOND_M: f64 = 1e-9;
+
+/// What a free run gave.
+#[derive(Debug)]
+pub(super) struct FreeRun {
+    /// Of each axis and channel, rms error in percent of the range of the readings; `None` where there are none.
+    pub(super) nrmse_percent: [[Option<f64>; CHANNELS]; 2],
+    /// What a rig cannot do.
+    pub(super) unphysical: Vec<String>,
+}
+
+/// Runs a record freely.
+pub(super) fn free_run(course: &Course, rig: &RigParameters) -> FreeRun {
+    let mut plant =
+        Plant::in_state(rig, &first_state(course, rig)).expect("a start state is one of the rig's");
+    let at_rest = course.points[0].map(|point| Point { rod_velocity_m_per_s: 0.0, ..point });
+    seat(&mut plant, course, &at_rest);
+    let stroke_m = rig.cylinder().stroke_m;
+    let highest_pa = HIGHEST * plant.supply_pressure_pa();
+    let mut errors = [[(0.0, 0_usize); CHANNELS]; 2];
+    let mut ranges = [[[f64::INFINITY, f64::NEG_INFINITY]; CHANNELS]; 2];
+    let mut unphysical: BTreeMap<(usize, &str), usize> = BTreeMap::new();
+    for (period, (inputs, samples)) in course.inputs.iter().zip(&course.samples).enumerate() {
+        let truth = plant.truth(inputs);
+        let shown = plant.shown(&truth);
+        for i in (0..2).filter(|i| course.measured[*i]) {
+            let axis = &truth.axes[i];
+            let extension_m = plant.state().axes[i].extension_m;
+            let pressures_pa = [axis.pressure_a_pa, axis.pressure_b_pa];
+            let found = [
+                ("not finite", !plant.state().is_finite()),
+                ("a pressure not above zero", pressures_pa.iter().any(|own| *own <= 0.0)),
+                (
+                    "a pressure more than a tenth above the supply's",
+                    pressures_pa.iter().any(|own| *own > highest_pa),
+                ),
+                ("the piston beyond its stroke", !(-BEYOND_M..=stroke_m + BEYOND_M).contains(&extension_m)),
+            ];
+            for (what, _) in found.into_iter().filter(|(_, found)| *found) {
+                unphysical.entry((i, what)).or_insert(period);
+            }
+            for at in 0..CHANNELS {
+                let Some(sample) = samples[i][at] else { continue };
+                let range = &mut ranges[i][at];
+                *range = [range[0].min(sample), range[1].max(sample)];
+                if period >= FILLING {
+                    let (sum, count) = &mut errors[i][at];
+                    *sum += (shown[i][at] - sample).powi(2);
+                    *count += 1;
+                }
+            }
+        }
+        if !plant.state().is_finite() {
+            break;
+        }
+        plant.step(inputs);
+    }
+    let nrmse_percent = std::array::from_fn(|i| {
+        std::array::from_fn(|at| {
+            let ((sum, count), [least, most]) = (errors[i][at], ranges[i][at]);
+            (count > 0 && most > least).then(|| 100.0 * (sum / count as f64).sqrt() / (most - least))
+        })
+    });
+    let unphysical = unphysical
+        .into_iter()
+        .map(|((i, what), period)| {
+            format!("{} axis: {what}, first after {:.3} s", Axis::ALL[i].name(), period as f64 * 1e-3)
+        })
+        .collect();
+    FreeRun { nrmse_percent, unphysical }
+}
+
+/// The errors of both runs by column.
+pub(super) fn both(
+    before: &FreeRun,
+    after: &FreeRun,
+    column: &dyn Fn(usize, usize) -> String,
+) -> BTreeMap<String, BeforeAfter> {
+    let mut all = BTreeMap::new();
+    for (i, at) in (0..2).flat_map(|i| (0..CHANNELS).map(move |at| (i, at))) {
+        if let (Some(before), Some(after)) = (before.nrmse_percent[i][at], after.nrmse_percent[i][at]) {
+            all.insert(column(i, at), BeforeAfter { before, after });
+        }
+    }
+    all
+}

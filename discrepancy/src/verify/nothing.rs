@@ -1,0 +1,71 @@
+//! What the windows of a record show of a model that lacks nothing: noise, drawn many times.
+
+use super::power::{Power, kept, levels, pooled, sums};
+use crate::windows::Windows;
+use rand_core::SeedableRng;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// Records of nothing.
+const DRAWS: u64 = 60;
+/// The range is a result and has the same bits each run.
+const SEED: u64 = 0x7e1d_0c7a_11ed_0006;
+/// Standard normal of 97.5 %.
+const TWO_SIDED: f64 = 1.96;
+
+/// Figures of noise alone.
+#[derive(Debug)]
+pub(super) struct Nothing {
+    /// Mean sum of squares of each window and lane, window by window.
+    pub(super) expected: Vec<f64>,
+    /// Mean of [`Power::quiet`], of each lane.
+    pub(super) quiet: Vec<f64>,
+    /// Standard deviation of each lane's pooled power.
+    pub(super) spreads: Vec<f64>,
+    /// 95 % range of chi2 per degree of freedom.
+    pub(super) range: [f64; 2],
+}
+
+impl Nothing {
+    pub(super) fn new(windows: &Windows<'_>) -> Self {
+        let lanes = windows.lanes().len();
+        let draws: Vec<Vec<f64>> = (0..DRAWS)
+            .into_par_iter()
+            .map(|draw| sums(&windows.noise(&mut Pcg64::seed_from_u64(SEED ^ draw)), lanes))
+            .collect();
+        // Windows differ in their directions of freedom; lanes without samples have nothing.
+        let mut expected = vec![0.0; windows.count() * lanes];
+        for draw in &draws {
+            expected.iter_mut().zip(draw).for_each(|(sum, own)| *sum += own / DRAWS as f64);
+        }
+        let powers: Vec<Power> = draws.iter().map(|draw| Power::new(draw, &expected, lanes)).collect();
+        let quiet = (0..lanes)
+            .map(|lane| powers.iter().map(|power| power.quiet()[lane]).sum::<f64>() / DRAWS as f64)
+            .collect();
+        let mut nothing = Nothing { expected, quiet, spreads: Vec::new(), range: [1.0; 2] };
+        // Every draw is treated as a record is: its levels are told from itself, its worst windows are left out.
+        let powers: Vec<Power> = powers.iter().map(|power| power.over(&levels(power, &nothing))).collect();
+        let of_lane = |power: &Power, lane: usize| {
+            let own = power.lane(lane);
+            pooled(&own, &kept(&own))
+        };
+        nothing.spreads = (0..lanes)
+            .map(|lane| spread(&powers.iter().map(|power| of_lane(power, lane)).collect::<Vec<_>>()).1)
+            .collect();
+        let joint = |power: &Power| {
+            let own = power.joint();
+            pooled(&own, &kept(&own))
+        };
+        let (mean, deviation) = spread(&powers.iter().map(joint).collect::<Vec<_>>());
+        nothing.range = [mean - TWO_SIDED * deviation, mean + TWO_SIDED * deviation];
+        nothing
+    }
+}
+
+/// Mean and standard deviation.
+fn spread(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    (mean, variance.sqrt())
+}

@@ -1,0 +1,224 @@
+//! Where windows begin: what a start explains, and starts that are moved to where their readings are met best.
+
+use super::whiten::SPIKE_REACH;
+use super::{FORCE, WINDOW, Windows, dot, project};
+use crate::course::{Course, Point};
+use nalgebra::{DMatrix, DVector};
+use plant::{Inputs, Plant, RigParameters, Setup, State};
+
+/// How far a start may move at a time where the rods are linked.
+const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
+/// How often the starts of a linked record are moved.
+pub(super) const LINKED_PASSES: usize = 3;
+/// The same of others, where it is asked for.
+const SETTLING: usize = 2;
+/// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
+const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
+/// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
+const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
+
+impl Windows<'_> {
+    /// Moves each window's start to where its readings say that it was, and takes its sensitivities anew.
+    pub(super) fn settle(&mut self) {
+        let rows = self.rows();
+        let all = self.sensitivities();
+        let simulated = self.simulate(&self.rig);
+        let mut left: Vec<f64> =
+            self.readings.iter().zip(&simulated).map(|(reading, own)| reading - own).collect();
+        for (value, _) in left.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
+            *value = 0.0;
+        }
+        let measured: Vec<usize> = (0..2).filter(|axis| self.course.measured[*axis]).collect();
+        for (at, columns) in all.iter().enumerate() {
+            let own = &mut left[at * rows..][..rows];
+            self.flatten_spikes(own);
+            self.whiten(at, own);
+            let count = columns.len();
+            // What is known of a start beforehand, in units of its doubt.
+            let mut matrix = DMatrix::<f64>::identity(count, count);
+            for row in 0..count {
+                for column in 0..count {
+                    matrix[(row, column)] += dot(&columns[row], &columns[column]);
+                }
+            }
+            let right = DVector::from_iterator(count, columns.iter().map(|column| dot(column, own)));
+            let Some(moved) = matrix.cholesky().map(|factor| factor.solve(&right)) else { continue };
+            for (place, axis) in measured.iter().enumerate() {
+                let part = |number: usize| {
+                    let most = if self.course.linked { FARTHEST[number] } else { DOUBT[number] };
+                    (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
+                };
+                let point = &mut self.points[self.starts[at] / WINDOW][*axis];
+                point.extension_m += part(0);
+                // What rests, rests: a speed of its own would only let it slide and stick again.
+                if point.rod_velocity_m_per_s != 0.0 {
+                    point.rod_velocity_m_per_s += part(1);
+                }
+                point.pressures_pa[0] += part(2);
+                point.pressures_pa[1] += part(3);
+            }
+        }
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+    }
+
+    /// The same windows with starts where the readings are met best, as linked ones have them anyway.
+    ///
+    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
+    /// window: where the points are far off, as those of a sensor that lags, both need the start itself.
+    #[must_use]
+    pub fn settled(mut self) -> Self {
+        for _ in 0..if self.course.linked { 0 } else { SETTLING } {
+            let (points, squares) = (self.points.clone(), self.squares());
+            self.settle();
+            // A start from which readings are met worse, as around a break-away, stays where it was.
+            let worse: Vec<bool> = self.squares().iter().zip(&squares).map(|(new, old)| new > old).collect();
+            for (start, _) in self.starts.iter().zip(&worse).filter(|(_, worse)| **worse) {
+                self.points[start / WINDOW] = points[start / WINDOW];
+            }
+        }
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+        self
+    }
+
+    /// Squares of what each window leaves under the baseline rig.
+    pub(super) fn squares(&self) -> Vec<f64> {
+        let left = self.residual(&self.simulate(&self.rig));
+        left.chunks_exact(self.rows().max(1)).map(|own| dot(own, own)).collect()
+    }
+
+    /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
+    fn seat(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
+        let mut points = self.points[start / WINDOW];
+        if let Some((axis, number)) = nudged {
+            let point = &mut points[axis];
+            match number {
+                0 => point.extension_m += NUDGES[0],
+                1 => point.rod_velocity_m_per_s += NUDGES[1],
+                2 => point.pressures_pa[0] += NUDGES[2],
+                _ => point.pressures_pa[1] += NUDGES[3],
+            }
+        }
+        seat(plant, self.course, &points);
+    }
+
+    /// What a change of each number of a window's start changes, by as much as it is doubted.
+    pub(super) fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
+        let mut plant = self.plant(&self.rig);
+        let rows = self.rows();
+        let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
+        for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
+            let place = self.starts.get(all.len()).is_some_and(|own| *own == start);
+            let before = plant.clone();
+            self.seat(&mut plant, start, None);
+            let mut straight = Vec::with_capacity(rows);
+            for inputs in &self.course.inputs[start..start + WINDOW] {
+                self.read(&plant, inputs, &mut straight);
+                plant.step(inputs);
+            }
+            if !place {
+                continue;
+            }
+            let valid = &self.valid[all.len() * rows..][..rows];
+            let mut columns: Vec<Vec<f64>> = Vec::new();
+            for axis in (0..2).filter(|axis| self.course.measured[*axis]) {
+                for (number, nudge) in NUDGES.iter().enumerate() {
+                    let mut nudged = before.clone();
+                    self.seat(&mut nudged, start, Some((axis, number)));
+                    let mut own = Vec::with_capacity(rows);
+                    for inputs in &self.course.inputs[start..start + WINDOW] {
+                        self.read(&nudged, inputs, &mut own);
+                        nudged.step(inputs);
+                    }
+                    let scale = DOUBT[number] / nudge;
+                    for ((own, straight), valid) in own.iter_mut().zip(&straight).zip(valid) {
+                        *own = if *valid { (*own - straight) * scale } else { 0.0 };
+                    }
+                    self.flatten_jumps(&mut own, scale);
+                    self.whiten(all.len(), &mut own);
+                    columns.push(own);
+                }
+            }
+            all.push(columns);
+        }
+        all
+    }
+
+    /// A sensitivity is scaled up from a small change: a jump that moves by a sample is no part of it.
+    pub(super) fn flatten_jumps(&self, own: &mut [f64], scale: f64) {
+        own.iter_mut().for_each(|own| *own /= scale);
+        let width = self.lanes.len();
+        for lane in 0..width {
+            if self.lanes[lane].1 != FORCE {
+                continue;
+            }
+            let force: Vec<f64> = own.iter().skip(lane).step_by(width).copied().collect();
+            for at in 0..force.len() {
+                let from = at.saturating_sub(SPIKE_REACH);
+                let to = (at + SPIKE_REACH + 1).min(force.len());
+                let mut near = force[from..to].to_vec();
+                near.sort_unstable_by(f64::total_cmp);
+                let median = near[near.len() / 2];
+                if (force[at] - median).abs() > 0.5 {
+                    own[at * width + lane] = median;
+                }
+            }
+        }
+        own.iter_mut().for_each(|own| *own *= scale);
+    }
+}
+
+/// The state in which a simulation of a course begins: as a run starts, with the record's set-up.
+#[must_use]
+pub(crate) fn first_state(course: &Course, rig: &RigParameters) -> State {
+    let stroke_m = rig.cylinder().stroke_m;
+    let drive_m = if course.measured[0] { course.points[0][0].extension_m } else { 0.1 };
+    let setup = Setup {
+        carriage_position_m: drive_m.clamp(0.0, stroke_m),
+        linked: course.linked,
+        added_mass_kg: course.added_mass_kg,
+    };
+    let plant = Plant::new(rig, &setup).expect("the set-up was checked");
+    let mut state = *plant.state();
+    for (axis, inputs) in state.axes.iter_mut().zip(course.inputs[0].valve) {
+        axis.spool = inputs;
+    }
+    state
+}
+
+/// Puts the measured axes of a plant at these points; volumes are the plant's own, since an effect may have changed them.
+pub(crate) fn seat(plant: &mut Plant, course: &Course, points: &[Point; 2]) {
+    let mut state = *plant.state();
+    let truth = plant.truth(&Inputs::default());
+    let cylinder = *plant.rig().cylinder();
+    for i in (0..2).filter(|i| course.measured[*i]) {
+        let (own, point, axis) = (&mut state.axes[i], &points[i], &truth.axes[i]);
+        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+        let volume_a_m3 = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
+        let volume_b_m3 = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
+        own.extension_m += way_m;
+        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
+        own.stored_air_a_j = point.pressures_pa[0].max(1e4) * volume_a_m3;
+        own.stored_air_b_j = point.pressures_pa[1].max(1e4) * volume_b_m3;
+    }
+    // Rounding may have left the stroke by a bit.
+    for own in &mut state.axes {
+        own.extension_m = own.extension_m.clamp(0.0, cylinder.stroke_m);
+    }
+    plant.go_on_in(&state).expect("the points of a record are states of the rig");
+}
+
+/// An orthonormal basis of some columns, those left out that are worth less than one standard deviation.
+pub(super) fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut own in columns {
+        // Twice, as rounding asks for.
+        project(&mut own, &basis);
+        project(&mut own, &basis);
+        let length = dot(&own, &own).sqrt();
+        if length > 1.0 {
+            own.iter_mut().for_each(|own| *own /= length);
+            basis.push(own);
+        }
+    }
+    basis
+}

@@ -1,0 +1,113 @@
+//! What noise is like: jumps of the force, errors of the sampling instant, noise that lasts longer than a period, and draws of it.
+
+use super::{FORCE, WINDOW, Windows, dot};
+use crate::course::{Course, PERIOD_S};
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+use std::f64::consts::TAU;
+
+/// Readings to each side that a reading of the force is compared with.
+pub(super) const SPIKE_REACH: usize = 4;
+/// Standard deviations by which it may differ from their median.
+const SPIKE: f64 = 6.0;
+
+impl Windows<'_> {
+    /// The residual of a model that lacks nothing: noise as the course has it, its memory and the sampling instants' errors
+    /// included, treated as a residual is.
+    #[must_use]
+    pub fn noise(&self, random: &mut Pcg64) -> Vec<f64> {
+        let width = self.lanes.len();
+        let memories: Vec<f64> =
+            self.lanes.iter().map(|(axis, channel)| self.course.memory[*axis][*channel]).collect();
+        let mut noise = Vec::with_capacity(self.readings.len());
+        for drifts in self.drifts.chunks_exact(self.rows().max(1)) {
+            let mut own = vec![0.0; width];
+            for (period, drifts) in drifts.chunks_exact(width).enumerate() {
+                for (own, memory) in own.iter_mut().zip(&memories) {
+                    let kept = if period == 0 { 0.0 } else { *memory };
+                    *own = kept * *own + (1.0 - kept * kept).sqrt() * gaussian(random);
+                }
+                let instant = gaussian(random);
+                noise.extend(own.iter().zip(drifts).map(|(own, drift)| own + drift * instant));
+            }
+        }
+        self.reduce(&mut noise);
+        noise
+    }
+
+    /// Takes account of errors of the sampling instant, which all readings of an instant share, and of noise that lasts longer
+    /// than a period: with d the drift of an instant's readings, (1 + d d')^(-1/2) and then e_n - r e_(n-1) over sqrt(1 - r^2).
+    pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
+        let width = self.lanes.len();
+        let drifts = &self.drifts[at * self.rows()..][..self.rows()];
+        for (own, drift) in window.chunks_exact_mut(width).zip(drifts.chunks_exact(width)) {
+            let square = dot(drift, drift);
+            if square > 1e-6 {
+                let share = dot(own, drift) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
+                own.iter_mut().zip(drift).for_each(|(own, drift)| *own -= share * drift);
+            }
+        }
+        for (lane, (axis, channel)) in self.lanes.iter().enumerate() {
+            let memory = self.course.memory[*axis][*channel];
+            if memory == 0.0 {
+                continue;
+            }
+            for period in (1..WINDOW).rev() {
+                let (place, before) = (period * width + lane, (period - 1) * width + lane);
+                if !(self.valid[at * self.rows() + place] && self.valid[at * self.rows() + before]) {
+                    continue;
+                }
+                // Where the instants are off, the noise of neighbours has less in common.
+                let own = memory / (1.0 + drifts[place] * drifts[place]);
+                window[place] = (window[place] - own * window[before]) / (1.0 - own * own).sqrt();
+            }
+        }
+    }
+
+    pub(super) fn flatten_spikes(&self, window: &mut [f64]) {
+        let width = self.lanes.len();
+        let forces: Vec<usize> =
+            self.lanes.iter().enumerate().filter(|(_, (_, at))| *at == FORCE).map(|(lane, _)| lane).collect();
+        for lane in forces {
+            let own: Vec<f64> = window.iter().skip(lane).step_by(width).copied().collect();
+            for at in 0..own.len() {
+                let mut near = [0.0; 2 * SPIKE_REACH + 1];
+                let from = at.saturating_sub(SPIKE_REACH);
+                let to = (at + SPIKE_REACH + 1).min(own.len());
+                let near = &mut near[..to - from];
+                near.copy_from_slice(&own[from..to]);
+                near.sort_unstable_by(f64::total_cmp);
+                let median = near[near.len() / 2];
+                if (own[at] - median).abs() > SPIKE {
+                    window[at * width + lane] = median;
+                }
+            }
+        }
+    }
+}
+
+/// Rate of a reading times the error of the sampling instant, over its noise; nobody knows that of the force.
+pub(super) fn drift(course: &Course, at: usize, axis: usize, channel: usize) -> f64 {
+    if course.jitter_s == 0.0 || channel == FORCE {
+        return 0.0;
+    }
+    let (before, after) = (at.saturating_sub(1), (at + 1).min(course.len() - 1));
+    let [before, own, after] = [before, at, after].map(|at| course.points[at][axis]);
+    let rate = match channel {
+        0 if axis == 0 => own.rod_velocity_m_per_s,
+        0 => -own.rod_velocity_m_per_s,
+        channel => {
+            let [before, after] = [before, after].map(|point| point.pressures_pa[channel - 2]);
+            (after - before) / (2.0 * PERIOD_S)
+        }
+    };
+    rate * course.jitter_s / course.noise[axis][channel]
+}
+
+/// A number of mean 0 and variance 1 [Box, Muller 1958, Ann. Math. Stat. 29(2), eq. 1].
+pub(super) fn gaussian(random: &mut Pcg64) -> f64 {
+    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+    let never_zero = ((random.next_u64() >> 11) + 1) as f64 * STEP;
+    let turn = (random.next_u64() >> 11) as f64 * STEP;
+    (-2.0 * never_zero.ln()).sqrt() * (TAU * turn).cos()
+}

@@ -1,0 +1,83 @@
+//! Claims about naming, on records that the plant makes here with something hidden in it.
+
+mod common;
+
+use common::course;
+use discrepancy::candidates::Candidate;
+use discrepancy::engine::Engine;
+use discrepancy::name::{Found, name};
+use discrepancy::parameters::COUNT;
+use plant::RigParameters;
+
+fn found(hidden: &RigParameters, without: &[&str]) -> Found {
+    let courses = [course(hidden, 11)];
+    let rig = RigParameters::baseline();
+    let engine = Engine::new(&courses, &rig);
+    let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
+    name(&engine, Candidate::all([true, false], false, &without), &mut |_| ())
+}
+
+fn with(effects: &[(&str, &str, &[(&str, f64)])]) -> RigParameters {
+    effects.iter().fold(RigParameters::baseline(), |rig, (name, place, numbers)| {
+        rig.with_effect(name, place, numbers).expect("numbers of the sheet")
+    })
+}
+
+fn names(found: &Found) -> Vec<String> {
+    found.model.placed.iter().map(|placed| placed.candidate.name()).collect()
+}
+
+/// Factors of the parameters with their errors.
+fn factors(found: &Found) -> Vec<(f64, f64)> {
+    let errors = &found.model.errors[found.model.errors.len() - COUNT..];
+    found.model.factors.iter().copied().zip(errors.iter().copied()).collect()
+}
+
+#[test]
+fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
+    let found = found(&RigParameters::baseline(), &[]);
+    assert_eq!(names(&found), Vec::<String>::new());
+    assert!(!found.inadequate);
+    for (at, (factor, error)) in factors(&found).into_iter().enumerate() {
+        assert!((factor - 1.0).abs() < 5.0 * error + 0.003, "parameter {at}: {factor} +- {error}");
+    }
+}
+
+#[test]
+fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
+    let found = found(&with(&[("rod-leakage", "drive.b", &[("leakage_nl_per_min", 4.0)])]), &[]);
+    assert_eq!(names(&found), ["rod-leakage drive.b"]);
+    let placed = &found.model.placed[0];
+    let leakage = placed.candidate.numbers(&placed.coordinates)[0];
+    let error = found.model.errors[0] * placed.candidate.slope(0, placed.coordinates[0]).abs();
+    assert!((leakage - 4.0).abs() < 4.0 * error + 0.05, "{leakage} +- {error}");
+    assert!(found.shares[0] > 0.9, "{:?}", found.shares);
+}
+
+#[test]
+fn two_hidden_effects_are_both_named() {
+    let hidden = with(&[
+        ("inclination", "drive", &[("force_n", 12.0)]),
+        ("valve-dead-zone", "drive", &[("dead_zone_percent", 2.0)]),
+    ]);
+    let mut named = names(&found(&hidden, &[]));
+    named.sort();
+    assert_eq!(named, ["inclination drive", "valve-dead-zone drive"]);
+}
+
+#[test]
+fn a_wrong_mass_is_a_parameter_and_no_effect() {
+    let rig = RigParameters::baseline();
+    let heavier = rig.with("mass.drive_kg", &[5.5]).and_then(|rig| rig.with("mass.carriage_kg", &[3.85]));
+    let found = found(&heavier.expect("a heavier rig"), &[]);
+    assert_eq!(names(&found), Vec::<String>::new());
+    let (mass, error) = factors(&found)[0];
+    assert!((mass - 1.1).abs() < 4.0 * error + 0.005, "{mass} +- {error}");
+}
+
+#[test]
+fn what_is_no_candidate_is_outside_the_catalogue() {
+    let hidden = with(&[("position-dependent-force", "drive", &[("spring_n", 30.0)])]);
+    let found = found(&hidden, &["position-dependent-force"]);
+    assert!(found.inadequate, "named {:?}", names(&found));
+}
