@@ -86,8 +86,8 @@ pub struct Classes {
 impl Classes {
     /// Those of these draws, by their numbers there: the same draw has another number in a study of another shape.
     ///
-    /// Noise of another size scales all signatures alike, but for the rounding of the sensors: the classes stay, and a strength is
-    /// the one at the noise of this study, as the committed limits are.
+    /// Noise of another size scales all signatures alike, but for the rounding of the sensors: the classes stay, and a strength
+    /// is the one at the noise of this study, as the committed limits are.
     #[must_use]
     pub fn of_draws(&self, draws: &[Draw]) -> BTreeMap<usize, DrawClasses> {
         let own = self.plan.draws();

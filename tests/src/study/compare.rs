@@ -131,7 +131,7 @@ fn figures(scores: &[Score]) -> Vec<Row> {
                 &score.tables.claimed_closed_ratio
             }),
             ("the same, all signals together, median", "at least 95 %", |score| {
-                &score.tables.claimed_together_ratio
+                &score.tables.claimed_joint_ratio
             }),
         ];
         rows.extend(
@@ -197,7 +197,7 @@ fn left_out<'a>(first: &str, score: &Score, splits: impl Iterator<Item = &'a Lef
         let mut cells = vec![split.name.clone()];
         cells.extend(rates.iter().map(told));
         cells.extend(
-            [split.claimed_closed_ratio, split.claimed_together_ratio]
+            [split.claimed_closed_ratio, split.claimed_joint_ratio]
                 .iter()
                 .map(|spread| quantile(spread, 1, 100.0, "%")),
         );

@@ -5,10 +5,10 @@
 //!                                 └─► over amplitude:  class named, amplitude / (committed limit x noise factor)
 //! ```
 //!
-//! The committed limits are those at the specified noise, and a limit grows in proportion to the noise, but for the rounding of the
-//! sensors: over the own limit of each study the curves of all noise factors should lie on each other. What is drawn lies mostly far
-//! above the limits; noise of four times the specified moves a draw four times nearer. "3 x limit and more" is of the committed
-//! limits in each study: the same draws at each noise.
+//! The committed limits are those at the specified noise, and a limit grows in proportion to the noise, but for the rounding of
+//! the sensors: over the own limit of each study the curves of all noise factors should lie on each other. What is drawn lies
+//! mostly far above the limits; noise of four times the specified moves a draw four times nearer. "3 x limit and more" is of the
+//! committed limits in each study: the same draws at each noise.
 
 use crate::study::compare::{grid, told, told_line};
 use crate::study::draws::Kind;

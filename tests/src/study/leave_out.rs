@@ -9,8 +9,8 @@
 //! ([`super::classes`]); where the classes of a draw are not known, only the effect itself. The rules, from issue 6:
 //!
 //! - *No wrong name*: there is a good report and nothing of the catalogue is named in it. A parameter of the baseline is no name.
-//! - The *balance* is right when it is one that `outside-expected.json` has for the effect, on the axis that the effect is at; what
-//!   acts on both axes may be seen on either.
+//! - The *balance* is right when it is one that `outside-expected.json` has for the effect, on the axis that the effect is at;
+//!   what acts on both axes may be seen on either.
 //! - The *variable* is right when one of the first two is expected.
 //! - The gap *still closes* for effects without memory: a term over what is measured can stand in for them. With memory are those
 //!   for which the plant keeps something from step to step (`plant/src/effects/memory.rs`).

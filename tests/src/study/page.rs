@@ -217,7 +217,7 @@ fn numbers(score: &Score) -> String {
         spread("amplitude off by, of itself", &numbers.off_ratio, 100.0, "%"),
         spread("its standard error, of itself", &numbers.error_ratio, 100.0, "%"),
         spread("gap to the floor closed, <em>claimed</em>", &score.tables.claimed_closed_ratio, 100.0, "%"),
-        spread("the same, all signals together", &score.tables.claimed_together_ratio, 100.0, "%"),
+        spread("the same, all signals together", &score.tables.claimed_joint_ratio, 100.0, "%"),
         spread("wall time", &score.tables.wall_s, 1.0, "s"),
         spread("memory", &score.tables.memory_mib, 1.0, "MiB"),
     ];

@@ -217,7 +217,7 @@ impl Report {
     ///
     /// `None` when no signal has all three, or there was no gap.
     #[must_use]
-    pub fn claimed_together(&self) -> Option<f64> {
+    pub fn claimed_joint(&self) -> Option<f64> {
         let mut excess = [0.0, 0.0];
         for gap in self.gap.values() {
             let Some(floor) = gap.floor_value.filter(|floor| *floor > 0.0) else { continue };
@@ -313,9 +313,9 @@ mod tests {
             "x": {"before": 2, "after": 1.5, "floor": 1, "closed": 0.5}, "f": {"closed": null}}}"#;
         assert_eq!(parse(text.as_bytes()).unwrap().claimed_closed(), Some(0.5));
         // 9 - 1 and 4 - 1 before, nothing and 2.25 - 1 after; the force tells no numbers.
-        let together = parse(text.as_bytes()).unwrap().claimed_together().unwrap();
+        let together = parse(text.as_bytes()).unwrap().claimed_joint().unwrap();
         assert!((together - (1.0 - 1.25 / 11.0)).abs() < 1e-12, "{together}");
         let none = r#"{"verdict": "nothing-missing", "gap": {"f": {"closed": 1}}}"#;
-        assert_eq!(parse(none.as_bytes()).unwrap().claimed_together(), None);
+        assert_eq!(parse(none.as_bytes()).unwrap().claimed_joint(), None);
     }
 }

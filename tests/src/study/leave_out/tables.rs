@@ -36,7 +36,7 @@ pub struct Split {
     /// Share of the gap that the program claims to have closed, the worst signal.
     pub claimed_closed_ratio: Spread,
     /// The same of all signals together, each in units of its noise.
-    pub claimed_together_ratio: Spread,
+    pub claimed_joint_ratio: Spread,
     /// How often which verdict.
     pub verdicts: BTreeMap<&'static str, usize>,
 }
@@ -73,7 +73,7 @@ fn split(name: &str, cases: &[(&Case, &LeftOut)]) -> Split {
         variable_right: rate(&|left| left.variable_right),
         both_right: rate(&|left| left.balance_right && left.variable_right),
         claimed_closed_ratio: Spread::of(claims().filter_map(|claim| claim.claimed_closed_ratio)),
-        claimed_together_ratio: Spread::of(claims().filter_map(|claim| claim.claimed_together_ratio)),
+        claimed_joint_ratio: Spread::of(claims().filter_map(|claim| claim.claimed_joint_ratio)),
         verdicts,
     }
 }
@@ -113,7 +113,7 @@ pub fn headline(cases: &[Case]) -> Vec<Line> {
         line(
             "the same, gap told: all signals together closed by at least 60 %",
             "all",
-            closed(&|case| case.judgement.claimed_together_ratio),
+            closed(&|case| case.judgement.claimed_joint_ratio),
         ),
         line(
             "the same, gap told: every signal closed by at least 60 %",

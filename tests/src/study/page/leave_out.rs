@@ -21,7 +21,7 @@ fn splits(head: &str, splits: &[Split]) -> String {
         let rates = [split.no_wrong_name, split.balance_right, split.variable_right, split.both_right];
         let mut row = vec![escaped(&split.name)];
         row.extend(rates.iter().map(told));
-        row.extend([split.claimed_closed_ratio, split.claimed_together_ratio].iter().map(median));
+        row.extend([split.claimed_closed_ratio, split.claimed_joint_ratio].iter().map(median));
         row.push(escaped(&verdicts(split)));
         row
     };
@@ -48,7 +48,7 @@ fn told_cases(score: &Score) -> String {
     let row = |case: &Case| {
         let left = case.left_out.as_ref()?;
         let mark = |right| if right { '✓' } else { '✗' };
-        let closed = case.judgement.claimed_together_ratio.map_or(String::new(), percent);
+        let closed = case.judgement.claimed_joint_ratio.map_or(String::new(), percent);
         let balance = left.balance.as_deref().unwrap_or("none");
         Some(vec![
             case.number.to_string(),

@@ -33,7 +33,7 @@ pub struct Tables {
     /// Share of the gap that the program claims to have closed on the held-out record, single effects that were named right.
     pub claimed_closed_ratio: Spread,
     /// The same of all signals together, each in units of its noise.
-    pub claimed_together_ratio: Spread,
+    pub claimed_joint_ratio: Spread,
     /// Why cases have no good report, and how many.
     pub errors: BTreeMap<String, usize>,
 }
@@ -155,8 +155,8 @@ impl Tables {
             claimed_closed_ratio: Spread::of(
                 named_right().filter_map(|case| case.judgement.claimed_closed_ratio),
             ),
-            claimed_together_ratio: Spread::of(
-                named_right().filter_map(|case| case.judgement.claimed_together_ratio),
+            claimed_joint_ratio: Spread::of(
+                named_right().filter_map(|case| case.judgement.claimed_joint_ratio),
             ),
             errors,
         }
