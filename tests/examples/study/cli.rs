@@ -80,6 +80,9 @@ pub(crate) struct DrawsArguments {
     /// Sensor noise of all records, 1 is as specified.
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
+    /// Divides all amplitudes, counted from the baseline: 100 brings most near their limits.
+    #[arg(long, default_value_t = 1.0)]
+    weaker: f64,
     /// Part of the study, as 0/4: draws whose number leaves this remainder.
     #[arg(long, default_value_t = Shard::WHOLE)]
     pub(crate) shard: Shard,
@@ -87,8 +90,8 @@ pub(crate) struct DrawsArguments {
 
 impl DrawsArguments {
     pub(crate) fn shape(&self) -> Shape {
-        let Self { each, nulls, parameters, pairs, triples, noise, .. } = *self;
-        Shape { each, nulls, parameters, pairs, triples, noise_factor: noise }
+        let Self { each, nulls, parameters, pairs, triples, noise, weaker, .. } = *self;
+        Shape { each, nulls, parameters, pairs, triples, noise_factor: noise, weaker_factor: weaker }
     }
 }
 

@@ -7,6 +7,7 @@
 //!
 //! The scores may be of different studies, as far as they are of one mode: the first row says of how many draws and which seed.
 
+use crate::study::draws::Shape;
 use crate::study::interval::Rate;
 use crate::study::leave_out::tables::Split as LeftSplit;
 use crate::study::score::Score;
@@ -161,10 +162,16 @@ fn parts(scores: &[Score], of: impl Fn(&Score) -> &Vec<Split>) -> Vec<Row> {
     splits.iter().enumerate().filter(|(at, _)| any(*at)).map(row).collect()
 }
 
-/// What a column is called: the label, and the noise where it is not the specified one.
+/// What a column is called: the label, and noise and amplitudes where they are not the specified ones.
 fn head(score: &Score) -> String {
-    let factor = score.shape.noise_factor;
-    if factor == 1.0 { score.label.clone() } else { format!("{}, noise times {factor}", score.label) }
+    let Shape { noise_factor, weaker_factor, .. } = score.shape;
+    let mut head = score.label.clone();
+    for (name, factor) in [("noise times", noise_factor), ("amplitudes over", weaker_factor)] {
+        if factor != 1.0 {
+            let _ = write!(head, ", {name} {factor}");
+        }
+    }
+    head
 }
 
 fn table(first: &str, scores: &[Score], last: &str, rows: &[Row]) -> String {

@@ -6,9 +6,11 @@
 //! ```
 //!
 //! The committed limits are those at the specified noise, and a limit grows in proportion to the noise, but for the rounding of
-//! the sensors: over the own limit of each study the curves of all noise factors should lie on each other. What is drawn lies
-//! mostly far above the limits; noise of four times the specified moves a draw four times nearer. "3 x limit and more" is of the
-//! committed limits in each study: the same draws at each noise.
+//! the sensors: over the own limit of each study the curves of all noise factors should lie on each other. "3 x limit and more" is
+//! of the committed limits in each study: the same draws at each noise.
+//!
+//! What is drawn lies mostly far above the limits. A study of the same noise whose amplitudes are divided by a factor
+//! (`draws --weaker`) adds its draws to the curve over amplitude, and to no other.
 
 use crate::study::compare::{grid, told, told_line};
 use crate::study::draws::Kind;
@@ -30,9 +32,9 @@ pub enum CurveError {
     /// Effects were left out of the catalogue.
     #[error("'{0}' is of a run without the hidden effects: there are no names to draw")]
     LeftOut(String),
-    /// Two studies have the same noise.
-    #[error("two studies have noise times {0}: give one for each")]
-    Doubled(f64),
+    /// Two studies have the same noise and are as strong.
+    #[error("two studies have noise times {0} and amplitudes over {1}: give one of each")]
+    Doubled(f64, f64),
     /// The drawing library refuses.
     #[error("the picture cannot be drawn: {0}")]
     Picture(String),
@@ -46,12 +48,14 @@ pub(crate) struct Curve {
 
 /// All curves of some scores.
 pub struct Curves<'a> {
-    /// By their noise.
+    /// By their noise; of the amplitudes as they are drawn.
     scores: Vec<&'a Score>,
+    /// The same, and those with weaker amplitudes.
+    all: Vec<&'a Score>,
 }
 
 impl<'a> Curves<'a> {
-    /// The curves of scores that differ in their noise.
+    /// The curves of scores that differ in their noise or in how weak they are.
     ///
     /// # Errors
     /// [`CurveError`] when there is none, or one that cannot stand there.
@@ -59,12 +63,31 @@ impl<'a> Curves<'a> {
         if let Some(left) = scores.iter().find(|score| score.leave_out.is_some()) {
             return Err(CurveError::LeftOut(left.label.clone()));
         }
-        let mut scores: Vec<&Score> = scores.iter().collect();
-        scores.sort_by(|left, right| noise(left).total_cmp(&noise(right)));
-        if let Some(pair) = scores.windows(2).find(|pair| noise(pair[0]) == noise(pair[1])) {
-            return Err(CurveError::Doubled(noise(pair[0])));
+        let mut all: Vec<&Score> = scores.iter().collect();
+        let key = |score: &Score| (noise(score), score.shape.weaker_factor);
+        all.sort_by(|left, right| {
+            let (left, right) = (key(left), key(right));
+            left.0.total_cmp(&right.0).then(left.1.total_cmp(&right.1))
+        });
+        if let Some(pair) = all.windows(2).find(|pair| key(pair[0]) == key(pair[1])) {
+            let (noise, weaker) = key(pair[0]);
+            return Err(CurveError::Doubled(noise, weaker));
         }
-        if scores.is_empty() { Err(CurveError::Nothing) } else { Ok(Curves { scores }) }
+        let scores: Vec<&Score> =
+            all.iter().copied().filter(|score| score.shape.weaker_factor == 1.0).collect();
+        if scores.is_empty() { Err(CurveError::Nothing) } else { Ok(Curves { scores, all }) }
+    }
+
+    /// Class among the names over amplitude, for each noise factor.
+    fn over_amplitude(&self) -> Vec<Curve> {
+        let mut factors: Vec<f64> = self.all.iter().map(|score| noise(score)).collect();
+        factors.dedup();
+        let of_factor = |factor: f64| {
+            let scores = self.all.iter().filter(|score| noise(score) == factor);
+            let cases: Vec<&Case> = scores.flat_map(|score| &score.cases).collect();
+            over_amplitude(factor, &cases)
+        };
+        factors.into_iter().map(of_factor).collect()
     }
 
     /// Both as tables.
@@ -82,8 +105,8 @@ impl<'a> Curves<'a> {
         });
         let over_noise = grid(&heads, std::iter::once(draws).chain(lines));
         let mut heads = vec!["amplitude over its limit at this noise".to_owned()];
-        heads.extend(self.scores.iter().map(|score| format!("noise times {}", noise(score))));
-        let curves: Vec<Curve> = self.scores.iter().map(|score| over_amplitude(score)).collect();
+        let curves = self.over_amplitude();
+        heads.extend(curves.iter().map(|curve| curve.name.clone()));
         let rows = (0..=ENDS.len()).map(|bin| {
             let rates = curves.iter().map(|curve| told(&curve.points[bin].1));
             std::iter::once(bin_name(bin)).chain(rates).collect()
@@ -112,7 +135,7 @@ impl<'a> Curves<'a> {
                     .collect(),
             })
             .collect();
-        let over_amplitude: Vec<Curve> = self.scores.iter().map(|score| over_amplitude(score)).collect();
+        let over_amplitude = self.over_amplitude();
         let noises = self.scores.iter().map(|score| (noise(score), format!("{}", noise(score)))).collect();
         let bins = (0..=ENDS.len()).map(|bin| (place(bin), bin_name(bin))).collect();
         picture::svg([
@@ -140,17 +163,13 @@ fn rate_of(score: &Score, name: &str) -> Option<Line> {
     score.tables.headline.iter().find(|line| line.name.starts_with(name)).cloned()
 }
 
-/// Class among the names, bin by bin of the amplitude over the limit at the study's noise.
-fn over_amplitude(score: &Score) -> Curve {
-    let ratio = |case: &Case| over_limit(case).map(|ratio| ratio / noise(score));
-    let of_bin = |bin: usize| {
-        let cases = score.cases.iter().filter(move |case| case.kind == Kind::Single);
-        Rate::of(cases.filter(|case| ratio(case).is_some_and(|ratio| bin_of(ratio) == bin)), |case| {
-            hidden(case).right
-        })
-    };
+/// Class among the names, bin by bin of the amplitude over the limit at this noise.
+fn over_amplitude(factor: f64, cases: &[&Case]) -> Curve {
+    let singles = || cases.iter().copied().filter(|case| case.kind == Kind::Single);
+    let is_of = |case: &Case, bin| over_limit(case).is_some_and(|ratio| bin_of(ratio / factor) == bin);
+    let of_bin = |bin| Rate::of(singles().filter(|case| is_of(case, bin)), |case| hidden(case).right);
     let points = (0..=ENDS.len()).map(|bin| (place(bin), of_bin(bin))).collect();
-    Curve { name: format!("noise times {}", noise(score)), points }
+    Curve { name: format!("noise times {factor}"), points }
 }
 
 fn bin_of(ratio: f64) -> usize {
@@ -196,6 +215,13 @@ mod tests {
         let curves = Curves::new(&scores).unwrap();
         let text = curves.markdown();
         let row = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
+        // What is weaker adds to the curve over amplitude alone.
+        let mut weak = at_noise(4.0, 0.4);
+        weak.shape.weaker_factor = 20.0;
+        let with_weak = [weak, at_noise(4.0, 8.0), at_noise(0.5, 8.0)];
+        let with_weak = Curves::new(&with_weak).unwrap().markdown();
+        assert!(with_weak.contains("| below 1 | none | 38/38"), "{with_weak}");
+        assert_eq!(with_weak.lines().next(), text.lines().next());
         // In the order of the noise, however they were given.
         assert_eq!(text.lines().next().unwrap(), "| noise | times 0.5 | times 4 |");
         assert_eq!(row("| 1 to 3"), "| 1 to 3 | none | 38/38 (91 to 100 %) |");
@@ -218,7 +244,7 @@ mod tests {
     fn scores_that_cannot_stand_on_one_curve_are_refused() {
         let refused = |scores: &[Score]| Curves::new(scores).err();
         assert_eq!(refused(&[]), Some(CurveError::Nothing));
-        assert_eq!(refused(&[scored("a"), scored("b")]), Some(CurveError::Doubled(1.0)));
+        assert_eq!(refused(&[scored("a"), scored("b")]), Some(CurveError::Doubled(1.0, 1.0)));
         assert_eq!(refused(&[scored_without("w")]), Some(CurveError::LeftOut("w".to_owned())));
     }
 }

@@ -247,6 +247,7 @@ const DIMENSIONLESS: &[&str] = &[
     "cosine",                // of two signatures
     "strength",              // of a signature, over what an ideal observer needs
     "noise_factor",          // on the noise of the sensors
+    "weaker_factor",         // on amplitudes
     "over_limit",            // amplitudes over their limits
     "limit_value",           // of an effect, whose unit is a field beside it
     "error_value",           // of a fitted number, whose unit is a field beside it

@@ -11,7 +11,8 @@ use std::sync::atomic::AtomicUsize;
 use tempfile::TempDir;
 
 /// Two nulls and a pair of shards of four parameters: three draws.
-const SHAPE: Shape = Shape { each: 0, nulls: 2, parameters: 0, pairs: 1, triples: 0, noise_factor: 1.0 };
+const SHAPE: Shape =
+    Shape { each: 0, nulls: 2, parameters: 0, pairs: 1, triples: 0, noise_factor: 1.0, weaker_factor: 1.0 };
 const HEAD: &str = "# linked=false added_mass_kg=0\ntime_s,drive_valve,drive_position_m\n";
 
 struct Bench {

@@ -7,7 +7,8 @@ use serde_json::json;
 use std::fs;
 use std::path::Path;
 
-const SHAPE: Shape = Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, noise_factor: 1.0 };
+const SHAPE: Shape =
+    Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, noise_factor: 1.0, weaker_factor: 1.0 };
 
 fn identity(name: &str) -> Identity {
     Identity { name: name.to_owned(), crc32: 7, arguments: vec![], leave_out: false }
