@@ -15,9 +15,12 @@
 //! | [`campaign`] | all draws that are not done yet, several at once |
 //! | [`report`] | `report.json`, read as strictly as it is promised |
 //! | [`judge`] | one case: what was hidden against what was named |
+//! | [`leave_out`] | one case whose effect is left out of the program's catalogue |
 //! | [`interval`] | what so many of so many prove |
 //! | [`score`] | all cases: rates, confusion matrix, parameters, time |
 //! | [`page`] | the score as one page |
+//! | [`compare`] | several scores side by side |
+//! | [`curve`] | how rates fall with noise and amplitude |
 //! | [`course`], [`signature`] | true states of a record; what an effect changes in windows that start from them |
 //! | [`limits`] | amplitude from which an ideal observer sees an effect |
 //! | [`classes`] | which effects leave the same signature in a record |
@@ -28,13 +31,16 @@
 
 pub mod campaign;
 pub mod classes;
+pub mod compare;
 pub mod compute;
 pub mod course;
+pub mod curve;
 pub mod document;
 pub mod draws;
 pub mod folder;
 pub mod interval;
 pub mod judge;
+pub mod leave_out;
 pub mod limits;
 pub mod page;
 pub mod program;

@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use std::str::FromStr;
 use system_tests::study::draws::{Shape, Shard};
 
 /// The study: judges a program that names missing effects, on records whose truth it never sees.
@@ -24,6 +25,33 @@ pub(crate) enum Command {
     Run(RunArguments),
     /// Scores the results: score-LABEL.json and score-LABEL.html.
     Score(ScoreArguments),
+    /// Several scores side by side, as tables in Markdown: ours beside the competitors.
+    Compare(CompareArguments),
+    /// How rates fall over noise and amplitude: curve-LABEL.md and curve-LABEL.svg.
+    Curve(CurveArguments),
+}
+
+/// Results under a label, of a study or of all its shards.
+#[derive(Debug, Clone)]
+pub(crate) struct Column {
+    /// What the results are called.
+    pub(crate) label: String,
+    /// Folder of the study, or of all its shards.
+    pub(crate) folders: Vec<PathBuf>,
+}
+
+impl FromStr for Column {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once('@') {
+            Some((label, folders)) if !label.is_empty() && !folders.is_empty() => {
+                let folders = folders.split(',').map(PathBuf::from).collect();
+                Ok(Column { label: label.to_owned(), folders })
+            }
+            _ => Err("write LABEL@FOLDER, and of several shards LABEL@FOLDER,FOLDER".to_owned()),
+        }
+    }
 }
 
 #[derive(Args)]
@@ -52,6 +80,9 @@ pub(crate) struct DrawsArguments {
     /// Sensor noise of all records, 1 is as specified.
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
+    /// Divides all amplitudes, counted from the baseline: 100 brings most near their limits.
+    #[arg(long, default_value_t = 1.0)]
+    weaker: f64,
     /// Part of the study, as 0/4: draws whose number leaves this remainder.
     #[arg(long, default_value_t = Shard::WHOLE)]
     pub(crate) shard: Shard,
@@ -59,8 +90,8 @@ pub(crate) struct DrawsArguments {
 
 impl DrawsArguments {
     pub(crate) fn shape(&self) -> Shape {
-        let Self { each, nulls, parameters, pairs, triples, noise, .. } = *self;
-        Shape { each, nulls, parameters, pairs, triples, noise_factor: noise }
+        let Self { each, nulls, parameters, pairs, triples, noise, weaker, .. } = *self;
+        Shape { each, nulls, parameters, pairs, triples, noise_factor: noise, weaker_factor: weaker }
     }
 }
 
@@ -101,6 +132,9 @@ pub(crate) struct RunArguments {
     /// What the results are called.
     #[arg(long, default_value = "program")]
     pub(crate) label: String,
+    /// Leaves the hidden effect and its class out: --without NAME for each; only draws of one effect are run.
+    #[arg(long)]
+    pub(crate) leave_out: bool,
     /// Longest time for one draw, s.
     #[arg(long, default_value_t = 600.0)]
     pub(crate) time_limit: f64,
@@ -132,4 +166,30 @@ pub(crate) struct ScoreArguments {
     /// Where the score is written; the first folder without it.
     #[arg(long)]
     pub(crate) to: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct CompareArguments {
+    /// LABEL@FOLDER for each program; of several shards LABEL@FOLDER,FOLDER.
+    #[arg(required = true)]
+    pub(crate) columns: Vec<Column>,
+    /// Where the tables are written; without it they are printed.
+    #[arg(long)]
+    pub(crate) to: Option<PathBuf>,
+    /// Writes the tables into tests/docs/study.md.
+    #[arg(long)]
+    pub(crate) write: bool,
+}
+
+#[derive(Args)]
+pub(crate) struct CurveArguments {
+    /// LABEL@FOLDER for each noise factor; of several shards LABEL@FOLDER,FOLDER.
+    #[arg(required = true)]
+    pub(crate) columns: Vec<Column>,
+    /// Folder for curve-LABEL.md and curve-LABEL.svg.
+    #[arg(long)]
+    pub(crate) to: PathBuf,
+    /// Writes the tables into tests/docs/study.md, and the picture beside it.
+    #[arg(long)]
+    pub(crate) write: bool,
 }

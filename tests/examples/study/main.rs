@@ -1,9 +1,10 @@
-//! The study's commands, for `scripts/study`: draws, limits, cosines, run, score.
+//! The study's commands, for `scripts/study`: draws, limits, cosines, run, score, compare, curve.
 
 mod cli;
+mod scores;
 
 use clap::Parser;
-use cli::{Cli, Command, CosinesArguments, DrawsArguments, LimitsArguments, RunArguments, ScoreArguments};
+use cli::{Cli, Command, CosinesArguments, DrawsArguments, LimitsArguments, RunArguments};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -12,12 +13,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use system_tests::study::campaign::{Campaign, CampaignEnd, make_record};
-use system_tests::study::classes::{Classes, DrawClasses};
+use system_tests::study::classes::{Classes, DrawClasses, read_draw};
+use system_tests::study::draws::{Draw, Kind};
 use system_tests::study::folder::{Plan, Study, read, write_whole};
-use system_tests::study::limits::Limits;
+use system_tests::study::leave_out::left_out;
 use system_tests::study::program::Program;
-use system_tests::study::score::{Known, score};
-use system_tests::study::{compute, document, page};
+use system_tests::study::{compute, document};
 
 /// Exit code of a study that was told to stop: everything that is done is kept.
 const INTERRUPTED: u8 = 130;
@@ -38,7 +39,9 @@ fn main() -> ExitCode {
         Command::Limits(arguments) => limits(&arguments),
         Command::Cosines(arguments) => cosines(&arguments, &stop),
         Command::Run(arguments) => run(&arguments, &stop),
-        Command::Score(arguments) => scored(&arguments),
+        Command::Score(arguments) => scores::score(&arguments),
+        Command::Compare(arguments) => scores::compare(&arguments),
+        Command::Curve(arguments) => scores::curve(&arguments),
     };
     match done {
         Ok(()) if stop.load(Ordering::Relaxed) => ExitCode::from(INTERRUPTED),
@@ -64,6 +67,7 @@ fn committed(name: &str) -> PathBuf {
 const PAGE: &str = "docs/study.md";
 const LIMITS: &str = "study/limits.json";
 const CLASSES: &str = "study/classes.json";
+const EXPECTED: &str = "study/outside-expected.json";
 
 fn draws(arguments: &DrawsArguments) -> Done {
     let plan = Plan { shard: arguments.shard, ..Plan::new(arguments.seed, arguments.shape()) };
@@ -106,11 +110,14 @@ fn run(arguments: &RunArguments, stop: &AtomicBool) -> Done {
         ),
         None => None,
     };
+    let classes = if arguments.leave_out { classes_for(&study)? } else { BTreeMap::new() };
+    let without = |draw: &Draw| left_out(draw, classes.get(&draw.number));
     let campaign = Campaign {
         study: &study,
         program: program.as_ref(),
         label: &arguments.label,
         make: &make_record,
+        without: if arguments.leave_out { Some(&without) } else { None },
         only: &arguments.only,
         jobs: arguments.jobs,
         keep_truth: arguments.keep_truth,
@@ -128,33 +135,29 @@ fn run(arguments: &RunArguments, stop: &AtomicBool) -> Done {
     Ok(())
 }
 
-fn scored(arguments: &ScoreArguments) -> Done {
-    let limits: Option<Limits> = read_if_there(&committed(LIMITS))?;
-    let known = known_classes(&arguments.folders)?;
-    let score = score(
-        &arguments.folders,
-        &arguments.label,
-        Known { limits: limits.as_ref(), classes: known.as_ref() },
-    )?;
-    let folder = arguments.to.as_ref().unwrap_or(&arguments.folders[0]);
-    let path = |extension: &str| folder.join(format!("score-{}.{extension}", arguments.label));
-    write_whole(&path("json"), format!("{:#}\n", serde_json::json!(score)).as_bytes())?;
-    write_whole(&path("html"), page::page(&score).as_bytes())?;
-    for line in &score.tables.headline {
-        let rate = &line.rate;
-        say(&format!("{}: {} of {} (wanted: {})", line.name, rate.count, rate.of, line.wanted));
+/// All classes that are known of a study: committed, or computed for it.
+fn classes_for(study: &Study) -> Result<BTreeMap<usize, DrawClasses>, Box<dyn Error>> {
+    let mut classes = known_classes(&study.draws)?;
+    for number in study.draws.iter().map(|draw| draw.number) {
+        let path = study.class(number);
+        if !classes.contains_key(&number) && path.exists() {
+            classes.insert(number, read_draw(&path, number)?);
+        }
     }
-    say(&path("html").display().to_string());
-    Ok(())
+    let single = || study.draws.iter().filter(|draw| draw.kind == Kind::Single);
+    let unknown = single().filter(|draw| !classes.contains_key(&draw.number)).count();
+    if unknown > 0 {
+        say(&format!(
+            "of {unknown} draws the classes are not known: there only the effect itself is left out"
+        ));
+    }
+    Ok(classes)
 }
 
-/// The committed classes, when they are those of the same study.
-fn known_classes(folders: &[PathBuf]) -> Result<Option<BTreeMap<usize, DrawClasses>>, Box<dyn Error>> {
-    let Some(classes) = read_if_there::<Classes>(&committed(CLASSES))? else { return Ok(None) };
-    let Some(folder) = folders.first() else { return Ok(None) };
-    let plan = Study::open(folder)?.plan;
-    let same = (plan.seed, plan.shape) == (classes.plan.seed, classes.plan.shape);
-    Ok(same.then(|| classes.draws.into_iter().map(|draw| (draw.number, draw)).collect()))
+/// The committed classes of these draws, by their numbers.
+fn known_classes(draws: &[Draw]) -> Result<BTreeMap<usize, DrawClasses>, Box<dyn Error>> {
+    let classes = read_if_there::<Classes>(&committed(CLASSES))?;
+    Ok(classes.map_or_else(BTreeMap::new, |classes| classes.of_draws(draws)))
 }
 
 fn read_if_there<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, Box<dyn Error>> {

@@ -6,8 +6,9 @@
 
 use crate::record_maker::{Experiment, Recipe};
 use crate::study::SCHEMA_VERSION;
-use crate::study::draws::Draw;
+use crate::study::draws::{Draw, Kind};
 use crate::study::folder::{FolderError, Study, make_whole, read};
+use crate::study::leave_out;
 use crate::study::program::{Identity, Interrupted, Program, Taken};
 use discrepancy::records::{self, ReadError, ReadOptions, Unknown};
 use plant::RigParameters;
@@ -35,6 +36,9 @@ const MOST_SAID: u64 = 1 << 20;
 /// Makes a record: measurement into the first folder, truth into the second; says why it cannot.
 pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
 
+/// Effects that a program has to do without on a draw.
+pub type Without<'a> = &'a (dyn Fn(&Draw) -> Vec<String> + Sync);
+
 /// Makes a record with the record maker.
 ///
 /// # Errors
@@ -58,6 +62,8 @@ pub struct Campaign<'a> {
     pub label: &'a str,
     /// Makes records.
     pub make: Make<'a>,
+    /// What is left out of the program's catalogue; then only draws of one effect are run.
+    pub without: Option<Without<'a>>,
     /// Numbers of draws that are run again; nothing: all that are missing.
     pub only: &'a [usize],
     /// Draws that run at once.
@@ -137,6 +143,9 @@ pub struct RunResult {
     pub program: Identity,
     /// How it ended, time, memory.
     pub taken: Taken,
+    /// Effects that were left out of its catalogue; absent in a file when none was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<String>,
 }
 
 impl Campaign<'_> {
@@ -149,9 +158,9 @@ impl Campaign<'_> {
         let wanted = |draw: &&Draw| {
             if self.only.is_empty() { !self.is_done(draw) } else { self.only.contains(&draw.number) }
         };
-        let missing: Vec<&Draw> = self.study.draws.iter().filter(wanted).collect();
+        let missing: Vec<&Draw> = self.draws().filter(wanted).collect();
         self.check_program()?;
-        let (all, began) = (self.study.draws.len(), Instant::now());
+        let (all, began) = (self.draws().count(), Instant::now());
         (self.say)(&format!("{} of {all} draws are to be done, {} at once", missing.len(), self.jobs));
         let queue = Mutex::new(missing.iter());
         let finished = Mutex::new(0);
@@ -197,6 +206,15 @@ impl Campaign<'_> {
         }
     }
 
+    /// The draws that this campaign is about.
+    fn draws(&self) -> impl Iterator<Item = &Draw> {
+        self.study.draws.iter().filter(|draw| self.without.is_none() || draw.kind == Kind::Single)
+    }
+
+    fn identity(&self, program: &Program) -> Identity {
+        Identity { leave_out: self.without.is_some(), ..program.identity().clone() }
+    }
+
     fn is_done(&self, draw: &Draw) -> bool {
         match self.program {
             Some(_) => self.study.run(self.label, draw.number).exists(),
@@ -207,14 +225,15 @@ impl Campaign<'_> {
     /// Results of another program under the same label are never mixed with its own.
     fn check_program(&self) -> Result<(), CampaignError> {
         let Some(program) = self.program else { return Ok(()) };
+        let identity = self.identity(program);
+        // Of all kinds: a label may hold what another mode would not run.
         for draw in self.study.draws.iter().filter(|draw| self.is_done(draw)) {
             let path = self.study.run(self.label, draw.number).join("result.json");
             let result = read_result(&path)?;
-            if result.program != *program.identity() {
+            if result.program != identity {
                 let what = format!(
-                    "is of another program ({:?}) than this one ({:?}): give another --label",
-                    result.program,
-                    program.identity()
+                    "is of another program ({:?}) than this one ({identity:?}): give another --label",
+                    result.program
                 );
                 return Err(FolderError::content(&path, what).into());
             }
@@ -301,7 +320,9 @@ impl Campaign<'_> {
             fs::copy(record, empty.path().join(copy)).map_err(files)?;
         }
         let said = folder.join("stderr.txt");
-        let taken = match program.run(empty.path(), File::create(&said).map_err(files)?, self.stop) {
+        let without = self.without.map_or_else(Vec::new, |without| without(draw));
+        let own = leave_out::arguments(&without);
+        let taken = match program.run(empty.path(), &own, File::create(&said).map_err(files)?, self.stop) {
             Ok(taken) => taken,
             Err(Interrupted) => return Ok(None),
         };
@@ -318,8 +339,8 @@ impl Campaign<'_> {
         if fs::metadata(&report).is_ok_and(|report| report.is_file() && report.len() <= LARGEST_REPORT) {
             fs::copy(&report, folder.join("report.json")).map_err(files)?;
         }
-        let result =
-            RunResult { schema_version: SCHEMA_VERSION, number, program: program.identity().clone(), taken };
+        let program = self.identity(program);
+        let result = RunResult { schema_version: SCHEMA_VERSION, number, program, taken, without };
         fs::write(folder.join("result.json"), format!("{:#}\n", json!(result))).map_err(files)?;
         Ok(Some(taken))
     }

@@ -12,7 +12,7 @@
 //! Parameters of the baseline are compared too, by 5 %. A wrong parameter is no missing effect, so such a twin is told but is not
 //! in the class.
 
-use crate::record_maker::PARAMETERS;
+use crate::record_maker::{PARAMETERS, Recipe};
 use crate::study::SCHEMA_VERSION;
 use crate::study::course::Course;
 use crate::study::draws::{Draw, axis_of};
@@ -23,6 +23,7 @@ use plant::effects::SHEETS;
 use plant::effects::sheet::{Place, Sheet};
 use plant::{ParameterError, RigParameters};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Cosine above which two effects count as one class.
@@ -80,6 +81,27 @@ pub struct Classes {
     pub plan: Plan,
     /// One for each draw that hides something.
     pub draws: Vec<DrawClasses>,
+}
+
+impl Classes {
+    /// Those of these draws, by their numbers there: the same draw has another number in a study of another shape.
+    ///
+    /// Noise of another size scales all signatures alike, but for the rounding of the sensors: the classes stay, and a strength
+    /// is the one at the noise of this study, as the committed limits are.
+    #[must_use]
+    pub fn of_draws(&self, draws: &[Draw]) -> BTreeMap<usize, DrawClasses> {
+        let own = self.plan.draws();
+        let recipe_of = |number: usize| own.get(number).map(|draw| &draw.recipe);
+        let by_seed: BTreeMap<u64, &DrawClasses> =
+            self.draws.iter().filter_map(|own| Some((recipe_of(own.number)?.seed, own))).collect();
+        let of_draw = |draw: &Draw| {
+            let known = *by_seed.get(&draw.recipe.seed)?;
+            let recipe = recipe_of(known.number)?;
+            let same = *recipe == Recipe { noise: recipe.noise, ..draw.recipe.clone() };
+            same.then(|| (draw.number, DrawClasses { number: draw.number, ..known.clone() }))
+        };
+        draws.iter().filter_map(of_draw).collect()
+    }
 }
 
 /// The classes of a draw in its train record.
@@ -220,6 +242,32 @@ mod tests {
                 assert_ne!(own.unwrap(), rig, "{name}");
             }
         }
+    }
+
+    #[test]
+    fn the_committed_classes_are_found_by_the_draw_and_not_by_its_number() {
+        use crate::study::draws::Shape;
+        let text = include_str!("../../study/classes.json");
+        let classes: Classes = serde_json::from_str(text).unwrap();
+        let of = |seed, shape| classes.of_draws(&Plan::new(seed, shape).draws());
+        // Fewer of each effect, more of others, other noise: all single draws are still those of the committed study.
+        let shape = Shape {
+            each: 2,
+            nulls: 3,
+            parameters: 1,
+            pairs: 2,
+            triples: 1,
+            noise_factor: 4.0,
+            weaker_factor: 1.0,
+        };
+        let found = of(1, shape);
+        assert_eq!(found.keys().copied().collect::<Vec<_>>(), (0..2 * SHEETS.len()).collect::<Vec<_>>());
+        for (number, own) in &found {
+            assert_eq!(own.number, *number);
+            assert_eq!(own.hidden[0].effect, SHEETS[number / 2].name);
+        }
+        assert_eq!(found[&3].hidden, classes.draws[7].hidden);
+        assert!(of(5, shape).is_empty());
     }
 
     #[test]

@@ -8,11 +8,13 @@
 //! - Place: any of the effect's kind. The record is of the axis it is at; of both, linked, for what needs two.
 //! - A fifth has a functional form that is not the catalogue's, a half 1 to 3 parameters of the baseline off by 1 to 3 %, a third
 //!   coloured noise and jitter: each drawn by itself.
+//! - A study near the limits divides all amplitudes by a factor, the draws staying the same ones: what is drawn lies far above them.
 //! - A case of wrong parameters alone has one that is off by 3 to 15 % and none of the other difficulties in the baseline.
 //!
 //! Source: issue 5 and effects.md, Blind protocol of discrepancy-notes.md.
 
 use crate::record_maker::{Experiment, Hidden, PARAMETERS, Recipe};
+use crate::study::limits::Scale;
 use plant::Axis;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Part, Place, PlaceKind, Sheet};
@@ -42,11 +44,31 @@ pub struct Shape {
     pub triples: u32,
     /// Noise of all records; 1 is as specified.
     pub noise_factor: f64,
+    /// What the amplitudes of the drawn range are divided by, counted from the baseline; absent in a file when it is 1.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub weaker_factor: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_one(factor: &f64) -> bool {
+    *factor == one()
 }
 
 impl Default for Shape {
     fn default() -> Self {
-        Shape { each: 6, nulls: 100, parameters: 6, pairs: 60, triples: 20, noise_factor: 1.0 }
+        Shape {
+            each: 6,
+            nulls: 100,
+            parameters: 6,
+            pairs: 60,
+            triples: 20,
+            noise_factor: 1.0,
+            weaker_factor: 1.0,
+        }
     }
 }
 
@@ -158,10 +180,25 @@ pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
     drawn.extend(more(Kind::Pair, 3000, shape.pairs, &|generator| generator.several(2)));
     drawn.extend(more(Kind::Triple, 4000, shape.triples, &|generator| generator.several(3)));
     let finish = |(number, (kind, recipe))| {
-        let recipe = Recipe { noise: shape.noise_factor, ..recipe };
+        let mut recipe = Recipe { noise: shape.noise_factor, ..recipe };
+        if !is_one(&shape.weaker_factor) {
+            recipe.hidden.iter_mut().for_each(|hidden| weaken(hidden, shape.weaker_factor));
+        }
         Draw { number, kind, recipe }
     };
     drawn.into_iter().enumerate().map(finish).collect()
+}
+
+/// Brings an amplitude nearer to the baseline; one that no number of is the baseline stays.
+fn weaken(hidden: &mut Hidden, factor: f64) {
+    let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
+    let (key, amplitude) = (&sheet.keys[0], hidden.numbers[0]);
+    let scales = Scale::of(key);
+    let excursion = scales.iter().find_map(|scale| Some((scale, scale.excursion(amplitude)?)));
+    if let Some((scale, excursion)) = excursion {
+        let sign = if key.signed { amplitude.signum() } else { 1.0 };
+        hidden.numbers[0] = sign * scale.value(excursion / factor).clamp(key.min.max(0.0), key.max);
+    }
 }
 
 /// Whether an effect is seen only where the axes are linked, or both draw air.
@@ -312,7 +349,7 @@ mod tests {
     use super::*;
 
     fn many() -> Vec<Draw> {
-        draws(3, &Shape { each: 60, nulls: 200, parameters: 20, pairs: 100, triples: 50, noise_factor: 1.0 })
+        draws(3, &Shape { each: 60, nulls: 200, parameters: 20, pairs: 100, triples: 50, ..Shape::default() })
     }
 
     #[test]
@@ -329,6 +366,34 @@ mod tests {
         };
         let large = recipes(7);
         assert!(recipes(3).iter().all(|small| large.contains(small)));
+    }
+
+    #[test]
+    fn a_weaker_study_has_the_same_draws_nearer_to_the_baseline() {
+        let whole = Shape { each: 4, nulls: 1, parameters: 0, pairs: 2, triples: 0, ..Shape::default() };
+        let weak = Shape { weaker_factor: 30.0, ..whole };
+        for (strong, weak) in draws(3, &whole).iter().zip(draws(3, &weak)) {
+            for (own, other) in strong.recipe.hidden.iter().zip(&weak.recipe.hidden) {
+                let key = &plant::effects::sheet(own.name).unwrap().keys[0];
+                let excursion = |value| Scale::of(key).iter().find_map(|scale| scale.excursion(value));
+                let [strong, weak] = [own, other].map(|hidden| excursion(hidden.numbers[0]));
+                // A file takes no spool that is faster than its largest number: there it stays.
+                let held = [key.min, key.max].contains(&other.numbers[0].abs());
+                let ratio = strong.zip(weak).map(|(strong, weak)| strong / weak);
+                assert!(
+                    ratio.is_none_or(|ratio| held || (ratio - 30.0).abs() < 1e-9),
+                    "{}: {ratio:?}",
+                    own.name
+                );
+                assert_eq!(own.numbers[0].is_sign_positive(), other.numbers[0].is_sign_positive());
+                assert_eq!(own.numbers[1..], other.numbers[1..]);
+            }
+            let hidden = strong.recipe.hidden.clone();
+            assert_eq!(strong.recipe, Recipe { hidden, ..weak.recipe });
+        }
+        // What was begun before there were weaker ones is still read.
+        assert!(!serde_json::to_string(&whole).unwrap().contains("weaker"));
+        assert_eq!(serde_json::from_str::<Shape>(&serde_json::to_string(&whole).unwrap()).unwrap(), whole);
     }
 
     #[test]

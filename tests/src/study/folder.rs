@@ -256,7 +256,15 @@ fn beside(path: &Path) -> PathBuf {
 mod tests {
     use super::*;
 
-    const SHAPE: Shape = Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, noise_factor: 1.0 };
+    const SHAPE: Shape = Shape {
+        each: 1,
+        nulls: 2,
+        parameters: 1,
+        pairs: 1,
+        triples: 1,
+        noise_factor: 1.0,
+        weaker_factor: 1.0,
+    };
 
     #[test]
     fn a_study_opens_as_it_was_begun_and_no_other_begins_in_its_folder() {

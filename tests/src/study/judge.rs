@@ -44,6 +44,10 @@ pub struct Judgement {
     pub parameter_right: bool,
     /// Share of the gap that the program claims to have closed, the worst signal.
     pub claimed_closed_ratio: Option<f64>,
+    /// The same of all signals together, each in units of its noise.
+    pub claimed_joint_ratio: Option<f64>,
+    /// Whether the program claims that its model leaves no more on the held-out record than nothing missing would.
+    pub claimed_white: Option<bool>,
 }
 
 /// What became of one hidden effect.
@@ -130,6 +134,8 @@ pub fn judge(
             && !missing
             && good.is_some_and(|report| reported(report, draw)),
         claimed_closed_ratio: good.and_then(Report::claimed_closed),
+        claimed_joint_ratio: good.and_then(Report::claimed_joint),
+        claimed_white: good.and_then(Report::claimed_white),
     }
 }
 

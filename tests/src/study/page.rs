@@ -10,20 +10,29 @@ use bench::page_style::{document, escaped};
 use plant::effects::SHEETS;
 use std::fmt::Write;
 
+mod leave_out;
+
 /// The page.
 #[must_use]
 pub fn page(score: &Score) -> String {
     let title = format!("Study of {}: {}", score.program.name, score.label);
-    let sections = [
+    let mut sections = vec![
         ("headline", "What the targets are about", headline(score)),
         ("confusion", "Hidden against named", confusion(score)),
-        ("nothing", "Nothing hidden", nothing_hidden(score)),
-        ("splits", "Over amplitude and difficulties", splits("part", &score.tables.splits)),
-        ("effects", "Effect by effect", splits("effect", &score.tables.effects)),
+    ];
+    match &score.leave_out {
+        Some(tables) => sections.extend(leave_out::sections(score, tables)),
+        None => sections.extend([
+            ("nothing", "Nothing hidden", nothing_hidden(score)),
+            ("splits", "Over amplitude and difficulties", splits("part", &score.tables.splits)),
+            ("effects", "Effect by effect", splits("effect", &score.tables.effects)),
+        ]),
+    }
+    sections.extend([
         ("numbers", "Numbers, gap, time", numbers(score)),
         ("errors", "Without a good report", errors(score)),
         ("cases", "All cases", cases(score)),
-    ];
+    ]);
     let contents: String = sections
         .iter()
         .map(|(name, title, _)| format!("<li><a href=\"#{name}\">{title}</a></li>\n"))
@@ -56,10 +65,15 @@ fn lead(score: &Score) -> String {
             " The classes of {count} draws are not known: there an effect counts as alone in its class."
         ),
     };
+    let left_out = if score.leave_out.is_some() {
+        " The hidden effect of each case, and its class, were left out of the program's catalogue; only draws of one effect."
+    } else {
+        ""
+    };
     format!(
         "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, {} of each wrong parameter, \
-         {} pairs, {} triples; seed {}, noise times {}, {} shard(s). Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; \
-         'at most' is the exact one-sided bound, 95 %.{classes}",
+         {} pairs, {} triples; seed {}, noise times {}, amplitudes over {}, {} shard(s). Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; \
+         'at most' is the exact one-sided bound, 95 %.{left_out}{classes}",
         score.cases.len(),
         shape.each,
         SHEETS.len(),
@@ -69,6 +83,7 @@ fn lead(score: &Score) -> String {
         shape.triples,
         score.seed,
         shape.noise_factor,
+        shape.weaker_factor,
         score.shards,
         score.program.name,
         score.program.crc32,
@@ -203,6 +218,7 @@ fn numbers(score: &Score) -> String {
         spread("amplitude off by, of itself", &numbers.off_ratio, 100.0, "%"),
         spread("its standard error, of itself", &numbers.error_ratio, 100.0, "%"),
         spread("gap to the floor closed, <em>claimed</em>", &score.tables.claimed_closed_ratio, 100.0, "%"),
+        spread("the same, all signals together", &score.tables.claimed_joint_ratio, 100.0, "%"),
         spread("wall time", &score.tables.wall_s, 1.0, "s"),
         spread("memory", &score.tables.memory_mib, 1.0, "MiB"),
     ];

@@ -3,8 +3,10 @@
 //! The program runs in a process group of its own in a folder that holds nothing but `rig.toml`, `train.csv` and `test.csv`:
 //!
 //! ```text
-//! PROGRAM close --rig rig.toml --train train.csv --test test.csv --out out [ARGUMENTS]
+//! PROGRAM close --rig rig.toml --train train.csv --test test.csv --out out [ARGUMENTS] [--without EFFECT ...]
 //! ```
+//!
+//! The last ones stand there when effects are left out of its catalogue ([`super::leave_out`]).
 //!
 //! When it has ended, or has used up its time, what is left of the group is killed. Memory is the kernel's largest resident set
 //! of the program and of the children it waited for; the kernel starts counting at what the study itself had at the time.
@@ -47,6 +49,9 @@ pub struct Identity {
     pub crc32: u32,
     /// More arguments it got.
     pub arguments: Vec<String>,
+    /// Whether it had to do without what was hidden; absent in a file when it had not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub leave_out: bool,
 }
 
 /// How a program ended.
@@ -87,7 +92,7 @@ impl Program {
         let path = path.canonicalize()?;
         let crc32 = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&fs::read(&path)?);
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let identity = Identity { name, crc32, arguments: arguments.clone() };
+        let identity = Identity { name, crc32, arguments: arguments.clone(), leave_out: false };
         Ok(Program { path, arguments, limit, identity })
     }
 
@@ -97,11 +102,17 @@ impl Program {
         &self.identity
     }
 
-    /// Runs it in a folder; what it says goes to a file.
+    /// Runs it in a folder, with arguments for this draw alone; what it says goes to a file.
     ///
     /// # Errors
     /// [`Interrupted`] when `stop` is set before it has ended.
-    pub fn run(&self, folder: &Path, said: File, stop: &AtomicBool) -> Result<Taken, Interrupted> {
+    pub fn run(
+        &self,
+        folder: &Path,
+        own: &[String],
+        said: File,
+        stop: &AtomicBool,
+    ) -> Result<Taken, Interrupted> {
         let began = Instant::now();
         let taken = |ended, memory_kib| Taken { ended, wall_s: began.elapsed().as_secs_f64(), memory_kib };
         let started = Command::new(&self.path)
@@ -117,6 +128,7 @@ impl Program {
                 "out",
             ])
             .args(&self.arguments)
+            .args(own)
             .current_dir(folder)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -175,7 +187,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let program = script(folder.path(), text, limit);
         let said = File::create(folder.path().join("said")).unwrap();
-        program.run(folder.path(), said, &AtomicBool::new(stop))
+        program.run(folder.path(), &[], said, &AtomicBool::new(stop))
     }
 
     const PATIENCE: Duration = Duration::from_secs(60);

@@ -41,6 +41,10 @@ pub struct Report {
     pub parameters: Vec<Parameter>,
     /// The gap to the measurement, for each signal.
     pub gap: BTreeMap<String, Gap>,
+    /// What is missing that the catalogue does not have.
+    pub outside: Option<Outside>,
+    /// What the program says of its model on the held-out record.
+    pub verification: Option<Verification>,
 }
 
 /// An effect at a place.
@@ -73,9 +77,54 @@ pub struct Parameter {
 /// The gap of one signal; all in one unit, which is the program's choice.
 #[derive(Debug, Clone, Copy, Deserialize)]
 pub struct Gap {
+    /// Of the baseline.
+    #[serde(rename = "before")]
+    pub before_value: Option<f64>,
+    /// Of the extended model.
+    #[serde(rename = "after")]
+    pub after_value: Option<f64>,
+    /// Of the sensor's noise.
+    #[serde(rename = "floor")]
+    pub floor_value: Option<f64>,
     /// Share of the gap to the noise floor that was closed, as the program claims.
     #[serde(rename = "closed")]
     pub closed_ratio: Option<f64>,
+}
+
+/// A disagreement that the catalogue does not explain.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Outside {
+    /// As `drive.flow-a`, or `linkage`.
+    pub balance: String,
+    /// What it depends on, the strongest first.
+    #[serde(default)]
+    pub variables: Vec<Dependence>,
+    /// A short formula, if one fits.
+    pub formula: Option<String>,
+}
+
+/// How a disagreement depends on a variable.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Dependence {
+    /// Its name, as in `outside-expected.json`.
+    pub variable: String,
+    /// Share of the variance that it explains.
+    #[serde(rename = "r2")]
+    pub r2_ratio: f64,
+    /// Significance.
+    #[serde(rename = "p_value")]
+    pub p_value_ratio: f64,
+}
+
+/// What a program says of its model on the held-out record.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Verification {
+    /// Windowed chi2 per degree of freedom of the extended model.
+    #[serde(rename = "chi2_after")]
+    pub chi2_after_ratio: f64,
+    /// 95 % range of the same when nothing is missing.
+    #[serde(rename = "chi2_null")]
+    pub chi2_null_ratio: [f64; 2],
 }
 
 #[derive(Deserialize)]
@@ -87,6 +136,8 @@ struct RawReport {
     parameters: Vec<Parameter>,
     #[serde(default)]
     gap: Option<BTreeMap<String, Gap>>,
+    outside: Option<Outside>,
+    verification: Option<Verification>,
 }
 
 #[derive(Deserialize)]
@@ -135,7 +186,8 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
         return Err("verdict ParametersOnly without a parameter".to_owned());
     }
     let gap = raw.gap.unwrap_or_default();
-    Ok(Report { verdict: raw.verdict, named, parameters: raw.parameters, gap })
+    let RawReport { verdict, parameters, outside, verification, .. } = raw;
+    Ok(Report { verdict, named, parameters, gap, outside, verification })
 }
 
 fn known(raw: RawNamed) -> Result<Named, String> {
@@ -155,6 +207,32 @@ impl Report {
     #[must_use]
     pub fn claimed_closed(&self) -> Option<f64> {
         self.gap.values().filter_map(|gap| gap.closed_ratio).reduce(f64::min)
+    }
+
+    /// Share of the gap that went, all signals together, each in units of its noise: one that was hardly off counts for little.
+    ///
+    /// ```text
+    /// 1 - sum(after^2 / floor^2 - 1) / sum(before^2 / floor^2 - 1)
+    /// ```
+    ///
+    /// `None` when no signal has all three, or there was no gap.
+    #[must_use]
+    pub fn claimed_joint(&self) -> Option<f64> {
+        let mut excess = [0.0, 0.0];
+        for gap in self.gap.values() {
+            let Some(floor) = gap.floor_value.filter(|floor| *floor > 0.0) else { continue };
+            let Some(values) = gap.before_value.zip(gap.after_value) else { continue };
+            excess[0] += (values.0 / floor).powi(2) - 1.0;
+            excess[1] += (values.1 / floor).powi(2) - 1.0;
+        }
+        (excess[0] > 0.0).then(|| 1.0 - excess[1] / excess[0])
+    }
+
+    /// Whether the program claims that its model leaves no more on the held-out record than nothing missing would.
+    #[must_use]
+    pub fn claimed_white(&self) -> Option<bool> {
+        let Verification { chi2_after_ratio, chi2_null_ratio: [low, high] } = self.verification?;
+        Some((low..=high).contains(&chi2_after_ratio))
     }
 }
 
@@ -213,9 +291,31 @@ mod tests {
     }
 
     #[test]
-    fn the_claim_is_the_worst_signal() {
+    fn what_is_outside_the_catalogue_is_read_with_its_variables_in_order() {
+        let text = r#"{"schema_version": 1, "verdict": "outside-catalogue", "outside": {"balance": "load.force", "variables":
+            [{"variable": "x", "r2": 0.8, "p_value": 0.005}, {"variable": "sign(v)", "r2": 0.1, "p_value": 0.2}],
+            "curve": {"at": []}, "formula": null}, "verification": {"chi2_after": 1.2, "chi2_null": [0.9, 1.1]}}"#;
+        let report = parse(text.as_bytes()).unwrap();
+        assert_eq!(report.claimed_white(), Some(false));
+        let outside = report.outside.unwrap();
+        assert_eq!(
+            (outside.balance.as_str(), outside.variables[1].variable.as_str()),
+            ("load.force", "sign(v)")
+        );
+        let bad = text.replace("\"balance\": \"load.force\",", "");
+        assert!(parse(bad.as_bytes()).unwrap_err().contains("balance"));
+        assert!(parse(br#"{"verdict": "nothing-missing", "outside": null}"#).unwrap().outside.is_none());
+    }
+
+    #[test]
+    fn the_claim_is_the_worst_signal_or_all_of_them_together() {
         let text = r#"{"verdict": "nothing-missing", "gap": {"p": {"before": 3, "after": 1, "floor": 1, "closed": 1.0},
             "x": {"before": 2, "after": 1.5, "floor": 1, "closed": 0.5}, "f": {"closed": null}}}"#;
         assert_eq!(parse(text.as_bytes()).unwrap().claimed_closed(), Some(0.5));
+        // 9 - 1 and 4 - 1 before, nothing and 2.25 - 1 after; the force tells no numbers.
+        let together = parse(text.as_bytes()).unwrap().claimed_joint().unwrap();
+        assert!((together - (1.0 - 1.25 / 11.0)).abs() < 1e-12, "{together}");
+        let none = r#"{"verdict": "nothing-missing", "gap": {"f": {"closed": 1}}}"#;
+        assert_eq!(parse(none.as_bytes()).unwrap().claimed_joint(), None);
     }
 }

@@ -5,6 +5,7 @@ use crate::study::classes::{DrawClasses, Member, read_draw};
 use crate::study::draws::{Draw, Kind, Shape, Shard};
 use crate::study::folder::{FolderError, Study, draw_as_json};
 use crate::study::judge::{Judgement, judge};
+use crate::study::leave_out::{self, Expectations, LeftOut};
 use crate::study::limits::Limits;
 use crate::study::program::Identity;
 use crate::study::report;
@@ -37,8 +38,11 @@ pub struct Score {
     pub shards: u32,
     /// Draws whose classes are not known: there an effect is alone in its class.
     pub without_classes: usize,
-    /// What the cases say together.
+    /// What the cases say together; with effects left out, only what makes sense then.
     pub tables: Tables,
+    /// What they say when the hidden effects were left out of the program's catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leave_out: Option<leave_out::Tables>,
     /// The cases.
     pub cases: Vec<Case>,
 }
@@ -64,6 +68,9 @@ pub struct Case {
     pub coloured_noise: bool,
     /// What it came to.
     pub judgement: Judgement,
+    /// What it came to when the hidden effect was left out of the program's catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<LeftOut>,
     /// Wall time of the program, s.
     pub wall_s: f64,
     /// Largest resident set of the program, KiB.
@@ -129,6 +136,9 @@ pub enum ScoreError {
         /// That of the first draw.
         program: Box<Identity>,
     },
+    /// Effects were left out, and what must show then is not known.
+    #[error("effects were left out of the program's catalogue: tests/study/outside-expected.json is wanted")]
+    NoExpectations,
 }
 
 /// What a score is made with besides the results.
@@ -138,6 +148,8 @@ pub struct Known<'a> {
     pub limits: Option<&'a Limits>,
     /// Classes that are known beforehand, by the number of the draw.
     pub classes: Option<&'a BTreeMap<usize, DrawClasses>>,
+    /// What must show of effects that are left out.
+    pub expectations: Option<&'a Expectations>,
 }
 
 /// Scores a study, given as a whole or as all of its shards.
@@ -150,9 +162,10 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
     let mut cases = Vec::new();
     let mut program: Option<Identity> = None;
     let mut without_classes = 0;
+    let leave_out = leaves_out(&studies, label)?;
     for study in &studies {
-        check_complete(study, label)?;
-        for draw in &study.draws {
+        check_complete(study, label, leave_out)?;
+        for draw in wanted(study, leave_out) {
             let folder = study.run(label, draw.number);
             let result = read_result(&folder.join("result.json"))?;
             let own = program.get_or_insert_with(|| result.program.clone());
@@ -163,11 +176,26 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
             let classes = classes_of(study, draw, known)?;
             without_classes += usize::from(classes.is_none() && !draw.recipe.hidden.is_empty());
             let report = report::read(&folder.join("report.json"));
-            cases.push(case(study, draw, &result, &report, classes.as_ref(), known.limits));
+            let mut case = case(study, draw, &result, &report, classes.as_ref(), known.limits);
+            if leave_out {
+                let expectations = known.expectations.ok_or(ScoreError::NoExpectations)?;
+                let good = report.as_ref().ok().filter(|_| case.judgement.error.is_none());
+                case.left_out = Some(leave_out::judge(draw, &result.without, expectations, good));
+                case.repeat.push_str(" --leave-out");
+            }
+            cases.push(case);
         }
     }
     cases.sort_by_key(|case| case.number);
     let (Some(first), Some(program)) = (studies.first(), program) else { return Err(ScoreError::Nothing) };
+    let mut tables = Tables::of(&cases);
+    if leave_out {
+        // Nobody names what is not in the catalogue.
+        tables.headline = leave_out::tables::headline(&cases);
+        tables.splits.clear();
+        tables.effects.clear();
+        tables.nothing_hidden.clear();
+    }
     Ok(Score {
         schema_version: crate::study::SCHEMA_VERSION,
         label: label.to_owned(),
@@ -176,7 +204,8 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
         shape: first.plan.shape,
         shards: first.plan.shard.parts,
         without_classes,
-        tables: Tables::of(&cases),
+        tables,
+        leave_out: leave_out.then(|| leave_out::Tables::of(&cases)),
         cases,
     })
 }
@@ -203,10 +232,22 @@ fn check_shards(studies: &[Study]) -> Result<(), ScoreError> {
     Err(ScoreError::MissingShards { missing: missing.join(", "), parts })
 }
 
-fn check_complete(study: &Study, label: &str) -> Result<(), ScoreError> {
-    let missing: Vec<_> = study
-        .draws
+/// Whether the hidden effects were left out: what the first result says, wherever it is.
+fn leaves_out(studies: &[Study], label: &str) -> Result<bool, FolderError> {
+    let paths = studies
         .iter()
+        .flat_map(|study| study.draws.iter().map(|draw| study.run(label, draw.number).join("result.json")));
+    let first = paths.into_iter().find(|path| path.exists());
+    Ok(first.map(|path| read_result(&path)).transpose()?.is_some_and(|result| result.program.leave_out))
+}
+
+/// The draws that are scored: with effects left out those of one effect.
+fn wanted(study: &Study, leave_out: bool) -> impl Iterator<Item = &Draw> {
+    study.draws.iter().filter(move |draw| !leave_out || draw.kind == Kind::Single)
+}
+
+fn check_complete(study: &Study, label: &str, leave_out: bool) -> Result<(), ScoreError> {
+    let missing: Vec<_> = wanted(study, leave_out)
         .map(|draw| draw.number)
         .filter(|number| !study.run(label, *number).exists())
         .collect();
@@ -256,6 +297,7 @@ fn case(
         wrong_parameters: !recipe.wrong_parameters.is_empty(),
         coloured_noise: recipe.coloured_noise,
         judgement: judge(draw, &members, &result.taken, report),
+        left_out: None,
         wall_s: result.taken.wall_s,
         memory_kib: result.taken.memory_kib,
         repeat: format!(
@@ -275,4 +317,4 @@ fn over_limit(draw: &Draw, at: usize, classes: Option<&DrawClasses>, limits: Opt
 }
 
 #[cfg(test)]
-mod tests;
+pub(in crate::study) mod tests;

@@ -247,11 +247,18 @@ const DIMENSIONLESS: &[&str] = &[
     "cosine",                // of two signatures
     "strength",              // of a signature, over what an ideal observer needs
     "noise_factor",          // on the noise of the sensors
+    "weaker_factor",         // on amplitudes
     "over_limit",            // amplitudes over their limits
     "limit_value",           // of an effect, whose unit is a field beside it
     "error_value",           // of a fitted number, whose unit is a field beside it
     "closed_ratio",          // share of a gap
     "claimed_closed_ratio",  // the same
+    "claimed_joint_ratio",   // the same
+    "floor_value",           // of a gap, as before_value and after_value
+    "r2_ratio",              // share of a variance
+    "p_value_ratio",         // significance
+    "chi2_after_ratio",      // chi2 per degree of freedom
+    "chi2_null_ratio",       // range of the same
     "off_ratio",             // error over truth
     "error_ratio",           // standard error over truth
     "quantiles",             // of a spread, whose field has the unit

@@ -11,7 +11,8 @@ use std::sync::atomic::AtomicUsize;
 use tempfile::TempDir;
 
 /// Two nulls and a pair of shards of four parameters: three draws.
-const SHAPE: Shape = Shape { each: 0, nulls: 2, parameters: 0, pairs: 1, triples: 0, noise_factor: 1.0 };
+const SHAPE: Shape =
+    Shape { each: 0, nulls: 2, parameters: 0, pairs: 1, triples: 0, noise_factor: 1.0, weaker_factor: 1.0 };
 const HEAD: &str = "# linked=false added_mass_kg=0\ntime_s,drive_valve,drive_position_m\n";
 
 struct Bench {
@@ -23,6 +24,8 @@ struct Bench {
     head: &'static str,
     /// Seed of a draw whose record cannot be made.
     tripped: Option<u64>,
+    /// Whether the hidden effect and another one are left out.
+    leaves_out: bool,
 }
 
 impl Bench {
@@ -38,6 +41,7 @@ impl Bench {
             made: AtomicUsize::new(0),
             head: HEAD,
             tripped: None,
+            leaves_out: false,
         }
     }
 
@@ -52,11 +56,13 @@ impl Bench {
             write(truth.join("truth.csv"), "time_s\n")?;
             write(truth.join("truth.json"), "{}")
         };
+        let without = |draw: &Draw| vec![draw.recipe.hidden[0].name.to_owned(), "inclination".to_owned()];
         let mut campaign = Campaign {
             study: &self.study,
             program: Some(&self.program),
             label: "fake",
             make: &make,
+            without: if self.leaves_out { Some(&without) } else { None },
             only: &[],
             jobs: 2,
             keep_truth: false,
@@ -189,6 +195,29 @@ fn another_program_does_not_go_on_with_the_results_of_one() {
     let bench = Bench { program: program(&bench.folder, "exit 1"), ..bench };
     assert!(bench.run(|_| {}).unwrap_err().to_string().contains("another --label"));
     assert_eq!(bench.run(|campaign| campaign.label = "other").unwrap(), CampaignEnd::Complete);
+}
+
+#[test]
+fn what_is_left_out_is_said_on_the_command_line_and_only_single_effects_are_run() {
+    // The arguments of every program come first, so that both stay what they are.
+    let bench = Bench::new("shift 10; echo \"$*\" >&2");
+    let folder = tempfile::tempdir().unwrap();
+    let shape = Shape { each: 1, ..SHAPE };
+    let bench = Bench { study: Study::begin(folder.path(), &Plan::new(5, shape)).unwrap(), ..bench };
+    let bench = Bench { leaves_out: true, ..bench };
+    assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete);
+    for draw in &bench.study.draws {
+        assert_eq!(bench.path(draw.number, "").exists(), draw.kind == Kind::Single);
+    }
+    let result = read_result(&bench.path(3, "result.json")).unwrap();
+    let effect = bench.study.draws[3].recipe.hidden[0].name;
+    assert_eq!(result.without, [effect, "inclination"]);
+    assert!(result.program.leave_out);
+    let said = fs::read_to_string(bench.path(3, "stderr.txt")).unwrap();
+    assert_eq!(said, format!("--without {effect} --without inclination\n"));
+    // The same program with its whole catalogue is another one.
+    let bench = Bench { leaves_out: false, ..bench };
+    assert!(bench.run(|_| {}).unwrap_err().to_string().contains("another --label"));
 }
 
 #[test]

@@ -7,10 +7,11 @@ use serde_json::json;
 use std::fs;
 use std::path::Path;
 
-const SHAPE: Shape = Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, noise_factor: 1.0 };
+const SHAPE: Shape =
+    Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, noise_factor: 1.0, weaker_factor: 1.0 };
 
 fn identity(name: &str) -> Identity {
-    Identity { name: name.to_owned(), crc32: 7, arguments: vec![] }
+    Identity { name: name.to_owned(), crc32: 7, arguments: vec![], leave_out: false }
 }
 
 /// A study whose program always tells the truth.
@@ -19,7 +20,13 @@ fn study(root: &Path, shard: &str, program: &str) -> Study {
     let study = Study::begin(root, &plan).unwrap();
     for draw in &study.draws {
         let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
-        let result = RunResult { schema_version: 1, number: draw.number, program: identity(program), taken };
+        let result = RunResult {
+            schema_version: 1,
+            number: draw.number,
+            program: identity(program),
+            taken,
+            without: vec![],
+        };
         make_whole(&study.run("truth", draw.number), |folder| {
             fs::write(folder.join("result.json"), json!(result).to_string()).unwrap();
             fs::write(folder.join("report.json"), truth_of(draw).to_string()).unwrap();
@@ -65,7 +72,85 @@ fn truth_of(draw: &Draw) -> Value {
         "gap": {"p": {"before": 4.0, "after": 1.0, "floor": 1.0, "closed": 1.0}}})
 }
 
-const UNKNOWN: Known<'_> = Known { limits: None, classes: None };
+/// A study of everything whose program always tells the truth, scored.
+pub(in crate::study) fn scored(label: &str) -> Score {
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path(), "0/1", label);
+    let score = score(&[folder.path().to_owned()], "truth", UNKNOWN).unwrap();
+    Score { label: label.to_owned(), ..score }
+}
+
+/// The same, whose effects were left out of the catalogue: it tells what is expected, and names nothing.
+pub(in crate::study) fn scored_without(label: &str) -> Score {
+    let folder = tempfile::tempdir().unwrap();
+    let expectations = without(folder.path());
+    let known = Known { expectations: Some(&expectations), ..UNKNOWN };
+    let score = score(&[folder.path().to_owned()], "truth", known).unwrap();
+    Score { label: label.to_owned(), ..score }
+}
+
+fn without(root: &Path) -> Expectations {
+    let expectations: Expectations =
+        serde_json::from_str(include_str!("../../../study/outside-expected.json")).unwrap();
+    let study = Study::begin(root, &Plan::new(3, SHAPE)).unwrap();
+    for draw in study.draws.iter().filter(|draw| draw.kind == Kind::Single) {
+        let hidden = &draw.recipe.hidden[0];
+        let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
+        let program = Identity { leave_out: true, ..identity("humble") };
+        let (number, without) = (draw.number, vec![hidden.name.to_owned()]);
+        let result = RunResult { schema_version: 1, number, program, taken, without };
+        let expected = &expectations[hidden.name];
+        let axis = crate::study::draws::axis_of(hidden.place).unwrap_or(plant::Axis::Load).name();
+        let balance = match expected.balances[0].as_str() {
+            "linkage" => "linkage".to_owned(),
+            name => format!("{axis}.{name}"),
+        };
+        let variables = json!([{"variable": expected.variables[0], "r2": 0.9, "p_value": 0.005}]);
+        let report = json!({"verdict": "outside-catalogue", "outside": {"balance": balance, "variables": variables},
+            "gap": {"x": {"before": 3.0, "after": 2.0, "floor": 1.0, "closed": 0.625}}});
+        make_whole(&study.run("truth", number), |folder| {
+            fs::write(folder.join("result.json"), json!(result).to_string()).unwrap();
+            fs::write(folder.join("report.json"), report.to_string()).unwrap();
+            Ok::<_, FolderError>(())
+        })
+        .unwrap();
+    }
+    expectations
+}
+
+#[test]
+fn with_effects_left_out_only_single_draws_are_wanted_and_the_tables_are_others() {
+    let score = scored_without("without");
+    assert_eq!(score.cases.len(), 38);
+    let tables = score.leave_out.as_ref().unwrap();
+    let all = tables.splits.iter().find(|split| split.name == "all").unwrap();
+    for rate in [all.no_wrong_name, all.both_right] {
+        assert_eq!((rate.count, rate.of), (38, 38));
+    }
+    assert_eq!(all.verdicts["outside-catalogue"], 38);
+    assert_eq!(tables.splits[0].no_wrong_name.of + tables.splits[1].no_wrong_name.of, 38);
+    assert!(tables.splits[0].claimed_closed_ratio.quantiles.unwrap() == [0.625; 4]);
+    let line = |name: &str| score.tables.headline.iter().find(|line| line.name.contains(name)).unwrap().rate;
+    assert_eq!(line("all signals together closed").count, tables.splits[0].no_wrong_name.of);
+    assert!(score.tables.splits.is_empty() && score.cases[0].repeat.ends_with("--leave-out"));
+    let page = crate::study::page::page(&score);
+    for part in ["no wrong name", "What was told", "outside-catalogue 1", "were left out"] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("Nothing hidden</h2>"));
+
+    // What must show is wanted then, and every single draw.
+    let folder = tempfile::tempdir().unwrap();
+    let expectations = without(folder.path());
+    let folders = [folder.path().to_owned()];
+    assert!(matches!(super::score(&folders, "truth", UNKNOWN), Err(ScoreError::NoExpectations)));
+    fs::remove_dir_all(folder.path().join("runs/truth/0007")).unwrap();
+    let known = Known { expectations: Some(&expectations), ..UNKNOWN };
+    let missing = super::score(&folders, "truth", known);
+    assert!(matches!(missing, Err(ScoreError::MissingRuns { count: 1, first: 7, .. })));
+}
+
+const UNKNOWN: Known<'_> = Known { limits: None, classes: None, expectations: None };
 
 #[test]
 fn whoever_tells_the_truth_has_all_points() {
@@ -122,7 +207,7 @@ fn amplitudes_stand_in_the_bin_of_their_limit() {
     };
     let over = |limit| {
         let limits = limits(limit);
-        let known = Known { limits: Some(&limits), classes: None };
+        let known = Known { limits: Some(&limits), ..UNKNOWN };
         let score = score(&[folder.path().to_owned()], "truth", known).unwrap();
         score.cases[draw.number].over_limit[0]
     };
