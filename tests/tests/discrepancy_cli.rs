@@ -248,7 +248,9 @@ fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
 
 #[test]
 fn columns_that_mean_something_else_make_the_verdict_bad_data() {
-    let cases: [(&str, &str, fn(Vec<&str>) -> String); 2] = [
+    /// Name of the defect, kind of its finding, and what it does to the record's lines.
+    type Case<'a> = (&'a str, &'a str, fn(Vec<&str>) -> String);
+    let cases: [Case<'_>; 2] = [
         ("swapped-pressures", "pressures a and b are swapped", swap_pressures),
         ("force-sign", "drive_force_N", |cells| turn_force(&cells)),
     ];
