@@ -77,7 +77,9 @@ pub enum WorkflowError {
     #[error(transparent)]
     Parameters(#[from] ParameterError),
     /// The rig file is a model of one balance.
-    #[error("{file}: a model of one balance (it has a kind): only close and name take one; give a rig file here")]
+    #[error(
+        "{file}: a model of one balance (it has a kind): only close and name take one; give a rig file here"
+    )]
     OneBalance {
         /// The file.
         file: String,
