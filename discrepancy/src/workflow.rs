@@ -21,7 +21,7 @@ use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions};
-use crate::report::{self, InputFiles, NamedEffect, Quantity, Report, Verdict, Where};
+use crate::report::{self, InputFiles, NamedEffect, Quantity, Report, Verdict};
 use crate::verify::verify;
 use plant::{ParameterError, RigParameters};
 use std::path::{Path, PathBuf};
@@ -197,7 +197,8 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     Ok(Outcome { report, extended: Some(text), pictures, experiment })
 }
 
-/// Judges the extended model on the held-out record, which is opened here and nowhere else; without one, draws the training record.
+/// Judges the extended model on the held-out record, which is opened here and nowhere else; without one, draws the
+/// training record.
 fn held_out(
     task: &Task,
     rig: &RigParameters,
