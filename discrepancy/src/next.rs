@@ -122,9 +122,9 @@ pub fn judge(
     explanations: &[Explanation],
     axes_measured: [bool; 2],
 ) -> Option<Judged> {
-    let named = |name: &&str| explanations.iter().any(|one| one.names.iter().any(|own| own == name));
-    let numbers = nuisance::NAMES.iter().filter(|name| !named(name));
-    let numbers: Vec<_> = numbers.filter_map(|name| nuisance::off(baseline, name).ok()).collect();
+    let named = |name: &str| explanations.iter().any(|one| one.names.iter().any(|own| own == name));
+    let numbers = nuisance::numbers().filter(|number| !named(number.name));
+    let numbers: Vec<_> = numbers.filter_map(|number| nuisance::off(baseline, number).ok()).collect();
     let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
         .into_par_iter()
         .map(|own| {

@@ -68,6 +68,10 @@ impl Parameter {
     /// Value and unit in a rig file, of the first axis that is measured; of tables 1, without a unit: their common factor.
     #[must_use]
     pub fn value(&self, rig: &RigParameters, measured: [bool; 2]) -> (f64, &'static str) {
+        // Of both axes together, only a factor says what both have in common.
+        if self.name == "parameter:mass" && measured == [true; 2] {
+            return (1.0, "");
+        }
         let own = if self.name == "parameter:mass" && !measured[0] { self.keys.len() - 1 } else { 0 };
         let key = table::KEYS.iter().find(|key| key.path() == self.keys[own]).expect("the table has it");
         match rig.numbers(self.keys[own]) {

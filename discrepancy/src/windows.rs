@@ -22,7 +22,7 @@ use crate::course::{CHANNELS, Course, Point};
 use crate::seats::Seats;
 use plant::{Inputs, Plant, RigParameters};
 use starts::{LINKED_PASSES, orthonormal};
-pub(crate) use starts::{first_state, seat};
+pub(crate) use starts::{first_state, seat, seated};
 use whiten::drift;
 
 /// Periods of a window.

@@ -2,6 +2,7 @@
 
 use super::edits::Edits;
 use super::{ExtendError, told, written};
+use crate::parameters::PARAMETERS;
 use crate::report::Quantity;
 use plant::parameters::table::KEYS;
 use plant::{Axis, RigParameters};
@@ -9,36 +10,18 @@ use std::ops::Range;
 use toml_edit::{Document, Item};
 
 /// All names, in the order of effects.md.
-pub(super) const NAMES: [&str; 9] = [
-    "parameter:mass",
-    "parameter:viscous-friction",
-    "parameter:sliding-friction",
-    "parameter:break-away-force",
-    "parameter:supply-pressure",
-    "parameter:spool-time-constant",
-    "parameter:flow-lag",
-    "parameter:kv-scale",
-    "parameter:piston-area",
-];
+pub(super) fn names() -> Vec<&'static str> {
+    PARAMETERS.iter().map(|parameter| parameter.name).collect()
+}
 
 /// The keys of the rig file, as `mass.drive_kg`, that a parameter scales; the first one is the parameter's own number.
 ///
 /// Only the mass differs between the axes. The carriage, which the force sensor moves, is scaled with the drive's mass.
 #[must_use]
 pub fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static str>> {
-    Some(match name {
-        "parameter:mass" if axis == Axis::Load => vec!["mass.load_kg"],
-        "parameter:mass" => vec!["mass.drive_kg", "mass.carriage_kg"],
-        "parameter:viscous-friction" => vec!["friction.viscous_n_per_mm_per_s"],
-        "parameter:sliding-friction" => vec!["friction.sliding_force_n"],
-        "parameter:break-away-force" => vec!["friction.break_away_force_n"],
-        "parameter:supply-pressure" => vec!["supply.pressure_bar"],
-        "parameter:spool-time-constant" => vec!["valve.spool_time_constant_ms"],
-        "parameter:flow-lag" => vec!["valve.flow_lag_time_constant_ms"],
-        "parameter:kv-scale" => vec!["valve.kv_supply_m3_per_h", "valve.kv_exhaust_m3_per_h"],
-        "parameter:piston-area" => vec!["cylinder.piston_area_mm2", "cylinder.annulus_area_mm2"],
-        _ => return None,
-    })
+    let parameter = PARAMETERS.iter().find(|parameter| parameter.name == name)?;
+    let of_axis = |key: &&&str| name != "parameter:mass" || (**key == "mass.load_kg") == (axis == Axis::Load);
+    Some(parameter.keys.iter().filter(of_axis).copied().collect())
 }
 
 /// The keys of a changed parameter, and the factor on them.
@@ -50,7 +33,7 @@ fn scaling(
     quantity: &Quantity,
     number_of: impl Fn(&str) -> Option<f64>,
 ) -> Result<(Vec<&'static str>, Option<f64>), ExtendError> {
-    let unknown = || ExtendError::UnknownParameter { name: quantity.name.clone(), known: NAMES.join(", ") };
+    let unknown = || ExtendError::UnknownParameter { name: quantity.name.clone(), known: names().join(", ") };
     if !quantity.value.is_finite() {
         let (what, value) = (quantity.name.clone(), quantity.value.to_string());
         return Err(ExtendError::NotFinite { what, value });

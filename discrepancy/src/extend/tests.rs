@@ -1,6 +1,6 @@
 //! What is written is what was found, and nothing else changes.
 
-use super::parameters::NAMES;
+use super::parameters::names;
 use super::*;
 use plant::Axis;
 
@@ -93,7 +93,7 @@ fn a_changed_parameter_keeps_its_comments_and_its_old_value() {
 fn each_parameter_scales_what_the_records_of_the_study_scale() {
     let base = RigParameters::baseline();
     let text = RigParameters::BASELINE_TOML;
-    for name in NAMES {
+    for name in names() {
         let rig = extended(text, &[], &[quantity(name, 1.03, "", None)]);
         let ratios = [
             (rig.mass().drive_kg / base.mass().drive_kg, "parameter:mass"),

@@ -9,8 +9,9 @@
 //! stored air at the end of each period.
 
 use super::WINDOW;
-use crate::course::{CHANNELS, Course, PERIOD_S, Point};
-use plant::{Inputs, Plant, RigParameters, Setup, State};
+use crate::course::{CHANNELS, Course, PERIOD_S};
+use crate::windows::seated;
+use plant::{Inputs, Plant, RigParameters, Setup};
 
 /// Readings of a window, as whoever has no noise sees them.
 pub(super) type Readings = [[[f64; CHANNELS]; WINDOW]; 2];
@@ -145,23 +146,4 @@ fn acceleration(course: &Course, at: usize) -> f64 {
     let (from, to) = (at.saturating_sub(5), (at + 5).min(course.len() - 1));
     let speed = |at: usize| course.points[at][0].rod_velocity_m_per_s;
     (speed(to) - speed(from)) / ((to - from) as f64 * PERIOD_S)
-}
-
-/// A plant's state with the mechanical state and the pressures of the measured axes; the rest stays its own.
-fn seated(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
-    let mut state = *plant.state();
-    let truth = plant.truth(&Inputs::default());
-    let cylinder = plant.rig().cylinder();
-    for axis in (0..2).filter(|axis| measured[*axis]) {
-        let (own, point, truth) = (&mut state.axes[axis], &points[axis], &truth.axes[axis]);
-        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
-        // The volumes are the plant's own: an effect may have changed them.
-        let volume_a = truth.stored_air_a_j / truth.pressure_a_pa + cylinder.piston_area_m2 * way_m;
-        let volume_b = truth.stored_air_b_j / truth.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
-        own.extension_m += way_m;
-        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
-        own.stored_air_a_j = point.pressures_pa[0] * volume_a;
-        own.stored_air_b_j = point.pressures_pa[1] * volume_b;
-    }
-    state
 }

@@ -22,8 +22,9 @@
 //! Source: discrepancy-notes.md, 1 and pipeline 9; Hunter and Reiner 1965, Technometrics 7(3): designs for discriminating
 //! between two rival models.
 
-use super::driven::{Driven, seated};
+use super::driven::Driven;
 use super::nuisance::{Product, dot};
+use crate::windows::seated;
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
 /// Share of a signature that forms and numbers leave unexplained: 25 = (1 - 0.95^2) / e^2.
@@ -167,7 +168,7 @@ impl<'a> Observer<'a> {
         let mut plant = plant_in(rig, &self.driven.start);
         let mut run = Run { readings: Vec::new(), jumps: Vec::new(), starts: Vec::new() };
         for window in 0..self.windows() {
-            let start = seated(&plant, &self.driven.points[window * WINDOW]);
+            let start = seated(&plant, &self.driven.points[window * WINDOW], [true; 2]);
             plant.go_on_in(&start).expect("a state of a run is one that the rig can be in");
             run.starts.push(start);
             self.read(&mut plant, window, &mut run.readings, &mut run.jumps);
@@ -230,7 +231,7 @@ impl<'a> Observer<'a> {
                 }
                 let mut plant = plant_in(rig, &base.starts[window]);
                 plant
-                    .go_on_in(&seated(&plant, &points))
+                    .go_on_in(&seated(&plant, &points, [true; 2]))
                     .expect("a nudge leaves the rig in a state of its own");
                 let (mut nudged, mut jumps) = (Vec::with_capacity(self.rows()), Vec::new());
                 self.read(&mut plant, window, &mut nudged, &mut jumps);

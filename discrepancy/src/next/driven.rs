@@ -13,7 +13,7 @@ use controller::axis::AxisRecord;
 use controller::rehearsal::{Rehearsal, RehearsalParts};
 use controller::run::RunError;
 use controller::setup::{Inputs as Files, Mode};
-use plant::{Axis, Inputs, Plant, RigParameters, Scene, SceneError, SetupError, State, Truth};
+use plant::{Axis, Inputs, RigParameters, Scene, SceneError, SetupError, State, Truth};
 use protocol::frames::MainChainState;
 
 /// Longest run, periods: what is behind it is not looked at.
@@ -102,23 +102,4 @@ fn points_of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         }
     })
-}
-
-/// A plant's state with the mechanical state and the pressures of a run; the rest stays its own.
-#[must_use]
-pub fn seated(plant: &Plant, points: &[Point; 2]) -> State {
-    let mut state = *plant.state();
-    let truth = plant.truth(&Inputs::default());
-    let cylinder = plant.rig().cylinder();
-    for ((own, point), axis) in state.axes.iter_mut().zip(points).zip(&truth.axes) {
-        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
-        // The volumes are the plant's own: an effect may have changed them.
-        let volume_a = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
-        let volume_b = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
-        own.extension_m += way_m;
-        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
-        own.stored_air_a_j = point.pressures_pa[0] * volume_a;
-        own.stored_air_b_j = point.pressures_pa[1] * volume_b;
-    }
-    state
 }

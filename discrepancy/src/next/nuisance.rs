@@ -8,58 +8,24 @@
 //! readings whitened by noise and numbers together. Source: Kay 1998, Fundamentals of Statistical Signal Processing II, 7.8
 //! (nuisance with a prior); the names are those of effects.md.
 
+use crate::parameters::{PARAMETERS, Parameter};
 use nalgebra::{DMatrix, DVector};
 use plant::{ParameterError, RigParameters};
 
 /// One prior standard deviation of a number, relative.
 const TOLERANCE: f64 = 0.03;
-/// All of them.
-pub const NAMES: [&str; 8] = [
-    "parameter:mass",
-    "parameter:viscous-friction",
-    "parameter:sliding-friction",
-    "parameter:break-away-force",
-    "parameter:supply-pressure",
-    "parameter:spool-time-constant",
-    "parameter:flow-lag",
-    "parameter:kv-scale",
-];
 
-/// The rig with one of [`NAMES`] larger by one standard deviation.
+/// All of them but the area, which a drawing tells.
+pub fn numbers() -> impl Iterator<Item = &'static Parameter> {
+    PARAMETERS.iter().filter(|parameter| parameter.name != "parameter:piston-area")
+}
+
+/// The rig with a number larger by one standard deviation.
 ///
 /// # Errors
-/// [`ParameterError`] when it leaves its range, or there is no such number.
-pub fn off(rig: &RigParameters, name: &str) -> Result<RigParameters, ParameterError> {
-    let factor = 1.0 + TOLERANCE;
-    let (friction, valve, mass) = (rig.friction(), rig.valve(), rig.mass());
-    let scaled = |numbers: &[f64]| -> Vec<f64> { numbers.iter().map(|number| number * factor).collect() };
-    match name {
-        "parameter:mass" => rig
-            .with("mass.drive_kg", &[mass.drive_kg * factor])?
-            .with("mass.carriage_kg", &[mass.carriage_kg * factor])?
-            .with("mass.load_kg", &[mass.load_kg * factor]),
-        "parameter:viscous-friction" => {
-            rig.with("friction.viscous_n_per_mm_per_s", &[friction.viscous_n_s_per_m / 1e3 * factor])
-        }
-        "parameter:sliding-friction" => {
-            rig.with("friction.sliding_force_n", &[friction.sliding_force_n * factor])
-        }
-        "parameter:break-away-force" => {
-            rig.with("friction.break_away_force_n", &[friction.break_away_force_n * factor])
-        }
-        "parameter:supply-pressure" => {
-            rig.with("supply.pressure_bar", &[rig.supply().pressure_pa / 1e5 * factor])
-        }
-        "parameter:spool-time-constant" => {
-            rig.with("valve.spool_time_constant_ms", &[valve.spool_time_constant_s * 1e3 * factor])
-        }
-        "parameter:flow-lag" => {
-            rig.with("valve.flow_lag_time_constant_ms", &[valve.flow_lag_time_constant_s * 1e3 * factor])
-        }
-        _ => rig
-            .with("valve.kv_supply_m3_per_h", &scaled(&valve.kv_supply_m3_per_h))?
-            .with("valve.kv_exhaust_m3_per_h", &scaled(&valve.kv_exhaust_m3_per_h)),
-    }
+/// [`ParameterError`] when it leaves its range.
+pub fn off(rig: &RigParameters, parameter: &Parameter) -> Result<RigParameters, ParameterError> {
+    parameter.scaled(rig, 1.0 + TOLERANCE)
 }
 
 /// The product of signatures that leaves out what the numbers explain.
@@ -116,8 +82,8 @@ mod tests {
     #[test]
     fn every_number_can_be_off() {
         let rig = RigParameters::baseline();
-        for name in NAMES {
-            assert_ne!(off(&rig, name).expect(name), rig, "{name}");
+        for number in numbers() {
+            assert_ne!(off(&rig, number).expect(number.name), rig, "{}", number.name);
         }
     }
 }

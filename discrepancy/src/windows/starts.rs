@@ -17,6 +17,9 @@ const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
 /// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
 const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 
+/// Absolute pressure that no chamber of a rig falls below, whatever a noisy point says, Pa.
+const LEAST_PA: f64 = 1e4;
+
 impl Windows<'_> {
     /// Moves each window's start to where its readings say that it was, and takes its sensitivities anew.
     pub(super) fn settle(&mut self) {
@@ -185,25 +188,30 @@ pub(crate) fn first_state(course: &Course, rig: &RigParameters) -> State {
     state
 }
 
-/// Puts the measured axes of a plant at these points; volumes are the plant's own, since an effect may have changed them.
-pub(crate) fn seat(plant: &mut Plant, course: &Course, points: &[Point; 2]) {
+/// A plant's state with these points on the measured axes; the rest stays its own.
+#[must_use]
+pub(crate) fn seated(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
     let mut state = *plant.state();
     let truth = plant.truth(&Inputs::default());
-    let cylinder = *plant.rig().cylinder();
-    for i in (0..2).filter(|i| course.measured[*i]) {
+    let cylinder = plant.rig().cylinder();
+    for i in (0..2).filter(|i| measured[*i]) {
         let (own, point, axis) = (&mut state.axes[i], &points[i], &truth.axes[i]);
         let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+        // The volumes are the plant's own: an effect may have changed them.
         let volume_a_m3 = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
         let volume_b_m3 = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
-        own.extension_m += way_m;
+        // Rounding may leave the stroke by a bit.
+        own.extension_m = (own.extension_m + way_m).clamp(0.0, cylinder.stroke_m);
         own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
-        own.stored_air_a_j = point.pressures_pa[0].max(1e4) * volume_a_m3;
-        own.stored_air_b_j = point.pressures_pa[1].max(1e4) * volume_b_m3;
+        own.stored_air_a_j = point.pressures_pa[0].max(LEAST_PA) * volume_a_m3;
+        own.stored_air_b_j = point.pressures_pa[1].max(LEAST_PA) * volume_b_m3;
     }
-    // Rounding may have left the stroke by a bit.
-    for own in &mut state.axes {
-        own.extension_m = own.extension_m.clamp(0.0, cylinder.stroke_m);
-    }
+    state
+}
+
+/// Puts the measured axes of a plant at these points.
+pub(crate) fn seat(plant: &mut Plant, course: &Course, points: &[Point; 2]) {
+    let state = seated(plant, points, course.measured);
     plant.go_on_in(&state).expect("the points of a record are states of the rig");
 }
 
