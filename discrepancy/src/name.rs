@@ -125,7 +125,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         contenders.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let Some(best) = contenders.first() else { break };
         let most = own_nothing - best.loss;
-        if most < WORTH_A_FIT {
+        if most < WORTH_A_FIT.max(SAFETY * threshold) {
             break;
         }
         contenders.truncate(CONTENDERS);

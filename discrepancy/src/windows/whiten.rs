@@ -1,4 +1,5 @@
-//! What noise is like: jumps of the force, errors of the sampling instant, noise that lasts longer than a period, and draws of it.
+//! What noise is like: jumps of the force, errors of the sampling instant, noise that lasts longer than a period, and
+//! draws of it.
 
 use super::{FORCE, WINDOW, Windows, dot};
 use crate::course::{Course, PERIOD_S};

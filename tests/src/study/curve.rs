@@ -5,9 +5,9 @@
 //!                                 └─► over amplitude:  class named, amplitude / (committed limit x noise factor)
 //! ```
 //!
-//! The committed limits are those at the specified noise, and a limit grows in proportion to the noise, but for the rounding of
-//! the sensors: over the own limit of each study the curves of all noise factors should lie on each other. "3 x limit and more" is
-//! of the committed limits in each study: the same draws at each noise.
+//! The committed limits are those at the specified noise, and a limit grows in proportion to the noise, but for the
+//! rounding of the sensors: over the own limit of each study the curves of all noise factors should lie on each other. "3
+//! x limit and more" is of the committed limits in each study: the same draws at each noise.
 //!
 //! What is drawn lies mostly far above the limits. A study of the same noise whose amplitudes are divided by a factor
 //! (`draws --weaker`) adds its draws to the curve over amplitude, and to no other.

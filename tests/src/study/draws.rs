@@ -8,7 +8,8 @@
 //! - Place: any of the effect's kind. The record is of the axis it is at; of both, linked, for what needs two.
 //! - A fifth has a functional form that is not the catalogue's, a half 1 to 3 parameters of the baseline off by 1 to 3 %, a third
 //!   coloured noise and jitter: each drawn by itself.
-//! - A study near the limits divides all amplitudes by a factor, the draws staying the same ones: what is drawn lies far above them.
+//! - A study near the limits divides all amplitudes by a factor, the draws staying the same ones: what is drawn lies far
+//!   above them.
 //! - A case of wrong parameters alone has one that is off by 3 to 15 % and none of the other difficulties in the baseline.
 //!
 //! Source: issue 5 and effects.md, Blind protocol of discrepancy-notes.md.

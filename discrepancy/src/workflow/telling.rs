@@ -1,0 +1,238 @@
+//! What naming found, as a report: verdict, names with their numbers, candidates, limits, and the verdict in words.
+
+use crate::engine::Engine;
+use crate::name::Found;
+use crate::parameters::{COUNT, PARAMETERS};
+use crate::refit::{Placed, Refit};
+use crate::report::{
+    self, DetectionLimit, EffectPlace, InputFiles, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict,
+    Where,
+};
+
+/// Standard errors by which a parameter must be off to be told.
+const OFF_ERRORS: f64 = 4.0;
+/// The least that it must be off by.
+const OFF_LEAST: f64 = 0.01;
+
+/// What naming found, as a report.
+pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
+    let named = named(found);
+    let parameters = parameters_off(engine, found);
+    let verdict = if found.inadequate {
+        Verdict::OutsideCatalogue
+    } else if named.iter().any(|named| !named.alternatives.is_empty()) {
+        Verdict::Ambiguous
+    } else if !named.is_empty() {
+        Verdict::Named
+    } else if !parameters.is_empty() {
+        Verdict::ParametersOnly
+    } else {
+        Verdict::NothingMissing
+    };
+    let named = if verdict == Verdict::OutsideCatalogue { Vec::new() } else { named };
+    let (not_excited, detection_limits) = limits(found);
+    Report {
+        named,
+        parameters,
+        candidates: candidates(found),
+        not_excited,
+        detection_limits,
+        ..empty(verdict, String::new())
+    }
+}
+
+fn named(found: &Found) -> Vec<NamedEffect> {
+    let mut at = 0;
+    let mut all = Vec::new();
+    for ((placed, share), alternatives) in
+        found.model.placed.iter().zip(&found.shares).zip(&found.alternatives)
+    {
+        let errors = &found.model.errors[at..at + placed.coordinates.len()];
+        at += placed.coordinates.len();
+        let alternatives = alternatives
+            .iter()
+            .filter_map(|other| {
+                let placed = other.placed.last()?;
+                let from = other.errors.len() - COUNT - placed.coordinates.len();
+                Some(named_effect(placed, &other.errors[from..], *share, Vec::new()))
+            })
+            .collect();
+        all.push(named_effect(placed, errors, *share, alternatives));
+    }
+    all.sort_by(|left, right| right.share_explained.total_cmp(&left.share_explained));
+    all
+}
+
+fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<NamedEffect>) -> NamedEffect {
+    let candidate = &placed.candidate;
+    let numbers = candidate.numbers(&placed.coordinates);
+    let parameters = candidate
+        .sheet
+        .keys
+        .iter()
+        .enumerate()
+        .map(|(at, key)| Quantity {
+            name: key.name.to_owned(),
+            value: numbers[at],
+            unit: key.unit.name().to_owned(),
+            standard_error: Some(errors[at] * candidate.slope(at, placed.coordinates[at]).abs())
+                .filter(|error| error.is_finite()),
+            before: key.neutral.filter(|neutral| neutral.is_finite()),
+        })
+        .collect();
+    NamedEffect {
+        effect: candidate.sheet.name.to_owned(),
+        place: Where::from(candidate.place),
+        parameters,
+        share_explained: share,
+        alternatives,
+    }
+}
+
+/// Parameters that are off by more than their errors and more than nothing.
+fn parameters_off(engine: &Engine<'_>, found: &Found) -> Vec<Quantity> {
+    let model: &Refit = &found.model;
+    let errors = &model.errors[model.errors.len() - COUNT..];
+    (0..PARAMETERS.len())
+        .filter(|at| {
+            let off = (model.factors[*at] - 1.0).abs();
+            off > OFF_LEAST && off > OFF_ERRORS * errors[*at]
+        })
+        .map(|at| crate::calibrate::quantity(engine, at, model))
+        .collect()
+}
+
+fn candidates(found: &Found) -> Vec<report::Candidate> {
+    let nothing = found.nothing;
+    found
+        .screened
+        .iter()
+        .map(|screened| {
+            let placed = &screened.start;
+            let candidate = &placed.candidate;
+            let fitted = found.fitted.iter().find(|own| {
+                let other = &own.placed[0].candidate;
+                other.sheet.name == candidate.sheet.name && other.place == candidate.place
+            });
+            let is_named = found.model.placed.iter().any(|own| {
+                own.candidate.sheet.name == candidate.sheet.name && own.candidate.place == candidate.place
+            });
+            let shown = fitted.map_or(placed, |own| &own.placed[0]);
+            let share = fitted.map(|own| {
+                ((found.calibrated.fit.loss - own.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
+            });
+            let fate = match (is_named, fitted.is_some()) {
+                (true, _) if !found.inadequate => "named",
+                (true, _) => "explains too little",
+                (false, true) => "fitted, and others explain more",
+                (false, false) => "not among the best of the screening",
+            };
+            report::Candidate {
+                effect: candidate.sheet.name.to_owned(),
+                place: Where::from(candidate.place),
+                score: (nothing - screened.loss) / found.threshold.max(1e-9),
+                share_explained: share,
+                amplitude: candidate.numbers(&shown.coordinates)[0],
+                unit: candidate.sheet.keys[0].unit.name().to_owned(),
+                fate: fate.to_owned(),
+            }
+        })
+        .collect()
+}
+
+/// What the records would not have shown at all, and from what amplitude on they would have shown the rest.
+fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
+    let mut not_excited = Vec::new();
+    let mut limits = Vec::new();
+    for (candidate, limit) in found.columns.candidates.iter().zip(&found.limits) {
+        let place = Where::from(candidate.place);
+        let effect = candidate.sheet.name.to_owned();
+        match limit {
+            Some(z) if *z <= 1.0 => {
+                let key = &candidate.sheet.keys[0];
+                let at = candidate.numbers(&{
+                    let mut coordinates = candidate.origin();
+                    coordinates[0] = *z;
+                    coordinates
+                })[0];
+                let neutral = key.neutral.filter(|neutral| neutral.is_finite());
+                limits.push(DetectionLimit {
+                    effect,
+                    place,
+                    name: key.name.to_owned(),
+                    value: neutral.map_or(at, |neutral| (at - neutral).abs()),
+                    unit: key.unit.name().to_owned(),
+                });
+            }
+            _ => not_excited.push(EffectPlace { effect, place }),
+        }
+    }
+    (not_excited, limits)
+}
+
+/// A report without anything in it.
+pub(super) fn empty(verdict: Verdict, summary: String) -> Report {
+    Report {
+        schema_version: SCHEMA_VERSION,
+        verdict,
+        summary,
+        inputs: InputFiles::default(),
+        named: Vec::new(),
+        parameters: Vec::new(),
+        outside: None,
+        gap: std::collections::BTreeMap::new(),
+        verification: None,
+        candidates: Vec::new(),
+        not_excited: Vec::new(),
+        detection_limits: Vec::new(),
+        location: None,
+        checks: Vec::new(),
+        next: None,
+    }
+}
+
+/// The verdict in a sentence or two.
+pub(super) fn summary(report: &Report) -> String {
+    let one = |own: &NamedEffect| format!("{} ({})", own.effect, place_name(&own.place));
+    let parameters = report.parameters.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+    let off =
+        if parameters.is_empty() { String::new() } else { format!(" Off in the rig file: {parameters}.") };
+    match report.verdict {
+        Verdict::NothingMissing => {
+            "Nothing is missing above the detection limits of these records.".to_owned()
+        }
+        Verdict::ParametersOnly => format!("No effect is missing.{off}"),
+        Verdict::Named => {
+            format!("Missing: {}.{off}", report.named.iter().map(one).collect::<Vec<_>>().join(" and "))
+        }
+        Verdict::Ambiguous => {
+            let told = report.named.iter().map(|own| {
+                std::iter::once(own).chain(&own.alternatives).map(one).collect::<Vec<_>>().join(" or ")
+            });
+            format!(
+                "Missing, and not to be told apart by these records: {}.{off}",
+                told.collect::<Vec<_>>().join("; and ")
+            )
+        }
+        Verdict::OutsideCatalogue => match &report.outside {
+            Some(outside) => {
+                let on = outside
+                    .variables
+                    .first()
+                    .map_or("nothing that was measured", |own| own.variable.as_str());
+                format!("Not in the catalogue: something in {} that depends on {on}.{off}", outside.balance)
+            }
+            None => format!("Something is missing that the catalogue does not explain.{off}"),
+        },
+        Verdict::BadData => report.summary.clone(),
+    }
+}
+
+/// A place as rig files name it.
+#[must_use]
+pub fn place_name(place: &Where) -> String {
+    match &place.element {
+        Some(element) => format!("{}.{element}", place.axis),
+        None => place.axis.clone(),
+    }
+}
