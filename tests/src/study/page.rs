@@ -72,10 +72,10 @@ fn lead(score: &Score) -> String {
     };
     format!(
         "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, \
-         {} of each wrong parameter, \
-         {} pairs, {} triples; seed {}, noise times {}, \
+         {} of each wrong parameter, {} pairs, {} triples; seed {}, noise times {}, \
          amplitudes over {}, {} shard(s). \
-         Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; 'at most' is the exact one-sided bound, 95 %.{left_out}{classes}",
+         Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; \
+         'at most' is the exact one-sided bound, 95 %.{left_out}{classes}",
         score.cases.len(),
         shape.each,
         SHEETS.len(),
