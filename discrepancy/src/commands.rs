@@ -147,6 +147,11 @@ fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
     }
     progress(&format!("{} and report.html are in {}", "report.json", out.display()));
     print(&in_words(report));
+    if !arguments.test.is_empty() && report.verification.is_none() && report.verdict != Verdict::BadData {
+        print(
+            "The held-out record cannot be used, and the model was not judged: ask check what is wrong with it.\n",
+        );
+    }
     Ok(if report.verdict == Verdict::BadData { Exit::BadInput } else { Exit::Good })
 }
 

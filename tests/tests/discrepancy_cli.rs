@@ -89,6 +89,9 @@ fn spoilt(folder: &Path, change: impl Fn(usize, Vec<&str>) -> Option<String>) ->
     path
 }
 
+/// What is done to each row.
+type Change = fn(Vec<&str>) -> String;
+
 /// Cells: time, valve, position, force, pressure a, pressure b.
 fn swap_pressures(mut cells: Vec<&str>) -> String {
     cells.swap(4, 5);
@@ -241,16 +244,25 @@ fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
     });
     assert!(saturated, "{}", check.stdout);
 
-    let _ = on("name", &record, folder.path(), &[]).expect_code(GOOD);
+    // A held-out record that cannot be used takes nothing away from what was found, and is told.
+    let swapped = folder.path().join("swapped");
+    fs::create_dir(&swapped).expect("a folder");
+    let swapped = spoilt(&swapped, |_, cells| Some(swap_pressures(cells)));
+    let test = swapped.to_str().expect("a path in ASCII");
+    let ended = on("close", &record, folder.path(), &["--test", test]).expect_code(GOOD);
+    assert!(ended.stdout.contains("held-out record cannot be used"), "{}", ended.stdout);
     let report = json(&folder.path().join("report.json"));
+    assert!(
+        report["verification"].is_null() && report["gap"] == serde_json::json!({}),
+        "{:#}",
+        report["gap"]
+    );
     assert!(effects(&report, "named").iter().any(|name| name == EFFECT), "{:#}", report["named"]);
 }
 
 #[test]
 fn columns_that_mean_something_else_make_the_verdict_bad_data() {
-    /// Name of the defect, kind of its finding, and what it does to the record's lines.
-    type Case<'a> = (&'a str, &'a str, fn(Vec<&str>) -> String);
-    let cases: [Case<'_>; 2] = [
+    let cases: [(&str, &str, Change); 2] = [
         ("swapped-pressures", "pressures a and b are swapped", swap_pressures),
         ("force-sign", "drive_force_N", |cells| turn_force(&cells)),
     ];
