@@ -36,6 +36,8 @@ const BELIEVED: f64 = 0.2;
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 /// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
 const EXCESS: f64 = 0.08;
+/// The same of linked records, where micrometres decide when the eye meets the carriage: records of nothing leave up to 0.2.
+const EXCESS_LINKED: f64 = 0.3;
 /// Screened gain below which nothing is fitted: the best of some forty candidates gains half of it by chance.
 const WORTH_A_FIT: f64 = 25.0;
 /// Share of the best screened gain below which a candidate is not fitted.
@@ -168,7 +170,9 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let limits = left.limits(columns.candidates.len(), threshold);
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
     let level = model.loss / engine.freedom().iter().sum::<f64>();
-    let inadequate = level > EXCESS && model.loss > STAYS * calibrated.fit.loss;
+    let linked = engine.windows().iter().any(|windows| windows.course().linked);
+    let excess_level = if linked { EXCESS_LINKED } else { EXCESS };
+    let inadequate = level > excess_level && model.loss > STAYS * calibrated.fit.loss;
     let alternatives = model.placed.iter().map(|placed| alternatives(placed, &calibrated, &rounds)).collect();
     let shares = shares(&model, &rounds, &calibrated, excess);
     Found {
