@@ -24,6 +24,8 @@ pub struct CommandCounters {
     pub expired: u64,
     /// Commands that never came, by the gaps in the sender's counter.
     pub lost: u64,
+    /// Times that the sender's counter jumped further than cycles had passed: what was lost there, it does not tell.
+    pub breaks: u64,
     /// Accepted commands that came a cycle or more later than the cycle after the one that they answer.
     pub late: u64,
     /// Commands equal to the one before, counter and all; accepted all the same, and told apart by the watch for two senders.
@@ -69,9 +71,12 @@ impl CommandIntake {
         };
         self.counters.late += u64::from(age > 1);
         self.counters.duplicate += u64::from(self.last.replace(command) == Some(command));
-        if let Step::Continues { lost } = self.sources.note(command.alive, live.count(), live.count() - age) {
+        match self.sources.note(command.alive, live.count(), live.count() - age) {
             // A refused frame leaves a gap in the counters of those accepted, but it came.
-            self.counters.lost += lost.saturating_sub(self.refused_since_accepted);
+            Step::Continues { lost } => {
+                self.counters.lost += lost.saturating_sub(self.refused_since_accepted);
+            }
+            Step::Breaks => self.counters.breaks += 1,
         }
         self.refused_since_accepted = 0;
         self.counters.accepted += 1;

@@ -88,7 +88,7 @@ pub enum Gaps {
         first: u8,
         /// Counter of the last.
         last: u8,
-        /// Times that a command expired or came too late to be taken: what was lost there, four bits cannot tell.
+        /// Times that a command expired, came too late to be taken, or jumped: what was lost there, four bits cannot tell.
         pauses: u64,
     },
     /// A controller, of its axis's sensors, by the rig's ticks.
@@ -179,7 +179,7 @@ pub struct Row {
     pub after_it_left: u64,
     /// Missing by the gaps that the receiver saw and the ends of its series; null where frames carry no count.
     pub missing_by_gaps: Option<u64>,
-    /// Pauses of the sender, or answers too old to be taken: frames lost in them leave no gap to be seen.
+    /// Pauses and restarts of the sender, or answers too old to be taken: frames lost in them leave no gap to be seen.
     #[serde(default)]
     pub pauses: u64,
 }

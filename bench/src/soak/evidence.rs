@@ -93,7 +93,7 @@ impl Evidence {
             let lost = commands["lost"].as_u64()?;
             let (first, last) = *counters.get(*id)?;
             let times = |key: &str| commands[key].as_u64().unwrap_or(0);
-            let pauses = times("expired") + times("refused_stale");
+            let pauses = times("expired") + times("refused_stale") + times("breaks");
             Some(((*id).to_owned(), Gaps::Commands { lost, first, last, pauses }))
         });
         Party { gaps: gaps.collect(), ..party("emulator", &self.summary) }
