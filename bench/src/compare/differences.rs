@@ -121,7 +121,7 @@ mod tests {
         let grid = table(&runs);
         assert_eq!(grid.head, ["rms difference from measured", "before", "after", "change"]);
         let row = grid.rows.iter().find(|row| row[0] == "drive position").unwrap();
-        assert_eq!(row[1..], ["1.000 mm", "0 m", "-100.0 %"]);
+        assert_eq!(row[1..], ["1.0000 mm", "0 mm", "-100.0 %"]);
         let [picture] = &pictures(&runs)[..] else { panic!("one picture") };
         let panel = picture.panels.iter().find(|panel| panel.title == "drive position, mm").unwrap();
         let names: Vec<_> = panel.curves.iter().map(|curve| curve.name.as_str()).collect();
