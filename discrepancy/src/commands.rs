@@ -123,7 +123,7 @@ fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
         let tests: Vec<&Path> = arguments.test.iter().map(PathBuf::as_path).collect();
         let report = balance::close_on(&records.rig, &records.train, &tests, &mut progress)?;
         let extended = balance::extended_model_text(&records.rig, &report).ok();
-        Outcome { report, extended, pictures: page::Pictures::default(), experiment: None }
+        Outcome { report, extended, pictures: page::Pictures::default(), experiment: None, not_judged: None }
     } else {
         let task = Task {
             rig: records.rig.clone(),
@@ -134,7 +134,7 @@ fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
         };
         close(&task, &mut progress)?
     };
-    let Outcome { report, extended, pictures, experiment } = &outcome;
+    let Outcome { report, extended, pictures, experiment, not_judged } = &outcome;
     write_json(&out.join("report.json"), report)?;
     write(&out.join("report.html"), &page::page(report, pictures))?;
     let model = records.rig.file_name().map_or_else(|| PathBuf::from("rig.toml"), PathBuf::from);
@@ -147,12 +147,11 @@ fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
     }
     progress(&format!("{} and report.html are in {}", "report.json", out.display()));
     print(&in_words(report));
-    if !arguments.test.is_empty() && report.verification.is_none() && report.verdict != Verdict::BadData {
-        print(
-            "The held-out record cannot be used, and the model was not judged: ask check what is wrong with it.\n",
-        );
+    if let Some(why) = not_judged {
+        print(&format!("The model was not judged on the held-out record: {why}\n"));
     }
-    Ok(if report.verdict == Verdict::BadData { Exit::BadInput } else { Exit::Good })
+    let is_good = report.verdict != Verdict::BadData && not_judged.is_none();
+    Ok(if is_good { Exit::Good } else { Exit::BadInput })
 }
 
 /// An effect that is not left out because its name was mistyped would be found.

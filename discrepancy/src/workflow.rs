@@ -54,6 +54,8 @@ pub struct Outcome {
     pub pictures: Pictures,
     /// File of the proposed experiment.
     pub experiment: Option<String>,
+    /// Why the held-out record was not judged, where one was given and was not.
+    pub not_judged: Option<String>,
 }
 
 /// Why the workflow did not run.
@@ -84,6 +86,14 @@ pub enum WorkflowError {
     /// A record cannot be simulated.
     #[error(transparent)]
     Course(#[from] CourseError),
+    /// The held-out record cannot be used.
+    #[error("{file}: cannot be used: {why}")]
+    Unusable {
+        /// The record.
+        file: String,
+        /// Its fatal findings.
+        why: String,
+    },
     /// Records of different axes or set-ups.
     #[error("{first} and {other} are not of the same axes and set-up: give records of one set-up at a time")]
     Mixed {
@@ -193,8 +203,12 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     report.summary = summary(&report);
     let text = extended(&rig_file, &told)?;
     let after = RigParameters::from_toml(&text, "extended rig.toml")?;
-    let pictures = held_out(task, rig, &after, &courses, &mut report, progress)?;
-    Ok(Outcome { report, extended: Some(text), pictures, experiment })
+    // What was found stays, whatever the held-out record is like.
+    let (pictures, not_judged) = match held_out(task, rig, &after, &courses, &mut report, progress) {
+        Ok(pictures) => (pictures, None),
+        Err(error) => (Pictures::default(), Some(error.to_string())),
+    };
+    Ok(Outcome { report, extended: Some(text), pictures, experiment, not_judged })
 }
 
 /// Judges the extended model on the held-out record, which is opened here and nowhere else; without one, draws the
@@ -214,8 +228,10 @@ fn held_out(
     progress(&format!("judging on {}", test.display()));
     let opened = open(test, &task.options, rig)?;
     let Some(course) = opened.course else {
-        progress(&format!("{} cannot be used: the model is not judged", test.display()));
-        return Ok(Pictures::default());
+        return Err(WorkflowError::Unusable {
+            file: test.display().to_string(),
+            why: fatal(std::slice::from_ref(&opened.checked.report)),
+        });
     };
     let verified = verify(rig, after, &course, progress);
     report.gap = verified.gap;
@@ -298,17 +314,17 @@ fn one_set_up(courses: &[Course]) -> Result<(), WorkflowError> {
     }
 }
 
+/// What makes records unusable, in words.
+fn fatal(checks: &[report::RecordCheck]) -> String {
+    let findings = checks.iter().flat_map(|check| &check.findings).filter(|finding| finding.fatal);
+    findings.map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("; ")
+}
+
 /// The outcome of records that cannot be used.
 fn bad_data(inputs: InputFiles, checks: Vec<report::RecordCheck>) -> Outcome {
-    let fatal: Vec<&str> = checks
-        .iter()
-        .flat_map(|check| &check.findings)
-        .filter(|finding| finding.fatal)
-        .map(|finding| finding.text.as_str())
-        .collect();
-    let summary = format!("A record cannot be used: {}", fatal.join("; "));
+    let summary = format!("A record cannot be used: {}", fatal(&checks));
     let report = Report { inputs, checks, ..empty(Verdict::BadData, summary) };
-    Outcome { report, extended: None, pictures: Pictures::default(), experiment: None }
+    Outcome { report, extended: None, pictures: Pictures::default(), experiment: None, not_judged: None }
 }
 
 fn addition(named: &NamedEffect) -> Addition {

@@ -2,31 +2,13 @@
 //! skipped aloud
 //! where the records are not there.
 
+mod real;
+
 use discrepancy::balance::{close_on, extended_model_text};
 use discrepancy::report::{Report, Verdict};
-use std::fs::OpenOptions;
+use real::{crate_folder, data};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-
-fn crate_folder() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// The folder of the records; without it the test is told as skipped, here and in the list of `scripts/test`.
-fn data(test: &str) -> Option<PathBuf> {
-    let folder = crate_folder().parent()?.join("../shared/data");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let reason = format!("{} is not there", folder.display());
-    eprintln!("SKIPPED {test}: {reason}");
-    if let Some(list) = std::env::var_os("AIRBENCH_SKIPS") {
-        let written = OpenOptions::new().create(true).append(true).open(list);
-        let written = written.and_then(|mut file| file.write_all(format!("{test}: {reason}\n").as_bytes()));
-        written.expect("AIRBENCH_SKIPS names a file that can be written");
-    }
-    None
-}
 
 fn model(name: &str) -> PathBuf {
     crate_folder().join("models").join(name)

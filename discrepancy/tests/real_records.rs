@@ -1,35 +1,16 @@
 //! The real records beside the project read with the mappings that ship; skipped aloud where they are not there.
 
+mod real;
+
 use discrepancy::records::{self, Channel, Form, ReadOptions, Record, Signal};
 use plant::Axis;
-use std::fs::OpenOptions;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use real::{crate_folder, data};
+use std::path::Path;
 
 const POSITION: Channel = Channel::Of(Axis::Drive, Signal::Position);
 const FORCE: Channel = Channel::Of(Axis::Drive, Signal::Force);
 const APPLIED: Channel = Channel::Of(Axis::Drive, Signal::AppliedForce);
 const PRESSURE: Channel = Channel::Of(Axis::Drive, Signal::PressureA);
-
-fn crate_folder() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// The folder of the records; without it the test is told as skipped, here and in the list of `scripts/test`.
-fn data(test: &str) -> Option<PathBuf> {
-    let folder = crate_folder().parent()?.join("../shared/data");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let reason = format!("{} is not there", folder.display());
-    eprintln!("SKIPPED {test}: {reason}");
-    if let Some(list) = std::env::var_os("AIRBENCH_SKIPS") {
-        let written = OpenOptions::new().create(true).append(true).open(list);
-        let written = written.and_then(|mut file| file.write_all(format!("{test}: {reason}\n").as_bytes()));
-        written.expect("AIRBENCH_SKIPS names a file that can be written");
-    }
-    None
-}
 
 fn read(file: &Path, mapping: &str) -> Record {
     let mapping = Some(crate_folder().join("mappings").join(mapping));

@@ -249,8 +249,9 @@ fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
     fs::create_dir(&swapped).expect("a folder");
     let swapped = spoilt(&swapped, |_, cells| Some(swap_pressures(cells)));
     let test = swapped.to_str().expect("a path in ASCII");
-    let ended = on("close", &record, folder.path(), &["--test", test]).expect_code(GOOD);
-    assert!(ended.stdout.contains("held-out record cannot be used"), "{}", ended.stdout);
+    let ended = on("close", &record, folder.path(), &["--test", test]).expect_code(BAD_INPUT);
+    assert!(ended.stdout.contains("not judged on the held-out record"), "{}", ended.stdout);
+    assert!(ended.stdout.contains("pressures a and b are swapped"), "{}", ended.stdout);
     let report = json(&folder.path().join("report.json"));
     assert!(
         report["verification"].is_null() && report["gap"] == serde_json::json!({}),
