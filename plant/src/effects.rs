@@ -169,6 +169,58 @@ impl AxisEffects {
     }
 }
 
+/// Which laws of an axis have effects in them; what has none goes by the baseline's.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Touched {
+    /// From command to spool.
+    pub(crate) spool: bool,
+    /// What passes the ports, and what the air in the chambers does.
+    pub(crate) air: bool,
+    /// Friction.
+    pub(crate) friction: bool,
+    /// What sensors show of the past.
+    pub(crate) sensors: bool,
+}
+
+impl AxisEffects {
+    /// Which laws of this axis have effects in them, itself or by the supply.
+    fn touched(&self, supply_droop: bool) -> Touched {
+        let passage = self.critical_pressure_ratio.is_some()
+            || self.valve_characteristic.is_some()
+            || self.valve_dead_zone.is_some()
+            || self.valve_null_leakage.is_some()
+            || self.line_delay.is_some()
+            || self.line_resistance.is_some()
+            || self.check_valve_restriction.is_some()
+            || self.silencer_back_pressure.is_some()
+            || self.end_cushion.is_some();
+        Touched {
+            spool: self.valve_hysteresis.is_some()
+                || self.valve_offset.is_some()
+                || self.spool_second_order.is_some()
+                || self.spool_rate_limit.is_some()
+                || self.command_dead_time.is_some(),
+            air: passage || self.adds_air() || supply_droop,
+            friction: self.stribeck_friction.is_some()
+                || self.presliding.is_some()
+                || self.friction_asymmetry.is_some()
+                || self.pressure_dependent_friction.is_some()
+                || self.position_dependent_friction.is_some()
+                || self.rest_time_dependent_break_away.is_some(),
+            sensors: self.position_sensor_lag.is_some()
+                || self.pressure_sensor_lag.iter().any(Option::is_some)
+                || self.time_skew.iter().any(Option::is_some),
+        }
+    }
+
+    /// Whether something but the valve's flow changes the air in the chambers.
+    pub(crate) fn adds_air(&self) -> bool {
+        self.heat_exchange.is_some()
+            || self.piston_leakage.is_some()
+            || self.rod_leakage.iter().any(Option::is_some)
+    }
+}
+
 /// The sheet of an effect by its name.
 #[must_use]
 pub fn sheet(name: &str) -> Option<&'static Sheet> {

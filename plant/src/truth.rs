@@ -200,18 +200,21 @@ fn edge_flows(
     lanes: &Lanes,
     air: &AirAt,
 ) -> [Pair; 2] {
-    if let Some(effects) = effects {
-        let [drive, load] = [0, 1].map(|axis| effects.ports_at(integrator, axis, state, air).flow_m3_per_s);
-        return [Pair::new(drive[0], load[0]), Pair::new(drive[1], load[1])];
-    }
     let exhaust_pa = integrator.chambers.exhaust_pa();
     let edges = integrator.valve.edges(lanes.spool, state.supply_pressure_pa, exhaust_pa);
     let shut = integrator.supply.check_valves_shut(state.supply_pressure_pa);
     let open = Pair::both(if shut { 0.0 } else { 1.0 });
-    [
+    let mut flows = [
         edge_flow(edges.conductance_a * open, edges.far_pressure_a, air.pressure[0]),
         edge_flow(edges.conductance_b * open, edges.far_pressure_b, air.pressure[1]),
     ]
+    .map(Pair::to_array);
+    let Some(effects) = effects else { return flows.map(|lanes| Pair::new(lanes[0], lanes[1])) };
+    for axis in (0..2).filter(|axis| effects.touched[*axis].air) {
+        let through = effects.ports_at(integrator, axis, state, air).flow_m3_per_s;
+        flows.iter_mut().zip(through).for_each(|(lanes, flow)| lanes[axis] = flow);
+    }
+    flows.map(|lanes| Pair::new(lanes[0], lanes[1]))
 }
 
 /// Every force at an instant.

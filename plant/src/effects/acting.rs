@@ -6,13 +6,13 @@
 //!
 //! Laws: the file of each effect. Scheme: the head of `integrator.rs`.
 
-use super::AxisEffects;
 use super::air::HeatAt;
 use super::flows::PortsAt;
 use super::memory::{Memory, Moving};
 use super::presliding::Bristle;
 use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
+use super::{AxisEffects, Touched};
 use crate::integrator::laws::{At, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
 use crate::lanes::{Mask, Pair};
@@ -25,6 +25,7 @@ use crate::truth::Forces;
 #[derive(Debug, Clone)]
 pub(crate) struct Effects {
     pub(crate) on: [AxisEffects; 2],
+    pub(crate) touched: [Touched; 2],
     pub(crate) memory: Memory,
     /// Factors of the motion: for the two lengths of step and the directions of drive and load, to the middle and to the end.
     pub(super) ways: [[[[MotionSpan; 2]; 2]; 2]; 2],
@@ -50,6 +51,7 @@ impl Effects {
         let on = AxisEffects::of(rig);
         let mut effects = Box::new(Effects {
             memory: Memory::at_rest(&on, of, state),
+            touched: [0, 1].map(|axis: usize| on[axis].touched(on[0].supply_droop.is_some())),
             on,
             ways: [[[[of.spans()[0].motion_to_end; 2]; 2]; 2]; 2],
             substep_s: of.substep_s(),
@@ -109,27 +111,34 @@ impl Effects {
     }
 }
 
-impl Laws for Effects {
-    type Carried = Moving;
-
-    fn carried(&self) -> Moving {
-        self.memory.moving
+impl Effects {
+    /// The spools at the midpoint; those at the end are kept where effects move them.
+    fn spool_to_middle(&self, at: At<'_>, carried: &mut Moving) -> Pair {
+        let mut spools = at.spool_after(at.span.spool_to_middle).to_array();
+        let (since_period_s, half_s) = (at.since_period_s(), at.span.span_s / 2.0);
+        for (axis, spool) in spools.iter_mut().enumerate().filter(|(axis, _)| self.touched[*axis].spool) {
+            let own = &mut carried.axes[axis];
+            *spool = self.spool_over(axis, own, at, at.from.spool.to_array()[axis], since_period_s);
+            own.spool = self.spool_over(axis, own, at, *spool, since_period_s + half_s);
+        }
+        Pair::new(spools[0], spools[1])
     }
 
-    fn middle(&self, at: At<'_>, carried: &mut Moving) -> Middle {
+    /// Pressures and flows at the midpoint of the axes that have effects in them.
+    fn pass_air(&self, at: At<'_>, spool: Pair, carried: &mut Moving, middle: &mut Middle) {
         let At { of, span, from, node, .. } = at;
         let half_s = span.span_s / 2.0;
-        let (since_period_s, ahead_s) = (at.since_period_s(), at.since_substep_s() + half_s);
-        let extension = of.ahead(span, from);
+        let ahead_s = at.since_substep_s() + half_s;
+        let extension = middle.extension;
         let volume = [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let volume_from = [of.chambers.volume_a(from.extension), of.chambers.volume_b(from.extension)];
         let supply = SupplySide { supply_droop: carried.droop_pa + carried.droop_pa_per_s * half_s };
-        let (mut pressure_pa, mut flow, mut drawn) = ([[0.0; 2]; 2], [[0.0; 2]; 2], 0.0);
-        for axis in 0..2 {
+        let mut pressure_pa = middle.pressure.map(Pair::to_array);
+        let mut flow = middle.edge_flow.map(Pair::to_array);
+        let mut drawn = 0.0;
+        for axis in (0..2).filter(|axis| self.touched[*axis].air) {
             let lane = |pair: Pair| pair.to_array()[axis];
             let own = &mut carried.axes[axis];
-            let spool = self.spool_over(axis, own, at, lane(from.spool), since_period_s);
-            own.spool = self.spool_over(axis, own, at, spool, since_period_s + half_s);
             let exhaust =
                 ExhaustSide { silencer_back_pressure: own.silencer_pa + own.silencer_pa_per_s * half_s };
             for chamber in 0..2 {
@@ -143,7 +152,7 @@ impl Laws for Effects {
                 of,
                 axis,
                 &PortsAt {
-                    spool,
+                    spool: lane(spool),
                     supply_pa: supply.sum(node.middle_pa),
                     exhaust_pa: exhaust.sum(of.chambers.exhaust_pa()),
                     pressure_pa: [pressure_pa[0][axis], pressure_pa[1][axis]],
@@ -172,14 +181,49 @@ impl Laws for Effects {
             carried.droop_pa = after_pa - node.middle_pa;
             carried.droop_pa_per_s = (carried.droop_pa - before_pa) / span.span_s;
         }
-        let pressure = pressure_pa.map(|lanes| Pair::new(lanes[0], lanes[1]));
-        Middle {
-            extension,
-            pneumatic: of.chambers.pneumatic_force(pressure[0], pressure[1]),
-            edge_flow: flow.map(|lanes| Pair::new(lanes[0], lanes[1])),
-            pressure,
-            per_volume: volume.map(Pair::reciprocal),
+        middle.pressure = pressure_pa.map(|lanes| Pair::new(lanes[0], lanes[1]));
+        middle.pneumatic = of.chambers.pneumatic_force(middle.pressure[0], middle.pressure[1]);
+        middle.edge_flow = flow.map(|lanes| Pair::new(lanes[0], lanes[1]));
+    }
+
+    /// Remembers what sensors of an axis will show of this instant.
+    fn keep_readings(&mut self, of: &Integrator, axis: usize, lanes: &Lanes) {
+        let span_s = self.substep_s;
+        let lane = |pair: Pair| pair.to_array()[axis];
+        let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
+        let [a, b] = [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber]));
+        let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
+        let (on, own) = (&self.on[axis], &mut self.memory.moving.axes[axis]);
+        for (i, truth) in [x, a, b].into_iter().enumerate() {
+            let (shown, seen) = (own.shown[i], own.seen[i]);
+            own.shown[i] = match i {
+                0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
+                _ => {
+                    on.pressure_sensor_lag[i - 1].map_or(truth, |lag| lag.advance(shown, seen, truth, span_s))
+                }
+            };
+            own.seen[i] = truth;
         }
+        for (channel, truth) in [(0, x), (2, a), (3, b)] {
+            self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
+        }
+    }
+}
+
+impl Laws for Effects {
+    type Carried = Moving;
+
+    fn carried(&self) -> Moving {
+        self.memory.moving
+    }
+
+    fn middle(&self, at: At<'_>, carried: &mut Moving) -> Middle {
+        let spool = self.spool_to_middle(at, carried);
+        let mut middle = at.middle(spool);
+        if self.touched.iter().any(|touched| touched.air) {
+            self.pass_air(at, spool, carried, &mut middle);
+        }
+        middle
     }
 
     fn outside(&self, at: At<'_>, middle: &Middle) -> Pair {
@@ -274,7 +318,7 @@ impl Laws for Effects {
         let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
         let mut stored = to.air().map(|air| air.stored.to_array());
         for axis in [0, 1] {
-            if !self.adds_air(axis) {
+            if !self.on[axis].adds_air() {
                 continue;
             }
             let lane = |pair: Pair| pair.to_array()[axis];
@@ -309,8 +353,11 @@ impl Laws for Effects {
         (to.air_a.stored, to.air_b.stored) = (a, b);
     }
 
-    fn spool(&self, _: At<'_>, carried: &Moving) -> Pair {
-        Pair::new(carried.axes[0].spool, carried.axes[1].spool)
+    fn spool(&self, at: At<'_>, carried: &Moving) -> Pair {
+        let baseline = at.spool_after(at.span.spool_to_end).to_array();
+        let spool =
+            |axis: usize| if self.touched[axis].spool { carried.axes[axis].spool } else { baseline[axis] };
+        Pair::new(spool(0), spool(1))
     }
 
     fn keep(&mut self, of: &Integrator, held: Held, lanes: &Lanes, carried: Moving) {
@@ -325,22 +372,8 @@ impl Laws for Effects {
             for (line, flow) in self.memory.lines[axis].iter_mut().zip(own.port_flow_m3_per_s) {
                 line.iter_mut().for_each(|line| line.push(flow));
             }
-            let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
-            let [a, b] =
-                [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber]));
-            let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
-            let on = &self.on[axis];
-            for (i, truth) in [x, a, b].into_iter().enumerate() {
-                let (shown, seen) = (own.shown[i], own.seen[i]);
-                own.shown[i] = match i {
-                    0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
-                    _ => on.pressure_sensor_lag[i - 1]
-                        .map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
-                };
-                own.seen[i] = truth;
-            }
-            for (channel, truth) in [(0, x), (2, a), (3, b)] {
-                self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
+            if self.touched[axis].sensors {
+                self.keep_readings(of, axis, lanes);
             }
         }
         if self.memory.channels.iter().any(|axis| axis[1].is_some()) {

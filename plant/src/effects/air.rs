@@ -86,13 +86,6 @@ impl Effects {
         self.on[axis].heat_exchange.map_or(0.0, |effect| effect.work_share())
     }
 
-    pub(super) fn adds_air(&self, axis: usize) -> bool {
-        let on = &self.on[axis];
-        on.heat_exchange.is_some()
-            || on.piston_leakage.is_some()
-            || on.rod_leakage.iter().any(Option::is_some)
-    }
-
     /// What enters the line of a chamber, `ahead_s` after the newest substep's beginning.
     pub(crate) fn line(&self, axis: usize, chamber: usize, port: f64, ahead_s: f64) -> LineFlow {
         let line = self.on[axis].line_delay.zip(self.memory.lines[axis][chamber].as_ref());

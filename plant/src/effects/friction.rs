@@ -84,6 +84,9 @@ impl Effects {
     /// All levels of an axis at a speed, both directions; none below 0, none easier to break away than to slide.
     pub(crate) fn levels(&self, of: &Integrator, axis: usize, at: &Rubbing, speed: f64) -> Levels {
         let file = *of.motion.levels();
+        if !self.touched[axis].friction {
+            return file;
+        }
         let sliding = |speed, direction| {
             self.sliding_level(of, axis, at, speed, direction).sum(file.sliding_n[0]).max(0.0)
         };

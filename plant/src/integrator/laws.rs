@@ -34,6 +34,37 @@ impl At<'_> {
     pub(crate) fn since_period_s(&self) -> f64 {
         f64::from(self.substep) * self.of.substep_s() + self.since_substep_s()
     }
+
+    /// The spools when this share of what they lack is left.
+    #[inline(always)]
+    pub(crate) fn spool_after(&self, share: Pair) -> Pair {
+        self.held.command + (self.from.spool - self.held.command) * share
+    }
+
+    /// The baseline's air and flows at the midpoint, with the spools there.
+    #[inline(always)]
+    pub(crate) fn middle(&self, spool: Pair) -> Middle {
+        let At { of, span, from, node, .. } = *self;
+        let mut edges = of.valve.edges(spool, node.middle_pa, of.chambers.exhaust_pa());
+        if node.shut {
+            (edges.conductance_a, edges.conductance_b) = (Pair::both(0.0), Pair::both(0.0));
+        }
+        let extension = of.ahead(span, from);
+        let per_volume_a = of.chambers.volume_a(extension).reciprocal();
+        let per_volume_b = of.chambers.volume_b(extension).reciprocal();
+        let pressure_a = span.lag.midpoint_air(from.air_a) * per_volume_a;
+        let pressure_b = span.lag.midpoint_air(from.air_b) * per_volume_b;
+        Middle {
+            extension,
+            pneumatic: of.chambers.pneumatic_force(pressure_a, pressure_b),
+            edge_flow: [
+                edge_flow(edges.conductance_a, edges.far_pressure_a, pressure_a),
+                edge_flow(edges.conductance_b, edges.far_pressure_b, pressure_b),
+            ],
+            pressure: [pressure_a, pressure_b],
+            per_volume: [per_volume_a, per_volume_b],
+        }
+    }
 }
 
 /// The laws of a rig; pairs hold a value for each axis, forces are along its own extension.
@@ -103,27 +134,7 @@ impl Laws for Baseline {
 
     #[inline(always)]
     fn middle(&self, at: At<'_>, (): &mut ()) -> Middle {
-        let At { of, span, from, node, held, .. } = at;
-        let spool = held.command + (from.spool - held.command) * span.spool_to_middle;
-        let mut edges = of.valve.edges(spool, node.middle_pa, of.chambers.exhaust_pa());
-        if node.shut {
-            (edges.conductance_a, edges.conductance_b) = (Pair::both(0.0), Pair::both(0.0));
-        }
-        let extension = of.ahead(span, from);
-        let per_volume_a = of.chambers.volume_a(extension).reciprocal();
-        let per_volume_b = of.chambers.volume_b(extension).reciprocal();
-        let pressure_a = span.lag.midpoint_air(from.air_a) * per_volume_a;
-        let pressure_b = span.lag.midpoint_air(from.air_b) * per_volume_b;
-        Middle {
-            extension,
-            pneumatic: of.chambers.pneumatic_force(pressure_a, pressure_b),
-            edge_flow: [
-                edge_flow(edges.conductance_a, edges.far_pressure_a, pressure_a),
-                edge_flow(edges.conductance_b, edges.far_pressure_b, pressure_b),
-            ],
-            pressure: [pressure_a, pressure_b],
-            per_volume: [per_volume_a, per_volume_b],
-        }
+        at.middle(at.spool_after(at.span.spool_to_middle))
     }
 
     #[inline(always)]
@@ -177,7 +188,7 @@ impl Laws for Baseline {
 
     #[inline(always)]
     fn spool(&self, at: At<'_>, (): &()) -> Pair {
-        at.held.command + (at.from.spool - at.held.command) * at.span.spool_to_end
+        at.spool_after(at.span.spool_to_end)
     }
 
     #[inline(always)]
