@@ -19,6 +19,9 @@ use tempfile::TempDir;
 /// Limit for one machine, static build and first download of QEMU and kernel included.
 const LIMIT: Duration = Duration::from_secs(20 * 60);
 
+/// Lines of what a machine said that a failing test shows: what failed must not drown in them.
+const LAST_LINES: usize = 12;
+
 /// The programs may be started a moment before the rig's cycle 0, by this much at most, s.
 const BEFORE_CYCLE_ZERO_S: f64 = 1.0;
 
@@ -60,7 +63,11 @@ impl Guest {
         // The guest's programs are built by vcan-vm as it wants them, whatever this test was built with.
         command.env_remove("CARGO_TARGET_DIR").arg("--out").arg(folder.path()).args(arguments);
         let ended = Running::start("scripts/vcan-vm", &mut command).wait_within(LIMIT);
-        eprintln!("{}", ended.stderr);
+        let lines: Vec<&str> = ended.stderr.lines().collect();
+        let last = lines[lines.len().saturating_sub(LAST_LINES)..].join("\n");
+        let log = root().join(format!("target/vm-said-{}.txt", std::process::id()));
+        fs::write(&log, &ended.stderr).expect("a log in target");
+        eprintln!("the last lines of {}:\n{last}", log.display());
         Self { folder, said: ended.expect_code(0).stderr }
     }
 

@@ -331,9 +331,14 @@ fn frames_around_the_disturbances_are_accounted_for(guest: &Guest, run: &Path) {
         on.heard.iter().any(|frame| frame.standard_id() == Some(FOREIGN)),
         "no frame of cangen crossed the wire"
     );
-    for report in [&on.summary, &on.controller] {
-        assert_eq!(count(report, "/frames_ignored/malformed"), 0);
-        assert!(count(report, "/frames_ignored/unknown") <= foreign);
+    for (report, card) in [(&on.summary, &on.can0), (&on.controller, &on.can1)] {
+        // Where its FIFO ran over, an emulated card hands out garbled frames; nowhere else.
+        let [malformed, unknown] =
+            ["malformed", "unknown"].map(|kind| count(report, &format!("/frames_ignored/{kind}")));
+        assert!(
+            card.overruns > 0 || (malformed == 0 && unknown <= foreign),
+            "{malformed} malformed, {unknown} unknown, {foreign} foreign, {card:?}"
+        );
     }
     // Wherever a sensor frame was lost, it is missing in the count of those that the rig says it sent.
     for (axis, id) in [("drive", frames::DRIVE_SENSORS.id), ("load", frames::LOAD_SENSORS.id)] {
