@@ -32,6 +32,10 @@ const CONTENDERS: usize = 6;
 const STEPS: usize = 5;
 /// Share of a screened gain that the simulator may deny before other amplitudes are tried.
 const BELIEVED: f64 = 0.2;
+/// How many contenders are fitted with sensitivities of their own, how often at most, and the fall of the loss that ends it.
+const REFINED: usize = 3;
+const REFININGS: usize = 4;
+const SETTLED: f64 = 1.0;
 /// Amplitudes that are tried then.
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 /// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
@@ -142,9 +146,10 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
             })
             .collect();
         refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        // Sensitivities of the parameters were those of the model before: the best get their own.
-        let gain = model.loss - refits.first().map_or(model.loss, |best| best.loss);
-        let near = refits.iter().take(3).filter(|own| model.loss - own.loss > 0.5 * gain).count();
+        // Sensitivities of the parameters were those of the model before: the best get their own. What they gain is held against
+        // what the parameters alone reach with the same sensitivities.
+        let gain = own_nothing - refits.first().map_or(own_nothing, |best| best.loss);
+        let near = refits.iter().take(REFINED).filter(|own| own_nothing - own.loss > 0.5 * gain).count();
         let refined: Vec<Refit> = refits[..near].par_iter().map(|own| refine(engine, own)).collect();
         refits.splice(..near, refined);
         refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
@@ -225,12 +230,20 @@ fn around_of(engine: &Engine<'_>, model: &Refit) -> Around {
     Around { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
 }
 
-/// Fits a model again with sensitivities taken at itself.
+/// Fits a model again with sensitivities taken at itself, until that no longer helps.
 fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
-    match refit(engine, &around_of(engine, own), &own.placed, NUMBER_COSTS) {
-        Some(refined) if refined.loss < own.loss => refined,
-        _ => own.clone(),
+    let mut best = own.clone();
+    for _ in 0..REFININGS {
+        let Some(next) = refit(engine, &around_of(engine, &best), &best.placed, NUMBER_COSTS) else { break };
+        let settled = next.loss > best.loss - SETTLED;
+        if next.loss < best.loss {
+            best = next;
+        }
+        if settled {
+            break;
+        }
     }
+    best
 }
 
 /// Whether a model is better than the one before by more than chance and inexactness give.
