@@ -28,6 +28,8 @@ pub struct Engine<'a> {
     rig: RigParameters,
     rows: usize,
     freedom: Vec<f64>,
+    /// What the quiet windows say that the noise is too small or large.
+    level: f64,
 }
 
 impl<'a> Engine<'a> {
@@ -37,11 +39,27 @@ impl<'a> Engine<'a> {
         let windows: Vec<Windows<'a>> = courses.par_iter().map(|course| Windows::new(course, rig)).collect();
         let rows = windows.first().map_or(0, Windows::rows);
         let freedom = windows.iter().flat_map(Windows::freedom).collect();
-        let mut engine = Engine { windows, rig: rig.clone(), rows, freedom };
+        let mut engine = Engine { windows, rig: rig.clone(), rows, freedom, level: 1.0 };
         let residual = engine.residual(&engine.simulate(rig));
-        let level = level(&residual, rows, &engine.freedom);
-        engine.freedom.iter_mut().for_each(|own| *own *= level);
+        engine.level = level(&residual, rows, &engine.freedom);
+        engine.freedom.iter_mut().for_each(|own| *own *= engine.level);
         engine
+    }
+
+    /// The same records with starts where another rig meets them best: where rods are linked, micrometres decide which of them
+    /// touch, and a rig may only be held against readings from where it would have been itself.
+    #[must_use]
+    pub fn settled_at(&self, rig: &RigParameters) -> Engine<'a> {
+        let windows: Vec<Windows<'a>> =
+            self.windows.par_iter().map(|own| Windows::new(own.course(), rig)).collect();
+        let freedom = windows.iter().flat_map(Windows::freedom).map(|own| own * self.level).collect();
+        Engine { windows, rig: self.rig.clone(), rows: self.rows, freedom, level: self.level }
+    }
+
+    /// Whether a record was made with linked rods.
+    #[must_use]
+    pub fn is_linked(&self) -> bool {
+        self.windows.iter().any(|windows| windows.course().linked)
     }
 
     /// The baseline.

@@ -20,6 +20,7 @@ use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
 use crate::screen::{Columns, Screened};
+use plant::effects::sheet::Part;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -36,6 +37,9 @@ const BELIEVED: f64 = 0.2;
 const REFINED: usize = 3;
 const REFININGS: usize = 4;
 const SETTLED: f64 = 1.0;
+/// How often a model of linked rods and the starts that it says follow each other, and the share of the loss that ends it.
+const MOVES: usize = 3;
+const MOVED: f64 = 0.05;
 /// Amplitudes that are tried then.
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 /// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
@@ -44,6 +48,8 @@ const EXCESS: f64 = 0.08;
 const EXCESS_LINKED: f64 = 0.3;
 /// Screened gain below which nothing is fitted: the best of some forty candidates gains half of it by chance.
 const WORTH_A_FIT: f64 = 25.0;
+/// Share of the last round's threshold below which no further effect is fitted.
+const LOOKED_FOR: f64 = 0.5;
 /// Share of the best screened gain below which a candidate is not fitted.
 const CONTENDS: f64 = 0.35;
 /// What each number of an effect costs: it must be worth more than one more candidate tried.
@@ -51,7 +57,7 @@ const NUMBER_COSTS: f64 = 8.0;
 /// What came close in a round, that is tried again when another effect has joined.
 const SWAPPED: usize = 3;
 /// Multiple of the threshold of nothing that is asked for, since a model is never exact.
-const SAFETY: f64 = 3.0;
+const SAFETY: f64 = 2.0;
 /// Share of what the parameters leave that the first effect must take.
 const TAKES_FIRST: f64 = 0.1;
 /// Share of what a model leaves that one more effect must take.
@@ -113,13 +119,17 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let (nothing, mut screened) = columns.screen(engine, &around, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
+    let Placement { home, fit } = at_home(engine, &calibrated.fit, 0.0);
+    let calibrated = Calibrated { fit, around: calibrated.around };
+    let mut home = home;
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
     let mut rounds: Vec<(Vec<Placed>, Vec<Refit>)> = Vec::new();
     for round in 0..MOST {
+        let here = home.as_ref().unwrap_or(engine);
         let (own_nothing, own_screened) =
-            if round == 0 { (nothing, screened.clone()) } else { screen_again(engine, &columns, &model) };
+            if round == 0 { (nothing, screened.clone()) } else { screen_again(here, &columns, &model) };
         let taken = |screened: &Screened| {
             let own = &columns.candidates[screened.at];
             model.placed.iter().any(|placed| {
@@ -131,18 +141,19 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         contenders.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let Some(best) = contenders.first() else { break };
         let most = own_nothing - best.loss;
-        if most < WORTH_A_FIT.max(SAFETY * threshold) {
+        // The threshold before is that of a residual in which much was still missing: it tells when to stop looking, not what to refuse.
+        if most < WORTH_A_FIT.max(LOOKED_FOR * threshold) {
             break;
         }
         contenders.truncate(CONTENDERS);
         contenders.retain(|screened| own_nothing - screened.loss > CONTENDS * most);
         progress(&format!("fitting {} candidates, round {}", contenders.len(), round + 1));
-        let point = if round == 0 { around.clone() } else { around_of(engine, &model) };
+        let point = if round == 0 { around.clone() } else { around_of(here, &model) };
         let mut refits: Vec<Refit> = contenders
             .par_iter()
             .filter_map(|screened| {
-                let start = best_start(engine, &point, &model.placed, screened, own_nothing);
-                refit_steps(engine, &point, &start, NUMBER_COSTS, STEPS)
+                let start = best_start(here, &point, &model.placed, screened, own_nothing);
+                refit_steps(here, &point, &start, NUMBER_COSTS, STEPS)
             })
             .collect();
         refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
@@ -150,15 +161,18 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         // what the parameters alone reach with the same sensitivities.
         let gain = own_nothing - refits.first().map_or(own_nothing, |best| best.loss);
         let near = refits.iter().take(REFINED).filter(|own| own_nothing - own.loss > 0.5 * gain).count();
-        let refined: Vec<Refit> = refits[..near].par_iter().map(|own| refine(engine, own)).collect();
-        refits.splice(..near, refined);
-        refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        let mut refined: Vec<Placement> =
+            refits[..near].par_iter().map(|own| at_home(here, &refine(here, own), NUMBER_COSTS)).collect();
+        refined.sort_by(|left, right| left.fit.loss.total_cmp(&right.fit.loss));
+        refits.splice(..near, refined.iter().map(|own| own.fit.clone()));
+        let best_home = (!refined.is_empty()).then(|| refined.swap_remove(0).home).flatten();
         let Some(best) = refits.first() else { break };
+        let there = best_home.as_ref().unwrap_or(here);
         if round == 0 {
             fitted = refits.clone();
         }
         // What nothing gains is told by what the best model leaves: what it explains is no noise.
-        let own = Nothing::new(engine, &columns, &around_of(engine, best), best).threshold();
+        let own = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
         if !accepted(&model, best, own) {
             break;
         }
@@ -166,17 +180,18 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         rounds.push((model.placed.clone(), refits.clone()));
         model = best.clone();
         if round > 0 {
-            swap(engine, &mut model, &rounds, progress);
+            swap(there, &mut model, &rounds, progress);
         }
+        home = best_home.or(home);
     }
-    drop_unneeded(engine, &calibrated, &mut model, &mut rounds, threshold);
-    let left = Nothing::new(engine, &columns, &around_of(engine, &model), &model);
+    let here = home.as_ref().unwrap_or(engine);
+    drop_unneeded(here, &calibrated, &mut model, &mut rounds, threshold);
+    let left = Nothing::new(here, &columns, &around_of(here, &model), &model);
     threshold = left.threshold();
     let limits = left.limits(columns.candidates.len(), threshold);
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
-    let level = model.loss / engine.freedom().iter().sum::<f64>();
-    let linked = engine.windows().iter().any(|windows| windows.course().linked);
-    let excess_level = if linked { EXCESS_LINKED } else { EXCESS };
+    let level = model.loss / here.freedom().iter().sum::<f64>();
+    let excess_level = if engine.is_linked() { EXCESS_LINKED } else { EXCESS };
     let inadequate = level > excess_level && model.loss > STAYS * calibrated.fit.loss;
     let alternatives = model.placed.iter().map(|placed| alternatives(placed, &calibrated, &rounds)).collect();
     let shares = shares(&model, &rounds, &calibrated, excess);
@@ -246,6 +261,30 @@ fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
     best
 }
 
+/// A model, and the records as they are met best by it; `None` where its own starts make no difference.
+struct Placement<'a> {
+    home: Option<Engine<'a>>,
+    fit: Refit,
+}
+
+/// Fits a model again from where it says itself that the pistons were, where that matters.
+fn at_home<'a>(engine: &Engine<'a>, own: &Refit, penalty: f64) -> Placement<'a> {
+    let mut best = Placement { home: None, fit: own.clone() };
+    for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
+        let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
+        let home = engine.settled_at(&rig);
+        let Some(fit) = refit(&home, &around_of(&home, &best.fit), &best.fit.placed, penalty) else { break };
+        let settled = best.home.is_some() && fit.loss > best.fit.loss - MOVED * best.fit.loss.abs();
+        if best.home.is_none() || fit.loss < best.fit.loss {
+            best = Placement { home: Some(home), fit };
+        }
+        if settled {
+            break;
+        }
+    }
+    best
+}
+
 /// Whether a model is better than the one before by more than chance and inexactness give.
 fn accepted(before: &Refit, after: &Refit, threshold: f64) -> bool {
     let gain = before.loss - after.loss;
@@ -259,7 +298,9 @@ fn accepted(before: &Refit, after: &Refit, threshold: f64) -> bool {
 #[must_use]
 pub fn is_large(placed: &Placed) -> bool {
     let candidate = &placed.candidate;
-    (0..placed.coordinates.len()).filter(|key| !candidate.is_shape(*key)).any(|key| {
+    // Where rods are linked, damping alone takes up what starts within micrometres leave.
+    let keys = if candidate.place.part == Part::Linkage { 1 } else { placed.coordinates.len() };
+    (0..keys).filter(|key| !candidate.is_shape(*key)).any(|key| {
         let sheet_key = &candidate.sheet.keys[key];
         let ends = sheet_key.drawn.map(|number| candidate.coordinate(key, number));
         // A range that holds the neutral value has no smallest change.

@@ -21,7 +21,7 @@ mod whiten;
 use crate::course::{CHANNELS, Course, Point};
 use crate::seats::Seats;
 use plant::{Inputs, Plant, RigParameters};
-use starts::{LINKED_PASSES, orthonormal};
+use starts::orthonormal;
 pub(crate) use starts::{first_state, seat, seated};
 use whiten::drift;
 
@@ -92,8 +92,8 @@ impl<'a> Windows<'a> {
         };
         windows.bases = windows.sensitivities().into_iter().map(orthonormal).collect();
         // A micrometre of the eye in its gap is two newtons: where the rods are linked, the record's points are too coarse.
-        for _ in 0..if course.linked { LINKED_PASSES } else { 0 } {
-            windows.settle();
+        if course.linked {
+            windows.settle_linked();
         }
         windows
     }
@@ -106,7 +106,7 @@ impl<'a> Windows<'a> {
 
     /// The course.
     #[must_use]
-    pub fn course(&self) -> &Course {
+    pub fn course(&self) -> &'a Course {
         self.course
     }
 

@@ -255,7 +255,12 @@ impl<'a> Observer<'a> {
 }
 
 fn plant_in(rig: &RigParameters, state: &State) -> Plant {
-    Plant::in_state(rig, state).expect("a state of a run is one that the rig can be in")
+    Plant::in_state(rig, &of_rig(rig, state)).expect("a state of a run is one that the rig can be in")
+}
+
+/// The state with what this rig's supply gives at most: another rig's run may have had more.
+fn of_rig(rig: &RigParameters, state: &State) -> State {
+    State { supply_pressure_pa: state.supply_pressure_pa.min(rig.supply().pressure_pa), ..*state }
 }
 
 /// Which way an axis goes, and whether the rods touch.

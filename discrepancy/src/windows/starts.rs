@@ -8,8 +8,10 @@ use plant::{Inputs, Plant, RigParameters, Setup, State};
 
 /// How far a start may move at a time where the rods are linked.
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
+/// Share of a step that is tried next when the whole met the readings worse.
+const SHORTER: f64 = 0.3;
 /// How often the starts of a linked record are moved.
-pub(super) const LINKED_PASSES: usize = 3;
+const LINKED_PASSES: usize = 6;
 /// The same of others, where it is asked for.
 const SETTLING: usize = 2;
 /// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
@@ -22,7 +24,13 @@ const LEAST_PA: f64 = 1e4;
 
 impl Windows<'_> {
     /// Moves each window's start to where its readings say that it was, and takes its sensitivities anew.
-    pub(super) fn settle(&mut self) {
+    fn settle(&mut self) {
+        self.settle_by(&vec![1.0; self.starts.len()]);
+        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+    }
+
+    /// Moves them by shares of the way, one for each window.
+    fn settle_by(&mut self, shares: &[f64]) {
         let rows = self.rows();
         let all = self.sensitivities();
         let simulated = self.simulate(&self.rig);
@@ -49,7 +57,7 @@ impl Windows<'_> {
             for (place, axis) in measured.iter().enumerate() {
                 let part = |number: usize| {
                     let most = if self.course.linked { FARTHEST[number] } else { DOUBT[number] };
-                    (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
+                    shares[at] * (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
                 point.extension_m += part(0);
@@ -61,7 +69,46 @@ impl Windows<'_> {
                 point.pressures_pa[1] += part(3);
             }
         }
+    }
+
+    /// Settles all starts of a linked record; steps that meet a window's readings worse are taken back and made shorter.
+    pub(super) fn settle_linked(&mut self) {
+        let mut shares = vec![1.0; self.starts.len()];
+        let mut squares = self.raw_squares();
+        for _ in 0..LINKED_PASSES {
+            let points = self.points.clone();
+            self.settle_by(&shares);
+            let new = self.raw_squares();
+            for (at, start) in self.starts.iter().enumerate() {
+                if new[at] > squares[at] {
+                    self.points[start / WINDOW] = points[start / WINDOW];
+                    shares[at] *= SHORTER;
+                } else {
+                    squares[at] = new[at];
+                    shares[at] = 1.0;
+                }
+            }
+        }
         self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+    }
+
+    /// Squares of what each window leaves, starts as they are.
+    fn raw_squares(&self) -> Vec<f64> {
+        let rows = self.rows();
+        let simulated = self.simulate(&self.rig);
+        let mut left: Vec<f64> =
+            self.readings.iter().zip(&simulated).map(|(reading, own)| reading - own).collect();
+        for (value, _) in left.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
+            *value = 0.0;
+        }
+        left.chunks_exact_mut(rows)
+            .enumerate()
+            .map(|(at, own)| {
+                self.flatten_spikes(own);
+                self.whiten(at, own);
+                dot(own, own)
+            })
+            .collect()
     }
 
     /// The same windows with starts where the readings are met best, as linked ones have them anyway.
