@@ -13,16 +13,18 @@
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
+mod home;
+mod nothing;
+
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::fit::Products;
-use crate::parameters::{COUNT, PARAMETERS};
+use crate::parameters::COUNT;
 use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
 use crate::screen::{Columns, Screened};
+use home::{Placement, at_home};
+use nothing::Nothing;
 use plant::effects::sheet::Part;
-use rand_core::{Rng, SeedableRng};
-use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 /// Effects at most.
@@ -37,9 +39,6 @@ const BELIEVED: f64 = 0.2;
 const REFINED: usize = 3;
 const REFININGS: usize = 4;
 const SETTLED: f64 = 1.0;
-/// How often a model of linked rods and the starts that it says follow each other, and the share of the loss that ends it.
-const MOVES: usize = 3;
-const MOVED: f64 = 0.05;
 /// Amplitudes that are tried then.
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 /// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
@@ -70,12 +69,6 @@ const STAYS: f64 = 0.3;
 const ALIKE: f64 = 20.0;
 /// The same as a share of what the effect takes.
 const ALIKE_SHARE: f64 = 0.02;
-/// Simulated records of nothing for the threshold.
-const NULLS: usize = 300;
-/// Share of them that stays below it.
-const NULL_SHARE: f64 = 0.99;
-/// A generator's seed: the threshold is part of the result, and has the same bits each run.
-const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
 
 /// What naming found.
 #[derive(Debug)]
@@ -261,30 +254,6 @@ fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
     best
 }
 
-/// A model, and the records as they are met best by it; `None` where its own starts make no difference.
-struct Placement<'a> {
-    home: Option<Engine<'a>>,
-    fit: Refit,
-}
-
-/// Fits a model again from where it says itself that the pistons were, where that matters.
-fn at_home<'a>(engine: &Engine<'a>, own: &Refit, penalty: f64) -> Placement<'a> {
-    let mut best = Placement { home: None, fit: own.clone() };
-    for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
-        let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
-        let home = engine.settled_at(&rig);
-        let Some(fit) = refit(&home, &around_of(&home, &best.fit), &best.fit.placed, penalty) else { break };
-        let settled = best.home.is_some() && fit.loss > best.fit.loss - MOVED * best.fit.loss.abs();
-        if best.home.is_none() || fit.loss < best.fit.loss {
-            best = Placement { home: Some(home), fit };
-        }
-        if settled {
-            break;
-        }
-    }
-    best
-}
-
 /// Whether a model is better than the one before by more than chance and inexactness give.
 fn accepted(before: &Refit, after: &Refit, threshold: f64) -> bool {
     let gain = before.loss - after.loss;
@@ -328,71 +297,6 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
         })
         .collect();
     columns.screen(engine, &around, &residual, &beside)
-}
-
-/// What a model leaves, against all candidates, window by window.
-struct Nothing {
-    /// Of each probe: candidate, coordinate of the amplitude, scores of the windows, information.
-    probes: Vec<(usize, f64, Vec<f64>, f64)>,
-}
-
-impl Nothing {
-    fn new(engine: &Engine<'_>, columns: &Columns, around: &Around, model: &Refit) -> Self {
-        let rig =
-            rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
-        let residual = engine.residual(&engine.simulate(&rig));
-        let of: Vec<(usize, f64, usize)> = columns
-            .probes
-            .iter()
-            .enumerate()
-            .flat_map(|(at, probes)| probes.iter().map(move |(probe, place)| (at, probe[0], *place)))
-            .collect();
-        let parameter_columns = around.columns.iter().map(Vec::as_slice);
-        let all: Vec<&[f64]> =
-            parameter_columns.chain(of.iter().map(|(_, _, place)| columns.column(*place))).collect();
-        let products = Products::new(&residual, &all, engine.freedom(), engine.rows());
-        let ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
-        let parameters: Vec<usize> = (0..COUNT).collect();
-        let weights = &products.fit(&parameters, &ridges).weights;
-        let scores = products.cleared_scores(&parameters, weights, &ridges);
-        let probes =
-            of.into_iter().zip(scores).map(|((at, z, _), (scores, own))| (at, z, scores, own)).collect();
-        Nothing { probes }
-    }
-
-    /// The gain that a share of records of nothing stays below: random signs of the windows keep what hangs together within each,
-    /// and take away what hangs together with a candidate.
-    fn threshold(&self) -> f64 {
-        let windows = self.probes.first().map_or(0, |(_, _, scores, _)| scores.len());
-        let mut random = Pcg64::seed_from_u64(SEED);
-        let mut most: Vec<f64> = (0..NULLS)
-            .map(|_| {
-                let signs: Vec<f64> =
-                    (0..windows).map(|_| if random.next_u64() >> 63 == 0 { 1.0 } else { -1.0 }).collect();
-                self.probes
-                    .iter()
-                    .map(|(_, _, scores, information)| {
-                        let sum: f64 = scores.iter().zip(&signs).map(|(own, sign)| own * sign).sum();
-                        sum * sum / information
-                    })
-                    .fold(0.0, f64::max)
-            })
-            .collect();
-        most.sort_by(f64::total_cmp);
-        most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
-    }
-
-    /// Smallest coordinate of each candidate's amplitude whose gain would have been accepted.
-    fn limits(&self, candidates: usize, threshold: f64) -> Vec<Option<f64>> {
-        let mut limits: Vec<Option<f64>> = vec![None; candidates];
-        for (at, z, _, information) in self.probes.iter().filter(|(_, z, _, _)| *z != 0.0) {
-            let limit = z.abs() * (SAFETY * threshold / information).sqrt();
-            if limit.is_finite() && limits[*at].is_none_or(|own| limit < own) {
-                limits[*at] = Some(limit);
-            }
-        }
-        limits
-    }
 }
 
 /// Puts what came close in an earlier round in the place of what won it: beside the effects that joined since, it may win.

@@ -1,0 +1,33 @@
+//! Models of linked rods, fitted from where they say themselves that the pistons were.
+
+use super::around_of;
+use crate::engine::Engine;
+use crate::refit::{Refit, refit, rig_of};
+
+/// How often a model of linked rods and the starts that it says follow each other, and the share of the loss that ends it.
+const MOVES: usize = 3;
+const MOVED: f64 = 0.05;
+
+/// A model, and the records as they are met best by it; `None` where its own starts make no difference.
+pub(super) struct Placement<'a> {
+    pub(super) home: Option<Engine<'a>>,
+    pub(super) fit: Refit,
+}
+
+/// Fits a model again from where it says itself that the pistons were, where that matters.
+pub(super) fn at_home<'a>(engine: &Engine<'a>, own: &Refit, penalty: f64) -> Placement<'a> {
+    let mut best = Placement { home: None, fit: own.clone() };
+    for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
+        let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
+        let home = engine.settled_at(&rig);
+        let Some(fit) = refit(&home, &around_of(&home, &best.fit), &best.fit.placed, penalty) else { break };
+        let settled = best.home.is_some() && fit.loss > best.fit.loss - MOVED * best.fit.loss.abs();
+        if best.home.is_none() || fit.loss < best.fit.loss {
+            best = Placement { home: Some(home), fit };
+        }
+        if settled {
+            break;
+        }
+    }
+    best
+}

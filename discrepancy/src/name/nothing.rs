@@ -1,0 +1,84 @@
+//! What nothing gains: the threshold of a model, and the smallest amplitudes that would have been accepted.
+//!
+//! Source: discrepancy-notes.md, 4 (thresholds from this very record) and pipeline 1.
+
+use super::SAFETY;
+use crate::engine::Engine;
+use crate::fit::Products;
+use crate::parameters::{COUNT, PARAMETERS};
+use crate::refit::{Around, Refit, rig_of};
+use crate::screen::Columns;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Simulated records of nothing for the threshold.
+const NULLS: usize = 300;
+/// Share of them that stays below it.
+const NULL_SHARE: f64 = 0.99;
+/// A generator's seed: the threshold is part of the result, and has the same bits each run.
+const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
+
+/// What a model leaves, against all candidates, window by window.
+pub(super) struct Nothing {
+    /// Of each probe: candidate, coordinate of the amplitude, scores of the windows, information.
+    probes: Vec<(usize, f64, Vec<f64>, f64)>,
+}
+
+impl Nothing {
+    pub(super) fn new(engine: &Engine<'_>, columns: &Columns, around: &Around, model: &Refit) -> Self {
+        let rig =
+            rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
+        let residual = engine.residual(&engine.simulate(&rig));
+        let of: Vec<(usize, f64, usize)> = columns
+            .probes
+            .iter()
+            .enumerate()
+            .flat_map(|(at, probes)| probes.iter().map(move |(probe, place)| (at, probe[0], *place)))
+            .collect();
+        let parameter_columns = around.columns.iter().map(Vec::as_slice);
+        let all: Vec<&[f64]> =
+            parameter_columns.chain(of.iter().map(|(_, _, place)| columns.column(*place))).collect();
+        let products = Products::new(&residual, &all, engine.freedom(), engine.rows());
+        let ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
+        let parameters: Vec<usize> = (0..COUNT).collect();
+        let weights = &products.fit(&parameters, &ridges).weights;
+        let scores = products.cleared_scores(&parameters, weights, &ridges);
+        let probes =
+            of.into_iter().zip(scores).map(|((at, z, _), (scores, own))| (at, z, scores, own)).collect();
+        Nothing { probes }
+    }
+
+    /// The gain that a share of records of nothing stays below: random signs of the windows keep what hangs together within each,
+    /// and take away what hangs together with a candidate.
+    pub(super) fn threshold(&self) -> f64 {
+        let windows = self.probes.first().map_or(0, |(_, _, scores, _)| scores.len());
+        let mut random = Pcg64::seed_from_u64(SEED);
+        let mut most: Vec<f64> = (0..NULLS)
+            .map(|_| {
+                let signs: Vec<f64> =
+                    (0..windows).map(|_| if random.next_u64() >> 63 == 0 { 1.0 } else { -1.0 }).collect();
+                self.probes
+                    .iter()
+                    .map(|(_, _, scores, information)| {
+                        let sum: f64 = scores.iter().zip(&signs).map(|(own, sign)| own * sign).sum();
+                        sum * sum / information
+                    })
+                    .fold(0.0, f64::max)
+            })
+            .collect();
+        most.sort_by(f64::total_cmp);
+        most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
+    }
+
+    /// Smallest coordinate of each candidate's amplitude whose gain would have been accepted.
+    pub(super) fn limits(&self, candidates: usize, threshold: f64) -> Vec<Option<f64>> {
+        let mut limits: Vec<Option<f64>> = vec![None; candidates];
+        for (at, z, _, information) in self.probes.iter().filter(|(_, z, _, _)| *z != 0.0) {
+            let limit = z.abs() * (SAFETY * threshold / information).sqrt();
+            if limit.is_finite() && limits[*at].is_none_or(|own| limit < own) {
+                limits[*at] = Some(limit);
+            }
+        }
+        limits
+    }
+}
