@@ -14,7 +14,7 @@ use crate::report::Quantity;
 use plant::RigParameters;
 
 /// Points at most.
-const POINTS: usize = 4;
+const POINTS: usize = 8;
 /// Fall of the loss below which it has settled.
 const SETTLED: f64 = 1.0;
 /// Share of the tolerance above which an error says that the record does not tell.

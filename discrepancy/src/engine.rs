@@ -132,7 +132,7 @@ impl<'a> Engine<'a> {
         let around = |at: usize, change: f64| {
             let mut factors = *factors;
             factors[at] += change;
-            self.simulate(&with_factors(rig, &factors))
+            self.simulate_coarsely(&with_factors(rig, &factors))
         };
         (0..PARAMETERS.len())
             .into_par_iter()

@@ -55,8 +55,10 @@ const CONTENDS: f64 = 0.35;
 const NUMBER_COSTS: f64 = 8.0;
 /// What came close in a round, that is tried again when another effect has joined.
 const SWAPPED: usize = 3;
-/// Multiple of the threshold of nothing that is asked for, since a model is never exact.
+/// Multiple of the threshold of nothing that is asked of the first effect and of every further one, since a model is never exact,
+/// least of all one with another effect fitted in it.
 const SAFETY: f64 = 2.0;
+const SAFETY_BESIDE: f64 = 3.0;
 /// Share of what the parameters leave that the first effect must take.
 const TAKES_FIRST: f64 = 0.1;
 /// Share of what a model leaves that one more effect must take.
@@ -153,7 +155,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         // Sensitivities of the parameters were those of the model before: the best get their own. What they gain is held against
         // what the parameters alone reach with the same sensitivities.
         let gain = own_nothing - refits.first().map_or(own_nothing, |best| best.loss);
-        let near = refits.iter().take(REFINED).filter(|own| own_nothing - own.loss > 0.5 * gain).count();
+        let near =
+            refits.iter().take(REFINED).filter(|own| own_nothing - own.loss >= 0.5 * gain).count().max(1);
         let mut refined: Vec<Placement> =
             refits[..near].par_iter().map(|own| at_home(here, &refine(here, own), NUMBER_COSTS)).collect();
         refined.sort_by(|left, right| left.fit.loss.total_cmp(&right.fit.loss));
@@ -258,9 +261,10 @@ fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
 fn accepted(before: &Refit, after: &Refit, threshold: f64) -> bool {
     let gain = before.loss - after.loss;
     let Some(joined) = after.placed.last() else { return false };
-    let share = if before.placed.is_empty() { TAKES_FIRST } else { TAKES };
+    let (share, safety) =
+        if before.placed.is_empty() { (TAKES_FIRST, SAFETY) } else { (TAKES, SAFETY_BESIDE) };
     let takes = gain > share * before.loss.max(0.0);
-    gain > SAFETY * threshold && takes && is_large(joined)
+    gain > safety * threshold && takes && is_large(joined)
 }
 
 /// Whether one of an effect's amplitudes is no smaller than a share of what occurs.
@@ -351,7 +355,7 @@ fn drop_unneeded(
             .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
         let Some((at, own)) = least else { break };
         let share = (own.loss - model.loss) / (calibrated.fit.loss - model.loss).max(1e-9);
-        if own.loss - model.loss > SAFETY * threshold && share > 0.002 {
+        if own.loss - model.loss > SAFETY_BESIDE * threshold && share > 0.002 {
             break;
         }
         rounds.remove(at.min(rounds.len() - 1));

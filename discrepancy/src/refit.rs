@@ -27,6 +27,11 @@ const AMPLITUDE_TOLERANCE: f64 = 3.0;
 const SHAPE_TOLERANCE: f64 = 0.7;
 /// By how much a parameter may be off at most: one that is off by more is another rig.
 const MOST_OFF: f64 = 0.3;
+/// What each parameter that is off costs, as a number of an effect does: a sensor that shows four per cent too little is a better
+/// explanation than all masses, frictions and areas off by as much.
+const PARAMETER_COSTS: f64 = 8.0;
+/// From where on a parameter counts as off.
+const COUNTS_AS_OFF: f64 = 0.005;
 /// Coordinates beyond which nothing is looked for: a half more than the strongest that occurs.
 const FARTHEST: f64 = 1.5;
 
@@ -46,7 +51,7 @@ pub struct Refit {
     pub placed: Vec<Placed>,
     /// Factors of the parameters.
     pub factors: [f64; COUNT],
-    /// The loss, priors and a penalty for each number included.
+    /// The loss, priors and a penalty for each number of an effect and each parameter that is off included.
     pub loss: f64,
     /// Squares of each window.
     pub squares: Vec<f64>,
@@ -76,6 +81,11 @@ pub fn rig_of(rig: &RigParameters, placed: &[Placed], factors: &[f64; COUNT]) ->
 /// Ridges of the parameters, for changes from `factors` of what is believed to be 1.
 fn parameter_ridges() -> Vec<f64> {
     PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect()
+}
+
+/// How many parameters are off, those that are so by little counted in part.
+fn parameters_off(factors: &[f64; COUNT]) -> f64 {
+    factors.iter().map(|factor| (factor - 1.0).powi(2)).map(|own| own / (own + COUNTS_AS_OFF.powi(2))).sum()
 }
 
 fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
@@ -219,7 +229,10 @@ pub fn refit_steps(
     for (own, change) in factors.iter_mut().zip(&point.fit.coefficients) {
         *own = (*own + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
-    let loss = point.fit.loss + prior(&point.placed) + penalty * moved.len() as f64;
+    let loss = point.fit.loss
+        + prior(&point.placed)
+        + penalty * moved.len() as f64
+        + PARAMETER_COSTS * parameters_off(&factors);
     Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
 }
 

@@ -26,7 +26,7 @@ pub(crate) use starts::{first_state, seat, seated};
 use whiten::drift;
 
 /// Periods of a window.
-pub const WINDOW: usize = 100;
+pub const WINDOW: usize = 400;
 /// Place of the force among the readings.
 const FORCE: usize = 1;
 /// Steps of a period where only a difference is wanted.
