@@ -147,8 +147,9 @@ fn an_entry_that_separates_more_pairs_wins_over_one_that_separates_fewer_by_more
 
 #[test]
 fn a_piston_at_rest_does_not_tell_the_gains_of_its_chambers_apart() {
-    // Regression: a piston that comes to rest sliding gives way to one sign of a nudge of its pressures alone. Taken as creeping it
-    // made a cosine of 0.42 and T = 210 in shut-and-hold; the study ran that, and the records stayed alike. It is 0.98.
+    // Regression: a piston that comes to rest sliding gives way to one sign of a nudge of its pressures alone. Taken as
+    // creeping it made a cosine of 0.42 and T = 210 in shut-and-hold; the study ran that, and the records stayed alike. It is
+    // 0.98.
     let entry = MENU.iter().find(|entry| entry.name == "shut-and-hold").expect("an entry");
     let gains = [
         explained(&[("pressure-sensor-gain", "drive.b", &[("gain_percent", 0.36)])]),
