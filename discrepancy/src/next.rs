@@ -96,7 +96,9 @@ impl Judged {
 
 /// The experiment that best separates these explanations, and what would where none does.
 ///
-/// `axes_measured` are drive and load. `progress` gets a line for each entry of the menu.
+/// `axes_measured` are drive and load. What is proposed is judged together with the records that it adds to, on the axes that all
+/// of them show: where that is one alone, entries that link the rods are left out, since it tells nothing of what the other does.
+/// `progress` gets a line for each entry of the menu.
 pub fn propose(
     baseline: &RigParameters,
     explanations: &[Explanation],
@@ -105,7 +107,8 @@ pub fn propose(
 ) -> Proposal {
     let mut table = Vec::new();
     if explanations.len() > 1 {
-        for entry in MENU {
+        let both = axes_measured == [true, true];
+        for entry in MENU.iter().filter(|entry| both || !entry.is_linked()) {
             progress(&format!("rehearsing {}", entry.name));
             table.extend(judge(entry, baseline, explanations, axes_measured));
         }

@@ -94,8 +94,11 @@ pub enum WorkflowError {
         /// Its fatal findings.
         why: String,
     },
-    /// Records of different axes or set-ups.
-    #[error("{first} and {other} are not of the same axes and set-up: give records of one set-up at a time")]
+    /// Records that show no common axis, or of linked rods one axis only in common.
+    #[error(
+        "{first} and {other} do not show the same axes: records are judged on what all of them show, and of linked rods that \
+         must be both"
+    )]
     Mixed {
         /// The first record.
         first: String,
@@ -168,14 +171,15 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
         rig: rig_file.file.clone(),
         train: task.train.iter().map(|path| path.display().to_string()).collect(),
     };
-    let courses: Vec<Course> = opened.into_iter().filter_map(|opened| opened.course).collect();
+    let mut courses: Vec<Course> = opened.into_iter().filter_map(|opened| opened.course).collect();
     if courses.len() < task.train.len() {
         return Ok(bad_data(inputs, checks));
     }
-    one_set_up(&courses)?;
+    on_shared_axes(&mut courses)?;
 
     let engine = Engine::new(&courses, rig);
-    let candidates = Candidate::all(courses[0].measured, courses[0].linked, &task.without);
+    let linked = courses.iter().any(|course| course.linked);
+    let candidates = Candidate::all(courses[0].measured, linked, &task.without);
     let found = name(&engine, candidates, progress);
     let mut report = report_of(&engine, &found);
     report.inputs = inputs;
@@ -302,16 +306,17 @@ fn open_all(
         .collect()
 }
 
-fn one_set_up(courses: &[Course]) -> Result<(), WorkflowError> {
-    let first = &courses[0];
-    let other = courses.iter().find(|course| {
-        (course.measured, course.linked, course.added_mass_kg)
-            != (first.measured, first.linked, first.added_mass_kg)
-    });
-    match other {
-        Some(other) => Err(WorkflowError::Mixed { first: first.name.clone(), other: other.name.clone() }),
-        None => Ok(()),
+/// Takes what all records show: an axis that one of them lacks is left out of the others. Linked rods move together, so that no
+/// axis of theirs can be left out.
+fn on_shared_axes(courses: &mut [Course]) -> Result<(), WorkflowError> {
+    let shared = [0, 1].map(|axis| courses.iter().all(|course| course.measured[axis]));
+    let lacks = |course: &&Course| course.measured != shared && (course.linked || shared == [false, false]);
+    if let Some(course) = courses.iter().find(lacks) {
+        let other = courses.iter().find(|other| other.measured != course.measured).unwrap_or(course);
+        return Err(WorkflowError::Mixed { first: course.name.clone(), other: other.name.clone() });
     }
+    courses.iter_mut().for_each(|course| course.measured = shared);
+    Ok(())
 }
 
 /// What makes records unusable, in words.
@@ -332,4 +337,52 @@ fn addition(named: &NamedEffect) -> Addition {
     let numbers =
         named.parameters.iter().map(|own| (own.name.clone(), own.value, own.standard_error)).collect();
     Addition { effect: named.effect.clone(), place, numbers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn course(name: &str, measured: [bool; 2], linked: bool) -> Course {
+        Course {
+            name: name.to_owned(),
+            linked,
+            added_mass_kg: 0.0,
+            measured,
+            inputs: Vec::new(),
+            samples: Vec::new(),
+            points: Vec::new(),
+            noise: [[1.0; 4]; 2],
+            memory: [[0.0; 4]; 2],
+            jitter_s: 0.0,
+            gaps: Vec::new(),
+        }
+    }
+
+    const DRIVE: [bool; 2] = [true, false];
+    const LOAD: [bool; 2] = [false, true];
+    const BOTH: [bool; 2] = [true, true];
+
+    #[test]
+    fn records_are_judged_on_the_axes_that_all_of_them_show() {
+        for (records, shared) in [
+            ([(DRIVE, false), (DRIVE, false)], DRIVE),
+            ([(LOAD, false), (BOTH, false)], LOAD),
+            ([(BOTH, true), (BOTH, false)], BOTH),
+        ] {
+            let mut courses = records.map(|(measured, linked)| course("a", measured, linked));
+            on_shared_axes(&mut courses).unwrap();
+            assert!(courses.iter().all(|course| course.measured == shared), "{records:?}");
+        }
+    }
+
+    #[test]
+    fn no_axis_of_linked_rods_is_left_out() {
+        for records in [[(DRIVE, false), (LOAD, false)], [(DRIVE, false), (BOTH, true)]] {
+            let [one, two] = records;
+            let mut courses = [course("one", one.0, one.1), course("two", two.0, two.1)];
+            let error = on_shared_axes(&mut courses).unwrap_err().to_string();
+            assert!(error.contains("one") && error.contains("two"), "{error}");
+        }
+    }
 }

@@ -40,8 +40,8 @@ mod sensing;
 mod tests;
 mod valve;
 
-pub use closed_loop::{replay, simulate};
-pub use files::{make, write};
+pub use closed_loop::{replay, simulate, simulate_proposed};
+pub use files::{make, write, write_measurement};
 pub use numbers::PARAMETERS;
 
 use controller::run::RunError;
@@ -235,6 +235,14 @@ pub enum MakeError {
     Stopped {
         /// When.
         at_s: f64,
+    },
+    /// A proposed experiment does not come to its end.
+    #[error("{file}: is not done after {length_s} s")]
+    Unfinished {
+        /// The experiment's file.
+        file: String,
+        /// How long it was run, s.
+        length_s: f64,
     },
     /// A number is no longer finite, or a pressure no longer positive.
     #[error("the {axis} axis is in no state of a rig at {at_s} s")]

@@ -16,6 +16,7 @@
 //! | [`report`] | `report.json`, read as strictly as it is promised |
 //! | [`judge`] | one case: what was hidden against what was named |
 //! | [`leave_out`] | one case whose effect is left out of the program's catalogue |
+//! | [`resolve`] | whether the experiment that a program proposes resolves what it could not tell apart |
 //! | [`interval`] | what so many of so many prove |
 //! | [`score`] | all cases: rates, confusion matrix, parameters, time |
 //! | [`page`] | the score as one page |
@@ -45,6 +46,7 @@ pub mod limits;
 pub mod page;
 pub mod program;
 pub mod report;
+pub mod resolve;
 pub mod score;
 pub mod signature;
 

@@ -24,6 +24,7 @@
 
 use super::driven::Driven;
 use super::nuisance::{Product, dot};
+use crate::course::Point;
 use crate::windows::seated;
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
@@ -154,6 +155,15 @@ impl<'a> Observer<'a> {
         self.driven.inputs.len() / WINDOW
     }
 
+    /// Where the axes are at the start of a window, at rest where they creep: there friction holds a piston up to the break-away
+    /// force, whichever way, as the workflow takes it. One that came to rest sliding would give way to one sign of a nudge alone.
+    fn points(&self, window: usize) -> [Point; 2] {
+        self.driven.points[window * WINDOW].map(|point| {
+            let creeps = point.rod_velocity_m_per_s.abs() < REST_M_PER_S;
+            if creeps { Point { rod_velocity_m_per_s: 0.0, ..point } } else { point }
+        })
+    }
+
     /// Readings of a period.
     fn width(&self) -> usize {
         CHANNELS * self.measured.len()
@@ -168,7 +178,7 @@ impl<'a> Observer<'a> {
         let mut plant = plant_in(rig, &self.driven.start);
         let mut run = Run { readings: Vec::new(), jumps: Vec::new(), starts: Vec::new() };
         for window in 0..self.windows() {
-            let start = seated(&plant, &self.driven.points[window * WINDOW], [true; 2]);
+            let start = seated(&plant, &self.points(window), [true; 2]);
             plant.go_on_in(&start).expect("a state of a run is one that the rig can be in");
             run.starts.push(start);
             self.read(&mut plant, window, &mut run.readings, &mut run.jumps);
@@ -219,7 +229,7 @@ impl<'a> Observer<'a> {
         let mut columns = Vec::new();
         for axes in together {
             for number in 0..STATE_NUMBERS {
-                let mut points = self.driven.points[window * WINDOW];
+                let mut points = self.points(window);
                 for axis in &axes {
                     let point = &mut points[*axis];
                     match number {

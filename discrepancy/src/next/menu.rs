@@ -14,6 +14,14 @@ pub struct Entry {
     pub toml: &'static str,
 }
 
+impl Entry {
+    /// Whether it links the rods.
+    #[must_use]
+    pub fn is_linked(&self) -> bool {
+        self.toml.lines().any(|line| line.trim_end() == "linked = true")
+    }
+}
+
 macro_rules! menu {
     ($($name:literal: $serves:literal,)*) => {
         /// All of them; of equals the first is proposed.

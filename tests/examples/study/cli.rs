@@ -29,6 +29,8 @@ pub(crate) enum Command {
     Compare(CompareArguments),
     /// How rates fall over noise and amplitude: curve-LABEL.md and curve-LABEL.svg.
     Curve(CurveArguments),
+    /// Runs the experiments that the program proposed where it could not tell effects apart: resolve-LABEL.json and .md.
+    Resolve(ResolveArguments),
 }
 
 /// Results under a label, of a study or of all its shards.
@@ -190,6 +192,37 @@ pub(crate) struct CurveArguments {
     #[arg(long)]
     pub(crate) to: PathBuf,
     /// Writes the tables into tests/docs/study.md, and the picture beside it.
+    #[arg(long)]
+    pub(crate) write: bool,
+}
+
+#[derive(Args)]
+pub(crate) struct ResolveArguments {
+    /// Folder of the study.
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// What the results are called; those with the proposed experiments stand under LABEL-resolve.
+    #[arg(long, default_value = "program")]
+    pub(crate) label: String,
+    /// The program that the results are of. Without it only the table is made of what is done.
+    #[arg(long)]
+    pub(crate) program: Option<PathBuf>,
+    /// Its arguments, after --; the same as in the run.
+    #[arg(last = true)]
+    pub(crate) arguments: Vec<String>,
+    /// Longest time for one start, s.
+    #[arg(long, default_value_t = 1200.0)]
+    pub(crate) time_limit: f64,
+    /// Draws at once.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) jobs: usize,
+    /// Runs these draws, again if they are done; commas between.
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) only: Vec<usize>,
+    /// Free space on the disk below which the study stops, MiB.
+    #[arg(long, default_value_t = 1024)]
+    pub(crate) least_free: u64,
+    /// Writes the table into tests/docs/study.md.
     #[arg(long)]
     pub(crate) write: bool,
 }

@@ -1,6 +1,7 @@
-//! The study's commands, for `scripts/study`: draws, limits, cosines, run, score, compare, curve.
+//! The study's commands, for `scripts/study`: draws, limits, cosines, run, score, compare, curve, resolve.
 
 mod cli;
+mod resolve;
 mod scores;
 
 use clap::Parser;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Score(arguments) => scores::score(&arguments),
         Command::Compare(arguments) => scores::compare(&arguments),
         Command::Curve(arguments) => scores::curve(&arguments),
+        Command::Resolve(arguments) => resolve::resolve(&arguments, &stop),
     };
     match done {
         Ok(()) if stop.load(Ordering::Relaxed) => ExitCode::from(INTERRUPTED),
@@ -103,13 +105,8 @@ fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
 fn run(arguments: &RunArguments, stop: &AtomicBool) -> Done {
     let study = Study::open(&arguments.out)?;
     let limit = Duration::from_secs_f64(arguments.time_limit.max(0.001));
-    let program = match &arguments.program {
-        Some(path) => Some(
-            Program::new(path, arguments.arguments.clone(), limit)
-                .map_err(|error| format!("--program {}: {error}", path.display()))?,
-        ),
-        None => None,
-    };
+    let program =
+        arguments.program.as_ref().map(|path| program(path, &arguments.arguments, limit)).transpose()?;
     let classes = if arguments.leave_out { classes_for(&study)? } else { BTreeMap::new() };
     let without = |draw: &Draw| left_out(draw, classes.get(&draw.number));
     let campaign = Campaign {
@@ -126,13 +123,22 @@ fn run(arguments: &RunArguments, stop: &AtomicBool) -> Done {
         stop,
         say: &say,
     };
-    match campaign.run()? {
+    told(campaign.run()?);
+    Ok(())
+}
+
+fn program(path: &Path, arguments: &[String], limit: Duration) -> Result<Program, String> {
+    Program::new(path, arguments.to_owned(), limit)
+        .map_err(|error| format!("--program {}: {error}", path.display()))
+}
+
+fn told(end: CampaignEnd) {
+    match end {
         CampaignEnd::Complete => say("complete"),
         CampaignEnd::Stopped(left) => {
             say(&format!("stopped, {left} draws are left: the same command goes on"))
         }
     }
-    Ok(())
 }
 
 /// All classes that are known of a study: committed, or computed for it.

@@ -7,6 +7,7 @@ use super::rig::{Evaluated, Rig, STEPS_PER_MS, State, drift};
 use super::sensing::Sensing;
 use super::{Experiment, MakeError, ROWS, Recipe, Record, Row, TrueAxis, hidden};
 use crate::binaries::workspace;
+use controller::axis::AxisController;
 use controller::cli::FileArguments;
 use controller::rehearsal::{Rehearsal, SimulatedRig, Standing};
 use controller::setup::{Inputs, Mode};
@@ -20,6 +21,8 @@ const MOST_JITTER_S: f64 = 4e-4;
 /// The experiment begins when the initial positioning is over, whatever a hidden effect does to standstill and error: all records
 /// of an experiment are driven at the same times.
 const UNSETTLED: [&str; 3] = ["still_m=0.1", "position_error_m=0.5", "force_error_n=2000"];
+/// Longest run of an experiment that somebody proposes: six repetitions of half a minute.
+const MOST_ROWS: usize = 180_000;
 /// Streams of random numbers: 0 to 7 are the sensors'.
 const JITTER_STREAM: u64 = 8;
 
@@ -41,20 +44,63 @@ pub(super) fn run(
 ) -> Result<Record, MakeError> {
     let (inputs, scene) = read(recipe, rig)?;
     let made = Made::new(recipe, rig, &scene, steps_per_ms)?;
-    let mode = Mode { partner_needed: true, real_time: false, forever: false };
-    let controllers =
-        Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?;
-    let mut rehearsal = Rehearsal::with_rig(made, controllers);
+    let mut rehearsal = Rehearsal::with_rig(made, controllers(&inputs)?);
     let mut record = record(recipe, &scene, rows);
     for _ in 0..rows {
-        let row = rehearsal.step(|_, _| {}).cycle;
-        if rehearsal.rig().stopped {
-            return Err(MakeError::Stopped { at_s: row.time_s });
-        }
-        check(&row)?;
-        record.rows.push(row);
+        record.rows.push(next_row(&mut rehearsal)?);
     }
     Ok(record)
+}
+
+/// Makes a record under an experiment that somebody proposes, given as its file's name and its text, from its start to its end.
+///
+/// Both axes move as the experiment says, linked or not. Recorded are the recipe's axes, and both where the rods are linked:
+/// there one axis alone tells nothing. The recipe's own experiment is not driven.
+///
+/// # Errors
+/// [`MakeError`] when recipe or experiment are none, or the run does not come to its end.
+pub fn simulate_proposed(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    (file, toml): (&str, &str),
+) -> Result<Record, MakeError> {
+    let nominal = rig.without_effects();
+    let program = |name: &str| {
+        std::fs::read_to_string(workspace().join(format!("controller/programs/{name}.toml"))).ok()
+    };
+    let experiment = Inputs::of_texts(&nominal, (file, toml), program, &[])?.experiment;
+    let driven = [experiment.drive.is_some(), experiment.load.is_some()];
+    let set = unsettled(Axis::ALL.into_iter().filter(|axis| driven[axis.index()]));
+    let set: Vec<&str> = set.iter().map(String::as_str).collect();
+    let inputs = Inputs::of_texts(&nominal, (file, toml), program, &set)?;
+    let scene = scene(toml, file, rig)?;
+    let moved = Recipe { both_axes: true, ..recipe.clone() };
+    let made = Made::new(&moved, rig, &scene, STEPS_PER_MS)?;
+    let mut rehearsal = Rehearsal::with_rig(made, controllers(&inputs)?);
+    let recorded = Recipe { both_axes: recipe.both_axes || scene.linked, ..recipe.clone() };
+    let mut record = record(&recorded, &scene, ROWS);
+    while !rehearsal.ended() && record.rows.len() < MOST_ROWS {
+        record.rows.push(next_row(&mut rehearsal)?);
+    }
+    if rehearsal.station().done() {
+        Ok(record)
+    } else {
+        Err(MakeError::Unfinished { file: file.to_owned(), length_s: record.rows.len() as f64 / 1000.0 })
+    }
+}
+
+fn controllers(inputs: &Inputs) -> Result<Vec<AxisController>, MakeError> {
+    let mode = Mode { partner_needed: true, real_time: false, forever: false };
+    Ok(Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?)
+}
+
+fn next_row(rehearsal: &mut Rehearsal<Made>) -> Result<Row, MakeError> {
+    let row = rehearsal.step(|_, _| {}).cycle;
+    if rehearsal.rig().stopped {
+        return Err(MakeError::Stopped { at_s: row.time_s });
+    }
+    check(&row)?;
+    Ok(row)
 }
 
 /// The recipe's rig under given valve commands of drive and load, one pair for each row: what the record would have been with
@@ -145,8 +191,7 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
     let experiment = experiment_file(recipe)?;
     let file = experiment.display().to_string();
     let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
-    let set =
-        moved.flat_map(|axis| UNSETTLED.map(|what| format!("{}.settled.{what}", axis.name()))).collect();
+    let set = unsettled(moved);
     let files = FileArguments {
         rig: workspace().join("plant/rig.toml"),
         experiment,
@@ -159,11 +204,21 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
     };
     let mut inputs = Inputs::read(&files)?;
     inputs.rig = rig.without_effects();
-    let scene = Scene::from_toml(&inputs.experiment_toml, &file, rig)?;
-    if !scene.hand.is_empty() || !scene.event.is_empty() {
-        return Err(MakeError::People { file });
-    }
+    let scene = scene(&inputs.experiment_toml, &file, rig)?;
     Ok((inputs, scene))
+}
+
+fn unsettled(axes: impl Iterator<Item = Axis>) -> Vec<String> {
+    axes.flat_map(|axis| UNSETTLED.map(|what| format!("{}.settled.{what}", axis.name()))).collect()
+}
+
+fn scene(experiment_toml: &str, file: &str, rig: &RigParameters) -> Result<Scene, MakeError> {
+    let scene = Scene::from_toml(experiment_toml, file, rig)?;
+    if scene.hand.is_empty() && scene.event.is_empty() {
+        Ok(scene)
+    } else {
+        Err(MakeError::People { file: file.to_owned() })
+    }
 }
 
 /// The rig of a recipe as a rehearsal moves it.
@@ -187,7 +242,9 @@ impl Made {
     ) -> Result<Self, MakeError> {
         let numbers = Numbers::new(rig, scene.added_mass_kg, &recipe.wrong_parameters)?;
         let stroke_m = numbers.stroke_m;
-        let (made, laws) = hidden::rig(recipe, numbers, steps_per_ms)?;
+        let (mut made, laws) = hidden::rig(recipe, numbers, steps_per_ms)?;
+        // Both axes may move without being linked.
+        made.coupling = made.coupling.filter(|_| scene.linked);
         let mut axis = 0;
         let sensing = laws.map(|laws| {
             let streams = |channel| Stream::new(recipe.seed, (4 * axis + channel) as u64);

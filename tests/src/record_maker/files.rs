@@ -56,6 +56,14 @@ pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), Ma
     save(truth, "truth.json", text.as_bytes())
 }
 
+/// Writes what the sensors read alone into a folder, which is made if missing.
+///
+/// # Errors
+/// [`MakeError::File`].
+pub fn write_measurement(record: &Record, folder: &Path, name: &str) -> Result<(), MakeError> {
+    save(folder, name, &measurement_csv(record))
+}
+
 fn save(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), MakeError> {
     let path = folder.join(name);
     let failed = |error| MakeError::File { path: path.display().to_string(), error };

@@ -9,7 +9,8 @@ use crate::study::SCHEMA_VERSION;
 use crate::study::draws::{Draw, Kind};
 use crate::study::folder::{FolderError, Study, make_whole, read};
 use crate::study::leave_out;
-use crate::study::program::{Identity, Interrupted, Program, Taken};
+use crate::study::program::{Identity, Interrupted, Program, Start, Taken};
+use crate::study::report::{self, Report};
 use discrepancy::records::{self, ReadError, ReadOptions, Unknown};
 use plant::RigParameters;
 use serde::{Deserialize, Serialize};
@@ -30,6 +31,8 @@ pub const EXPERIMENTS: [(Experiment, &str); 3] = [
 
 /// Largest report that is kept.
 const LARGEST_REPORT: u64 = 64 << 20;
+/// Largest experiment that is kept.
+const LARGEST_EXPERIMENT: u64 = 1 << 20;
 /// Most that is kept of what a program says.
 const MOST_SAID: u64 = 1 << 20;
 
@@ -160,8 +163,21 @@ impl Campaign<'_> {
         };
         let missing: Vec<&Draw> = self.draws().filter(wanted).collect();
         self.check_program()?;
-        let (all, began) = (self.draws().count(), Instant::now());
+        let all = self.draws().count();
         (self.say)(&format!("{} of {all} draws are to be done, {} at once", missing.len(), self.jobs));
+        self.each(&missing, |draw| self.one(draw))
+    }
+
+    /// Does something with draws, several at once; `one` says what it did, or `None` when it was told to stop in its midst.
+    ///
+    /// # Errors
+    /// As [`Campaign::run`].
+    pub(crate) fn each(
+        &self,
+        missing: &[&Draw],
+        one: impl Fn(&Draw) -> Result<Option<String>, CampaignError> + Sync,
+    ) -> Result<CampaignEnd, CampaignError> {
+        let began = Instant::now();
         let queue = Mutex::new(missing.iter());
         let finished = Mutex::new(0);
         let failed = Mutex::new(None);
@@ -169,7 +185,7 @@ impl Campaign<'_> {
         let worker = || {
             while !self.stop.load(Ordering::Relaxed) && failed.lock().expect("no holder panics").is_none() {
                 let Some(draw) = queue.lock().expect("no holder panics").next() else { return };
-                match self.one(draw) {
+                match one(draw) {
                     Err(error @ CampaignError::Make { .. }) => {
                         // Of this draw alone; the others need not wait for it.
                         (self.say)(&error.to_string());
@@ -269,7 +285,7 @@ impl Campaign<'_> {
         Ok(Some(format!("records {made_s:.1} s, program {ended:?} {wall_s:.1} s {} MiB", memory_kib >> 10)))
     }
 
-    fn check_disk(&self) -> Result<(), CampaignError> {
+    pub(crate) fn check_disk(&self) -> Result<(), CampaignError> {
         // A system that does not tell is no reason to stop.
         let Ok(told) = rustix::fs::statvfs(&self.study.root) else { return Ok(()) };
         let free_mib = told.f_bavail.saturating_mul(told.f_frsize) >> 20;
@@ -278,7 +294,7 @@ impl Campaign<'_> {
     }
 
     /// The truth first: records without it would be of no use, the other way round they are made again.
-    fn make_records(&self, draw: &Draw) -> Result<(), CampaignError> {
+    pub(crate) fn make_records(&self, draw: &Draw) -> Result<(), CampaignError> {
         let (number, rig) = (draw.number, RigParameters::baseline());
         make_whole(&self.study.records(number), |records| {
             make_whole(&self.study.truth(number), |truth| {
@@ -307,22 +323,46 @@ impl Campaign<'_> {
         let number = draw.number;
         let files = |error| CampaignError::Files { number, error };
         let empty = tempfile::tempdir().map_err(files)?;
+        self.lay_out(draw, empty.path())?;
+        let without = self.without.map_or_else(Vec::new, |without| without(draw));
+        let own = leave_out::arguments(&without);
+        let start = Start { folder: empty.path(), train: &["train.csv"], own: &own };
+        let Some(taken) = self.start(number, program, &start, folder)? else { return Ok(None) };
+        let program = self.identity(program);
+        let result = RunResult { schema_version: SCHEMA_VERSION, number, program, taken, without };
+        fs::write(folder.join("result.json"), format!("{:#}\n", json!(result))).map_err(files)?;
+        Ok(Some(taken))
+    }
+
+    /// Puts what a program may see of a draw into an empty folder.
+    pub(crate) fn lay_out(&self, draw: &Draw, empty: &Path) -> Result<(), CampaignError> {
+        let number = draw.number;
+        let files = |error| CampaignError::Files { number, error };
         let folder_of_records = self.study.records(number);
         let test = EXPERIMENTS
             .iter()
             .find(|(experiment, _)| *experiment == draw.test())
             .map_or("train", |found| found.1);
-        fs::write(empty.path().join("rig.toml"), RigParameters::BASELINE_TOML).map_err(files)?;
+        fs::write(empty.join("rig.toml"), RigParameters::BASELINE_TOML).map_err(files)?;
         for (name, copy) in [("train", "train.csv"), (test, "test.csv")] {
             let record = folder_of_records.join(name).join("measurement.csv");
-            let blind = ReadOptions { unknown: Unknown::Refused, ..ReadOptions::default() };
-            records::read(&record, &blind).map_err(|error| CampaignError::Record { number, error })?;
-            fs::copy(record, empty.path().join(copy)).map_err(files)?;
+            check_blind(number, &record)?;
+            fs::copy(record, empty.join(copy)).map_err(files)?;
         }
+        Ok(())
+    }
+
+    /// Starts the program, and keeps in `folder` what it says, its report and the experiment that this proposes.
+    pub(crate) fn start(
+        &self,
+        number: usize,
+        program: &Program,
+        start: &Start<'_>,
+        folder: &Path,
+    ) -> Result<Option<Taken>, CampaignError> {
+        let files = |error| CampaignError::Files { number, error };
         let said = folder.join("stderr.txt");
-        let without = self.without.map_or_else(Vec::new, |without| without(draw));
-        let own = leave_out::arguments(&without);
-        let taken = match program.run(empty.path(), &own, File::create(&said).map_err(files)?, self.stop) {
+        let taken = match program.run(start, File::create(&said).map_err(files)?, self.stop) {
             Ok(taken) => taken,
             Err(Interrupted) => return Ok(None),
         };
@@ -334,20 +374,33 @@ impl Campaign<'_> {
                 .and_then(|file| file.set_len(MOST_SAID))
                 .map_err(files)?;
         }
-        let report = empty.path().join("out/report.json");
-        // What cannot be copied was not written, or is no file: the judge says so.
-        if fs::metadata(&report).is_ok_and(|report| report.is_file() && report.len() <= LARGEST_REPORT) {
-            fs::copy(&report, folder.join("report.json")).map_err(files)?;
+        let out = start.folder.join("out");
+        keep(&out, folder, "report.json", LARGEST_REPORT).map_err(files)?;
+        let report = report::read(&folder.join("report.json"));
+        if let Some(experiment) = report.as_ref().ok().and_then(Report::proposed) {
+            keep(&out, folder, experiment, LARGEST_EXPERIMENT).map_err(files)?;
         }
-        let program = self.identity(program);
-        let result = RunResult { schema_version: SCHEMA_VERSION, number, program, taken, without };
-        fs::write(folder.join("result.json"), format!("{:#}\n", json!(result))).map_err(files)?;
         Ok(Some(taken))
     }
 }
 
+/// A record that holds more than a measurement could tell what is hidden.
+pub(crate) fn check_blind(number: usize, record: &Path) -> Result<(), CampaignError> {
+    let blind = ReadOptions { unknown: Unknown::Refused, ..ReadOptions::default() };
+    records::read(record, &blind).map(drop).map_err(|error| CampaignError::Record { number, error })
+}
+
+/// Copies a file of a program's folder. What cannot be copied was not written, or is no file: the judge says so.
+fn keep(out: &Path, folder: &Path, name: &str, largest: u64) -> io::Result<()> {
+    let file = out.join(name);
+    if fs::metadata(&file).is_ok_and(|file| file.is_file() && file.len() <= largest) {
+        fs::copy(&file, folder.join(name))?;
+    }
+    Ok(())
+}
+
 /// Why a run's folder is not finished.
-enum CampaignEndOr {
+pub(crate) enum CampaignEndOr {
     Interrupted,
     Error(CampaignError),
 }

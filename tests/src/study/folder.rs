@@ -4,9 +4,11 @@
 //! OUT/draws.json               schema version, seed, shape, shard, all recipes of the shard
 //! OUT/records/0007/            train, held-out-0, held-out-1: each with measurement.csv
 //! OUT/truth/0007/              the same folders with truth.json (and truth.csv, if it is kept)
-//! OUT/runs/LABEL/0007/         result.json, report.json, stderr.txt of the program with this label
+//! OUT/runs/LABEL/0007/         result.json, report.json, stderr.txt of the program with this label, and next-*.toml
+//! OUT/runs/LABEL-resolve/0007/ resolution.json, and the same of the program that was given that experiment's record
 //! OUT/classes/0007.json        which effects leave the same signature
 //! OUT/score-LABEL.json, .html  the score
+//! OUT/resolve-LABEL.json, .md  what the proposed experiments resolve
 //! ```
 //!
 //! `draws.json` is written for people and other programs. It is never read back: the draws follow from seed and shape, and the

@@ -280,4 +280,4 @@ impl Member {
 }
 
 #[cfg(test)]
-mod tests;
+pub(in crate::study) mod tests;

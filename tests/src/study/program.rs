@@ -3,10 +3,11 @@
 //! The program runs in a process group of its own in a folder that holds nothing but `rig.toml`, `train.csv` and `test.csv`:
 //!
 //! ```text
-//! PROGRAM close --rig rig.toml --train train.csv --test test.csv --out out [ARGUMENTS] [--without EFFECT ...]
+//! PROGRAM close --rig rig.toml --train train.csv [next.csv] --test test.csv --out out [ARGUMENTS] [--without EFFECT ...]
 //! ```
 //!
-//! The last ones stand there when effects are left out of its catalogue ([`super::leave_out`]).
+//! The last ones stand there when effects are left out of its catalogue ([`super::leave_out`]), `next.csv` when it is given the
+//! record of the experiment that it proposed ([`super::resolve`]).
 //!
 //! When it has ended, or has used up its time, what is left of the group is killed. Memory is the kernel's largest resident set
 //! of the program and of the children it waited for; the kernel starts counting at what the study itself had at the time.
@@ -79,6 +80,17 @@ pub struct Taken {
     pub memory_kib: u64,
 }
 
+/// What is of one start alone.
+#[derive(Debug, Clone, Copy)]
+pub struct Start<'a> {
+    /// The folder that it runs in.
+    pub folder: &'a Path,
+    /// Training records in it.
+    pub train: &'a [&'a str],
+    /// Arguments behind those of every start.
+    pub own: &'a [String],
+}
+
 /// The study was told to stop while the program ran; it was killed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
@@ -102,34 +114,20 @@ impl Program {
         &self.identity
     }
 
-    /// Runs it in a folder, with arguments for this draw alone; what it says goes to a file.
+    /// Runs it once; what it says goes to a file.
     ///
     /// # Errors
     /// [`Interrupted`] when `stop` is set before it has ended.
-    pub fn run(
-        &self,
-        folder: &Path,
-        own: &[String],
-        said: File,
-        stop: &AtomicBool,
-    ) -> Result<Taken, Interrupted> {
+    pub fn run(&self, start: &Start<'_>, said: File, stop: &AtomicBool) -> Result<Taken, Interrupted> {
         let began = Instant::now();
         let taken = |ended, memory_kib| Taken { ended, wall_s: began.elapsed().as_secs_f64(), memory_kib };
         let started = Command::new(&self.path)
-            .args([
-                "close",
-                "--rig",
-                "rig.toml",
-                "--train",
-                "train.csv",
-                "--test",
-                "test.csv",
-                "--out",
-                "out",
-            ])
+            .args(["close", "--rig", "rig.toml", "--train"])
+            .args(start.train)
+            .args(["--test", "test.csv", "--out", "out"])
             .args(&self.arguments)
-            .args(own)
-            .current_dir(folder)
+            .args(start.own)
+            .current_dir(start.folder)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(said)
@@ -187,7 +185,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let program = script(folder.path(), text, limit);
         let said = File::create(folder.path().join("said")).unwrap();
-        program.run(folder.path(), &[], said, &AtomicBool::new(stop))
+        let start = Start { folder: folder.path(), train: &["train.csv"], own: &[] };
+        program.run(&start, said, &AtomicBool::new(stop))
     }
 
     const PATIENCE: Duration = Duration::from_secs(60);

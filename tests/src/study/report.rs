@@ -45,6 +45,17 @@ pub struct Report {
     pub outside: Option<Outside>,
     /// What the program says of its model on the held-out record.
     pub verification: Option<Verification>,
+    /// What the program would measure next.
+    pub next: Option<Next>,
+}
+
+/// What a program would measure next.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+pub struct Next {
+    /// File of an experiment, beside the report.
+    pub experiment: Option<String>,
+    /// What would tell where no experiment on this rig does.
+    pub otherwise: Option<String>,
 }
 
 /// An effect at a place.
@@ -138,6 +149,7 @@ struct RawReport {
     gap: Option<BTreeMap<String, Gap>>,
     outside: Option<Outside>,
     verification: Option<Verification>,
+    next: Option<Next>,
 }
 
 #[derive(Deserialize)]
@@ -186,8 +198,8 @@ pub fn parse(bytes: &[u8]) -> Result<Report, String> {
         return Err("verdict ParametersOnly without a parameter".to_owned());
     }
     let gap = raw.gap.unwrap_or_default();
-    let RawReport { verdict, parameters, outside, verification, .. } = raw;
-    Ok(Report { verdict, named, parameters, gap, outside, verification })
+    let RawReport { verdict, parameters, outside, verification, next, .. } = raw;
+    Ok(Report { verdict, named, parameters, gap, outside, verification, next })
 }
 
 fn known(raw: RawNamed) -> Result<Named, String> {
@@ -203,6 +215,14 @@ fn known(raw: RawNamed) -> Result<Named, String> {
 }
 
 impl Report {
+    /// File of the experiment that it proposes: a plain name beside it, else there is none.
+    #[must_use]
+    pub fn proposed(&self) -> Option<&str> {
+        let name = self.next.as_ref()?.experiment.as_deref()?;
+        let plain = Path::new(name).file_name().is_some_and(|file| file == name);
+        (plain && name.starts_with("next") && name.ends_with(".toml")).then_some(name)
+    }
+
     /// Smallest share of the gap that the program claims to have closed, over the signals it tells one for.
     #[must_use]
     pub fn claimed_closed(&self) -> Option<f64> {
@@ -305,6 +325,28 @@ mod tests {
         let bad = text.replace("\"balance\": \"load.force\",", "");
         assert!(parse(bad.as_bytes()).unwrap_err().contains("balance"));
         assert!(parse(br#"{"verdict": "nothing-missing", "outside": null}"#).unwrap().outside.is_none());
+    }
+
+    #[test]
+    fn what_is_measured_next_is_read_where_it_is_told() {
+        let with = |next: &str| {
+            parse(format!(r#"{{"verdict": "nothing-missing", "next": {next}}}"#).as_bytes()).unwrap().next
+        };
+        let next = with(
+            r#"{"reason": "alike", "experiment": "next-ends.toml", "divergence": 88, "otherwise": null}"#,
+        );
+        assert_eq!(next.unwrap().experiment.unwrap(), "next-ends.toml");
+        assert_eq!(
+            with(r#"{"reason": "alike", "otherwise": "tilting"}"#).unwrap().otherwise.unwrap(),
+            "tilting"
+        );
+        assert_eq!(with("null"), None);
+        let elsewhere = |name: &str| {
+            let text = format!(r#"{{"verdict": "nothing-missing", "next": {{"experiment": "{name}"}}}}"#);
+            parse(text.as_bytes()).unwrap().proposed().map(str::to_owned)
+        };
+        assert_eq!(elsewhere("next-ends.toml").as_deref(), Some("next-ends.toml"));
+        assert_eq!(elsewhere("../next-ends.toml").or(elsewhere("report.json")), None);
     }
 
     #[test]

@@ -4,10 +4,10 @@ use super::*;
 use crate::study::draws::{Shape, draws};
 use crate::study::report::parse;
 
-const TAKEN: Taken = Taken { ended: Ended::Exited(0), wall_s: 1.0, memory_kib: 1024 };
+pub(in crate::study) const TAKEN: Taken = Taken { ended: Ended::Exited(0), wall_s: 1.0, memory_kib: 1024 };
 
 /// The first draw of a kind that hides these effects.
-fn draw(kind: Kind, effects: &[&str]) -> Draw {
+pub(in crate::study) fn draw(kind: Kind, effects: &[&str]) -> Draw {
     let shape = Shape {
         each: 1,
         nulls: 1,
@@ -48,7 +48,8 @@ fn entry(text: &str) -> String {
     )
 }
 
-fn said(verdict: &str, names: &[&str]) -> Result<Report, String> {
+/// A report of this verdict with these names.
+pub(in crate::study) fn said(verdict: &str, names: &[&str]) -> Result<Report, String> {
     let names: Vec<_> = names.iter().map(|name| entry(name)).collect();
     parse(format!(r#"{{"verdict": "{verdict}", "named": [{}]}}"#, names.join(",")).as_bytes())
 }
