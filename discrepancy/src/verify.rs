@@ -1,7 +1,7 @@
 //! The held-out record: the baseline and the extended model, both frozen.
 //!
 //! ```text
-//!   windows of 100 ms ──► power of each window and signal over what noise gives ──► gap, chi2, whiteness, confirmed
+//!   windows of 400 ms ──► power of each window and signal over what noise gives ──► gap, chi2, whiteness, confirmed
 //!   whole record, open loop ──► free run: error in percent of the range, what a rig cannot do
 //! ```
 //!

@@ -1,4 +1,4 @@
-//! A record in windows of 100 ms, each simulated from where the record says that the pistons were.
+//! A record in windows of 400 ms, each simulated from where the record says that the pistons were.
 //!
 //! ```text
 //!   e_k = M_k (y_k - f_k(start_k; rig)) / sigma          window k: readings y, simulation f, noise sigma
@@ -13,7 +13,7 @@
 //! the force that differs from those around it more than noise can is put back to their median, in residuals and sensitivities
 //! alike [rig-model.md, Accuracy].
 //!
-//! Source: discrepancy-notes.md, 1 (windows of 100 to 200 ms judge best), 6.
+//! Source: discrepancy-notes.md, 1 (naming over the length of windows: as good from 100 ms to 2 s), 6.
 
 mod starts;
 mod whiten;
