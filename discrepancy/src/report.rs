@@ -219,7 +219,7 @@ pub struct Gap {
     /// Noise of the sensor alone.
     pub floor: f64,
     /// Share of the excess power over the floor that went, 1 - (after^2 - floor^2) / (before^2 - floor^2), at most 1; null
-    /// when there was none.
+    /// when there was too little to tell.
     pub closed: Option<f64>,
 }
 

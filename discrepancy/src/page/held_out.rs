@@ -12,7 +12,7 @@ pub(super) fn gap(report: &Report) -> String {
         let size = |value: f64| number(words::with_unit(&words::short(value * factor), &unit));
         let closed = match gap.closed {
             Some(closed) => Cell::Judged(closed >= 0.95, words::percent(closed)),
-            None => said("there was none"),
+            None => said("too little to tell"),
         };
         vec![said(words::signal(signal)), size(gap.before), size(gap.after), size(gap.floor), closed]
     };
