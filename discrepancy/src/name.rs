@@ -24,7 +24,6 @@ use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
 use crate::screen::{Columns, Screened};
 use home::{Placement, at_home};
 use nothing::Nothing;
-use plant::effects::sheet::Part;
 use rayon::prelude::*;
 
 /// Effects at most.
@@ -64,12 +63,15 @@ const TAKES_FIRST: f64 = 0.1;
 /// Share of what a model leaves that one more effect must take.
 const TAKES: f64 = 0.3;
 /// Share of the smallest change that occurs below which an effect is none.
-const FLOOR: f64 = 0.3;
+const FLOOR: f64 = 0.6;
 /// Share of what the parameters leave that may stay beside an explanation.
 const STAYS: f64 = 0.3;
 /// Mean logarithm by which an explanation lowers what windows leave, from which on it is one: to a sixth. A law of another form
 /// than the catalogue's leaves more than noise, and is this effect all the same.
 const REDUCES: f64 = 1.8;
+/// Effects that are none without their first number: without cracking pressure a check valve is the resistance of a line, and where
+/// rods are linked, damping alone takes up what starts within micrometres leave.
+const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
 /// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart.
 const ALIKE: f64 = 20.0;
 /// The same as a share of what the effect takes.
@@ -163,14 +165,18 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
             refits.iter().take(REFINED).filter(|own| own_nothing - own.loss >= 0.5 * gain).count().max(1);
         let mut refined: Vec<Placement> =
             refits[..near].par_iter().map(|own| at_home(here, &refine(here, own), NUMBER_COSTS)).collect();
-        refined.sort_by(|left, right| left.fit.loss.total_cmp(&right.fit.loss));
         refits.splice(..near, refined.iter().map(|own| own.fit.clone()));
-        let best_home = (!refined.is_empty()).then(|| refined.swap_remove(0).home).flatten();
-        let Some(best) = refits.first() else { break };
-        let there = best_home.as_ref().unwrap_or(here);
         if round == 0 {
             fitted = refits.clone();
+            fitted.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         }
+        // What is smaller than what occurs is no explanation, however well it fits.
+        refits.retain(|own| own.placed.last().is_some_and(is_large));
+        refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        let Some(best) = refits.first() else { break };
+        let best_home =
+            refined.iter_mut().find(|own| own.fit.loss == best.loss).and_then(|own| own.home.take());
+        let there = best_home.as_ref().unwrap_or(here);
         // What nothing gains is told by what the best model leaves: what it explains is no noise. What another effect still adds is
         // none either: a model that may be needed beside another one joins, and is taken out at the end if it is not.
         let own = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
@@ -263,19 +269,18 @@ fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
     best
 }
 
-/// Whether a model's last effect takes a good share of what the model before it leaves, and is of a size that occurs.
+/// Whether a model's last effect takes a good share of what the model before it leaves.
 fn takes(before: &Refit, after: &Refit) -> bool {
     let gain = before.loss - after.loss;
     let share = if before.placed.is_empty() { TAKES_FIRST } else { TAKES };
-    gain > (share * before.loss).max(WORTH_A_FIT) && after.placed.last().is_some_and(is_large)
+    gain > (share * before.loss).max(WORTH_A_FIT)
 }
 
 /// Whether one of an effect's amplitudes is no smaller than a share of what occurs.
 #[must_use]
 pub fn is_large(placed: &Placed) -> bool {
     let candidate = &placed.candidate;
-    // Where rods are linked, damping alone takes up what starts within micrometres leave.
-    let keys = if candidate.place.part == Part::Linkage { 1 } else { placed.coordinates.len() };
+    let keys = if DEFINED_BY_FIRST.contains(&candidate.sheet.name) { 1 } else { placed.coordinates.len() };
     (0..keys).filter(|key| !candidate.is_shape(*key)).any(|key| {
         let sheet_key = &candidate.sheet.keys[key];
         let ends = sheet_key.drawn.map(|number| candidate.coordinate(key, number));
