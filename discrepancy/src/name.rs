@@ -2,14 +2,14 @@
 //!
 //! ```text
 //!   parameters alone ──► screening of all candidates ──► the best fitted in the simulator ──► takes enough?
-//!                             ▲                                                                    │ yes: joins the model
-//!                             └───────── what is left, the model's own columns beside ─────────────┘ up to three times
+//!                             ▲                                                                  │ yes: joins the model
+//!                             └──────── what is left, the model's own columns beside ────────────┘ up to three times
 //!   each that joined is taken out once: what is not missed goes; what fits as well as one of them is its alternative
 //! ```
 //!
-//! An effect joins when it takes a good share of what the model leaves, with an amplitude no smaller than a share of what occurs. It
-//! stays when, beside all that joined, the loss without it is higher by several times what nothing gains there. What is left after
-//! three, or beside an explanation that leaves much, is outside the catalogue.
+//! An effect joins when it takes a good share of what the model leaves, with an amplitude no smaller than a share of what occurs.
+//! It stays when, beside all that joined, the loss without it is higher by several times what nothing gains there. What is left
+//! after three, or beside an explanation that leaves much, is outside the catalogue.
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
@@ -69,8 +69,8 @@ const STAYS: f64 = 0.3;
 /// Mean logarithm by which an explanation lowers what windows leave, from which on it is one: to a sixth. A law of another form
 /// than the catalogue's leaves more than noise, and is this effect all the same.
 const REDUCES: f64 = 1.8;
-/// Effects that are none without their first number: without cracking pressure a check valve is the resistance of a line, and where
-/// rods are linked, damping alone takes up what starts within micrometres leave.
+/// Effects that are none without their first number: without cracking pressure a check valve is the resistance of a line, and
+/// where rods are linked, damping alone takes up what starts within micrometres leave.
 const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
 /// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart.
 const ALIKE: f64 = 20.0;
@@ -177,8 +177,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         let best_home =
             refined.iter_mut().find(|own| own.fit.loss == best.loss).and_then(|own| own.home.take());
         let there = best_home.as_ref().unwrap_or(here);
-        // What nothing gains is told by what the best model leaves: what it explains is no noise. What another effect still adds is
-        // none either: a model that may be needed beside another one joins, and is taken out at the end if it is not.
+        // What nothing gains is told by what the best model leaves: what it explains is no noise. What another effect still adds
+        // is none either: a model that may be needed beside another one joins, and is taken out at the end if it is not.
         let own = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
         if !takes(&model, best) {
             break;
