@@ -119,9 +119,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let (nothing, mut screened) = columns.screen(engine, &around, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
-    let Placement { home, fit } = at_home(engine, &calibrated.fit, 0.0);
+    let Placement { mut home, fit } = at_home(engine, &calibrated.fit, 0.0);
     let calibrated = Calibrated { fit, around: calibrated.around };
-    let mut home = home;
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
@@ -160,7 +159,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         // Sensitivities of the parameters were those of the model before: the best get their own. What they gain is held against
         // what the parameters alone reach with the same sensitivities.
-        let gain = own_nothing - refits.first().map_or(own_nothing, |best| best.loss);
+        let Some(best) = refits.first() else { break };
+        let gain = own_nothing - best.loss;
         let near =
             refits.iter().take(REFINED).filter(|own| own_nothing - own.loss >= 0.5 * gain).count().max(1);
         let mut refined: Vec<Placement> =
@@ -179,11 +179,10 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         let there = best_home.as_ref().unwrap_or(here);
         // What nothing gains is told by what the best model leaves: what it explains is no noise. What another effect still adds
         // is none either: a model that may be needed beside another one joins, and is taken out at the end if it is not.
-        let own = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
         if !takes(&model, best) {
             break;
         }
-        threshold = own;
+        threshold = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
         rounds.push((model.placed.clone(), refits.clone()));
         model = best.clone();
         if round > 0 {
@@ -197,9 +196,10 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     threshold = left.threshold();
     let limits = left.limits(columns.candidates.len(), threshold);
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
-    let level = model.loss / here.freedom().iter().sum::<f64>();
+    let freedom = here.freedom().iter().sum::<f64>();
+    let level = model.loss / freedom;
     let excess_level = if engine.is_linked() { EXCESS_LINKED } else { EXCESS };
-    let reduced = (calibrated.fit.loss - model.loss) / here.freedom().iter().sum::<f64>();
+    let reduced = (calibrated.fit.loss - model.loss) / freedom;
     let inadequate = level > excess_level && model.loss > STAYS * calibrated.fit.loss && reduced < REDUCES;
     let alternatives = model.placed.iter().map(|placed| alternatives(placed, &calibrated, &rounds)).collect();
     let shares = shares(&model, &rounds, &calibrated, excess);
