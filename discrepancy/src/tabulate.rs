@@ -2,14 +2,16 @@
 //!
 //! ```text
 //!   balance, variables ──► each usable variable: 8 points, from its curve ──► the best ──► more points, while they pay
-//!   of `outside`           (a flow: into a, into b, into both)                 │               └──► second variable?
-//!                                                                              └─► parameters that are off stay, others go back
+//!   of `outside`           (a flow: into a, into b, into both)                                 └──► second variable?
 //! ```
 //!
 //! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that know
 //! nothing of the next ones, and beside parameters that have taken up a part of it. So it is only where the fit begins. What is
 //! minimised is the loss of naming, over the same windows; each point costs as a number of an effect does. A table that leaves the
 //! training windows no better is not added.
+//!
+//! The parameters that were off alone are fitted along, since what a table looks for must not be put on them. In the end all go back
+//! to what the file says, and only those that the tables need join again: alone, they took up a part of what was missing.
 //!
 //! Source: discrepancy-notes.md, Pipeline 8; [`crate::refit`] for the fit.
 
@@ -26,8 +28,9 @@ use fit::{Model, Point, Tied};
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};
 
-/// Variables that are tried: of those that `outside` tells, the first ones that a table can be over.
-const TRIED: usize = 4;
+/// Variables that are tried: of those that `outside` tells, the first ones that a table can be over; and of the others beside one.
+const TRIED: usize = 3;
+const TRIED_BESIDE: usize = 2;
 /// Points of a first table, and of finer ones.
 const POINTS: usize = 8;
 const FINER: [usize; 2] = [16, 32];
@@ -36,6 +39,8 @@ const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
 /// What each point of a table costs, as a number of an effect does.
 const POINT_COSTS: f64 = 8.0;
+/// Fall of the loss for which a parameter is off beside a table, as much as naming asks of what is worth a fit.
+const NEEDED: f64 = 25.0;
 /// Share of the loss that a table must take to be added, and one over a second variable of what the first one left.
 const TAKES: f64 = 0.05;
 const TAKES_MORE: f64 = 0.15;
@@ -51,7 +56,7 @@ pub struct Tables {
     pub share_explained: f64,
 }
 
-/// The tables that explain an unknown input, or why there are none. `told` are the parameters that are off without them.
+/// The tables that explain an unknown input, or why there are none; `off` says which parameters of a fit are off.
 ///
 /// # Errors
 /// The reason in words.
@@ -65,35 +70,38 @@ pub fn tabulate(
 ) -> Result<Tables, String> {
     let (axis, balance) = place(&outside.balance)
         .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
-    let usable: Vec<Over> = outside.variables.iter().filter_map(|own| over(&own.variable)).collect();
+    let mut usable: Vec<Over> = outside.variables.iter().filter_map(|own| over(&own.variable)).collect();
     if usable.is_empty() {
         let told: Vec<&str> = outside.variables.iter().map(|own| own.variable.as_str()).collect();
         let told = if told.is_empty() { "nothing that was measured".to_owned() } else { told.join(", ") };
         let known = Variable::ALL.map(Variable::name).join(", ");
         return Err(format!("a table can be over {known}, and it depends on {told}"));
     }
+    usable.truncate(TRIED);
+    // A constant follows whatever the parameters have taken of it: it is tried though nobody tells it, and costs one number.
+    if !usable.contains(&Over::Constant) {
+        usable.push(Over::Constant);
+    }
     let home = engine.is_linked().then(|| engine.settled_at(&calibrated.rig(engine.rig())));
     let engine = home.as_ref().unwrap_or(engine);
-    let without = Model::alone(calibrated.fit.factors, &off(&calibrated.fit));
-    let nothing = Point::of(engine, without.clone()).ok_or("the rig with these parameters cannot be had")?;
-    let free = Model::alone(calibrated.fit.factors, &[true; COUNT]);
+    let free = off(&calibrated.fit);
+    let alone = Model::alone(calibrated.fit.factors, free);
+    let nothing = Point::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
+    let nothing = fit::fit(engine, nothing, FIRST_STEPS);
     let seek = Seek { engine, axis, balance, unknowns };
 
     progress("a table for what is missing");
-    let first = seek.best(&free, &usable[..usable.len().min(TRIED)], FIRST_STEPS);
+    let first = seek.best(&nothing.model, &usable);
     let Some((mut best, used)) = first else { return Err("no rig can have its curve".to_owned()) };
     best = seek.finer(best);
-    let others: Vec<Over> = usable.iter().copied().filter(|own| *own != used).take(TRIED).collect();
+    let others: Vec<Over> = usable.iter().copied().filter(|own| *own != used).take(TRIED_BESIDE).collect();
     progress("a table over a second variable");
-    if let Some((second, _)) = seek.best(&best.model, &others, FIRST_STEPS)
+    if let Some((second, _)) = seek.best(&best.model, &others)
         && best.loss - second.loss > TAKES_MORE * best.loss.abs()
     {
         best = fit::fit(engine, second, STEPS);
     }
-    // Parameters that are not off are what the file says: the report tells all that the model differs by.
-    let off = off(&best.as_refit(engine));
-    let held = Point::of(engine, best.model.held(&off)).ok_or("no rig can have its curve")?;
-    let best = fit::fit(engine, held, STEPS);
+    let (best, off) = with_needed(engine, best);
     let share_explained = (nothing.loss - best.loss) / nothing.loss.max(1e-9);
     if best.loss > nothing.loss - TAKES * nothing.loss.abs() {
         return Err("its table leaves the windows of the training records no better".to_owned());
@@ -104,6 +112,17 @@ pub fn tabulate(
         parameters: (0..COUNT).filter(|at| off[*at]).map(|at| quantity(engine, at, &refit)).collect(),
         share_explained: share_explained.min(1.0),
     })
+}
+
+/// The model with the parameters that it needs beside its tables, and which; the others are what the file says.
+fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
+    let held = Point::of(engine, best.model.clone().held([false; COUNT]));
+    let Some(bare) = held.map(|start| fit::fit(engine, start, STEPS)) else { return (best, [true; COUNT]) };
+    let needed = fit::needed(engine, &bare, NEEDED);
+    let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
+        return (bare, [false; COUNT]);
+    };
+    (fit::fit(engine, start, STEPS), needed)
 }
 
 /// What a table can be over: a variable, or nothing.
@@ -137,7 +156,7 @@ struct Seek<'a> {
 
 impl Seek<'_> {
     /// The best model with one more variable, and which; `None` where no rig can have any.
-    fn best(&self, model: &Model, variables: &[Over], steps: usize) -> Option<(Point, Over)> {
+    fn best(&self, model: &Model, variables: &[Over]) -> Option<(Point, Over)> {
         let sets: &[&[Balance]] = match self.balance {
             Balance::Force => &[&[Balance::Force]],
             Balance::FlowA => &[&[Balance::FlowA], &[Balance::FlowA, Balance::FlowB]],
@@ -146,7 +165,7 @@ impl Seek<'_> {
         let mut best: Option<(Point, Over)> = None;
         for (over, balances) in variables.iter().flat_map(|over| sets.iter().map(move |own| (over, own))) {
             let Some(start) = self.start(model, *over, balances) else { continue };
-            let own = fit::fit(self.engine, start, steps);
+            let own = fit::fit(self.engine, start, FIRST_STEPS);
             if best.as_ref().is_none_or(|(point, _)| own.loss < point.loss) {
                 best = Some((own, *over));
             }

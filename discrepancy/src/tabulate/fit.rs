@@ -5,8 +5,8 @@
 //!   step of z, shortened until the loss falls
 //! ```
 //!
-//! Beside [`crate::refit`], which moves the coordinates of effects and takes parameters linearly: a table's straight lines are
-//! flexible enough to take up what a linear parameter leaves, so that here parameters are simulated too.
+//! [`crate::refit`] moves the coordinates of effects and takes parameters linearly; here parameters are simulated too, since a
+//! table would take up what their straight lines leave.
 
 use super::{POINT_COSTS, with_tables};
 use crate::engine::Engine;
@@ -14,6 +14,7 @@ use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::Refit;
 use crate::windows::dot;
+use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
 
@@ -64,17 +65,21 @@ enum Coordinate {
 
 impl Model {
     /// Parameters alone; those that are not free are what the file says.
-    pub(super) fn alone(factors: [f64; COUNT], free: &[bool; COUNT]) -> Self {
+    pub(super) fn alone(factors: [f64; COUNT], free: [bool; COUNT]) -> Self {
         Model { factors, free: [true; COUNT], tables: Vec::new() }.held(free)
     }
 
     /// The same with only some parameters free, the others what the file says.
-    pub(super) fn held(mut self, free: &[bool; COUNT]) -> Self {
-        self.free = *free;
-        for (factor, _) in self.factors.iter_mut().zip(free).filter(|(_, free)| !**free) {
+    pub(super) fn held(mut self, free: [bool; COUNT]) -> Self {
+        self.free = free;
+        for (factor, _) in self.factors.iter_mut().zip(free).filter(|(_, free)| !free) {
             *factor = 1.0;
         }
         self
+    }
+
+    fn rig(&self, engine: &Engine<'_>) -> Option<RigParameters> {
+        with_tables(&with_factors(engine.rig(), &self.factors), &self.tables)
     }
 
     fn moved(&self) -> Vec<Coordinate> {
@@ -145,7 +150,6 @@ impl Model {
 #[derive(Clone, Debug)]
 pub(super) struct Point {
     pub(super) model: Model,
-    simulated: Vec<f64>,
     residual: Vec<f64>,
     /// Of the windows, and what the model costs.
     pub(super) loss: f64,
@@ -154,25 +158,23 @@ pub(super) struct Point {
 impl Point {
     /// `None` where no rig can be so.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
-        let rig = with_tables(&with_factors(engine.rig(), &model.factors), &model.tables)?;
-        let simulated = engine.simulate(&rig);
-        let residual = engine.residual(&simulated);
+        let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
         let windows = residual.chunks_exact(engine.rows()).zip(engine.freedom());
         let left: f64 =
             windows.map(|(own, freedom)| freedom * (dot(own, own) / freedom).max(LEAST).ln()).sum();
         let loss = left + model.costs();
-        loss.is_finite().then_some(Point { model, simulated, residual, loss })
+        loss.is_finite().then_some(Point { model, residual, loss })
     }
 
     /// Derivatives of the simulation by each coordinate.
     fn columns(&self, engine: &Engine<'_>, moved: &[Coordinate]) -> Option<Vec<Vec<f64>>> {
+        let from = engine.simulate_coarsely(&self.model.rig(engine)?);
         moved
             .par_iter()
             .map(|coordinate| {
                 let change = self.model.change(*coordinate);
-                let model = self.model.moved_by(*coordinate, change);
-                let rig = with_tables(&with_factors(engine.rig(), &model.factors), &model.tables)?;
-                let mut column = engine.difference(&engine.simulate(&rig), &self.simulated);
+                let rig = self.model.moved_by(*coordinate, change).rig(engine)?;
+                let mut column = engine.difference(&engine.simulate_coarsely(&rig), &from);
                 column.iter_mut().for_each(|own| *own /= change);
                 Some(column)
             })
@@ -200,6 +202,39 @@ impl Point {
         let factors = self.model.factors;
         Refit { placed: Vec::new(), factors, loss: self.loss, squares: Vec::new(), errors, inflation: 1.0 }
     }
+}
+
+/// Parameters that a model needs beside its tables, one after the other while the loss falls by `gain`, by straight lines.
+pub(super) fn needed(engine: &Engine<'_>, point: &Point, gain: f64) -> [bool; COUNT] {
+    let mut needed = [false; COUNT];
+    let model = Model { free: [true; COUNT], ..point.model.clone() };
+    let moved = model.moved();
+    let open = Point { model, ..point.clone() };
+    let Some(columns) = open.columns(engine, &moved) else { return needed };
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let products = Products::new(&open.residual, &columns, engine.freedom(), engine.rows());
+    let loss_with = |needed: &[bool; COUNT]| {
+        let is_in = |at: &usize| match moved[*at] {
+            Coordinate::Factor(factor) => needed[factor],
+            Coordinate::Value(..) => true,
+        };
+        let chosen: Vec<usize> = (0..moved.len()).filter(is_in).collect();
+        let ridges: Vec<f64> = chosen.iter().map(|at| open.model.ridge(moved[*at])).collect();
+        products.fit(&chosen, &ridges).loss
+    };
+    let mut loss = loss_with(&needed);
+    for _ in 0..COUNT {
+        let tried = (0..COUNT).filter(|at| !needed[*at]).map(|at| {
+            let mut more = needed;
+            more[at] = true;
+            (loss_with(&more), more)
+        });
+        match tried.min_by(|left, right| left.0.total_cmp(&right.0)) {
+            Some((less, more)) if loss - less > gain => (loss, needed) = (less, more),
+            _ => break,
+        }
+    }
+    needed
 }
 
 /// Moves a model until its loss falls no more.
