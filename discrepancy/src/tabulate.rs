@@ -1,8 +1,8 @@
 //! What the catalogue does not have, added to the rig as a table: its points fitted in the simulator, parameters beside them.
 //!
 //! ```text
-//!   balance, variables ──► each usable variable: 8 points, from its curve ──► the best ──► more points, while they pay
-//!   of `outside`           (a flow: into a, into b, into both)                                 └──► second variable?
+//!   balance of ──► each variable that the plant knows, screened ──► three fitted ──► the best: more points, while they pay
+//!   `outside`      (of a flow: into a, into b, into both)           from the curve   └──► second variable?
 //! ```
 //!
 //! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that know
@@ -28,9 +28,8 @@ use fit::{Model, Point, Tied};
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};
 
-/// Variables that are tried: of those that `outside` tells, the first ones that a table can be over; and of the others beside one.
+/// What is fitted of all that is screened: a variable that explains an unknown input best need not predict the windows best.
 const TRIED: usize = 3;
-const TRIED_BESIDE: usize = 2;
 /// Points of a first table, and of finer ones.
 const POINTS: usize = 8;
 const FINER: [usize; 2] = [16, 32];
@@ -70,18 +69,6 @@ pub fn tabulate(
 ) -> Result<Tables, String> {
     let (axis, balance) = place(&outside.balance)
         .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
-    let mut usable: Vec<Over> = outside.variables.iter().filter_map(|own| over(&own.variable)).collect();
-    if usable.is_empty() {
-        let told: Vec<&str> = outside.variables.iter().map(|own| own.variable.as_str()).collect();
-        let told = if told.is_empty() { "nothing that was measured".to_owned() } else { told.join(", ") };
-        let known = Variable::ALL.map(Variable::name).join(", ");
-        return Err(format!("a table can be over {known}, and it depends on {told}"));
-    }
-    usable.truncate(TRIED);
-    // A constant follows whatever the parameters have taken of it: it is tried though nobody tells it, and costs one number.
-    if !usable.contains(&Over::Constant) {
-        usable.push(Over::Constant);
-    }
     let home = engine.is_linked().then(|| engine.settled_at(&calibrated.rig(engine.rig())));
     let engine = home.as_ref().unwrap_or(engine);
     let free = off(&calibrated.fit);
@@ -91,12 +78,10 @@ pub fn tabulate(
     let seek = Seek { engine, axis, balance, unknowns };
 
     progress("a table for what is missing");
-    let first = seek.best(&nothing.model, &usable);
-    let Some((mut best, used)) = first else { return Err("no rig can have its curve".to_owned()) };
-    best = seek.finer(best);
-    let others: Vec<Over> = usable.iter().copied().filter(|own| *own != used).take(TRIED_BESIDE).collect();
+    let (first, used) = seek.best(&nothing.model, None).ok_or("no rig can have its curve")?;
+    let mut best = seek.finer(first);
     progress("a table over a second variable");
-    if let Some((second, _)) = seek.best(&best.model, &others)
+    if let Some((second, _)) = seek.best(&best.model, Some(used))
         && best.loss - second.loss > TAKES_MORE * best.loss.abs()
     {
         best = fit::fit(engine, second, STEPS);
@@ -132,13 +117,6 @@ enum Over {
     Constant,
 }
 
-fn over(name: &str) -> Option<Over> {
-    if name == "constant" {
-        return Some(Over::Constant);
-    }
-    Variable::ALL.into_iter().find(|own| own.name() == name).map(Over::Variable)
-}
-
 /// `drive.flow-a`; `None` for a balance that a table cannot add to.
 fn place(balance: &str) -> Option<(Axis, Balance)> {
     let (axis, own) = balance.split_once('.')?;
@@ -155,35 +133,47 @@ struct Seek<'a> {
 }
 
 impl Seek<'_> {
-    /// The best model with one more variable, and which; `None` where no rig can have any.
-    fn best(&self, model: &Model, variables: &[Over]) -> Option<(Point, Over)> {
+    /// The best model with one more variable but `used`, and which; `None` where no rig can have any. All are screened by straight
+    /// lines, the best are fitted.
+    fn best(&self, model: &Model, used: Option<Over>) -> Option<(Point, Over)> {
         let sets: &[&[Balance]] = match self.balance {
             Balance::Force => &[&[Balance::Force]],
             Balance::FlowA => &[&[Balance::FlowA], &[Balance::FlowA, Balance::FlowB]],
             Balance::FlowB => &[&[Balance::FlowB], &[Balance::FlowA, Balance::FlowB]],
         };
-        let mut best: Option<(Point, Over)> = None;
-        for (over, balances) in variables.iter().flat_map(|over| sets.iter().map(move |own| (over, own))) {
-            let Some(start) = self.start(model, *over, balances) else { continue };
-            let own = fit::fit(self.engine, start, FIRST_STEPS);
-            if best.as_ref().is_none_or(|(point, _)| own.loss < point.loss) {
-                best = Some((own, *over));
+        let all = Variable::ALL.into_iter().map(Over::Variable).chain([Over::Constant]);
+        let mut screened: Vec<(f64, Over, &[Balance])> = all
+            .filter(|over| Some(*over) != used)
+            .flat_map(|over| sets.iter().map(move |balances| (over, *balances)))
+            .filter_map(|(over, balances)| {
+                let flat = Point::of(self.engine, self.with(model, over, balances, true)?)?;
+                Some((fit::promised(self.engine, &flat)?, over, balances))
+            })
+            .collect();
+        screened.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let fitted = screened.iter().take(TRIED).filter_map(|(_, over, balances)| {
+            Some((fit::fit(self.engine, self.start(model, *over, balances)?, FIRST_STEPS), *over))
+        });
+        fitted.min_by(|left, right| left.0.loss.total_cmp(&right.0.loss))
+    }
+
+    /// A model with tables of some balances, at their curves or at 0.
+    fn with(&self, model: &Model, over: Over, balances: &[Balance], is_flat: bool) -> Option<Model> {
+        let mut model = model.clone();
+        for balance in balances {
+            let mut own = self.table(over, *balance)?;
+            if is_flat {
+                own.table.value.fill(0.0);
             }
+            model.tables.push(own);
         }
-        best
+        Some(model)
     }
 
     /// A model with tables of some balances, at their curves or at 0, whichever does better.
     fn start(&self, model: &Model, over: Over, balances: &[Balance]) -> Option<Point> {
-        let mut from = [model.clone(), model.clone()];
-        for balance in balances {
-            let curved = self.table(over, *balance)?;
-            let mut flat = curved.clone();
-            flat.table.value.fill(0.0);
-            from[0].tables.push(curved);
-            from[1].tables.push(flat);
-        }
-        let [curved, flat] = from.map(|model| Point::of(self.engine, model));
+        let from = [false, true].map(|is_flat| self.with(model, over, balances, is_flat));
+        let [curved, flat] = from.map(|model| Point::of(self.engine, model?));
         match (curved, flat) {
             (Some(curved), Some(flat)) => Some(if curved.loss < flat.loss { curved } else { flat }),
             (one, other) => one.or(other),

@@ -204,6 +204,16 @@ impl Point {
     }
 }
 
+/// The loss that straight lines promise of a model's coordinates.
+pub(super) fn promised(engine: &Engine<'_>, point: &Point) -> Option<f64> {
+    let moved = point.model.moved();
+    let columns = point.columns(engine, &moved)?;
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
+    let ridges: Vec<f64> = moved.iter().map(|own| point.model.ridge(*own)).collect();
+    Some(products.fit(&(0..moved.len()).collect::<Vec<_>>(), &ridges).loss + point.model.costs())
+}
+
 /// Parameters that a model needs beside its tables, one after the other while the loss falls by `gain`, by straight lines.
 pub(super) fn needed(engine: &Engine<'_>, point: &Point, gain: f64) -> [bool; COUNT] {
     let mut needed = [false; COUNT];
