@@ -5,13 +5,13 @@
 //!   `outside`      (of a flow: into a, into b, into both)           from the curve   └──► second variable?
 //! ```
 //!
-//! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that know
-//! nothing of the next ones, and beside parameters that have taken up a part of it. So it is only where the fit begins. What is
-//! minimised is the loss of naming, over the same windows; each point costs as a number of an effect does. A table that leaves the
-//! training windows no better is not added.
+//! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that
+//! know nothing of the next ones, and beside parameters that have taken up a part of it. So it is only where the fit begins.
+//! What is minimised is the loss of naming, over the same windows; each point costs as a number of an effect does. A table that
+//! leaves the training windows no better is not added.
 //!
-//! The parameters that were off alone are fitted along, since what a table looks for must not be put on them. In the end all go back
-//! to what the file says, and only those that the tables need join again: alone, they took up a part of what was missing.
+//! The parameters that were off alone are fitted along, since what a table looks for must not be put on them. In the end all go
+//! back to what the file says, and only those that the tables need join again: alone, they took up a part of what was missing.
 //!
 //! Source: discrepancy-notes.md, Pipeline 8; [`crate::refit`] for the fit.
 
@@ -133,8 +133,8 @@ struct Seek<'a> {
 }
 
 impl Seek<'_> {
-    /// The best model with one more variable but `used`, and which; `None` where no rig can have any. All are screened by straight
-    /// lines, the best are fitted.
+    /// The best model with one more variable but `used`, and which; `None` where no rig can have any. All are screened by
+    /// straight lines, the best are fitted.
     fn best(&self, model: &Model, used: Option<Over>) -> Option<(Point, Over)> {
         let sets: &[&[Balance]] = match self.balance {
             Balance::Force => &[&[Balance::Force]],
