@@ -21,6 +21,7 @@ use crate::report::Quantity;
 use edits::Edits;
 pub use parameters::key_of_parameter;
 use plant::effects::sheet::{EffectKey, Sheet};
+use plant::effects::tabulated::Tabulated;
 use plant::effects::{SHEETS, sheet};
 use plant::{ParameterError, RigParameters};
 use toml_edit::Document;
@@ -156,6 +157,37 @@ pub fn extend(
         Document::parse(extended.as_str()).map_err(|error| layout(&told, error.message().to_owned()))?;
         text = extended;
     }
+    RigParameters::from_toml(&text, file).map_err(ExtendError::Refused)?;
+    Ok(text)
+}
+
+/// The rig file with these tables at its end, `records` named as where they come from; `file` is only its name for messages.
+///
+/// # Errors
+/// [`ExtendError`] for a file that cannot take them and for numbers that a rig file must not hold.
+pub fn add_tables(
+    rig_text: &str,
+    file: &str,
+    tables: &[Tabulated],
+    records: &[String],
+) -> Result<String, ExtendError> {
+    if tables.is_empty() {
+        return Ok(rig_text.to_owned());
+    }
+    let from = source(records);
+    let mut added = String::new();
+    for table in tables {
+        added += "\n# What no effect of the catalogue explains, as a table: a straight line between points, constant beyond.\n";
+        added += &format!("# Found{from}.\n{}", table.toml());
+    }
+    let mut edits = Edits::new(rig_text);
+    edits.append_text(&added);
+    let text = edits.applied();
+    Document::parse(text.as_str()).map_err(|error| ExtendError::Layout {
+        file: file.to_owned(),
+        what: "a table".to_owned(),
+        reason: error.message().lines().last().unwrap_or_default().to_owned(),
+    })?;
     RigParameters::from_toml(&text, file).map_err(ExtendError::Refused)?;
     Ok(text)
 }

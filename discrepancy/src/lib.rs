@@ -19,6 +19,7 @@
 //! | [`extend`] | the rig file with what was found |
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
+//! | [`tabulate`] | the same added to the rig as a table |
 //! | [`next`] | the experiment that would tell apart what a record does not |
 //! | [`verify`] | the held-out record: both models, frozen |
 //! | [`report`] | what was found, as data |
@@ -47,6 +48,7 @@ pub mod refit;
 pub mod report;
 pub mod screen;
 pub mod seats;
+pub mod tabulate;
 pub mod verify;
 pub mod windows;
 pub mod workflow;

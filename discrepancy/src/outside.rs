@@ -100,6 +100,10 @@ impl Found<'_> {
             curve: order.first().map(|first| smooth(map(self.series, *first), VARIABLES[*first])),
             formula,
             variables,
+            added: false,
+            why_not: None,
+            tables: Vec::new(),
+            share_explained: None,
         }
     }
 

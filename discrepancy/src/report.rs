@@ -179,6 +179,31 @@ pub struct Outside {
     pub curve: Option<Curve>,
     /// A short formula, if one fits.
     pub formula: Option<String>,
+    /// Whether the extended rig file has it, as the tables.
+    pub added: bool,
+    /// Why not, in words; null when it has.
+    pub why_not: Option<String>,
+    /// The terms that were added, each a table; empty when none.
+    pub tables: Vec<TableTerm>,
+    /// Share of the disagreement of the training records, beside parameters alone, that goes with the tables; null when none.
+    pub share_explained: Option<f64>,
+}
+
+/// A term that the extended rig file has as a table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TableTerm {
+    /// `drive.force`, `drive.flow-a` and so on.
+    pub balance: String,
+    /// x, v, |v|, sign(v), u, p_a, p_b or p_a-p_b.
+    pub variable: String,
+    /// Its unit.
+    pub variable_unit: String,
+    /// Unit of the term, N or Nl/min.
+    pub unit: String,
+    /// Points, growing.
+    pub at: Vec<f64>,
+    /// The term there; a straight line between points, constant beyond them.
+    pub value: Vec<f64>,
 }
 
 /// Statistical dependence of a disagreement on a variable.

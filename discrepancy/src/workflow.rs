@@ -14,19 +14,20 @@ use crate::candidates::Candidate;
 use crate::check::{Checked, check};
 use crate::course::{Course, CourseError};
 use crate::engine::Engine;
-use crate::extend::{Addition, ExtendError, extend};
+use crate::extend::{Addition, ExtendError, add_tables, extend};
 use crate::locate::locate;
 use crate::name::name;
 use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions};
-use crate::report::{self, InputFiles, NamedEffect, Quantity, Report, Verdict};
+use crate::report::{self, InputFiles, NamedEffect, Quantity, Report, TableTerm, Verdict};
+use crate::tabulate::{tables, tabulate};
 use crate::verify::verify;
 use plant::{ParameterError, RigParameters};
 use std::path::{Path, PathBuf};
 pub use telling::place_name;
-use telling::{empty, report_of, summary};
+use telling::{empty, off, report_of, summary};
 
 /// What the workflow is asked.
 #[derive(Clone, Debug, Default)]
@@ -191,11 +192,23 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
         let calibrated = found.calibrated.rig(rig);
         let unknowns = locate(&calibrated, &courses, progress).unknowns;
         report.outside = outside(&calibrated, &courses, &unknowns, progress);
+        if let Some(told) = &mut report.outside {
+            match tabulate(&engine, &found.calibrated, told, &unknowns, &off, progress) {
+                Ok(found) => {
+                    told.added = true;
+                    told.tables = found.terms;
+                    told.share_explained = Some(found.share_explained);
+                    report.parameters = found.parameters;
+                }
+                Err(why_not) => told.why_not = Some(why_not),
+            }
+        }
     }
     let told = Told {
         named: report.named.clone(),
         parameters: report.parameters.clone(),
         inputs: report.inputs.clone(),
+        outside: report.outside.as_ref().map(|own| ToldOutside { tables: own.tables.clone() }),
     };
     let mut experiment = None;
     if report.verdict == Verdict::Ambiguous
@@ -252,6 +265,17 @@ pub struct Told {
     pub parameters: Vec<Quantity>,
     /// Files.
     pub inputs: InputFiles,
+    /// What the catalogue does not have.
+    #[serde(default)]
+    pub outside: Option<ToldOutside>,
+}
+
+/// The tables of what the catalogue does not have.
+#[derive(Clone, Debug, Default, serde::Deserialize)]
+pub struct ToldOutside {
+    /// Terms that were added.
+    #[serde(default)]
+    pub tables: Vec<TableTerm>,
 }
 
 /// The rig file with what a report names.
@@ -260,7 +284,9 @@ pub struct Told {
 /// [`ExtendError`] when it names what a rig cannot have.
 pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> {
     let additions: Vec<Addition> = told.named.iter().map(addition).collect();
-    extend(&rig_file.text, &rig_file.file, &additions, &told.parameters, &told.inputs.train)
+    let text = extend(&rig_file.text, &rig_file.file, &additions, &told.parameters, &told.inputs.train)?;
+    let terms = told.outside.as_ref().map_or(&[][..], |own| &own.tables);
+    add_tables(&text, &rig_file.file, &tables(terms), &told.inputs.train)
 }
 
 /// The experiment that tells apart what a report could not; `None` when there is nothing to tell apart.

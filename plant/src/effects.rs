@@ -20,12 +20,15 @@ mod readings;
 mod replaced;
 pub mod sheet;
 mod sums;
+pub mod tabulated;
 mod terms;
 
 use crate::parameters::RigParameters;
+use crate::state::Axis;
 pub(crate) use acting::Effects;
 pub(crate) use replaced::{dead_volumes_m3, linkage};
 use sheet::{Effect, Element, Part, Place, PlaceKind, Sheet, Switched};
+use tabulated::{Balance, Tables};
 pub(crate) use terms::Term;
 pub use terms::Terms;
 
@@ -86,6 +89,8 @@ macro_rules! catalogue {
         #[derive(Debug, Clone, Default)]
         pub(crate) struct AxisEffects {
             $(pub(crate) $module: slot!($type, $kind),)*
+            /// Terms of no effect, from tables.
+            pub(crate) tabulated: Tables,
         }
 
         /// The data sheets of all effects, in the order of the catalogue.
@@ -102,6 +107,7 @@ macro_rules! catalogue {
             pub(crate) fn is_on(&self, module: &str, element: Option<Element>) -> bool {
                 match module {
                     $(stringify!($module) => is_in!(self.$module, element, $kind),)*
+                    "tabulated" => self.tabulated.adds(balance_of(element)),
                     _ => false,
                 }
             }
@@ -165,6 +171,9 @@ impl AxisEffects {
                 .collect();
             axes[usize::from(switched.place.part == Part::Load)].switch_on(switched, &numbers, rig);
         }
+        for (own, axis) in axes.iter_mut().zip(Axis::ALL) {
+            own.tabulated = Tables::of(rig, axis);
+        }
         axes
     }
 }
@@ -218,6 +227,7 @@ impl AxisEffects {
         self.heat_exchange.is_some()
             || self.piston_leakage.is_some()
             || self.rod_leakage.iter().any(Option::is_some)
+            || self.tabulated.adds_air()
     }
 }
 
@@ -225,6 +235,15 @@ impl AxisEffects {
 #[must_use]
 pub fn sheet(name: &str) -> Option<&'static Sheet> {
     SHEETS.iter().find(|sheet| sheet.name == name)
+}
+
+/// The balance of tables at a chamber, or at none.
+fn balance_of(element: Option<Element>) -> Balance {
+    match element {
+        Some(Element::A) => Balance::FlowA,
+        Some(Element::B) => Balance::FlowB,
+        _ => Balance::Force,
+    }
 }
 
 fn chamber(place: Place) -> usize {

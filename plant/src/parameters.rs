@@ -10,6 +10,7 @@ pub mod table;
 
 mod reader;
 mod switched;
+mod tabulated;
 
 use serde::Serialize;
 
@@ -18,6 +19,7 @@ pub use reader::ParameterError;
 pub use table::VALVE_POINTS;
 
 use crate::effects::sheet::{Place, Switched};
+use crate::effects::tabulated::Tabulated;
 
 /// The numbers of one rig; made from a rig file, or the shipped baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -223,11 +225,26 @@ impl RigParameters {
         Self::from_entries(self.entries.with_effects_of(text, file)?)
     }
 
-    /// The same rig with all effects off.
+    /// The same rig with these tables and no others; values in the units of a rig file.
+    ///
+    /// # Errors
+    /// [`ParameterError`] as from a file that says so.
+    pub fn with_tabulated(&self, tables: &[Tabulated]) -> Result<Self, ParameterError> {
+        Self::from_entries(self.entries.with_tabulated(tables)?)
+    }
+
+    /// The tables of terms that no effect of the catalogue has, in the order of the file.
+    #[must_use]
+    pub fn tabulated(&self) -> &[Tabulated] {
+        &self.entries.tabulated
+    }
+
+    /// The same rig with all effects off, tables too.
     #[must_use]
     pub fn without_effects(&self) -> Self {
         let mut entries = self.entries.clone();
         entries.effects.clear();
+        entries.tabulated.clear();
         RigParameters { entries, ..self.clone() }
     }
 

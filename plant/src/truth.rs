@@ -14,6 +14,7 @@
 //! Source: rig-model.md, One axis, Masses and linkage.
 
 use crate::effects::Effects;
+use crate::effects::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::Pair;
 use crate::motion::side;
@@ -266,7 +267,8 @@ impl Forces {
         let axis = |i: usize| {
             let place = lanes.place(i);
             let hand_n = hand.to_array()[i];
-            let effect_n = effects.map_or(0.0, |effects| effects.force(i, place.extension).sum(0.0));
+            let effect_n =
+                effects.map_or(0.0, |effects| effects.force(i, &Seen::at(lanes, &air, i)).sum(0.0));
             let force = pneumatic[i] + hand_n + contact_n + effect_n;
             let rubbing = effects.map(|effects| (effects, effects.rubbing_at(integrator, i, place, &air)));
             let levels = rubbing.as_ref().map_or(*motion.levels(), |(effects, rubbing)| {

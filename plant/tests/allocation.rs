@@ -5,7 +5,8 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use plant::{Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
+use plant::effects::tabulated::{Balance, Tabulated, Variable};
+use plant::{Axis, Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
 
 thread_local! {
     /// Allocations of this thread; the test harness has threads of its own.
@@ -69,7 +70,14 @@ fn a_period_with_all_effects_allocates_nothing() {
             rig = rig.with_effect(sheet.name, &place, &numbers).expect("drawn numbers are allowed");
         }
     }
-    periods_allocate_nothing(&rig);
+    let tables = Balance::ALL.map(|balance| Tabulated {
+        axis: Axis::Load,
+        balance,
+        variable: Variable::Velocity,
+        at: vec![-1.0, 0.0, 1.0],
+        value: vec![1.0, 0.0, -1.0],
+    });
+    periods_allocate_nothing(&rig.with_tabulated(&tables).expect("allowed"));
 }
 
 #[test]

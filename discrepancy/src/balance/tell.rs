@@ -318,7 +318,16 @@ impl Study {
     fn outside(&self) -> Option<Outside> {
         self.found.decoy.as_ref()?;
         let balance = self.balance_name().into();
-        Some(Outside { balance, variables: Vec::new(), curve: self.map(), formula: None })
+        Some(Outside {
+            balance,
+            variables: Vec::new(),
+            curve: self.map(),
+            formula: None,
+            added: false,
+            why_not: Some("a model of one balance takes no table".to_owned()),
+            tables: Vec::new(),
+            share_explained: None,
+        })
     }
 
     fn checks(&self) -> Vec<RecordCheck> {

@@ -140,6 +140,13 @@ impl<'t> Edits<'t> {
         self.edits.push((at..at, format!("{comma} {pair}")));
     }
 
+    /// Text at the end of the file, with the file's line ends.
+    pub(super) fn append_text(&mut self, text: &str) {
+        let end = self.line_end;
+        let first = if self.text.is_empty() || self.text.ends_with('\n') { "" } else { end };
+        self.edits.push((self.text.len()..self.text.len(), format!("{first}{}", text.replace('\n', end))));
+    }
+
     /// A table at the end of the file.
     fn append(&mut self, sheet: &Sheet, addition: &Addition, from: &str) {
         let end = self.line_end;

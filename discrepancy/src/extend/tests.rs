@@ -3,6 +3,7 @@
 use super::parameters::names;
 use super::*;
 use plant::Axis;
+use plant::effects::tabulated::{Balance, Variable};
 
 fn records() -> Vec<String> {
     vec!["a.csv".to_owned(), "b.csv".to_owned()]
@@ -296,4 +297,30 @@ fn comments_are_rounded_to_the_second_digit_of_the_error() {
     assert_eq!(told(2.513_17, Some(0.0412), "N"), "2.513 +- 0.041 N");
     assert_eq!(told(412_500.3, Some(1234.0), ""), "412500 +- 1234");
     assert_eq!(told(7.0, None, "bar"), "7 bar, not bounded by the records");
+}
+
+#[test]
+fn tables_stand_at_the_end_with_their_source_and_the_line_ends_of_the_file() {
+    let table = Tabulated {
+        axis: Axis::Load,
+        balance: Balance::FlowA,
+        variable: Variable::PressureA,
+        at: vec![1e5, 1e6 / 3.0],
+        value: vec![0.0, -2.5],
+    };
+    let windows = RigParameters::BASELINE_TOML.replace('\n', "\r\n");
+    for text in [RigParameters::BASELINE_TOML, RigParameters::BASELINE_TOML.trim_end(), &windows] {
+        let one = add_tables(text, "rig.toml", std::slice::from_ref(&table), &["a.csv".to_owned()]).unwrap();
+        assert!(one.starts_with(text) && one.contains("# Found from a.csv."));
+        assert!(!text.contains('\r') || one.matches('\n').count() == one.matches("\r\n").count());
+        let two = add_tables(&one, "rig.toml", std::slice::from_ref(&table), &[]).unwrap();
+        assert_eq!(
+            RigParameters::from_toml(&two, "rig.toml").unwrap().tabulated(),
+            [table.clone(), table.clone()]
+        );
+    }
+    assert_eq!(add_tables("nothing", "rig.toml", &[], &[]).unwrap(), "nothing");
+    let inline = format!("tabulated = []\n{}", RigParameters::BASELINE_TOML);
+    let error = add_tables(&inline, "rig.toml", &[table], &[]).unwrap_err().to_string();
+    assert!(error.contains("rig.toml") && error.contains("a table"), "{error}");
 }

@@ -136,8 +136,9 @@ fn unknown(outside: &Outside) -> String {
             bench::page_style::escaped(formula)
         );
     } else {
-        text += &paragraph("No short formula fits; the curve can be added to the model as a table.");
+        text += &paragraph("No short formula fits.");
     }
+    text += &paragraph(&table_added(outside));
     if let Some(curve) = &outside.curve {
         text += &charts(&[curve_figure(
             "outside-curve",
@@ -146,6 +147,23 @@ fn unknown(outside: &Outside) -> String {
         )]);
     }
     text
+}
+
+/// Whether the extended rig file has it, in a sentence.
+fn table_added(outside: &Outside) -> String {
+    if !outside.added {
+        let why = outside.why_not.as_ref().map_or(String::new(), |why| format!(": {why}"));
+        return format!("It is not added to the model{why}.");
+    }
+    let tables: Vec<String> = outside
+        .tables
+        .iter()
+        .map(|own| format!("{} over {}", words::balance(&own.balance), own.variable))
+        .collect();
+    let share = outside.share_explained.map_or(String::new(), |share| {
+        format!("; that takes {} of the disagreement of the training records", words::percent(share))
+    });
+    format!("It is added to the model as a table: {}{share}.", words::listed(&tables, "and"))
 }
 
 /// A curve with its band.

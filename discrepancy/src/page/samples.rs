@@ -290,6 +290,17 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
                 variables: vec![dependence("x", 0.913, 0.0), dependence("p_a-p_b", 0.08, 0.21)],
                 curve: Some(curve("x", "m", "N", |x| 14.0 * (9.0 * x).sin() + 20.0 * x * x, 0.25)),
                 formula: Some("14 sin(9 x) + 20 x^2".to_owned()),
+                added: true,
+                why_not: None,
+                tables: vec![TableTerm {
+                    balance: "drive.force".to_owned(),
+                    variable: "x".to_owned(),
+                    variable_unit: "m".to_owned(),
+                    unit: "N".to_owned(),
+                    at: vec![0.0, 0.2, 0.4],
+                    value: vec![0.0, 14.4, -3.0],
+                }],
+                share_explained: Some(0.83),
             });
         }
         Verdict::BadData => {

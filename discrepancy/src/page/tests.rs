@@ -110,7 +110,13 @@ fn nothing_missing_is_said_with_its_limits_and_has_no_picture_after() {
 fn what_is_outside_the_catalogue_has_its_curve_formula_and_significance() {
     let page = made(Verdict::OutsideCatalogue);
     let seen = text(&page);
-    for part in ["drive: force on the piston", "14 sin(9 x) + 20 x^2", "none of 200", "91 %"] {
+    for part in [
+        "drive: force on the piston",
+        "14 sin(9 x) + 20 x^2",
+        "none of 200",
+        "91 %",
+        "is added to the model as a table",
+    ] {
         assert!(seen.contains(part), "{part}");
     }
     assert!(page.contains("id=\"outside-curve-t\""));

@@ -2,7 +2,7 @@
 
 use crate::engine::Engine;
 use crate::name::Found;
-use crate::parameters::{COUNT, PARAMETERS};
+use crate::parameters::COUNT;
 use crate::refit::{Placed, Refit};
 use crate::report::{
     self, DetectionLimit, EffectPlace, InputFiles, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict,
@@ -17,7 +17,9 @@ const OFF_LEAST: f64 = 0.01;
 /// What naming found, as a report.
 pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     let named = named(found);
-    let parameters = parameters_off(engine, found);
+    // Without a name the parameters are what they are alone: those beside effects that do not explain belong to no model.
+    let fit = if found.inadequate { &found.calibrated.fit } else { &found.model };
+    let parameters = parameters_off(engine, fit);
     let verdict = if found.inadequate {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
@@ -90,16 +92,18 @@ fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<N
 }
 
 /// Parameters that are off by more than their errors and more than nothing.
-fn parameters_off(engine: &Engine<'_>, found: &Found) -> Vec<Quantity> {
-    let model: &Refit = &found.model;
+fn parameters_off(engine: &Engine<'_>, model: &Refit) -> Vec<Quantity> {
+    let off = off(model);
+    (0..COUNT).filter(|at| off[*at]).map(|at| crate::calibrate::quantity(engine, at, model)).collect()
+}
+
+/// Which parameters are off by more than their errors and more than nothing.
+pub(super) fn off(model: &Refit) -> [bool; COUNT] {
     let errors = &model.errors[model.errors.len() - COUNT..];
-    (0..PARAMETERS.len())
-        .filter(|at| {
-            let off = (model.factors[*at] - 1.0).abs();
-            off > OFF_LEAST && off > OFF_ERRORS * errors[*at]
-        })
-        .map(|at| crate::calibrate::quantity(engine, at, model))
-        .collect()
+    std::array::from_fn(|at| {
+        let off = (model.factors[at] - 1.0).abs();
+        off > OFF_LEAST && off > OFF_ERRORS * errors[at]
+    })
 }
 
 fn candidates(found: &Found) -> Vec<report::Candidate> {

@@ -12,6 +12,7 @@ use super::memory::{Memory, Moving};
 use super::presliding::Bristle;
 use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
+use super::tabulated::Seen;
 use super::{AxisEffects, Touched};
 use crate::integrator::laws::{At, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
@@ -45,7 +46,7 @@ pub(crate) const ALONG_X: [f64; 2] = [1.0, -1.0];
 impl Effects {
     /// The effects of a rig at rest in a state; `None` if the rig has none switched on.
     pub(crate) fn of(rig: &RigParameters, of: &Integrator, state: &State) -> Option<Box<Self>> {
-        if rig.effects().is_empty() {
+        if rig.effects().is_empty() && rig.tabulated().is_empty() {
             return None;
         }
         let on = AxisEffects::of(rig);
@@ -97,9 +98,10 @@ impl Effects {
             .for_each(|(commands, command)| commands.begin_period(command));
     }
 
-    /// Forces on one piston beside air, hand, contact and friction, by its extension.
-    pub(crate) fn force(&self, axis: usize, extension_m: f64) -> Force {
+    /// Forces on one piston beside air, hand, contact and friction.
+    pub(crate) fn force(&self, axis: usize, seen: &Seen) -> Force {
         let on = &self.on[axis];
+        let extension_m = seen.extension_m;
         let position_m = if axis == 0 { extension_m } else { self.stroke_m - extension_m };
         Force {
             inclination: on.inclination.map_or(0.0, |effect| ALONG_X[axis] * effect.term()),
@@ -107,6 +109,7 @@ impl Effects {
                 .position_dependent_force
                 .map_or(0.0, |effect| ALONG_X[axis] * effect.term(position_m)),
             end_cushion: on.end_cushion.map_or(0.0, |effect| effect.stop_force(extension_m, self.stroke_m)),
+            tabulated: on.tabulated.force(seen),
         }
     }
 }
@@ -210,6 +213,17 @@ impl Effects {
     }
 }
 
+/// What tables are over in a step; speed and spool are those at its beginning.
+fn seen(at: At<'_>, middle: &Middle, axis: usize) -> Seen {
+    let lane = |pair: Pair| pair.to_array()[axis];
+    Seen {
+        extension_m: lane(middle.extension),
+        velocity_m_per_s: lane(at.from.velocity),
+        spool: lane(at.from.spool),
+        pressure_pa: middle.pressure.map(lane),
+    }
+}
+
 impl Laws for Effects {
     type Carried = Moving;
 
@@ -227,7 +241,7 @@ impl Laws for Effects {
     }
 
     fn outside(&self, at: At<'_>, middle: &Middle) -> Pair {
-        let [drive, load] = [0, 1].map(|axis| self.force(axis, middle.extension.to_array()[axis]).sum(0.0));
+        let [drive, load] = [0, 1].map(|axis| self.force(axis, &seen(at, middle, axis)).sum(0.0));
         at.held.hand + Pair::new(drive, load)
     }
 
@@ -323,7 +337,7 @@ impl Laws for Effects {
             }
             let lane = |pair: Pair| pair.to_array()[axis];
             let pressure_pa = middle.pressure.map(lane);
-            let leakage = self.leakage(of, axis, pressure_pa).map(|terms| terms.sum(0.0));
+            let leakage = self.leakage(of, axis, &seen(at, middle, axis)).map(|terms| terms.sum(0.0));
             let own = &mut carried.axes[axis];
             for chamber in 0..2 {
                 // What lag and bounds have let in, as a mean flow over the step.

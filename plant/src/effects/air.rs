@@ -5,6 +5,7 @@ use super::flows::{Ports, PortsAt};
 use super::heat_exchange::{ChamberHeat, wetted_m2};
 use super::memory::Moving;
 use super::sums::{AirRate, ExhaustSide, Leakage, LineFlow, SupplySide};
+use super::tabulated::Seen;
 use crate::integrator::Integrator;
 use crate::state::State;
 use crate::truth::AirAt;
@@ -40,17 +41,18 @@ impl Effects {
         )
     }
 
-    /// Flows into the chambers of an axis beside the valve's, by their pressures.
-    pub(crate) fn leakage(&self, of: &Integrator, axis: usize, pressure_pa: [f64; 2]) -> [Leakage; 2] {
+    /// Flows into the chambers of an axis beside the valve's, by their pressures and what tables are over.
+    pub(crate) fn leakage(&self, of: &Integrator, axis: usize, seen: &Seen) -> [Leakage; 2] {
         let on = &self.on[axis];
+        let pressure_pa = seen.pressure_pa;
         let across = on.piston_leakage.map_or(0.0, |effect| effect.flow(pressure_pa[0], pressure_pa[1]));
         let out = |chamber: usize| {
             on.rod_leakage[chamber]
                 .map_or(0.0, |effect| -effect.flow(pressure_pa[chamber], of.atmospheric_pa()))
         };
         [
-            Leakage { piston_leakage: -across, rod_leakage: out(0) },
-            Leakage { piston_leakage: across, rod_leakage: out(1) },
+            Leakage { piston_leakage: -across, rod_leakage: out(0), tabulated: on.tabulated.flow(0, seen) },
+            Leakage { piston_leakage: across, rod_leakage: out(1), tabulated: on.tabulated.flow(1, seen) },
         ]
     }
 

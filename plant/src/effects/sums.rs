@@ -65,7 +65,7 @@ balance!(/** Normal flow that leaves the valve for a chamber. */
 balance!(/** Normal flow that enters the line of a chamber's lag. */
     LineFlow "line_flow" in "m3_per_s" = port + line_delay);
 balance!(/** Normal flow into a chamber, beside the valve's. */
-    Leakage "leakage" in "m3_per_s" = nothing + piston_leakage + rod_leakage);
+    Leakage "leakage" in "m3_per_s" = nothing + piston_leakage + rod_leakage + tabulated);
 balance!(/** Rate of a chamber's stored air p V, beside p_N times the flow. */
     AirRate "air_rate" in "W" = nothing + heat_exchange);
 balance!(/** Dead volume of a chamber. */
@@ -81,7 +81,8 @@ balance!(/** Viscous friction in one direction. */
 balance!(/** Friction where bristles take the place of stick and slip, along the own extension. */
     Bristles "bristles" in "N" = nothing + presliding);
 balance!(/** Force on the piston along its own extension, beside air, hand, contact and friction. */
-    Force "force" in "N" = nothing + inclination + position_dependent_force + end_cushion);
+    Force "force" in "N" = nothing
+    + inclination + position_dependent_force + end_cushion + tabulated);
 balance!(/** Gap of the linkage. */
     Gap "gap" in "m" = file + coupling_backlash);
 balance!(/** Stiffness of the linkage. */

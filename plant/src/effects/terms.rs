@@ -8,6 +8,7 @@ use super::air::HeatAt;
 use super::sheet::{Element, Part};
 use super::sums::Balance;
 use super::sums::{Damping, DeadSpace, ExhaustSide, Gap, Stiffness};
+use super::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::Pair;
 use crate::motion::side;
@@ -123,7 +124,8 @@ impl Effects {
             teller.balance(&ExhaustSide { silencer_back_pressure: own.silencer_pa }, None, None);
 
             // The chambers.
-            let leakage = self.leakage(of, axis, air.of_axis_pa(axis));
+            let seen = Seen::at(&lanes, &air, axis);
+            let leakage = self.leakage(of, axis, &seen);
             let flows = lanes.air().map(|air| lane(air.flow));
             for (chamber, (name, element)) in CHAMBERS.into_iter().enumerate() {
                 let (at, element) = (Some(name), Some(element));
@@ -169,7 +171,7 @@ impl Effects {
             teller.balance(&self.viscous_term(of, axis, direction), None, None);
             let bristles = self.bristles(of, axis, &rubbing, place, force).unwrap_or_default();
             teller.balance(&bristles, None, None);
-            teller.balance(&self.force(axis, place.extension), None, None);
+            teller.balance(&self.force(axis, &seen), None, None);
 
             // What the sensors make of it.
             let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m() - place.extension };

@@ -8,9 +8,10 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::switched;
 use super::table::{KEYS, Key, Unit};
+use super::{switched, tabulated};
 use crate::effects::sheet::Switched;
+use crate::effects::tabulated::Tabulated;
 
 /// Why a rig file is refused; every message gives the place, the key, the value and what is allowed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -108,6 +109,7 @@ pub(super) struct Entry {
 pub(super) struct Entries {
     pub(super) file: String,
     pub(super) effects: Vec<Switched>,
+    pub(super) tabulated: Vec<Tabulated>,
     entries: BTreeMap<(&'static str, &'static str), Entry>,
 }
 
@@ -122,7 +124,8 @@ impl Entries {
             entries.insert((key.table, key.name), place.read_key(root.get_ref(), key)?);
         }
         let effects = switched::read(root.get_ref(), &place)?;
-        Ok(Entries { file: file.to_owned(), effects, entries })
+        let tabulated = tabulated::read(root.get_ref(), &place)?;
+        Ok(Entries { file: file.to_owned(), effects, tabulated, entries })
     }
 
     /// The entry of a key of the table.
@@ -188,6 +191,14 @@ impl Entries {
         self.with_effects_of(&text, &self.file)
     }
 
+    /// The same rig with these tables and no others, by a file of their own that says so.
+    pub(super) fn with_tabulated(&self, tables: &[Tabulated]) -> Result<Self, ParameterError> {
+        let text: String = tables.iter().map(Tabulated::toml).collect();
+        let place = Place { text: &text, file: &self.file };
+        let tabulated = tabulated::read(place.parse()?.get_ref(), &place)?;
+        Ok(Entries { tabulated, ..self.clone() })
+    }
+
     /// The same rig with the effects of a file that holds nothing else; they replace those of the same name and place.
     pub(super) fn with_effects_of(&self, text: &str, file: &str) -> Result<Self, ParameterError> {
         let in_file = Place { text, file };
@@ -249,7 +260,8 @@ impl Place<'_> {
                 known: known.join(", "),
             }
         };
-        for (name, value) in root.iter().filter(|(name, _)| name.get_ref() != "effects") {
+        let is_key = |name: &str| !["effects", "tabulated"].contains(&name);
+        for (name, value) in root.iter().filter(|(name, _)| is_key(name.get_ref())) {
             let known: Vec<&str> =
                 KEYS.iter().filter(|key| key.table == name.get_ref()).map(|key| key.name).collect();
             if known.is_empty() {

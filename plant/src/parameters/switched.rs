@@ -113,7 +113,7 @@ fn at(sheet: &Sheet) -> String {
     sheet.place.names().join(", ")
 }
 
-fn unknown(
+pub(super) fn unknown(
     text: &Text<'_>,
     offset: usize,
     path: &str,
@@ -129,7 +129,12 @@ fn unknown(
     }
 }
 
-fn wrong(text: &Text<'_>, path: &str, value: &Spanned<DeValue<'_>>, range: &str) -> ParameterError {
+pub(super) fn wrong(
+    text: &Text<'_>,
+    path: &str,
+    value: &Spanned<DeValue<'_>>,
+    range: &str,
+) -> ParameterError {
     ParameterError::WrongType {
         file: text.file.to_owned(),
         line: text.line(value.span().start),

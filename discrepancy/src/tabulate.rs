@@ -1,0 +1,330 @@
+//! What the catalogue does not have, added to the rig as a table: its points fitted in the simulator, parameters beside them.
+//!
+//! ```text
+//!   balance of ──► each variable that the plant knows, screened ──► three fitted ──► the best: more points, while they pay
+//!   `outside`      (of a flow: into a, into b, into both)           from the curve   └──► second variable?
+//! ```
+//!
+//! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that
+//! know nothing of the next ones, and beside parameters that have taken up a part of it. So it is only where the fit begins.
+//! What is minimised is the loss of naming, over the same windows; each point costs as a number of an effect does. A table that
+//! leaves the training windows no better is not added.
+//!
+//! The parameters that were off alone are fitted along, since what a table looks for must not be put on them. In the end all go
+//! back to what the file says, and only those that the tables need join again: alone, they took up a part of what was missing.
+//!
+//! Source: discrepancy-notes.md, Pipeline 8; [`crate::refit`] for the fit.
+
+mod fit;
+
+use crate::calibrate::{Calibrated, quantity};
+use crate::engine::Engine;
+use crate::locate::maps::map;
+use crate::locate::{UnknownSeries, VARIABLE_UNITS, VARIABLES};
+use crate::parameters::COUNT;
+use crate::refit::Refit;
+use crate::report::{Outside, Quantity, TableTerm};
+use fit::{Model, Point, Tied};
+use plant::effects::tabulated::{Balance, Tabulated, Variable};
+use plant::{Axis, RigParameters};
+
+/// What is fitted of all that is screened: a variable that explains an unknown input best need not predict the windows best.
+const TRIED: usize = 3;
+/// Points of a first table, and of finer ones.
+const POINTS: usize = 8;
+const FINER: [usize; 2] = [16, 32];
+/// Steps of a first fit, and of one that counts.
+const FIRST_STEPS: usize = 2;
+const STEPS: usize = 5;
+/// What each point of a table costs, as a number of an effect does.
+const POINT_COSTS: f64 = 8.0;
+/// Fall of the loss for which a parameter is off beside a table, as much as naming asks of what is worth a fit.
+const NEEDED: f64 = 25.0;
+/// Share of the loss that a table must take to be added, and one over a second variable of what the first one left.
+const TAKES: f64 = 0.05;
+const TAKES_MORE: f64 = 0.15;
+
+/// Tables with the parameters beside them.
+#[derive(Clone, Debug)]
+pub struct Tables {
+    /// The tables.
+    pub terms: Vec<TableTerm>,
+    /// Parameters that are off beside them.
+    pub parameters: Vec<Quantity>,
+    /// Share of the loss of the parameters alone that goes with the tables, at most 1.
+    pub share_explained: f64,
+}
+
+/// The tables that explain an unknown input, or why there are none; `off` says which parameters of a fit are off.
+///
+/// # Errors
+/// The reason in words.
+pub fn tabulate(
+    engine: &Engine<'_>,
+    calibrated: &Calibrated,
+    outside: &Outside,
+    unknowns: &[UnknownSeries],
+    off: &dyn Fn(&Refit) -> [bool; COUNT],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Tables, String> {
+    let (axis, balance) = place(&outside.balance)
+        .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
+    let home = engine.is_linked().then(|| engine.settled_at(&calibrated.rig(engine.rig())));
+    let engine = home.as_ref().unwrap_or(engine);
+    let free = off(&calibrated.fit);
+    let alone = Model::alone(calibrated.fit.factors, free);
+    let nothing = Point::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
+    let nothing = fit::fit(engine, nothing, FIRST_STEPS);
+    let seek = Seek { engine, axis, balance, unknowns };
+
+    progress("a table for what is missing");
+    let (first, used) = seek.best(&nothing.model, None).ok_or("no rig can have its curve")?;
+    let mut best = seek.finer(first);
+    progress("a table over a second variable");
+    if let Some((second, _)) = seek.best(&best.model, Some(used))
+        && best.loss - second.loss > TAKES_MORE * best.loss.abs()
+    {
+        best = fit::fit(engine, second, STEPS);
+    }
+    let (best, off) = with_needed(engine, best);
+    let share_explained = (nothing.loss - best.loss) / nothing.loss.max(1e-9);
+    if best.loss > nothing.loss - TAKES * nothing.loss.abs() {
+        return Err("its table leaves the windows of the training records no better".to_owned());
+    }
+    let refit = best.as_refit(engine);
+    Ok(Tables {
+        terms: best.model.tables.iter().map(|table| term(&table.table)).collect(),
+        parameters: (0..COUNT).filter(|at| off[*at]).map(|at| quantity(engine, at, &refit)).collect(),
+        share_explained: share_explained.min(1.0),
+    })
+}
+
+/// The model with the parameters that it needs beside its tables, and which; the others are what the file says.
+fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
+    let held = Point::of(engine, best.model.clone().held([false; COUNT]));
+    let Some(bare) = held.map(|start| fit::fit(engine, start, STEPS)) else { return (best, [true; COUNT]) };
+    let needed = fit::needed(engine, &bare, NEEDED);
+    let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
+        return (bare, [false; COUNT]);
+    };
+    (fit::fit(engine, start, STEPS), needed)
+}
+
+/// What a table can be over: a variable, or nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Over {
+    Variable(Variable),
+    Constant,
+}
+
+/// `drive.flow-a`; `None` for a balance that a table cannot add to.
+fn place(balance: &str) -> Option<(Axis, Balance)> {
+    let (axis, own) = balance.split_once('.')?;
+    let axis = Axis::ALL.into_iter().find(|known| known.name() == axis)?;
+    Some((axis, Balance::ALL.into_iter().find(|known| known.name() == own)?))
+}
+
+/// The search for tables of a balance.
+struct Seek<'a> {
+    engine: &'a Engine<'a>,
+    axis: Axis,
+    balance: Balance,
+    unknowns: &'a [UnknownSeries],
+}
+
+impl Seek<'_> {
+    /// The best model with one more variable but `used`, and which; `None` where no rig can have any. All are screened by
+    /// straight lines, the best are fitted.
+    fn best(&self, model: &Model, used: Option<Over>) -> Option<(Point, Over)> {
+        let sets: &[&[Balance]] = match self.balance {
+            Balance::Force => &[&[Balance::Force]],
+            Balance::FlowA => &[&[Balance::FlowA], &[Balance::FlowA, Balance::FlowB]],
+            Balance::FlowB => &[&[Balance::FlowB], &[Balance::FlowA, Balance::FlowB]],
+        };
+        let all = Variable::ALL.into_iter().map(Over::Variable).chain([Over::Constant]);
+        let mut screened: Vec<(f64, Over, &[Balance])> = all
+            .filter(|over| Some(*over) != used)
+            .flat_map(|over| sets.iter().map(move |balances| (over, *balances)))
+            .filter_map(|(over, balances)| {
+                let flat = Point::of(self.engine, self.with(model, over, balances, true)?)?;
+                Some((fit::promised(self.engine, &flat)?, over, balances))
+            })
+            .collect();
+        screened.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let fitted = screened.iter().take(TRIED).filter_map(|(_, over, balances)| {
+            Some((fit::fit(self.engine, self.start(model, *over, balances)?, FIRST_STEPS), *over))
+        });
+        fitted.min_by(|left, right| left.0.loss.total_cmp(&right.0.loss))
+    }
+
+    /// A model with tables of some balances, at their curves or at 0.
+    fn with(&self, model: &Model, over: Over, balances: &[Balance], is_flat: bool) -> Option<Model> {
+        let mut model = model.clone();
+        for balance in balances {
+            let mut own = self.table(over, *balance)?;
+            if is_flat {
+                own.table.value.fill(0.0);
+            }
+            model.tables.push(own);
+        }
+        Some(model)
+    }
+
+    /// A model with tables of some balances, at their curves or at 0, whichever does better.
+    fn start(&self, model: &Model, over: Over, balances: &[Balance]) -> Option<Point> {
+        let from = [false, true].map(|is_flat| self.with(model, over, balances, is_flat));
+        let [curved, flat] = from.map(|model| Point::of(self.engine, model?));
+        match (curved, flat) {
+            (Some(curved), Some(flat)) => Some(if curved.loss < flat.loss { curved } else { flat }),
+            (one, other) => one.or(other),
+        }
+    }
+
+    /// The curve of an unknown input as a table.
+    fn table(&self, over: Over, balance: Balance) -> Option<Tied> {
+        let name = format!("{}.{}", self.axis.name(), balance.name());
+        let series = self.unknowns.iter().find(|series| series.balance == name)?;
+        let variable = match over {
+            Over::Constant => Variable::Extension,
+            Over::Variable(variable) => variable,
+        };
+        let place = VARIABLES.iter().position(|own| *own == variable.name())?;
+        let mut seen: Vec<f64> = series.points.iter().map(|point| point.variables[place]).collect();
+        seen.sort_unstable_by(f64::total_cmp);
+        let curve = map(series, place);
+        let at = match (over, variable) {
+            (Over::Constant, _) => vec![0.0, self.engine.rig().cylinder().stroke_m],
+            (_, Variable::Direction) => vec![-1.0, 1.0],
+            _ => knots(&seen, POINTS),
+        };
+        if at.len() < 2 || curve.at.is_empty() {
+            return None;
+        }
+        let most = balance.most();
+        let value = match over {
+            Over::Constant => {
+                let mean = curve.value.iter().sum::<f64>() / curve.value.len() as f64;
+                vec![mean.clamp(-most, most); 2]
+            }
+            Over::Variable(_) => {
+                at.iter().map(|x| line(&curve.at, &curve.value, *x).clamp(-most, most)).collect()
+            }
+        };
+        let table = Tabulated { axis: self.axis, balance, variable, at, value };
+        Some(Tied { table, is_constant: over == Over::Constant, seen })
+    }
+
+    /// The same with more points, as long as they are worth what they cost.
+    fn finer(&self, start: Point) -> Point {
+        let mut best = fit::fit(self.engine, start, STEPS);
+        for count in FINER {
+            let mut model = best.model.clone();
+            for own in model.tables.iter_mut().filter(|own| own.table.at.len() > 2) {
+                let at = knots(&own.seen, count);
+                own.table.value = at.iter().map(|x| line(&own.table.at, &own.table.value, *x)).collect();
+                own.table.at = at;
+            }
+            let Some(point) = Point::of(self.engine, model) else { break };
+            let tried = fit::fit(self.engine, point, STEPS);
+            if tried.loss >= best.loss {
+                break;
+            }
+            best = tried;
+        }
+        best
+    }
+}
+
+/// Points of a table over sorted values: half by how many there are, half by how far they reach, so that neither a crowd at rest
+/// nor a single fast stroke takes all.
+fn knots(seen: &[f64], count: usize) -> Vec<f64> {
+    let (Some(least), Some(most)) = (seen.first(), seen.last()) else { return Vec::new() };
+    let width = most - least;
+    let mut at = vec![*least];
+    for (rank, value) in seen.iter().enumerate() {
+        let along = 0.5 * rank as f64 / seen.len() as f64 + 0.5 * (value - least) / width;
+        let apart = value - at[at.len() - 1] > 0.2 * width / count as f64;
+        if along >= at.len() as f64 / (count - 1) as f64 && apart {
+            at.push(*value);
+        }
+    }
+    if at.len() > 1 && most - at[at.len() - 1] < 0.2 * width / count as f64 {
+        at.pop();
+    }
+    if *most > at[at.len() - 1] {
+        at.push(*most);
+    }
+    at
+}
+
+/// A straight line between points, constant beyond them.
+fn line(at: &[f64], value: &[f64], x: f64) -> f64 {
+    let above = at.partition_point(|own| *own <= x);
+    if above == 0 || above == at.len() {
+        return value[above.min(at.len() - 1)];
+    }
+    let share = (x - at[above - 1]) / (at[above] - at[above - 1]);
+    value[above - 1] + (value[above] - value[above - 1]) * share
+}
+
+/// A table as the report tells it.
+fn term(table: &Tabulated) -> TableTerm {
+    let place = VARIABLES.iter().position(|own| *own == table.variable.name());
+    TableTerm {
+        balance: format!("{}.{}", table.axis.name(), table.balance.name()),
+        variable: table.variable.name().to_owned(),
+        variable_unit: place.map_or("", |at| VARIABLE_UNITS[at]).to_owned(),
+        unit: if table.balance == Balance::Force { "N" } else { "Nl/min" }.to_owned(),
+        at: table.at.clone(),
+        value: table.value.clone(),
+    }
+}
+
+/// The tables of a report as a rig has them; those that no rig can have are left out.
+#[must_use]
+pub fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
+    let table = |term: &TableTerm| {
+        let (axis, balance) = place(&term.balance)?;
+        let variable = Variable::ALL.into_iter().find(|own| own.name() == term.variable)?;
+        Some(Tabulated { axis, balance, variable, at: term.at.clone(), value: term.value.clone() })
+    };
+    terms.iter().filter_map(table).collect()
+}
+
+/// The rig with more tables than it has.
+fn with_tables(rig: &RigParameters, tables: &[Tied]) -> Option<RigParameters> {
+    let mut all = rig.tabulated().to_vec();
+    all.extend(tables.iter().map(|own| own.table.clone()));
+    rig.with_tabulated(&all).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_where_values_are_and_reach_from_the_least_to_the_most() {
+        let mut seen: Vec<f64> =
+            (0..1000).map(|at| if at < 700 { 0.0 } else { f64::from(at) * 1e-3 }).collect();
+        seen.sort_unstable_by(f64::total_cmp);
+        for count in [2, 8, 16, 32] {
+            let at = knots(&seen, count);
+            assert!((2..=count + 1).contains(&at.len()), "{at:?}");
+            assert_eq!((at[0], at[at.len() - 1]), (0.0, 0.999));
+            assert!(at.windows(2).all(|pair| pair[0] < pair[1]), "{at:?}");
+        }
+        assert_eq!(knots(&[3.0; 9], 8), [3.0]);
+    }
+
+    #[test]
+    fn terms_of_a_report_are_tables_of_a_rig() {
+        let told = Tabulated {
+            axis: Axis::Load,
+            balance: Balance::FlowB,
+            variable: Variable::PressureB,
+            at: vec![1e5, 6e5],
+            value: vec![0.0, -3.5],
+        };
+        assert_eq!(tables(&[term(&told)]), [told]);
+    }
+}

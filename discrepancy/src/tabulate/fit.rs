@@ -1,0 +1,274 @@
+//! The values of tables and the factors of parameters, fitted in the simulator by Gauss-Newton.
+//!
+//! ```text
+//!   e(z) = readings - simulation at z      columns: d simulation / d z_i, all coordinates alike, new at each step
+//!   step of z, shortened until the loss falls
+//! ```
+//!
+//! [`crate::refit`] moves the coordinates of effects and takes parameters linearly; here parameters are simulated too, since a
+//! table would take up what their straight lines leave.
+
+use super::{POINT_COSTS, with_tables};
+use crate::engine::Engine;
+use crate::fit::Products;
+use crate::parameters::{COUNT, PARAMETERS, with_factors};
+use crate::refit::Refit;
+use crate::windows::dot;
+use plant::RigParameters;
+use plant::effects::tabulated::{Balance, Tabulated};
+use rayon::prelude::*;
+
+/// Change of a factor by which derivatives are taken.
+const FACTOR_CHANGE: f64 = 0.01;
+/// The same of a value: N, Nl/min; and in proportion.
+const FORCE_CHANGE_N: f64 = 1.0;
+const FLOW_CHANGE_NL_PER_MIN: f64 = 0.5;
+const CHANGE_SHARE: f64 = 0.05;
+/// Standard deviations of values before anything is measured: beyond what occurs.
+const FORCE_TOLERANCE_N: f64 = 200.0;
+const FLOW_TOLERANCE_NL_PER_MIN: f64 = 200.0;
+/// By how much a parameter may be off at most, as in [`crate::refit`].
+const MOST_OFF: f64 = 0.3;
+/// Shortened steps that are tried.
+const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
+/// Fall of the loss below which a fit has settled.
+const SETTLED: f64 = 1.0;
+/// Smallest power of a window over its noise, as in [`crate::fit`].
+const LEAST: f64 = 1e-3;
+
+/// A table whose values are moved.
+#[derive(Clone, Debug)]
+pub(super) struct Tied {
+    pub(super) table: Tabulated,
+    /// Whether all values are one.
+    pub(super) is_constant: bool,
+    /// What its variable was in the windows, sorted.
+    pub(super) seen: Vec<f64>,
+}
+
+/// Tables and parameters.
+#[derive(Clone, Debug)]
+pub(super) struct Model {
+    pub(super) factors: [f64; COUNT],
+    /// Which of them are moved.
+    free: [bool; COUNT],
+    pub(super) tables: Vec<Tied>,
+}
+
+/// What is moved.
+#[derive(Clone, Copy, Debug)]
+enum Coordinate {
+    Factor(usize),
+    /// Table and point; of a constant all points.
+    Value(usize, usize),
+}
+
+impl Model {
+    /// Parameters alone; those that are not free are what the file says.
+    pub(super) fn alone(factors: [f64; COUNT], free: [bool; COUNT]) -> Self {
+        Model { factors, free: [true; COUNT], tables: Vec::new() }.held(free)
+    }
+
+    /// The same with only some parameters free, the others what the file says.
+    pub(super) fn held(mut self, free: [bool; COUNT]) -> Self {
+        self.free = free;
+        for (factor, _) in self.factors.iter_mut().zip(free).filter(|(_, free)| !free) {
+            *factor = 1.0;
+        }
+        self
+    }
+
+    fn rig(&self, engine: &Engine<'_>) -> Option<RigParameters> {
+        with_tables(&with_factors(engine.rig(), &self.factors), &self.tables)
+    }
+
+    fn moved(&self) -> Vec<Coordinate> {
+        let factors = (0..COUNT).filter(|at| self.free[*at]).map(Coordinate::Factor);
+        let values = self.tables.iter().enumerate().flat_map(|(at, own)| {
+            (0..if own.is_constant { 1 } else { own.table.at.len() })
+                .map(move |point| Coordinate::Value(at, point))
+        });
+        factors.chain(values).collect()
+    }
+
+    fn moved_by(&self, coordinate: Coordinate, change: f64) -> Self {
+        let mut model = self.clone();
+        match coordinate {
+            Coordinate::Factor(at) => {
+                model.factors[at] = (model.factors[at] + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
+            }
+            Coordinate::Value(at, point) => {
+                let own = &mut model.tables[at];
+                let most = own.table.balance.most();
+                let value = (own.table.value[point] + change).clamp(-most, most);
+                if own.is_constant {
+                    own.table.value.fill(value);
+                } else {
+                    own.table.value[point] = value;
+                }
+            }
+        }
+        model
+    }
+
+    /// How far a coordinate is moved for a derivative.
+    fn change(&self, coordinate: Coordinate) -> f64 {
+        match coordinate {
+            Coordinate::Factor(_) => FACTOR_CHANGE,
+            Coordinate::Value(at, point) => {
+                let table = &self.tables[at].table;
+                let least = match table.balance {
+                    Balance::Force => FORCE_CHANGE_N,
+                    Balance::FlowA | Balance::FlowB => FLOW_CHANGE_NL_PER_MIN,
+                };
+                least.max(CHANGE_SHARE * table.value[point].abs())
+            }
+        }
+    }
+
+    fn ridge(&self, coordinate: Coordinate) -> f64 {
+        let tolerance = match coordinate {
+            Coordinate::Factor(at) => PARAMETERS[at].tolerance,
+            Coordinate::Value(at, _) => match self.tables[at].table.balance {
+                Balance::Force => FORCE_TOLERANCE_N,
+                Balance::FlowA | Balance::FlowB => FLOW_TOLERANCE_NL_PER_MIN,
+            },
+        };
+        tolerance.powi(-2)
+    }
+
+    /// What coordinates cost that are far from nothing, and points that there are.
+    fn costs(&self) -> f64 {
+        let factors: f64 =
+            (0..COUNT).map(|at| ((self.factors[at] - 1.0) / PARAMETERS[at].tolerance).powi(2)).sum();
+        let points = self.moved().iter().filter(|own| matches!(own, Coordinate::Value(..))).count();
+        factors + POINT_COSTS * points as f64
+    }
+}
+
+/// A model and what it leaves.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    pub(super) model: Model,
+    residual: Vec<f64>,
+    /// Of the windows, and what the model costs.
+    pub(super) loss: f64,
+}
+
+impl Point {
+    /// `None` where no rig can be so.
+    pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
+        let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
+        let windows = residual.chunks_exact(engine.rows()).zip(engine.freedom());
+        let left: f64 =
+            windows.map(|(own, freedom)| freedom * (dot(own, own) / freedom).max(LEAST).ln()).sum();
+        let loss = left + model.costs();
+        loss.is_finite().then_some(Point { model, residual, loss })
+    }
+
+    /// Derivatives of the simulation by each coordinate.
+    fn columns(&self, engine: &Engine<'_>, moved: &[Coordinate]) -> Option<Vec<Vec<f64>>> {
+        let from = engine.simulate_coarsely(&self.model.rig(engine)?);
+        moved
+            .par_iter()
+            .map(|coordinate| {
+                let change = self.model.change(*coordinate);
+                let rig = self.model.moved_by(*coordinate, change).rig(engine)?;
+                let mut column = engine.difference(&engine.simulate_coarsely(&rig), &from);
+                column.iter_mut().for_each(|own| *own /= change);
+                Some(column)
+            })
+            .collect()
+    }
+
+    /// The parameters of the model with their errors, as a fit of no effect.
+    pub(super) fn as_refit(&self, engine: &Engine<'_>) -> Refit {
+        let moved = self.model.moved();
+        let mut errors = vec![f64::INFINITY; COUNT];
+        if let Some(columns) = self.columns(engine, &moved) {
+            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            let products = Products::new(&self.residual, &columns, engine.freedom(), engine.rows());
+            let ridges: Vec<f64> = moved.iter().map(|own| self.model.ridge(*own)).collect();
+            let chosen: Vec<usize> = (0..moved.len()).collect();
+            let fit = products.fit(&chosen, &ridges);
+            if let Some(covariance) = products.covariance(&chosen, &fit, &ridges) {
+                for (at, coordinate) in moved.iter().enumerate() {
+                    if let Coordinate::Factor(own) = coordinate {
+                        errors[*own] = covariance[(at, at)].max(0.0).sqrt();
+                    }
+                }
+            }
+        }
+        let factors = self.model.factors;
+        Refit { placed: Vec::new(), factors, loss: self.loss, squares: Vec::new(), errors, inflation: 1.0 }
+    }
+}
+
+/// The loss that straight lines promise of a model's coordinates.
+pub(super) fn promised(engine: &Engine<'_>, point: &Point) -> Option<f64> {
+    let moved = point.model.moved();
+    let columns = point.columns(engine, &moved)?;
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
+    let ridges: Vec<f64> = moved.iter().map(|own| point.model.ridge(*own)).collect();
+    Some(products.fit(&(0..moved.len()).collect::<Vec<_>>(), &ridges).loss + point.model.costs())
+}
+
+/// Parameters that a model needs beside its tables, one after the other while the loss falls by `gain`, by straight lines.
+pub(super) fn needed(engine: &Engine<'_>, point: &Point, gain: f64) -> [bool; COUNT] {
+    let mut needed = [false; COUNT];
+    let model = Model { free: [true; COUNT], ..point.model.clone() };
+    let moved = model.moved();
+    let open = Point { model, ..point.clone() };
+    let Some(columns) = open.columns(engine, &moved) else { return needed };
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let products = Products::new(&open.residual, &columns, engine.freedom(), engine.rows());
+    let loss_with = |needed: &[bool; COUNT]| {
+        let is_in = |at: &usize| match moved[*at] {
+            Coordinate::Factor(factor) => needed[factor],
+            Coordinate::Value(..) => true,
+        };
+        let chosen: Vec<usize> = (0..moved.len()).filter(is_in).collect();
+        let ridges: Vec<f64> = chosen.iter().map(|at| open.model.ridge(moved[*at])).collect();
+        products.fit(&chosen, &ridges).loss
+    };
+    let mut loss = loss_with(&needed);
+    for _ in 0..COUNT {
+        let tried = (0..COUNT).filter(|at| !needed[*at]).map(|at| {
+            let mut more = needed;
+            more[at] = true;
+            (loss_with(&more), more)
+        });
+        match tried.min_by(|left, right| left.0.total_cmp(&right.0)) {
+            Some((less, more)) if loss - less > gain => (loss, needed) = (less, more),
+            _ => break,
+        }
+    }
+    needed
+}
+
+/// Moves a model until its loss falls no more.
+pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
+    let mut point = start;
+    for _ in 0..steps {
+        let moved = point.model.moved();
+        let Some(columns) = point.columns(engine, &moved) else { break };
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
+        let ridges: Vec<f64> = moved.iter().map(|own| point.model.ridge(*own)).collect();
+        let joint = products.fit(&(0..moved.len()).collect::<Vec<_>>(), &ridges);
+        let tried = SHARES.iter().find_map(|share| {
+            let changes = moved.iter().zip(&joint.coefficients);
+            let model = changes
+                .fold(point.model.clone(), |model, (own, change)| model.moved_by(*own, share * change));
+            Point::of(engine, model).filter(|tried| tried.loss < point.loss)
+        });
+        let Some(tried) = tried else { break };
+        let settled = point.loss - tried.loss < SETTLED;
+        point = tried;
+        if settled {
+            break;
+        }
+    }
+    point
+}

@@ -1,0 +1,29 @@
+//! A record that the plant makes, as text.
+
+use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
+use std::fmt::Write;
+
+/// Strokes of the records that are taken as courses, rad/s.
+pub(crate) const STROKES_RAD_PER_S: f64 = 1.3;
+
+/// Twelve seconds of the drive as a record: a second of rest, then strokes over most of its way and rests between.
+pub(crate) fn measurement(hidden: &RigParameters, seed: u64, strokes_rad_per_s: f64) -> String {
+    let mut plant = Plant::new(hidden, &Setup::default()).expect("a setup of the rig");
+    let mut sensors = Sensors::new(hidden, seed);
+    let mut text = String::from(
+        "time_s,drive_valve,drive_position_m,drive_force_N,drive_pressure_a_Pa,drive_pressure_b_Pa\n",
+    );
+    for cycle in 0..12_000 {
+        let at_s = f64::from(cycle) * 1e-3;
+        let [shown, _] = sensors.sample(&plant, &Inputs::default());
+        let aim_m = 0.1 + 0.3 * (0.5 - 0.5 * (strokes_rad_per_s * (at_s - 1.0).max(0.0)).cos());
+        // A pause in every fourth second.
+        let valve = if at_s < 1.0 || at_s % 4.0 > 3.3 { 0.0 } else { 8.0 * (aim_m - shown.position.value) };
+        let valve = quantise_valve(valve.clamp(-1.0, 1.0));
+        let [position, force, a, b] =
+            [shown.position, shown.force, shown.pressure_a, shown.pressure_b].map(|reading| reading.value);
+        writeln!(text, "{at_s:.3},{valve},{position},{force},{a},{b}").expect("a string takes all");
+        plant.step(&Inputs { valve: [valve, 0.0], ..Inputs::default() });
+    }
+    text
+}
