@@ -14,6 +14,7 @@
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
 mod home;
+mod needed;
 mod nothing;
 
 use crate::calibrate::{Calibrated, calibrate};
@@ -23,6 +24,7 @@ use crate::parameters::COUNT;
 use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
 use crate::screen::{Columns, Screened};
 use home::{Placement, at_home};
+use needed::with_needed;
 use nothing::Nothing;
 use rayon::prelude::*;
 
@@ -84,6 +86,9 @@ pub struct Found {
     pub calibrated: Calibrated,
     /// The model that explains the records.
     pub model: Refit,
+    /// The model as it is told: parameters that it does not need are what the file says. Of one that explains too little, the
+    /// parameters alone.
+    pub told: Refit,
     /// What takes the place of each of its effects just as well.
     pub alternatives: Vec<Vec<Refit>>,
     /// Share of the excess that goes with each effect.
@@ -201,11 +206,18 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let excess_level = if engine.is_linked() { EXCESS_LINKED } else { EXCESS };
     let reduced = (calibrated.fit.loss - model.loss) / freedom;
     let inadequate = level > excess_level && model.loss > STAYS * calibrated.fit.loss && reduced < REDUCES;
+    let told = if inadequate {
+        let home = engine.is_linked().then(|| engine.settled_at(&calibrated.rig(engine.rig())));
+        with_needed(home.as_ref().unwrap_or(engine), &calibrated.fit)
+    } else {
+        with_needed(here, &model)
+    };
     let alternatives = model.placed.iter().map(|placed| alternatives(placed, &calibrated, &rounds)).collect();
     let shares = shares(&model, &rounds, &calibrated, excess);
     Found {
         calibrated,
         model,
+        told,
         alternatives,
         shares,
         screened,

@@ -79,7 +79,7 @@ pub fn rig_of(rig: &RigParameters, placed: &[Placed], factors: &[f64; COUNT]) ->
 }
 
 /// Ridges of the parameters, for changes from `factors` of what is believed to be 1.
-fn parameter_ridges() -> Vec<f64> {
+pub(crate) fn parameter_ridges() -> Vec<f64> {
     PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect()
 }
 
@@ -88,7 +88,8 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
     factors.iter().map(|factor| (factor - 1.0).powi(2)).map(|own| own / (own + COUNTS_AS_OFF.powi(2))).sum()
 }
 
-fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
+/// Ridge of a coordinate.
+pub(crate) fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
     let tolerance = if candidate.is_shape(key) { SHAPE_TOLERANCE } else { AMPLITUDE_TOLERANCE };
     tolerance.powi(-2)
 }
@@ -168,10 +169,7 @@ pub fn refit_steps(
     let mut point = evaluate(start.to_vec())?;
     let mut last = None;
     for step in 0..=steps {
-        let columns: Vec<Vec<f64>> = moved
-            .iter()
-            .map(|(at, key)| derivative(engine, around, &point, *at, *key))
-            .collect::<Option<_>>()?;
+        let columns = coordinate_columns(engine, &around.factors, &point.placed, &point.simulated)?;
         let all: Vec<&[f64]> =
             parameter_columns.iter().copied().chain(columns.iter().map(Vec::as_slice)).collect();
         let products = Products::new(&point.residual, &all, engine.freedom(), engine.rows());
@@ -236,23 +234,35 @@ pub fn refit_steps(
     Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
 }
 
+/// What each coordinate of a model changes, per unit of it, in the order of the effects and their keys; `simulated` is what the
+/// model shows. `None` where the rig cannot have a neighbour of it.
+pub(crate) fn coordinate_columns(
+    engine: &Engine<'_>,
+    factors: &[f64; COUNT],
+    placed: &[Placed],
+    simulated: &[f64],
+) -> Option<Vec<Vec<f64>>> {
+    moved(placed).iter().map(|(at, key)| derivative(engine, factors, placed, simulated, *at, *key)).collect()
+}
+
 /// What a coordinate changes, per unit of it; towards the inside where the range ends.
 fn derivative(
     engine: &Engine<'_>,
-    around: &Around,
-    point: &Point,
+    factors: &[f64; COUNT],
+    placed: &[Placed],
+    simulated: &[f64],
     at: usize,
     key: usize,
 ) -> Option<Vec<f64>> {
-    let candidate = point.placed[at].candidate;
-    let own = point.placed[at].coordinates[key];
+    let candidate = placed[at].candidate;
+    let own = placed[at].coordinates[key];
     let size = CHANGE.max(CHANGE_SHARE * own.abs());
     let [_, most] = candidate.range(key);
     let change = if own + size > most.min(FARTHEST) { -size } else { size };
-    let mut placed = point.placed.clone();
+    let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;
-    let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &around.factors)?);
-    let mut column = engine.difference(&simulated, &point.simulated);
+    let moved = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);
+    let mut column = engine.difference(&moved, simulated);
     column.iter_mut().for_each(|own| *own /= change);
     Some(column)
 }

@@ -43,6 +43,8 @@ pub struct Report {
     pub named: Vec<NamedEffect>,
     /// Numbers of the baseline that were off, and no others.
     pub parameters: Vec<Quantity>,
+    /// Numbers that the model moved along by too little to call them off; the extended rig file has them.
+    pub carried: Vec<Quantity>,
     /// What is missing that the catalogue does not have.
     pub outside: Option<Outside>,
     /// Per signal of the held-out record, as `drive_position_m`; empty without `--test`.

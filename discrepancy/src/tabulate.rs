@@ -55,24 +55,25 @@ pub struct Tables {
     pub share_explained: f64,
 }
 
-/// The tables that explain an unknown input, or why there are none; `off` says which parameters of a fit are off.
+/// The tables that explain an unknown input, or why there are none; `told` is the parameters alone, those
+/// that are needed.
 ///
 /// # Errors
 /// The reason in words.
 pub fn tabulate(
     engine: &Engine<'_>,
     calibrated: &Calibrated,
+    told: &Refit,
     outside: &Outside,
     unknowns: &[UnknownSeries],
-    off: &dyn Fn(&Refit) -> [bool; COUNT],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Tables, String> {
     let (axis, balance) = place(&outside.balance)
         .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
     let home = engine.is_linked().then(|| engine.settled_at(&calibrated.rig(engine.rig())));
     let engine = home.as_ref().unwrap_or(engine);
-    let free = off(&calibrated.fit);
-    let alone = Model::alone(calibrated.fit.factors, free);
+    let free = told.factors.map(|factor| factor != 1.0);
+    let alone = Model::alone(told.factors, free);
     let nothing = Point::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
     let nothing = fit::fit(engine, nothing, FIRST_STEPS);
     let seek = Seek { engine, axis, balance, unknowns };

@@ -18,8 +18,9 @@
 //! of its own: as in [`crate::fit`], a window counts by how many times its noise it is off. An effect that fewer than ten windows
 //! show cannot pass, whatever its size.
 //!
-//! The range of nothing comes from simulated residuals of noise alone, with memory and errors of the sampling instant as
-//! the course has them. Source: discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s).
+//! What noise alone leaves comes from simulated residuals, with memory and errors of the sampling instant as the course has them.
+//! The range of nothing comes from whole records that the extended model would have left itself: their starts are looked for as
+//! those of the record are. Source: discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s).
 //! Cameron, Gelbach, Miller 2008, Rev. Econ. Stat. 90(3): clusters.
 
 mod free_run;
@@ -67,7 +68,7 @@ pub fn verify(
     progress("held-out record in windows, before and after");
     let (before, after) = rayon::join(|| Model::new(course, before), || Model::new(course, after));
     progress("held-out record: what noise alone would show");
-    let nothing = Nothing::new(&after.windows);
+    let nothing = Nothing::new(&after.windows, &after.simulated);
     progress("held-out record: free run");
     let (run_before, run_after) = rayon::join(
         || free_run::free_run(course, before.windows.rig()),

@@ -27,7 +27,7 @@ use crate::verify::verify;
 use plant::{ParameterError, RigParameters};
 use std::path::{Path, PathBuf};
 pub use telling::place_name;
-use telling::{empty, off, report_of, summary};
+use telling::{empty, report_of, summary};
 
 /// What the workflow is asked.
 #[derive(Clone, Debug, Default)]
@@ -193,12 +193,13 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
         let unknowns = locate(&calibrated, &courses, progress).unknowns;
         report.outside = outside(&calibrated, &courses, &unknowns, progress);
         if let Some(told) = &mut report.outside {
-            match tabulate(&engine, &found.calibrated, told, &unknowns, &off, progress) {
+            match tabulate(&engine, &found.calibrated, &found.told, told, &unknowns, progress) {
                 Ok(found) => {
                     told.added = true;
                     told.tables = found.terms;
                     told.share_explained = Some(found.share_explained);
                     report.parameters = found.parameters;
+                    report.carried.clear();
                 }
                 Err(why_not) => told.why_not = Some(why_not),
             }
@@ -207,6 +208,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     let told = Told {
         named: report.named.clone(),
         parameters: report.parameters.clone(),
+        carried: report.carried.clone(),
         inputs: report.inputs.clone(),
         outside: report.outside.as_ref().map(|own| ToldOutside { tables: own.tables.clone() }),
     };
@@ -263,6 +265,9 @@ pub struct Told {
     pub named: Vec<NamedEffect>,
     /// Parameters that were off.
     pub parameters: Vec<Quantity>,
+    /// Parameters that the model moved by less.
+    #[serde(default)]
+    pub carried: Vec<Quantity>,
     /// Files.
     pub inputs: InputFiles,
     /// What the catalogue does not have.
@@ -284,7 +289,8 @@ pub struct ToldOutside {
 /// [`ExtendError`] when it names what a rig cannot have.
 pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> {
     let additions: Vec<Addition> = told.named.iter().map(addition).collect();
-    let text = extend(&rig_file.text, &rig_file.file, &additions, &told.parameters, &told.inputs.train)?;
+    let changed = [&told.parameters[..], &told.carried].concat();
+    let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, &told.inputs.train)?;
     let terms = told.outside.as_ref().map_or(&[][..], |own| &own.tables);
     add_tables(&text, &rig_file.file, &tables(terms), &told.inputs.train)
 }

@@ -71,6 +71,7 @@ impl Study {
             },
             named,
             parameters,
+            carried: Vec::new(),
             outside: self.outside(),
             gap: BTreeMap::new(),
             verification: None,

@@ -218,6 +218,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
         },
         named: Vec::new(),
         parameters: Vec::new(),
+        carried: Vec::new(),
         outside: None,
         gap: gap(),
         verification: Some(verification()),

@@ -5,6 +5,7 @@ use super::{FORCE, WINDOW, Windows, dot, project};
 use crate::course::{Course, Point};
 use nalgebra::{DMatrix, DVector};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
+use rand_pcg::Pcg64;
 
 /// How far a start may move at a time where the rods are linked.
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
@@ -128,6 +129,31 @@ impl Windows<'_> {
         }
         self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
         self
+    }
+
+    /// The same windows of a record that this rig would have left, with noise: it began where these windows begin, of which the
+    /// new ones know no more than what the record's points say. `simulated` is what the rig shows without noise.
+    #[must_use]
+    pub fn redrawn(&self, simulated: &[f64], random: &mut Pcg64) -> Self {
+        let noise = self.raw_noise(random);
+        let readings = simulated.iter().zip(&noise).map(|(own, noise)| own + noise).collect();
+        let points = (0..self.points.len()).map(|window| self.course.points[window * WINDOW]).collect();
+        let mut windows = Windows {
+            course: self.course,
+            rig: self.rig.clone(),
+            starts: self.starts.clone(),
+            points,
+            lanes: self.lanes.clone(),
+            readings,
+            valid: self.valid.clone(),
+            drifts: self.drifts.clone(),
+            bases: Vec::new(),
+        };
+        windows.bases = windows.sensitivities().into_iter().map(orthonormal).collect();
+        if self.course.linked {
+            windows.settle_linked();
+        }
+        windows.settled()
     }
 
     /// Squares of what each window leaves under the baseline rig.

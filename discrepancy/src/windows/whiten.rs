@@ -13,10 +13,16 @@ pub(super) const SPIKE_REACH: usize = 4;
 const SPIKE: f64 = 6.0;
 
 impl Windows<'_> {
-    /// The residual of a model that lacks nothing: noise as the course has it, its memory and the sampling instants' errors
-    /// included, treated as a residual is.
+    /// The residual of a model that lacks nothing: noise, treated as a residual is.
     #[must_use]
     pub fn noise(&self, random: &mut Pcg64) -> Vec<f64> {
+        let mut noise = self.raw_noise(random);
+        self.reduce(&mut noise);
+        noise
+    }
+
+    /// Noise as the course has it, its memory and the sampling instants' errors included.
+    pub(super) fn raw_noise(&self, random: &mut Pcg64) -> Vec<f64> {
         let width = self.lanes.len();
         let memories: Vec<f64> =
             self.lanes.iter().map(|(axis, channel)| self.course.memory[*axis][*channel]).collect();
@@ -32,7 +38,6 @@ impl Windows<'_> {
                 noise.extend(own.iter().zip(drifts).map(|(own, drift)| own + drift * instant));
             }
         }
-        self.reduce(&mut noise);
         noise
     }
 

@@ -1,5 +1,6 @@
 //! What naming found, as a report: verdict, names with their numbers, candidates, limits, and the verdict in words.
 
+use crate::calibrate::quantity;
 use crate::engine::Engine;
 use crate::name::Found;
 use crate::parameters::COUNT;
@@ -17,9 +18,7 @@ const OFF_LEAST: f64 = 0.01;
 /// What naming found, as a report.
 pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     let named = named(found);
-    // Without a name the parameters are what they are alone: those beside effects that do not explain belong to no model.
-    let fit = if found.inadequate { &found.calibrated.fit } else { &found.model };
-    let parameters = parameters_off(engine, fit);
+    let (parameters, carried) = parameters(engine, &found.told);
     let verdict = if found.inadequate {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
@@ -36,6 +35,7 @@ pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     Report {
         named,
         parameters,
+        carried,
         candidates: candidates(found),
         not_excited,
         detection_limits,
@@ -47,9 +47,9 @@ fn named(found: &Found) -> Vec<NamedEffect> {
     let mut at = 0;
     let mut all = Vec::new();
     for ((placed, share), alternatives) in
-        found.model.placed.iter().zip(&found.shares).zip(&found.alternatives)
+        found.told.placed.iter().zip(&found.shares).zip(&found.alternatives)
     {
-        let errors = &found.model.errors[at..at + placed.coordinates.len()];
+        let errors = &found.told.errors[at..at + placed.coordinates.len()];
         at += placed.coordinates.len();
         let alternatives = alternatives
             .iter()
@@ -91,19 +91,15 @@ fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<N
     }
 }
 
-/// Parameters that are off by more than their errors and more than nothing.
-fn parameters_off(engine: &Engine<'_>, model: &Refit) -> Vec<Quantity> {
-    let off = off(model);
-    (0..COUNT).filter(|at| off[*at]).map(|at| crate::calibrate::quantity(engine, at, model)).collect()
-}
-
-/// Which parameters are off by more than their errors and more than nothing.
-pub(super) fn off(model: &Refit) -> [bool; COUNT] {
+/// Parameters that are off, and those that a model moved by too little to say so.
+fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantity>) {
     let errors = &model.errors[model.errors.len() - COUNT..];
-    std::array::from_fn(|at| {
-        let off = (model.factors[at] - 1.0).abs();
-        off > OFF_LEAST && off > OFF_ERRORS * errors[at]
-    })
+    let by = |at: usize| (model.factors[at] - 1.0).abs();
+    let (off, carried): (Vec<usize>, Vec<usize>) = (0..COUNT)
+        .filter(|at| by(*at) > 0.0)
+        .partition(|at| by(*at) > OFF_LEAST && by(*at) > OFF_ERRORS * errors[*at]);
+    let told = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, model)).collect();
+    (told(off), told(carried))
 }
 
 fn candidates(found: &Found) -> Vec<report::Candidate> {
@@ -183,6 +179,7 @@ pub(super) fn empty(verdict: Verdict, summary: String) -> Report {
         inputs: InputFiles::default(),
         named: Vec::new(),
         parameters: Vec::new(),
+        carried: Vec::new(),
         outside: None,
         gap: std::collections::BTreeMap::new(),
         verification: None,
