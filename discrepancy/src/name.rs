@@ -23,7 +23,7 @@ use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
 use crate::screen::{Columns, Screened};
-use home::{Placement, at_home};
+use home::{Placement, at_home, gap_start};
 use needed::with_needed;
 use nothing::Nothing;
 use rayon::prelude::*;
@@ -74,6 +74,9 @@ const REDUCES: f64 = 1.8;
 /// Effects that are none without their first number: without cracking pressure a check valve is the resistance of a line, and
 /// where rods are linked, damping alone takes up what starts within micrometres leave.
 const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
+/// What stands between linked rods: screening sees little of it, since starts were moved to where the rig without it meets the
+/// readings.
+const BACKLASH: &str = "coupling-backlash";
 /// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart.
 const ALIKE: f64 = 20.0;
 /// The same as a share of what the effect takes.
@@ -150,14 +153,22 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         if most < WORTH_A_FIT.max(LOOKED_FOR * threshold) {
             break;
         }
+        let always =
+            |screened: &Screened| here.is_linked() && columns.candidates[screened.at].sheet.name == BACKLASH;
+        let gap: Vec<Screened> = contenders.iter().filter(|own| always(own)).cloned().collect();
+        contenders.retain(|screened| !always(screened) && own_nothing - screened.loss > CONTENDS * most);
         contenders.truncate(CONTENDERS);
-        contenders.retain(|screened| own_nothing - screened.loss > CONTENDS * most);
+        contenders.extend(gap);
         progress(&format!("fitting {} candidates, round {}", contenders.len(), round + 1));
         let point = if round == 0 { around.clone() } else { around_of(here, &model) };
         let mut refits: Vec<Refit> = contenders
             .par_iter()
             .filter_map(|screened| {
-                let start = best_start(here, &point, &model.placed, screened, own_nothing);
+                let start = if always(screened) {
+                    gap_start(here, &point, &model.placed, &screened.start)
+                } else {
+                    best_start(here, &point, &model.placed, screened, own_nothing)
+                };
                 refit_steps(here, &point, &start, NUMBER_COSTS, STEPS)
             })
             .collect();
@@ -166,8 +177,13 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         // what the parameters alone reach with the same sensitivities.
         let Some(best) = refits.first() else { break };
         let gain = own_nothing - best.loss;
-        let near =
+        let mut near =
             refits.iter().take(REFINED).filter(|own| own_nothing - own.loss >= 0.5 * gain).count().max(1);
+        // How good another gap is, only its own home tells.
+        let is_backlash =
+            |own: &Refit| own.placed.last().is_some_and(|own| own.candidate.sheet.name == BACKLASH);
+        near += usize::from(!refits[..near].iter().any(is_backlash) && refits.iter().any(is_backlash));
+        refits.sort_by_key(|own| !is_backlash(own));
         let mut refined: Vec<Placement> =
             refits[..near].par_iter().map(|own| at_home(here, &refine(here, own), NUMBER_COSTS)).collect();
         refits.splice(..near, refined.iter().map(|own| own.fit.clone()));

@@ -2,8 +2,11 @@
 
 use super::around_of;
 use crate::engine::Engine;
-use crate::refit::{Refit, refit, rig_of};
+use crate::refit::{Around, Placed, Refit, loss_at, refit, rig_of};
+use rayon::prelude::*;
 
+/// Amplitudes of a gap that are tried.
+const AMPLITUDES: [f64; 5] = [0.12, 0.25, 0.45, 0.7, 1.0];
 /// How often a model of linked rods and the starts that it says follow each other, and the share of the loss that ends it.
 const MOVES: usize = 3;
 const MOVED: f64 = 0.05;
@@ -30,4 +33,36 @@ pub(super) fn at_home<'a>(engine: &Engine<'a>, own: &Refit, penalty: f64) -> Pla
         }
     }
     best
+}
+
+/// Where the fit of a gap begins: where the records are met best from its own home. From the home of a rig with another one it is
+/// worse, however right it is.
+pub(super) fn gap_start(
+    engine: &Engine<'_>,
+    point: &Around,
+    model: &[Placed],
+    start: &Placed,
+) -> Vec<Placed> {
+    let [least, most] = start.candidate.range(0);
+    let told = start.coordinates[0];
+    let tried: Vec<Vec<Placed>> = AMPLITUDES
+        .iter()
+        .map(|own| own * told.signum())
+        .filter(|own| *own >= least && *own <= most)
+        .chain([told])
+        .map(|amplitude| {
+            let mut own = start.clone();
+            own.coordinates[0] = amplitude;
+            [model, &[own]].concat()
+        })
+        .collect();
+    let losses: Vec<f64> = tried
+        .par_iter()
+        .map(|placed| {
+            rig_of(engine.rig(), placed, &point.factors)
+                .map_or(f64::INFINITY, |rig| loss_at(&engine.settled_at(&rig), point, placed))
+        })
+        .collect();
+    let best = (0..tried.len()).min_by(|left, right| losses[*left].total_cmp(&losses[*right]));
+    tried[best.expect("one at least")].clone()
 }

@@ -11,8 +11,10 @@ use rand_pcg::Pcg64;
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
 /// Share of a step that is tried next when the whole met the readings worse.
 const SHORTER: f64 = 0.3;
-/// How often the starts of a linked record are moved.
-const LINKED_PASSES: usize = 6;
+/// How often the starts of a linked record are moved after each search.
+const LINKED_PASSES: usize = 3;
+/// Shifts of the pistons against each other that are searched, either way: as far as two sensors' noise, then nearer.
+const SHIFTS_M: [[f64; 3]; 2] = [[30e-6, 70e-6, 120e-6], [5e-6, 12e-6, 25e-6]];
 /// The same of others, where it is asked for.
 const SETTLING: usize = 2;
 /// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
@@ -72,25 +74,54 @@ impl Windows<'_> {
         }
     }
 
-    /// Settles all starts of a linked record; steps that meet a window's readings worse are taken back and made shorter.
+    /// Settles all starts of a linked record: first on the side of the gap where each window is met best, then from there; steps
+    /// that meet a window's readings worse are taken back and made shorter.
     pub(super) fn settle_linked(&mut self) {
-        let mut shares = vec![1.0; self.starts.len()];
         let mut squares = self.raw_squares();
-        for _ in 0..LINKED_PASSES {
-            let points = self.points.clone();
-            self.settle_by(&shares);
-            let new = self.raw_squares();
-            for (at, start) in self.starts.iter().enumerate() {
-                if new[at] > squares[at] {
-                    self.points[start / WINDOW] = points[start / WINDOW];
-                    shares[at] *= SHORTER;
-                } else {
-                    squares[at] = new[at];
-                    shares[at] = 1.0;
+        for shifts in SHIFTS_M {
+            self.shift_linked(&shifts, &mut squares);
+            let mut shares = vec![1.0; self.starts.len()];
+            for _ in 0..LINKED_PASSES {
+                let points = self.points.clone();
+                self.settle_by(&shares);
+                let new = self.raw_squares();
+                for (at, start) in self.starts.iter().enumerate() {
+                    if new[at] > squares[at] {
+                        self.points[start / WINDOW] = points[start / WINDOW];
+                        shares[at] *= SHORTER;
+                    } else {
+                        squares[at] = new[at];
+                        shares[at] = 1.0;
+                    }
                 }
             }
         }
         self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+    }
+
+    /// Moves the pistons of each window's start towards each other or apart, by that of some shifts from which its readings are met
+    /// best: on the wrong side of the gap no step is short enough.
+    fn shift_linked(&mut self, shifts_m: &[f64], squares: &mut [f64]) {
+        let points = self.points.clone();
+        let mut best = vec![0.0; self.starts.len()];
+        for shift_m in shifts_m.iter().flat_map(|own| [-own, *own]) {
+            for (own, from) in self.points.iter_mut().zip(&points) {
+                for axis in 0..2 {
+                    own[axis].extension_m = from[axis].extension_m + 0.5 * shift_m;
+                }
+            }
+            for ((best, least), new) in best.iter_mut().zip(squares.iter_mut()).zip(self.raw_squares()) {
+                if new < *least {
+                    (*best, *least) = (shift_m, new);
+                }
+            }
+        }
+        self.points = points;
+        for (start, shift_m) in self.starts.iter().zip(best) {
+            for point in &mut self.points[start / WINDOW] {
+                point.extension_m += 0.5 * shift_m;
+            }
+        }
     }
 
     /// Squares of what each window leaves, starts as they are.
