@@ -44,6 +44,8 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     for (at, (factor, error)) in factors(&found).into_iter().enumerate() {
         assert!((factor - 1.0).abs() < 5.0 * error + 0.003, "parameter {at}: {factor} +- {error}");
     }
+    let moved = found.told.factors.iter().filter(|factor| **factor != 1.0).count();
+    assert!(moved <= 2, "what is told moves parameters that nobody misses: {:?}", found.told.factors);
 }
 
 #[test]
@@ -76,6 +78,11 @@ fn a_wrong_mass_is_a_parameter_and_no_effect() {
     assert_eq!(names(&found), Vec::<String>::new());
     let (mass, error) = factors(&found)[0];
     assert!((mass - 1.1).abs() < 4.0 * error + 0.005, "{mass} +- {error}");
+    // What is told is a fit of its own: the mass is as right without the parameters that went back to what the file says.
+    let told = found.told.factors;
+    assert!((told[0] - 1.1).abs() < 4.0 * error + 0.005, "{told:?}");
+    assert!(told.iter().filter(|factor| **factor == 1.0).count() >= COUNT / 2, "{told:?}");
+    assert!(found.told.loss < found.model.loss + 20.0 * COUNT as f64);
 }
 
 #[test]
