@@ -153,22 +153,18 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         if most < WORTH_A_FIT.max(LOOKED_FOR * threshold) {
             break;
         }
-        let always =
-            |screened: &Screened| here.is_linked() && columns.candidates[screened.at].sheet.name == BACKLASH;
-        let gap: Vec<Screened> = contenders.iter().filter(|own| always(own)).cloned().collect();
-        contenders.retain(|screened| !always(screened) && own_nothing - screened.loss > CONTENDS * most);
+        let gap = contenders
+            .iter()
+            .find(|own| here.is_linked() && columns.candidates[own.at].sheet.name == BACKLASH)
+            .cloned();
         contenders.truncate(CONTENDERS);
-        contenders.extend(gap);
+        contenders.retain(|screened| own_nothing - screened.loss > CONTENDS * most);
         progress(&format!("fitting {} candidates, round {}", contenders.len(), round + 1));
         let point = if round == 0 { around.clone() } else { around_of(here, &model) };
         let mut refits: Vec<Refit> = contenders
             .par_iter()
             .filter_map(|screened| {
-                let start = if always(screened) {
-                    gap_start(here, &point, &model.placed, &screened.start)
-                } else {
-                    best_start(here, &point, &model.placed, screened, own_nothing)
-                };
+                let start = best_start(here, &point, &model.placed, screened, own_nothing);
                 refit_steps(here, &point, &start, NUMBER_COSTS, STEPS)
             })
             .collect();
@@ -177,16 +173,22 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         // what the parameters alone reach with the same sensitivities.
         let Some(best) = refits.first() else { break };
         let gain = own_nothing - best.loss;
-        let mut near =
+        let near =
             refits.iter().take(REFINED).filter(|own| own_nothing - own.loss >= 0.5 * gain).count().max(1);
-        // How good another gap is, only its own home tells.
-        let is_backlash =
-            |own: &Refit| own.placed.last().is_some_and(|own| own.candidate.sheet.name == BACKLASH);
-        near += usize::from(!refits[..near].iter().any(is_backlash) && refits.iter().any(is_backlash));
-        refits.sort_by_key(|own| !is_backlash(own));
         let mut refined: Vec<Placement> =
             refits[..near].par_iter().map(|own| at_home(here, &refine(here, own), NUMBER_COSTS)).collect();
         refits.splice(..near, refined.iter().map(|own| own.fit.clone()));
+        let least = refits.iter().map(|own| own.loss).fold(model.loss, f64::min);
+        if let Some(gap) = gap
+            && least > EXCESS * here.freedom().iter().sum::<f64>()
+        {
+            progress("trying other gaps");
+            let start = gap_start(here, &point, &model.placed, &gap.start);
+            if let Some(own) = refit_steps(here, &point, &start, NUMBER_COSTS, STEPS) {
+                refined.push(at_home(here, &refine(here, &own), NUMBER_COSTS));
+                refits.extend(refined.last().map(|own| own.fit.clone()));
+            }
+        }
         if round == 0 {
             fitted = refits.clone();
             fitted.sort_by(|left, right| left.loss.total_cmp(&right.loss));

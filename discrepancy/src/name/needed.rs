@@ -1,4 +1,5 @@
-//! Which parameters a model needs beside its effects: the others go back to what the file says, and it is fitted again without them.
+//! Which parameters a model needs beside its effects: the others go back to what the file says, and it is fitted again without
+//! them.
 //!
 //! ```text
 //!   loss with all ──► the one that is missed least goes, while its going costs less than it is worth ──► fitted again

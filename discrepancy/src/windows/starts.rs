@@ -99,8 +99,8 @@ impl Windows<'_> {
         self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
     }
 
-    /// Moves the pistons of each window's start towards each other or apart, by that of some shifts from which its readings are met
-    /// best: on the wrong side of the gap no step is short enough.
+    /// Moves the pistons of each window's start towards each other or apart, by that of some shifts from which its readings are
+    /// met best: on the wrong side of the gap no step is short enough.
     fn shift_linked(&mut self, shifts_m: &[f64], squares: &mut [f64]) {
         let points = self.points.clone();
         let mut best = vec![0.0; self.starts.len()];
