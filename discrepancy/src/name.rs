@@ -137,12 +137,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         let here = home.as_ref().unwrap_or(engine);
         let (own_nothing, own_screened) =
             if round == 0 { (nothing, screened.clone()) } else { screen_again(here, &columns, &model) };
-        let taken = |screened: &Screened| {
-            let own = &columns.candidates[screened.at];
-            model.placed.iter().any(|placed| {
-                placed.candidate.sheet.name == own.sheet.name && placed.candidate.place == own.place
-            })
-        };
+        let taken = |screened: &Screened| model.placed.iter().any(|placed| same(placed, &screened.start));
         let mut contenders: Vec<Screened> =
             own_screened.into_iter().filter(|screened| !taken(screened)).collect();
         contenders.sort_by(|left, right| left.loss.total_cmp(&right.loss));
@@ -185,8 +180,14 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
             progress("trying other gaps");
             let start = gap_start(here, &point, &model.placed, &gap.start);
             if let Some(own) = refit_steps(here, &point, &start, NUMBER_COSTS, STEPS) {
-                refined.push(at_home(here, &refine(here, &own), NUMBER_COSTS));
-                refits.extend(refined.last().map(|own| own.fit.clone()));
+                let own = at_home(here, &refine(here, &own), NUMBER_COSTS);
+                // The one fitted from where screening said is the same effect, and no alternative to it.
+                let is_gap = |other: &Refit| other.placed.last().is_some_and(|own| same(own, &gap.start));
+                if refits.iter().filter(|other| is_gap(other)).all(|other| own.fit.loss < other.loss) {
+                    refits.retain(|other| !is_gap(other));
+                    refits.push(own.fit.clone());
+                    refined.push(own);
+                }
             }
         }
         if round == 0 {
@@ -408,16 +409,17 @@ fn drop_unneeded<'a>(
     }
 }
 
+/// Whether two are the same effect at the same place.
+fn same(left: &Placed, right: &Placed) -> bool {
+    left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
+}
+
 /// What takes the place of an effect of the model just as well.
 fn alternatives(
     placed: &Placed,
     calibrated: &Calibrated,
     rounds: &[(Vec<Placed>, Vec<Refit>)],
 ) -> Vec<Refit> {
-    let same = |left: &Placed, right: &Placed| {
-        left.candidate.sheet.name == right.candidate.sheet.name
-            && left.candidate.place == right.candidate.place
-    };
     // The round in which it joined.
     let Some((_, refits)) = rounds.iter().find(|(_, refits)| {
         refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))

@@ -7,9 +7,8 @@
 //!
 //! Figures of windows are robust in two ways, which both models and the draws of nothing share:
 //!
-//! - *Left out* are the 5 % of the windows, at least one, in which the extended model is worst: around a stop or a
-//!   break-away microseconds decide, and so do pascals where a piston rests at the edge of its friction. One such window would
-//!   outweigh all others, and a record of 20 s has two or three. Both models leave out the same
+//! - *Left out* are the 2 % of the windows, at least one, in which the extended model is worst: around a stop or a
+//!   break-away microseconds decide, and one such window would outweigh all others. Both models leave out the same
 //!   windows; for a gap they are those of its signal, for chi2 and whiteness those of all signals together. Whether the
 //!   extended model is better is asked of all windows.
 //! - *Level*: the noise of a channel is known to some per cent only. The tenth of the windows in which the better of both models

@@ -5,7 +5,7 @@ use super::nothing::Nothing;
 use crate::windows::WINDOW;
 
 /// Share of the windows that is left out, the worst of the extended model.
-const LEFT_OUT: f64 = 0.05;
+const LEFT_OUT: f64 = 0.02;
 /// Share of the windows that tells the level of the noise: its quantile.
 const QUIET: f64 = 0.1;
 
