@@ -19,6 +19,8 @@ use plant::parameters::ParameterError;
 const DECADES: f64 = 30.0;
 /// Neutral values from which on a key counts as neutral at infinity, as a multiple of the largest drawn one.
 const FAR: f64 = 10.0;
+/// Coordinates beyond which nothing is looked for: a half more than the strongest that occurs.
+const FARTHEST: f64 = 1.5;
 
 /// Effects whose traces change their shape as they grow.
 const BENT: [&str; 6] = [
@@ -143,6 +145,14 @@ impl Candidate {
         let scale = Scale::of(sheet_key);
         let ends = [scale.coordinate(sheet_key.min), scale.coordinate(sheet_key.max)];
         [ends[0].min(ends[1]), ends[0].max(ends[1])]
+    }
+
+    /// Where a fit looks for a key's coordinate.
+    #[must_use]
+    pub fn reach(&self, key: usize) -> [f64; 2] {
+        let [least, most] = self.range(key);
+        let most = most.min(FARTHEST);
+        [least.max(-FARTHEST).min(most), most]
     }
 
     /// Whether the first key can go to both sides of the baseline.

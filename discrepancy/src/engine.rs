@@ -14,12 +14,19 @@ use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::windows::{Windows, dot};
 use plant::RigParameters;
 use rayon::prelude::*;
+use std::sync::Mutex;
 
 /// Change of a factor by which the sensitivity to a parameter is taken.
 const FACTOR_CHANGE: f64 = 0.01;
 
 /// How far the level of noise is corrected: an effect that is seen in every window must not pass for noise.
 const LEVELS: [f64; 2] = [0.6, 1.05];
+
+/// Models whose sensitivities are kept: naming asks for the same ones several times, at a fifth of its time.
+const KEPT: usize = 4;
+
+/// A rig, the factors of its parameters, and the sensitivities to them.
+type Sensitivities = (RigParameters, [f64; COUNT], Vec<Vec<f64>>);
 
 /// The records, and the baseline's readings.
 #[derive(Debug)]
@@ -30,6 +37,8 @@ pub struct Engine<'a> {
     freedom: Vec<f64>,
     /// What the quiet windows say that the noise is too small or large.
     level: f64,
+    /// What was asked for last, the latest at the end.
+    kept: Mutex<Vec<Sensitivities>>,
 }
 
 impl<'a> Engine<'a> {
@@ -39,7 +48,8 @@ impl<'a> Engine<'a> {
         let windows: Vec<Windows<'a>> = courses.par_iter().map(|course| Windows::new(course, rig)).collect();
         let rows = windows.first().map_or(0, Windows::rows);
         let freedom = windows.iter().flat_map(Windows::freedom).collect();
-        let mut engine = Engine { windows, rig: rig.clone(), rows, freedom, level: 1.0 };
+        let mut engine =
+            Engine { windows, rig: rig.clone(), rows, freedom, level: 1.0, kept: Mutex::default() };
         let residual = engine.residual(&engine.simulate(rig));
         engine.level = level(&residual, rows, &engine.freedom);
         engine.freedom.iter_mut().for_each(|own| *own *= engine.level);
@@ -53,7 +63,14 @@ impl<'a> Engine<'a> {
         let windows: Vec<Windows<'a>> =
             self.windows.par_iter().map(|own| Windows::new(own.course(), rig)).collect();
         let freedom = windows.iter().flat_map(Windows::freedom).map(|own| own * self.level).collect();
-        Engine { windows, rig: self.rig.clone(), rows: self.rows, freedom, level: self.level }
+        Engine {
+            windows,
+            rig: self.rig.clone(),
+            rows: self.rows,
+            freedom,
+            level: self.level,
+            kept: Mutex::default(),
+        }
     }
 
     /// Whether a record was made with linked rods.
@@ -127,21 +144,34 @@ impl<'a> Engine<'a> {
     }
 
     /// Sensitivities of a rig's readings to the factors of all parameters, at these factors; an effect may be switched on.
+    ///
+    /// # Panics
+    /// When another thread panicked here.
     #[must_use]
     pub fn parameter_columns(&self, rig: &RigParameters, factors: &[f64; COUNT]) -> Vec<Vec<f64>> {
+        let kept = || self.kept.lock().expect("nobody panics with it");
+        if let Some((.., columns)) = kept().iter().find(|(own, at, _)| own == rig && at == factors) {
+            return columns.clone();
+        }
         let around = |at: usize, change: f64| {
             let mut factors = *factors;
             factors[at] += change;
             self.simulate_coarsely(&with_factors(rig, &factors))
         };
-        (0..PARAMETERS.len())
+        let columns: Vec<Vec<f64>> = (0..PARAMETERS.len())
             .into_par_iter()
             .map(|at| {
                 let mut column = self.difference(&around(at, FACTOR_CHANGE), &around(at, -FACTOR_CHANGE));
                 column.iter_mut().for_each(|own| *own /= 2.0 * FACTOR_CHANGE);
                 column
             })
-            .collect()
+            .collect();
+        let mut kept = kept();
+        if kept.len() == KEPT {
+            kept.remove(0);
+        }
+        kept.push((rig.clone(), *factors, columns.clone()));
+        columns
     }
 }
 

@@ -16,6 +16,7 @@
 mod home;
 mod needed;
 mod nothing;
+mod settle;
 
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;

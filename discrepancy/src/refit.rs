@@ -26,15 +26,12 @@ const SETTLED: f64 = 0.3;
 const AMPLITUDE_TOLERANCE: f64 = 3.0;
 const SHAPE_TOLERANCE: f64 = 0.7;
 /// By how much a parameter may be off at most: one that is off by more is another rig.
-const MOST_OFF: f64 = 0.3;
+pub(crate) const MOST_OFF: f64 = 0.3;
 /// What each parameter that is off costs, as a number of an effect does: a sensor that shows four per cent too little is a better
 /// explanation than all masses, frictions and areas off by as much.
 const PARAMETER_COSTS: f64 = 8.0;
 /// From where on a parameter counts as off.
 const COUNTS_AS_OFF: f64 = 0.005;
-/// Coordinates beyond which nothing is looked for: a half more than the strongest that occurs.
-const FARTHEST: f64 = 1.5;
-
 /// One effect at some coordinates.
 #[derive(Clone, Debug)]
 pub struct Placed {
@@ -187,11 +184,9 @@ pub fn refit_steps(
         for _ in 0..=HALVINGS {
             let mut placed = point.placed.clone();
             for ((at, key), change) in moved.iter().zip(&joint.coefficients[COUNT..]) {
-                let candidate = placed[*at].candidate;
-                let range = candidate.range(*key);
-                let (least, most) = (range[0].max(-FARTHEST), range[1].min(FARTHEST));
+                let [least, most] = placed[*at].candidate.reach(*key);
                 let own = &mut placed[*at].coordinates[*key];
-                *own = (*own + share * change).clamp(least.min(most), most);
+                *own = (*own + share * change).clamp(least, most);
             }
             if let Some(tried) = evaluate(placed)
                 && tried.fit.loss + prior(&tried.placed) < before
@@ -257,8 +252,8 @@ fn derivative(
     let candidate = placed[at].candidate;
     let own = placed[at].coordinates[key];
     let size = CHANGE.max(CHANGE_SHARE * own.abs());
-    let [_, most] = candidate.range(key);
-    let change = if own + size > most.min(FARTHEST) { -size } else { size };
+    let [_, most] = candidate.reach(key);
+    let change = if own + size > most { -size } else { size };
     let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;
     let moved = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);

@@ -7,55 +7,27 @@
 //!
 //! Parameters that a fit left free take up noise, and of two that hang together both move where one is off. A rig that had only
 //! the largest of them would be none of a fit: what is told, what the extended file has and what is judged is one model.
-//!
-//! Standard errors stay those beside all parameters: which of them are needed was told by the same records.
 
-use super::{NUMBER_COSTS, REFININGS, SETTLED, around_of};
+use super::around_of;
+use super::settle::settled;
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{Around, Refit, coordinate_columns, coordinate_ridge, parameter_ridges, refit, rig_of};
+use crate::refit::{Refit, coordinate_columns, coordinate_ridge, parameter_ridges, rig_of};
 
 /// Fall of the loss for which a parameter is moved: three and a half standard errors.
 const NEEDED: f64 = 12.0;
 
-/// The model with only the parameters that it needs; itself, where it cannot do without the others.
+/// The model with only the parameters that it needs, fitted in the simulator to the end; with all, where it cannot do without the
+/// others.
 pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
-    let Some(needed) = needed(engine, model) else { return model.clone() };
+    let Some(all) = settled(engine, model, &[true; COUNT]) else { return model.clone() };
+    let Some(needed) = needed(engine, &all) else { return all };
     let held = needed.iter().filter(|needed| !**needed).count();
-    let mut best: Option<Refit> = None;
-    for _ in 0..REFININGS {
-        let from = best.as_ref().unwrap_or(model);
-        let Some(next) = refit(engine, &around(engine, from, needed), &from.placed, NUMBER_COSTS) else {
-            break;
-        };
-        let settled = best.as_ref().is_some_and(|best| next.loss > best.loss - SETTLED);
-        if best.as_ref().is_none_or(|best| next.loss < best.loss) {
-            best = Some(next);
-        }
-        if settled {
-            break;
-        }
+    match settled(engine, &all, &needed) {
+        Some(fewer) if fewer.loss < all.loss + NEEDED * held as f64 => fewer,
+        _ => all,
     }
-    match best {
-        Some(best) if best.loss < model.loss + NEEDED * held as f64 => {
-            Refit { errors: model.errors.clone(), inflation: model.inflation, ..best }
-        }
-        _ => model.clone(),
-    }
-}
-
-/// Sensitivities around a model, those of parameters that are not needed left out: a column of nothing is not moved.
-fn around(engine: &Engine<'_>, model: &Refit, needed: [bool; COUNT]) -> Around {
-    let mut model = model.clone();
-    for (factor, _) in model.factors.iter_mut().zip(needed).filter(|(_, needed)| !needed) {
-        *factor = 1.0;
-    }
-    let mut around = around_of(engine, &model);
-    for (column, _) in around.columns.iter_mut().zip(needed).filter(|(_, needed)| !needed) {
-        column.fill(0.0);
-    }
-    around
 }
 
 /// Which parameters are needed, by straight lines around the model; `None` where all are, or where it has no neighbours.

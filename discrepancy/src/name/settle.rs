@@ -1,0 +1,207 @@
+//! The last steps of a fit, all numbers of the model in the simulator, and their standard errors there.
+//!
+//! ```text
+//!   effects and needed parameters ──► Gauss-Newton on all of them ──► accepted only when the simulator leaves less
+//! ```
+//!
+//! Naming moves the parameters by straight lines and never goes back to what is believed of them: good enough to compare models
+//! that have them in common. Where two parameters hang together it wanders off along what neither shows, and what a straight line
+//! promised is not what the simulator leaves.
+
+use crate::engine::Engine;
+use crate::fit::{Fit, Products};
+use crate::parameters::COUNT;
+use crate::refit::{MOST_OFF, Placed, Refit, coordinate_columns, coordinate_ridge, parameter_ridges, rig_of};
+use crate::windows::dot;
+use std::borrow::Cow;
+
+/// Steps at most, and halvings of one.
+const STEPS: usize = 6;
+const HALVINGS: i32 = 4;
+/// How often windows are left out of a step at most, and from where on they are: standard deviations of a window's squares.
+const DOUBTS: usize = 4;
+const BROKEN: f64 = 6.0;
+/// Chi2 per degree of freedom from which on a window is far off.
+const FAR_OFF: f64 = 3.0;
+/// Fall of the loss below which a fit has settled.
+const SETTLED: f64 = 0.3;
+
+/// A model where the simulator was asked.
+struct Point {
+    placed: Vec<Placed>,
+    factors: [f64; COUNT],
+    simulated: Vec<f64>,
+    residual: Vec<f64>,
+    /// Squares of each window.
+    squares: Vec<f64>,
+    /// What they and what is believed cost.
+    loss: f64,
+}
+
+/// Fits a model in the simulator, parameters that are not `needed` held at what the file says; `None` where the rig cannot have it.
+pub(super) fn settled(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
+    let mut factors = model.factors;
+    for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
+        *factor = 1.0;
+    }
+    let mut point = point(engine, model.placed.clone(), factors)?;
+    let chosen: Vec<usize> =
+        (0..COUNT + numbers(&point.placed).len()).filter(|at| *at >= COUNT || needed[*at]).collect();
+    let mut last = None;
+    for step in 0..=STEPS {
+        let lines = around(engine, &point)?;
+        let tried = (step < STEPS).then(|| stepped(engine, &point, &lines, &chosen)).flatten();
+        last = Some(lines);
+        let Some(tried) = tried else { break };
+        let fell = point.loss - tried.loss;
+        point = tried;
+        if fell < SETTLED {
+            last = None;
+            break;
+        }
+    }
+    let lines = match last {
+        Some(lines) => lines,
+        None => around(engine, &point)?,
+    };
+    let errors = errors(engine, &lines, &point);
+    let Point { placed, factors, squares, loss, .. } = point;
+    Some(Refit { placed, factors, loss, squares, errors, inflation: model.inflation })
+}
+
+fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Option<Point> {
+    let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
+    let residual = engine.residual(&simulated);
+    let products = Products::new(&residual, &[], engine.freedom(), engine.rows());
+    let squares: Vec<f64> = residual.chunks_exact(engine.rows()).map(|own| dot(own, own)).collect();
+    let believed = |ridge: f64, off: f64| ridge * off * off;
+    let loss = products.loss(&squares)
+        + parameter_ridges()
+            .iter()
+            .zip(&factors)
+            .map(|(ridge, own)| believed(*ridge, own - 1.0))
+            .sum::<f64>()
+        + numbers(&placed).iter().map(|(ridge, own)| believed(*ridge, *own)).sum::<f64>();
+    Some(Point { placed, factors, simulated, residual, squares, loss })
+}
+
+/// Ridge and value of each coordinate of the effects.
+fn numbers(placed: &[Placed]) -> Vec<(f64, f64)> {
+    placed
+        .iter()
+        .flat_map(|own| {
+            own.coordinates.iter().enumerate().map(|(key, z)| (coordinate_ridge(&own.candidate, key), *z))
+        })
+        .collect()
+}
+
+/// Straight lines around a point.
+struct Lines {
+    /// What each number changes, parameters first.
+    columns: Vec<Vec<f64>>,
+    /// What is believed of each.
+    ridges: Vec<f64>,
+    /// How far each is from what is believed.
+    from: Vec<f64>,
+}
+
+impl Lines {
+    /// Products without what some windows say of the lines.
+    fn products(&self, engine: &Engine<'_>, point: &Point, out: &[usize]) -> Products {
+        let mut columns = Cow::from(&self.columns);
+        if !out.is_empty() {
+            for column in columns.to_mut() {
+                out.iter().for_each(|at| column[at * engine.rows()..][..engine.rows()].fill(0.0));
+            }
+        }
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        Products::new(&point.residual, &columns, engine.freedom(), engine.rows())
+    }
+}
+
+fn around(engine: &Engine<'_>, point: &Point) -> Option<Lines> {
+    let rig = rig_of(engine.rig(), &point.placed, &[1.0; COUNT])?;
+    let mut columns = engine.parameter_columns(&rig, &point.factors);
+    columns.extend(coordinate_columns(engine, &point.factors, &point.placed, &point.simulated)?);
+    let (own, places): (Vec<f64>, Vec<f64>) = numbers(&point.placed).into_iter().unzip();
+    let ridges = [parameter_ridges(), own].concat();
+    let from = point.factors.iter().map(|factor| factor - 1.0).chain(places).collect();
+    Some(Lines { columns, ridges, from })
+}
+
+/// The best point along the lines that is better than this one: with all windows, and without those that are far off, whose lines may
+/// lead anywhere.
+fn stepped(engine: &Engine<'_>, point: &Point, lines: &Lines, chosen: &[usize]) -> Option<Point> {
+    let far: Vec<usize> = (0..engine.freedom().len())
+        .filter(|window| point.squares[*window] > FAR_OFF * engine.freedom()[*window])
+        .collect();
+    let with_all = along(engine, point, lines, chosen, &[]);
+    let without = if far.is_empty() { None } else { along(engine, point, lines, chosen, &far) };
+    [with_all, without].into_iter().flatten().min_by(|left, right| left.loss.total_cmp(&right.loss))
+}
+
+/// A better point along the lines, those of some windows left out. Where the simulator does not do what a window's lines promise, they
+/// are left out as well: around a break-away, what a small change does says nothing of a smaller one.
+fn along(
+    engine: &Engine<'_>,
+    point: &Point,
+    lines: &Lines,
+    chosen: &[usize],
+    out: &[usize],
+) -> Option<Point> {
+    let part = |of: &[f64]| chosen.iter().map(|at| of[*at]).collect::<Vec<_>>();
+    let (ridges, from) = (part(&lines.ridges), part(&lines.from));
+    let mut out = out.to_vec();
+    for _ in 0..DOUBTS {
+        let fit = lines.products(engine, point, &out).fit_from(chosen, &ridges, &from);
+        let tried = moved(engine, point, chosen, &fit, 1.0)?;
+        if tried.loss < point.loss {
+            return Some(tried);
+        }
+        let broken = |window: &usize| {
+            tried.squares[*window] - fit.squares[*window] > BROKEN * engine.freedom()[*window].sqrt()
+        };
+        let before = out.len();
+        out.extend((0..engine.freedom().len()).filter(broken));
+        out.sort_unstable();
+        out.dedup();
+        if out.len() == before {
+            return (1..=HALVINGS).find_map(|halving| {
+                moved(engine, point, chosen, &fit, 0.4_f64.powi(halving))
+                    .filter(|tried| tried.loss < point.loss)
+            });
+        }
+    }
+    None
+}
+
+/// The point a share of a step away.
+fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share: f64) -> Option<Point> {
+    let (mut placed, mut factors) = (from.placed.clone(), from.factors);
+    let mut changes = vec![0.0; COUNT + numbers(&placed).len()];
+    chosen.iter().zip(&step.coefficients).for_each(|(at, own)| changes[*at] = share * own);
+    for (factor, change) in factors.iter_mut().zip(&changes) {
+        *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
+    }
+    let mut changes = changes[COUNT..].iter();
+    for own in &mut placed {
+        for key in 0..own.coordinates.len() {
+            let [least, most] = own.candidate.reach(key);
+            own.coordinates[key] =
+                (own.coordinates[key] + changes.next().expect("one each")).clamp(least, most);
+        }
+    }
+    point(engine, placed, factors)
+}
+
+/// Standard errors beside all parameters, in the order of [`Refit::errors`]: which parameters are needed was told by the same records.
+fn errors(engine: &Engine<'_>, lines: &Lines, point: &Point) -> Vec<f64> {
+    let products = lines.products(engine, point, &[]);
+    let all: Vec<usize> = (0..products.columns()).collect();
+    let weights = products.weights(&point.squares);
+    let stays =
+        Fit { coefficients: vec![0.0; all.len()], loss: point.loss, squares: point.squares.clone(), weights };
+    let own =
+        products.jackknife(&all, &stays, &lines.ridges).unwrap_or_else(|| vec![f64::INFINITY; all.len()]);
+    [&own[COUNT..], &own[..COUNT]].concat()
+}
