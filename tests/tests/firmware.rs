@@ -1,0 +1,121 @@
+//! Firmware that we did not write, as a customer would: a drive controller in C with the codec that cantools generates.
+//!
+//! In lockstep on the embedded bus here; in real time on vcan in `vm_vcan.rs`.
+
+use protocol::frames::{Frame, MainChainState};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use system_tests::binaries::workspace;
+use system_tests::bus_cycles;
+use system_tests::firmware::{build, positioned};
+use system_tests::launch::Pace;
+use system_tests::process::Running;
+use system_tests::records::{bus_log, count, json};
+use system_tests::scene::Scene;
+
+/// "Close the loop": dynamic and static error, m. The bounds of controller/experiments/point-to-point.toml.
+const DYNAMIC_M: f64 = 0.005;
+const STATIC_M: f64 = 0.0005;
+
+/// The programs, built once.
+fn built() -> &'static Path {
+    static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let made = || {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        build(folder.path(), &[]);
+        folder
+    };
+    BUILT.get_or_init(made).path()
+}
+
+fn experiment(more: &str) -> String {
+    format!("title = \"firmware\"\n[rig]\ncarriage_position_m = 0.15\n{more}")
+}
+
+/// A run in lockstep; the folder that the emulator leaves.
+fn run(scene: &Scene, out: &str, seconds: f64) -> PathBuf {
+    let options = format!("--members 0 --lockstep-echo drive --seconds {seconds}");
+    let folder = scene.path(out);
+    let emulator = scene.emulator(Pace::Lockstep).with(&options).out(&folder).start();
+    let mut command = Command::new(built().join("firmware-embedded"));
+    let firmware = Running::start("firmware", command.arg(scene.socket()));
+    let _ = emulator.wait().expect_code(0);
+    let _ = firmware.wait().expect_code(0);
+    folder
+}
+
+#[test]
+fn it_positions_within_the_figures_and_in_lockstep_always_alike() {
+    let scene = Scene::new(&experiment(""));
+    let folder = run(&scene, "one", 30.0);
+    let summary = json(&folder.join("summary.json"));
+    assert_eq!(summary["ended_because"], "the controllers are done");
+    assert_eq!((count(&summary, "/frames_malformed"), count(&summary, "/stale_commands")), (0, 0));
+    assert_eq!(count(&summary, "/drive_commands/accepted"), count(&summary, "/cycles"));
+    for what in ["lost", "late", "duplicate", "breaks", "refused_stale"] {
+        assert_eq!(count(&summary, &format!("/drive_commands/{what}")), 0, "{what}");
+    }
+    let done = positioned(&bus_log(&folder.join("bus.log")));
+    eprintln!("{done:?}");
+    assert_eq!(done.cycles, 8000);
+    assert!(done.set_points > 790 && done.set_point_error_m < 2e-5, "{done:?}");
+    assert!(done.position_error_dynamic_m < DYNAMIC_M, "{done:?}");
+    assert!(done.position_error_static_m < STATIC_M, "{done:?}");
+    // It does position: the errors are those of a real loop, and not of a carriage that was not there.
+    assert!(done.position_error_dynamic_m > 5e-4, "{done:?}");
+
+    let again = run(&scene, "again", 30.0);
+    for file in ["bus.log", "measurement.csv"] {
+        assert!(scene.same(&folder.join(file), &again.join(file)), "{file} differs in a second run");
+    }
+}
+
+#[test]
+fn the_emergency_stop_shuts_its_valve_and_it_stays_shut() {
+    let event = "event = [{ at_s = 4.0, do = \"emergency-stop\" }, { at_s = 5.0, do = \"release\" }]\n";
+    let scene = Scene::new(&experiment(event));
+    let folder = run(&scene, "stopped", 6.5);
+    let logged = bus_cycles::read(&folder.join("bus.log"));
+    let command = |cycle: u64| {
+        let frame = logged.iter().find_map(|logged| match logged.frame {
+            Frame::DriveValveCommand(command) if logged.cycle == cycle => Some(command),
+            _ => None,
+        });
+        frame.unwrap_or_else(|| panic!("no command in cycle {cycle}"))
+    };
+    let before = command(3990);
+    assert!(before.enable && before.opening.abs() > 0.02, "it moved: {before:?}");
+    for cycle in 4012..6400 {
+        let after = command(cycle);
+        assert!(!after.enable && after.opening == 0.0, "cycle {cycle}: {after:?}");
+    }
+    let told = logged.iter().rev().find_map(|logged| match logged.frame {
+        Frame::DriveChainStatus(status) => Some(status.main_chain),
+        _ => None,
+    });
+    assert_eq!(told, Some(MainChainState::Aborted));
+}
+
+#[test]
+fn it_is_written_as_for_a_processor_without_a_heap_and_its_codec_is_what_cantools_makes() {
+    let makefile =
+        std::fs::read_to_string(workspace().join("tests/firmware/Makefile")).expect("the Makefile");
+    let flags = makefile.lines().find(|line| line.starts_with("CFLAGS")).expect("CFLAGS");
+    for flag in ["-Wall", "-Wextra", "-Wconversion", "-Werror"] {
+        assert!(flags.split(' ').any(|word| word == flag), "{flag} is not in {flags}");
+    }
+    let codec = std::fs::read_to_string(built().join("rig.h")).expect("the codec");
+    assert!(codec.contains("This header file was generated by cantools version"), "rig.h is not of cantools");
+    // What the programs take from libraries: a heap would be here.
+    for program in ["firmware-embedded", "firmware-socketcan"] {
+        let listed = Command::new("nm").args(["-D", "-u"]).arg(built().join(program)).output().expect("nm");
+        let symbols = String::from_utf8_lossy(&listed.stdout).into_owned();
+        assert!(listed.status.success() && symbols.contains("roundf"), "{symbols}");
+        for heap in ["malloc", "calloc", "realloc", "free", "brk", "mmap"] {
+            let takes =
+                |line: &str| line.split_whitespace().last().is_some_and(|name| name.starts_with(heap));
+            assert!(!symbols.lines().any(takes), "{program} takes {heap}");
+        }
+    }
+}
