@@ -1,5 +1,6 @@
 //! The bench's command line.
 
+use crate::conformance::cli::ConformanceArguments;
 use crate::gateway::cli::GatewayArguments;
 use crate::latency_table::LatencyTableArguments;
 use crate::ping_pong::cli::{PingPongArguments, PongArguments};
@@ -46,6 +47,8 @@ pub enum Command {
     PingPong(PingPongArguments),
     /// Open a bus to programs that know no SocketCAN: the socketcand protocol, which python-can, cantools and SavvyCAN speak.
     Gateway(GatewayArguments),
+    /// Check whether a foreign controller keeps the contract of the bus: timing, counters, checksums, reaction to faults.
+    CheckController(Box<ConformanceArguments>),
     /// Print the table of ratios of a latency report, in Markdown.
     LatencyTable(LatencyTableArguments),
     /// The process that answers; ping-pong starts it.
