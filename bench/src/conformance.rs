@@ -243,7 +243,7 @@ impl<'a> Session<'a> {
             _controller: controller,
             line,
             rig: StandIn::new(arguments.axis, lockstep),
-            watch: Watch::new(arguments.axis),
+            watch: Watch::new(arguments.axis, arguments.both_axes),
             cycles: Vec::new(),
             cycle: 0,
             broken: None,

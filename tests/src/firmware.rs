@@ -11,6 +11,11 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Largest dynamic and static error that it may have, m: the bounds of controller/experiments/point-to-point.toml.
+pub const DYNAMIC_M: f64 = 0.005;
+/// The same at rest.
+pub const STATIC_M: f64 = 0.0005;
+
 /// The places between which it moves, m, and its times, in cycles.
 const PLACES_M: [f64; 2] = [0.1, 0.4];
 const MOVE_CYCLES: u64 = 3000;

@@ -8,15 +8,11 @@ use std::process::Command;
 use std::sync::OnceLock;
 use system_tests::binaries::workspace;
 use system_tests::bus_cycles;
-use system_tests::firmware::{build, positioned};
+use system_tests::firmware::{DYNAMIC_M, STATIC_M, build, positioned};
 use system_tests::launch::Pace;
 use system_tests::process::Running;
 use system_tests::records::{bus_log, count, json};
 use system_tests::scene::Scene;
-
-/// "Close the loop": dynamic and static error, m. The bounds of controller/experiments/point-to-point.toml.
-const DYNAMIC_M: f64 = 0.005;
-const STATIC_M: f64 = 0.0005;
 
 /// The programs, built once.
 fn built() -> &'static Path {

@@ -57,6 +57,9 @@ pub struct ConformanceArguments {
     /// The axis whose controller is checked.
     #[arg(long, value_enum, default_value_t = CheckedAxis::Drive)]
     pub axis: CheckedAxis,
+    /// The controller serves both axes: it may send the frames of the other one's too.
+    #[arg(long)]
+    pub both_axes: bool,
     /// How time passes.
     #[arg(long, value_enum, default_value_t = CheckPace::Real)]
     pub pace: CheckPace,

@@ -60,6 +60,8 @@ pub(super) struct Heard {
 /// Everything that was heard.
 pub(super) struct Watch {
     command: &'static MessageSpec,
+    /// Nodes of rig.dbc whose frames it may send.
+    nodes: Vec<&'static str>,
     /// By cycle: whether the sensors of the axis were sent.
     sent: Vec<bool>,
     last_alive: Option<u8>,
@@ -69,8 +71,18 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    pub(super) fn new(axis: CheckedAxis) -> Self {
-        Self { command: axis.command(), sent: Vec::new(), last_alive: None, heard: Vec::new(), opening: 0.0 }
+    /// Of the controller of an axis, or of `both_axes`.
+    pub(super) fn new(axis: CheckedAxis, both_axes: bool) -> Self {
+        let axes = [CheckedAxis::Drive, CheckedAxis::Load];
+        let nodes = axes.into_iter().filter(|one| *one == axis || both_axes);
+        Self {
+            nodes: nodes.map(|axis| axis.command().sender).collect(),
+            command: axis.command(),
+            sent: Vec::new(),
+            last_alive: None,
+            heard: Vec::new(),
+            opening: 0.0,
+        }
     }
 
     /// The sensors of `cycle` go out now, if they do.
@@ -99,7 +111,7 @@ impl Watch {
         let allowed = frame
             .standard_id()
             .and_then(MessageSpec::by_id)
-            .is_some_and(|spec| spec.sender == self.command.sender);
+            .is_some_and(|spec| self.nodes.contains(&spec.sender));
         match Frame::decode(frame) {
             Ok(Frame::DriveEmergencyStop(stop) | Frame::LoadEmergencyStop(stop)) if allowed => {
                 What::Stop(stop)
@@ -152,7 +164,7 @@ mod tests {
 
     /// What a controller is told to have sent, after cycles up to 4999 of which 4990 was skipped.
     fn judged(frames: &[CanFrame]) -> Vec<What> {
-        let mut watch = Watch::new(CheckedAxis::Drive);
+        let mut watch = Watch::new(CheckedAxis::Drive, false);
         (0..5000).filter(|cycle| *cycle != 4990).for_each(|cycle| watch.note_sent(cycle, cycle != 4995));
         frames.iter().for_each(|frame| watch.take(frame, 0));
         watch.heard.into_iter().map(|heard| heard.what).collect()
