@@ -58,7 +58,7 @@ install_stress_ng() {
 
 # The benchmark's floor is C; a Rust toolchain links with a C compiler anyway.
 install_compiler() {
-    command -v gcc >/dev/null || need_packages gcc libc6-dev
+    { command -v gcc >/dev/null || need_packages gcc libc6-dev; } && need_program make make
 }
 
 install_valgrind() {

@@ -6,7 +6,7 @@ use crate::binaries::workspace;
 use crate::guest::python;
 use protocol::can::CanFrame;
 use protocol::frames::{ECHO_RANGE, Frame, MainChainState};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,6 +22,10 @@ const MOVE_CYCLES: u64 = 3000;
 const REST_CYCLES: u64 = 1000;
 /// The last part of a rest, over which the static error is averaged (bus.md, A run's folder).
 const STATIC_CYCLES: u64 = 200;
+/// Cycles without an answer, in real time, by which a machine that stands still holds the loop up; and how many cycles after it
+/// are left out of the errors: some ten times the loop's lag.
+const HELD_UP_CYCLES: u64 = 20;
+const RECOVERY_CYCLES: u64 = 500;
 
 /// Builds it into `folder`, as its Makefile does for a customer, warnings being errors; gives the folder.
 ///
@@ -51,11 +55,13 @@ pub struct Positioned {
     pub set_point_error_m: f64,
     /// Set-points that it told during the experiment.
     pub set_points: usize,
-    /// Cycles of the experiment whose sensors crossed the bus.
+    /// Cycles of the experiment whose sensors crossed the bus, and that are in the errors.
     pub cycles: usize,
+    /// Cycles that are left out, since the machine had held the loop up.
+    pub left_out: usize,
 }
 
-/// Reads off the frames of a run how it positioned.
+/// Reads off the frames of a run how it positioned. What a machine that stood still did to the loop is left out, and told.
 ///
 /// # Panics
 /// When it did not begin its experiment, or no sensors show one of its moves or rests.
@@ -69,6 +75,11 @@ pub fn positioned(frames: &[CanFrame]) -> Positioned {
     for (cycle, position_m) in counted.positions_m.range(began..began + 2 * (MOVE_CYCLES + REST_CYCLES)) {
         let (set_point_m, part, within) = set_point(cycle - began);
         let error_m = (set_point_m - position_m).abs();
+        let held_up = counted.held_up.range(cycle.saturating_sub(RECOVERY_CYCLES)..=*cycle);
+        if held_up.count() > 0 {
+            done.left_out += 1;
+            continue;
+        }
         done.cycles += 1;
         if within < MOVE_CYCLES {
             done.position_error_dynamic_m = done.position_error_dynamic_m.max(error_m);
@@ -103,6 +114,8 @@ struct Counted {
     lockstep: bool,
     /// The cycle that the last command answers.
     answered: u64,
+    /// Cycles that were answered, or should have been, after the loop was held up.
+    held_up: BTreeSet<u64>,
     /// What waits for its command.
     waiting: Vec<Frame>,
     began: Option<u64>,
@@ -120,7 +133,11 @@ impl Counted {
             }
             Frame::DriveValveCommand(command) => {
                 let age = self.cycle.wrapping_sub(u64::from(command.echo)) % ECHO_RANGE;
-                self.answered = self.cycle.saturating_sub(age);
+                let answered = self.cycle.saturating_sub(age);
+                if answered - self.answered.min(answered) > HELD_UP_CYCLES || age > HELD_UP_CYCLES {
+                    self.held_up.insert(self.cycle);
+                }
+                self.answered = answered;
                 std::mem::take(&mut self.waiting).iter().for_each(|frame| self.take_told(frame));
             }
             told if self.lockstep => self.take_told(told),
