@@ -5,7 +5,7 @@
 tools=${tools:?set by scripts/test}
 
 # PyPI packages by version: clients that the tests hold the product against.
-python_packages=(cantools==45.1.0 crccheck==1.3.1 hdrhistogram==0.10.3)
+python_packages=(cantools==45.1.0 crccheck==1.3.1 hdrhistogram==0.10.3 python-can==4.6.1)
 gungraun_version=0.20.0
 
 install_tools() {
@@ -58,7 +58,7 @@ install_stress_ng() {
 
 # The benchmark's floor is C; a Rust toolchain links with a C compiler anyway.
 install_compiler() {
-    command -v gcc >/dev/null || need_packages gcc libc6-dev
+    { command -v gcc >/dev/null || need_packages gcc libc6-dev; } && need_program make make
 }
 
 install_valgrind() {

@@ -1,5 +1,7 @@
 //! The bench's command line.
 
+use crate::conformance::cli::ConformanceArguments;
+use crate::gateway::cli::GatewayArguments;
 use crate::latency_table::LatencyTableArguments;
 use crate::ping_pong::cli::{PingPongArguments, PongArguments};
 use crate::probe::cli::ProbeArguments;
@@ -43,6 +45,10 @@ pub enum Command {
     Probe(ProbeArguments),
     /// Measure round trips of 16 bytes between two processes, as a reference for those of rig and controller.
     PingPong(PingPongArguments),
+    /// Open a bus to programs that know no SocketCAN: the socketcand protocol, which python-can, cantools and SavvyCAN speak.
+    Gateway(GatewayArguments),
+    /// Check whether a foreign controller keeps the contract of the bus: timing, counters, checksums, reaction to faults.
+    CheckController(Box<ConformanceArguments>),
     /// Print the table of ratios of a latency report, in Markdown.
     LatencyTable(LatencyTableArguments),
     /// The process that answers; ping-pong starts it.

@@ -22,15 +22,20 @@
 //! | [`ping_pong`] | round trips of 16 bytes between two processes, as a reference |
 //! | [`latency_table`] | the table of ratios that `scripts/latency` ends with |
 //! | [`report`] | the latency report |
+//! | [`conformance`] | whether a foreign controller keeps the contract of the bus |
+//! | [`gateway`] | a door to a bus for clients of the socketcand protocol |
 //! | [`soak`] | emulator and controllers over hours, every frame accounted for |
 //! | [`cli`] | the command line |
 
 pub mod cli;
 pub mod compare;
+pub mod conformance;
 pub mod drawing;
 pub mod figures;
+pub mod gateway;
 pub mod grid;
 pub mod join;
+mod junit;
 pub mod latency_table;
 pub mod page_style;
 pub mod picture;

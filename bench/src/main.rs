@@ -3,6 +3,8 @@
 use bench::cli::{
     CauseArguments, CheckArguments, Cli, Command, CompareArguments, ReportArguments, SpreadArguments,
 };
+use bench::conformance::{self, ConformanceError};
+use bench::gateway::{self, GatewayError};
 use bench::ping_pong::{self, PingPongError};
 use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
@@ -37,6 +39,10 @@ fn main() -> ExitCode {
         Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
         Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
         Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
+        Command::CheckController(arguments) => {
+            return told(conformance::run(&arguments), ConformanceError::exit);
+        }
+        Command::Gateway(arguments) => return told(gateway::run(&arguments), GatewayError::exit),
         Command::Soak(arguments) => return told(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
         Command::SoakChild(arguments) => {
             eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));

@@ -30,6 +30,7 @@ mod wire;
 
 use crate::can::CanFrame;
 use crate::response_time::rig::TooSlow;
+use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 pub use hosted_rig::HostedRig;
@@ -163,6 +164,12 @@ pub trait Bus: Send {
     /// is [`Received::Nothing`]. So that what the host delivered was also received, and the account has no open end. On
     /// `can://`, where nobody counts what a peer that goes leaves unread, it does nothing.
     fn leave(&mut self) {}
+
+    /// The socket of a peer that is up, to be polled together with others; what was read from it and not yet received is none of
+    /// its business, so receive to [`Received::Nothing`] before polling. `None` while the bus is down, or for a peer without one.
+    fn socket(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
 
     /// What the bus's host counted, when this peer is the host as well.
     fn host_report(&self) -> Option<host::HostReport> {

@@ -7,7 +7,9 @@
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
+//!   door ──── the gateway, and a client that does what it is told
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
+//!   firmware  a controller in C, and how well it positions
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
 //!   record_maker  blind records for the study of the workflow, from a simulation of its own
@@ -24,7 +26,9 @@ pub mod axis_table;
 pub mod binaries;
 pub mod bus_cycles;
 pub mod disturb;
+pub mod door;
 pub mod events;
+pub mod firmware;
 pub mod guest;
 pub mod hidden;
 pub mod launch;

@@ -4,11 +4,13 @@
 //! The guest is emulated and uneven: cycles are skipped in it, and what is tested is that each of them is accounted for. Nothing
 //! here is ever skipped; without network for the first download the test fails.
 
+use protocol::can::CanFrame;
 use protocol::frames::{Frame, MainChainState};
 use serde_json::Value;
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
+use system_tests::firmware;
 use system_tests::guest::{Guest, compare_candump, data_frames, python};
 use system_tests::records::{count, json};
 
@@ -109,6 +111,46 @@ fn comparison_notices_every_alteration(log: &Path, run: &Path) {
 fn known_frames(log: &Path) -> Vec<Frame> {
     let text = fs::read_to_string(log).unwrap();
     data_frames(&text).iter().filter_map(|frame| Frame::decode(frame).ok()).collect()
+}
+
+/// Frames that canplayer of can-utils replays.
+const REPLAYED: u16 = 50;
+
+#[test]
+fn the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let payload = folder.path().join("payload");
+    fs::create_dir(&payload).unwrap();
+    let built = firmware::build(&folder.path().join("built"), &["STATIC=-static"]);
+    fs::copy(built.join("firmware-socketcan"), payload.join("firmware-socketcan")).unwrap();
+    let line = |n: u16| format!("(1700000000.{:06}) can7 5A5#{n:04X}\n", u32::from(n) * 1000);
+    fs::write(payload.join("replay.log"), (0..REPLAYED).map(line).collect::<String>()).unwrap();
+    let guest = Guest::run(&["--payload", payload.to_str().unwrap(), "--", "sh /airbench/job-firmware"]);
+
+    let codes = ["canplayer", "emulator", "firmware-still-runs"].map(|name| (name.to_owned(), 0));
+    assert_eq!(guest.codes(), codes.into());
+    let run = guest.out().join("firmware");
+    let summary = json(&run.join("summary.json"));
+    assert_eq!(summary["ended_because"], "the controllers are done");
+    assert_eq!(
+        (count(&summary, "/frames_malformed"), count(&summary, "/drive_commands/two_sources")),
+        (0, 0)
+    );
+
+    let log = fs::read_to_string(run.join("bus.log")).unwrap();
+    let done = firmware::positioned(&data_frames(&log));
+    eprintln!("{done:?}, {} of {} cycles skipped", count(&summary, "/skipped"), count(&summary, "/cycles"));
+    assert!(done.cycles > 300 && done.set_points > 30 && done.set_point_error_m < 2e-5, "{done:?}");
+    assert!(done.position_error_dynamic_m < firmware::DYNAMIC_M, "{done:?}");
+    assert!(done.position_error_static_m < firmware::STATIC_M, "{done:?}");
+
+    let on_the_bus = data_frames(&fs::read_to_string(guest.file("candump.log")).unwrap());
+    let replayed: Vec<_> = on_the_bus.iter().filter(|frame| frame.standard_id() == Some(0x5A5)).collect();
+    let expected: Vec<_> = (0..REPLAYED).map(|n| CanFrame::new(0x5A5, &n.to_be_bytes())).collect();
+    assert!(
+        replayed.into_iter().eq(&expected),
+        "canplayer's frames are not on vcan0 as they stand in the log"
+    );
 }
 
 #[test]

@@ -1,44 +1,20 @@
 //! `soak-junit.xml`: the checks of all segments as test cases, for whatever shows tests.
-//!
-//! The format is the one that CI systems agree on: `testsuites`, `testsuite`, `testcase` with `failure` or `skipped`. The crates
-//! that write it bring a date library and a UUID generator for forty lines of text.
 
 use super::model::{CheckResult, Segment, Soak};
-use std::fmt::Write;
+use crate::junit::Case;
 
 /// The file's text.
 #[must_use]
 pub fn text(soak: &Soak) -> String {
-    let cases: Vec<_> = soak.segments.iter().flat_map(cases).collect();
-    let count = |result| cases.iter().filter(|case| case.result == result).count();
-    let (tests, failures, skipped) =
-        (cases.len() + 1, count(CheckResult::Failed), count(CheckResult::Skipped));
-    let failures = failures + usize::from(!soak.trusted);
-    let counts = format!(r#"tests="{tests}" failures="{failures}" errors="0""#);
-    let time = format!(r#"time="{:.1}""#, soak.elapsed_s);
-    let mut text = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"airbench soak\" {counts} {time}>\n\
-         <testsuite name=\"soak\" {counts} skipped=\"{skipped}\" {time}>\n"
-    );
-    for case in cases.iter().chain([&Case {
+    let mut cases: Vec<_> = soak.segments.iter().flat_map(cases).collect();
+    cases.push(Case {
         class: "soak".into(),
         name: "verdict".into(),
         time_s: 0.0,
         result: if soak.trusted { CheckResult::Passed } else { CheckResult::Failed },
         detail: soak.verdict.clone(),
-    }]) {
-        case.write(&mut text);
-    }
-    text.push_str("</testsuite>\n</testsuites>\n");
-    text
-}
-
-struct Case {
-    class: String,
-    name: String,
-    time_s: f64,
-    result: CheckResult,
-    detail: String,
+    });
+    crate::junit::text("soak", &cases, soak.elapsed_s)
 }
 
 fn cases(segment: &Segment) -> Vec<Case> {
@@ -64,36 +40,6 @@ fn cases(segment: &Segment) -> Vec<Case> {
         detail: check.detail.clone(),
     };
     checks.map(case).collect()
-}
-
-impl Case {
-    fn write(&self, text: &mut String) {
-        let [class, name, detail] = [&self.class, &self.name, &self.detail].map(|text| escaped(text));
-        let _ = write!(text, r#"<testcase classname="{class}" name="{name}" time="{:.1}">"#, self.time_s);
-        let _ = match self.result {
-            CheckResult::Passed => write!(text, "<system-out>{detail}</system-out>"),
-            CheckResult::Failed => write!(text, r#"<failure message="{detail}">{detail}</failure>"#),
-            CheckResult::Skipped => write!(text, r#"<skipped message="{detail}"/>"#),
-        };
-        text.push_str("</testcase>\n");
-    }
-}
-
-/// A text as it may stand in an attribute or between tags; characters that XML 1.0 does not know are replaced.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' | '\t' | '\r' => out.push(' '),
-            c if c < ' ' || ('\u{FFFE}'..='\u{FFFF}').contains(&c) => out.push('\u{FFFD}'),
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt::Timeout;
 use rustix::net::{SendFlags, send};
 use std::io;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::time::{Duration, Instant};
 
 /// How a kind of bus opens its socket.
@@ -323,6 +323,10 @@ impl<L: Link> Bus for SocketPeer<L> {
             self.went_away(error);
         }
         Ok(())
+    }
+
+    fn socket(&self) -> Option<BorrowedFd<'_>> {
+        self.socket.as_ref().filter(|_| self.usable).map(AsFd::as_fd)
     }
 
     fn done(&mut self, cycle: u32) {

@@ -1,0 +1,400 @@
+//! Whether a foreign controller keeps the contract of the bus: the check is the rig, and disturbs it on purpose.
+//!
+//! ```text
+//!   session 1   regular operation ── noise on the bus ── skipped cycles
+//!   session 2   … its valve opens ── emergency stop
+//!   session 3   … its valve opens ── its sensors fall silent, and come back
+//! ```
+//!
+//! Each session has a controller that was started anew, when the check is given its command line; else whoever runs the check
+//! resets it. A fault is made while the valve is open: on a valve that is shut nothing could be seen.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `line` | the bus as the rig has it, cycle by cycle |
+//! | `stand_in` | what a rig says, and a carriage that follows |
+//! | `watch` | what was heard of the controller |
+//! | `judge` | the checks |
+//! | [`cli`] | the command line |
+
+pub mod cli;
+mod judge;
+mod line;
+mod stand_in;
+mod watch;
+
+use crate::SummaryError;
+use crate::junit::{self, Case};
+use crate::soak::model::CheckResult;
+use cli::{CheckPace, ConformanceArguments};
+use judge::{Phase, case};
+use line::{Broken, Line};
+use protocol::bus::{BusError, BusUrl, WireOptions};
+use protocol::can::CanFrame;
+use protocol::exit::Exit;
+use realtime::{Interrupt, Request};
+use rustix::process::{Pid, Signal, kill_process};
+use stand_in::{Disturbance, StandIn};
+use std::io::{self, Write};
+use std::os::unix::fs::DirBuilderExt;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use watch::Watch;
+
+/// Cycles of each part of the first session after regular operation.
+const NOISE_CYCLES: u64 = 200;
+const AFTER_SKIP_CYCLES: u64 = 100;
+/// Cycles that are skipped: as many as a 4-bit counter can tell, and more than that.
+const SKIPS: [u64; 2] = [7, 40];
+/// Cycles that pass before anything is judged: a controller may be starting.
+const SETTLING_CYCLES: u64 = 100;
+/// An opening that is no accident, and for how many cycles.
+const OPEN: f64 = 0.02;
+const OPEN_CYCLES: u64 = 10;
+/// Cycles that an emergency stop, and a loss of sensors, lasts; and what is watched after sensors are back.
+const STOP_CYCLES: u64 = 500;
+const LOSS_CYCLES: u64 = 200;
+const BACK_CYCLES: u64 = 200;
+/// When no valve opens for so many cycles, the carriage is pushed, by so much, again and again.
+const PUSH_EVERY_CYCLES: u64 = 5000;
+const PUSH_M: f64 = 0.02;
+/// FIFO priority of the check in real time; that of the emulator.
+const FIFO_PRIORITY: u8 = 80;
+/// How long a controller may take to end when it is asked to.
+const END_PATIENCE: Duration = Duration::from_secs(2);
+
+/// What keeps the check from being made.
+#[derive(Debug, thiserror::Error)]
+pub enum ConformanceError {
+    /// The bus cannot be had.
+    #[error("{0}; the check is the rig itself: end the emulator on this bus first")]
+    Bus(#[from] BusError),
+    /// The controller's command line does not start.
+    #[error("the controller '{command}' does not start: {reason}")]
+    Command {
+        /// What was to be started.
+        command: String,
+        /// What the system said.
+        reason: String,
+    },
+    /// The system gave no signal handler, or no folder for a bus.
+    #[error("{0}")]
+    System(io::Error),
+    /// The result cannot be written.
+    #[error(transparent)]
+    Write(SummaryError),
+    /// Somebody asked for the end.
+    #[error("interrupted before the last check; nothing was written")]
+    Interrupted,
+}
+
+impl ConformanceError {
+    /// The exit code that tells it.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Bus(_) => Exit::BusFailed,
+            Self::Interrupted => Exit::Interrupted,
+            _ => Exit::BadInput,
+        }
+    }
+}
+
+/// Checks a controller, tells what was found, and writes it as JUnit XML when asked.
+///
+/// # Errors
+/// [`ConformanceError`] when the check could not be made; what the controller does wrong is a result.
+pub fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
+    let interrupt = Interrupt::watch().map_err(ConformanceError::System)?;
+    let began = Instant::now();
+    let own = OwnFolder::new().map_err(ConformanceError::System)?;
+    let url = arguments.bus.clone().unwrap_or_else(|| own.url());
+    let real = arguments.pace == CheckPace::Real;
+    let _grants = real.then(|| {
+        let grants = realtime::acquire(&Request::for_a_loop(FIFO_PRIORITY, None));
+        grants.refusals().iter().for_each(|refusal| eprintln!("bench: warning: {refusal}"));
+        grants
+    });
+    let mut cases = Vec::new();
+    for session in [regular, emergency_stop, sensor_loss] {
+        let at = Instant::now();
+        let mut found = Session::open(&url, arguments, &interrupt).and_then(session)?;
+        if let Some(first) = found.first_mut() {
+            first.time_s = at.elapsed().as_secs_f64();
+        }
+        cases.append(&mut found);
+    }
+    tell(&cases);
+    if let Some(file) = &arguments.junit {
+        let text = junit::text("controller", &cases, began.elapsed().as_secs_f64());
+        std::fs::write(file, text)
+            .map_err(|error| ConformanceError::Write(SummaryError::write(file, error)))?;
+    }
+    let failed = cases.iter().any(|case| case.result == CheckResult::Failed);
+    Ok(if failed { Exit::BoundBroken } else { Exit::Good })
+}
+
+fn tell(cases: &[Case]) {
+    let mut out = io::stdout();
+    for case in cases {
+        let result = match case.result {
+            CheckResult::Passed => "passed ",
+            CheckResult::Failed => "FAILED ",
+            CheckResult::Skipped => "skipped",
+        };
+        let name = format!("{} {}", case.class.trim_start_matches("controller."), case.name);
+        // Whoever closed the pipe has read enough.
+        let _ = writeln!(out, "  {result}  {name:<30} {}", case.detail);
+    }
+}
+
+/// A controller at work, and what was heard of it.
+struct Session<'a> {
+    arguments: &'a ConformanceArguments,
+    interrupt: &'a Interrupt,
+    // Before the line: it is asked to end while its bus is there.
+    _controller: Option<Controller>,
+    line: Line,
+    rig: StandIn,
+    watch: Watch,
+    /// Cycles that were sent, and the stamps of those that say something of time.
+    cycles: Vec<(u64, Option<u64>)>,
+    cycle: u64,
+    broken: Option<Broken>,
+    frames: Vec<CanFrame>,
+}
+
+/// Regular operation, then what must not disturb it.
+fn regular(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
+    let answers = session.wait_for_answers()?;
+    let result = if answers { CheckResult::Passed } else { CheckResult::Failed };
+    let mut cases = vec![case("regular", "answers", result, session.about_answers())];
+    if !answers {
+        return Ok(cases);
+    }
+    session.cycles(SETTLING_CYCLES, Disturbance::default())?;
+    let from = session.cycle;
+    session.cycles((session.arguments.seconds * 1000.0) as u64, Disturbance::default())?;
+    cases.extend(judge::regular(&session.phase(from), session.arguments));
+    let from = session.cycle;
+    session.cycles(NOISE_CYCLES, Disturbance { noise: true, ..Disturbance::default() })?;
+    cases.push(judge::every_cycle("noise", &session.phase(from), session.arguments));
+    if session.arguments.pace == CheckPace::Real {
+        let from = session.cycle;
+        for skipped in SKIPS {
+            session.cycle += skipped;
+            session.cycles(1, Disturbance { skipped, ..Disturbance::default() })?;
+            session.cycles(AFTER_SKIP_CYCLES, Disturbance::default())?;
+        }
+        cases.push(judge::every_cycle("skipped-cycles", &session.phase(from), session.arguments));
+    } else {
+        let detail = "simulated time skips nothing: check it with --pace real".into();
+        cases.push(case("skipped-cycles", "every-cycle", CheckResult::Skipped, detail));
+    }
+    if let Some(broken) = &session.broken {
+        let detail = format!("in cycle {}: {broken:?}", session.cycle);
+        cases.push(case("regular", "to-the-end", CheckResult::Failed, detail));
+    }
+    Ok(cases)
+}
+
+/// The valve opens, and the emergency stop is tripped.
+fn emergency_stop(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
+    if !session.wait_for_open_valve()? {
+        return Ok(vec![session.nothing_to_see("emergency-stop")]);
+    }
+    let from = session.cycle;
+    session.cycles(STOP_CYCLES, Disturbance { stopped_since: Some(from), ..Disturbance::default() })?;
+    Ok(judge::emergency_stop(&session.watch.heard, from..from + STOP_CYCLES))
+}
+
+/// The valve opens, the sensors fall silent, and come back.
+fn sensor_loss(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
+    if session.arguments.pace == CheckPace::LockstepEcho {
+        let detail =
+            "who is in the barrier by its echo alone must have sensors to answer: check it with --pace real";
+        return Ok(vec![case("sensor-loss", "valve-shut", CheckResult::Skipped, detail.into())]);
+    }
+    if !session.wait_for_open_valve()? {
+        return Ok(vec![session.nothing_to_see("sensor-loss")]);
+    }
+    let from = session.cycle;
+    session.cycles(LOSS_CYCLES, Disturbance { sensors_lost: true, ..Disturbance::default() })?;
+    session.cycles(BACK_CYCLES, Disturbance::default())?;
+    Ok(judge::sensor_loss(&session.watch.heard, from..from + LOSS_CYCLES))
+}
+
+impl<'a> Session<'a> {
+    fn open(
+        url: &BusUrl,
+        arguments: &'a ConformanceArguments,
+        interrupt: &'a Interrupt,
+    ) -> Result<Self, ConformanceError> {
+        let line = Line::open(url, arguments)?;
+        let controller = Controller::start(url, arguments)?;
+        if controller.is_none() {
+            eprintln!("bench: waiting for the controller on {url}; reset it if it ran before");
+        }
+        let lockstep = arguments.pace != CheckPace::Real;
+        let mut session = Self {
+            arguments,
+            interrupt,
+            _controller: controller,
+            line,
+            rig: StandIn::new(arguments.axis, lockstep),
+            watch: Watch::new(arguments.axis, arguments.both_axes),
+            cycles: Vec::new(),
+            cycle: 0,
+            broken: None,
+            frames: Vec::new(),
+        };
+        session.broken = session.line.begin().err();
+        Ok(session)
+    }
+
+    /// So many cycles, or fewer when the controller leaves the barrier, falls silent in it, or babbles.
+    fn cycles(&mut self, count: u64, disturbance: Disturbance) -> Result<(), ConformanceError> {
+        for _ in 0..count {
+            if self.interrupt.came() {
+                return Err(ConformanceError::Interrupted);
+            }
+            if self.broken.is_some() || self.watch.babbles() {
+                return Ok(());
+            }
+            self.rig.frames(self.cycle, &disturbance, &mut self.frames);
+            self.watch.note_sent(self.cycle, !disturbance.sensors_lost);
+            let watch = &mut self.watch;
+            match self.line.exchange(&self.frames, |frame, stamp_ns| watch.take(frame, stamp_ns)) {
+                Ok(sent) => self.cycles.push((self.cycle, (!sent.disturbed).then_some(sent.stamp_ns))),
+                Err(broken) => self.broken = Some(broken),
+            }
+            let opening = if disturbance.stopped_since.is_some() { 0.0 } else { self.watch.opening };
+            self.rig.advance(opening);
+            self.cycle += 1;
+        }
+        Ok(())
+    }
+
+    fn patience_cycles(&self) -> u64 {
+        (self.arguments.patience * 1000.0) as u64
+    }
+
+    fn wait_for_answers(&mut self) -> Result<bool, ConformanceError> {
+        for _ in 0..self.patience_cycles() {
+            self.cycles(1, Disturbance::default())?;
+            if !self.watch.heard.is_empty() || self.broken.is_some() {
+                break;
+            }
+        }
+        Ok(!self.watch.heard.is_empty())
+    }
+
+    /// Waits until the valve has been open for a while, and pushes the carriage when that takes long.
+    fn wait_for_open_valve(&mut self) -> Result<bool, ConformanceError> {
+        let mut open_cycles = 0;
+        for waited in 1..=self.patience_cycles() {
+            self.cycles(1, Disturbance::default())?;
+            open_cycles = if self.watch.opening.abs() > OPEN { open_cycles + 1 } else { 0 };
+            if open_cycles >= OPEN_CYCLES && waited > SETTLING_CYCLES {
+                return Ok(true);
+            }
+            if self.broken.is_some() {
+                return Ok(false);
+            }
+            if waited % PUSH_EVERY_CYCLES == 0 {
+                self.rig.push(PUSH_M);
+            }
+        }
+        Ok(false)
+    }
+
+    fn phase(&self, from: u64) -> Phase<'_> {
+        let first = self.cycles.partition_point(|(cycle, _)| *cycle < from);
+        let heard = self.watch.heard.partition_point(|heard| heard.cycle < from);
+        Phase { cycles: &self.cycles[first..], heard: &self.watch.heard[heard..] }
+    }
+
+    fn about_answers(&self) -> String {
+        match (&self.broken, self.watch.heard.first()) {
+            (_, Some(first)) => format!("the first frame came in cycle {}", first.cycle),
+            (Some(Broken::NobodyThere), _) => "nobody joined the barrier".into(),
+            (Some(Broken::TimedOut(name)), _) => format!("{name} did not answer cycle {}", self.cycle - 1),
+            (None, None) => format!("nothing came in {} cycles", self.cycle),
+        }
+    }
+
+    fn nothing_to_see(&self, class: &str) -> Case {
+        let why = match &self.broken {
+            Some(broken) => format!("in cycle {}: {broken:?}", self.cycle),
+            None => format!(
+                "its valve did not open by more than {OPEN} for {OPEN_CYCLES} cycles in {} s: nothing could be seen; let it move",
+                self.arguments.patience
+            ),
+        };
+        case(class, "valve-shut", CheckResult::Failed, why)
+    }
+}
+
+/// The controller's process.
+struct Controller(Child);
+
+impl Controller {
+    fn start(url: &BusUrl, arguments: &ConformanceArguments) -> Result<Option<Self>, ConformanceError> {
+        let place = match url {
+            BusUrl::Can { interface } => interface.clone(),
+            BusUrl::Unix { path, .. } => path.display().to_string(),
+        };
+        let filled = |text: &std::ffi::OsString| match text.to_str() {
+            Some(text) => text.replace("{bus}", &url.to_string()).replace("{path}", &place).into(),
+            None => text.clone(),
+        };
+        let mut words = arguments.command.iter().map(filled);
+        let Some(program) = words.next() else { return Ok(None) };
+        let mut command = Command::new(&program);
+        command.args(words).stdin(Stdio::null()).stdout(Stdio::null()).process_group(0);
+        let child = command.spawn().map_err(|error| ConformanceError::Command {
+            command: program.to_string_lossy().into_owned(),
+            reason: error.to_string(),
+        })?;
+        Ok(Some(Self(child)))
+    }
+}
+
+impl Drop for Controller {
+    fn drop(&mut self) {
+        // One that has ended already is what is wanted.
+        let _ = kill_process(Pid::from_child(&self.0), Signal::TERM);
+        let until = Instant::now() + END_PATIENCE;
+        while Instant::now() < until {
+            if matches!(self.0.try_wait(), Ok(Some(_)) | Err(_)) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A folder of the check's own for its bus.
+struct OwnFolder(std::path::PathBuf);
+
+impl OwnFolder {
+    fn new() -> io::Result<Self> {
+        let folder = std::env::temp_dir().join(format!("airbench-check-{}", std::process::id()));
+        std::fs::DirBuilder::new().mode(0o700).create(&folder)?;
+        Ok(Self(folder))
+    }
+
+    fn url(&self) -> BusUrl {
+        BusUrl::Unix { path: self.0.join("bus"), wire: WireOptions::default() }
+    }
+}
+
+impl Drop for OwnFolder {
+    fn drop(&mut self) {
+        // What the system does not remove it cleans up itself.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}

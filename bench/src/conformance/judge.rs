@@ -1,0 +1,262 @@
+//! The checks: what the contract of the bus asks of a controller, held against what was heard of it.
+//!
+//! Source: the repository's `bench/docs/check-controller.md`, a section for each; the contract is `protocol/rig.dbc` and
+//! README.md, Buses.
+
+use super::cli::{CheckPace, ConformanceArguments};
+use super::watch::{Heard, What, Wrong};
+use crate::junit::Case;
+use crate::soak::model::CheckResult;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Cycles within which an emergency stop has shut the valve: two of the rig's status.
+const STOP_WITHIN_CYCLES: u64 = 20;
+/// Cycles without sensors after which a valve must be shut: the 50 ms of the contract, and two ticks for those who count by them.
+const LOSS_WITHIN_CYCLES: u64 = 70;
+/// Age beyond which the rig refuses a command (protocol: `STALE_AFTER_CYCLES`).
+const STALE_AFTER_CYCLES: u64 = protocol::commands::STALE_AFTER_CYCLES;
+/// Age of most commands at most: sensors are answered before the next ones come, or one cycle late.
+const USUAL_AGE_CYCLES: u64 = 1;
+/// Quantile of what is judged by most of it.
+const MOST: f64 = 0.99;
+
+/// A phase of a session as it went.
+pub(super) struct Phase<'a> {
+    /// Cycles whose sensors were sent, with their stamps; `None` for the time of a cycle that this process disturbed.
+    pub(super) cycles: &'a [(u64, Option<u64>)],
+    /// What came in them.
+    pub(super) heard: &'a [Heard],
+}
+
+impl Phase<'_> {
+    fn commands(&self) -> impl Iterator<Item = (&Heard, f64, Option<u64>, Option<u8>)> {
+        self.heard.iter().filter_map(|heard| match heard.what {
+            What::Command { opening, age, step } => Some((heard, opening, age, step)),
+            _ => None,
+        })
+    }
+
+    fn broken(&self, wrong: Wrong) -> usize {
+        self.heard.iter().filter(|heard| heard.what == What::Broken(wrong)).count()
+    }
+}
+
+/// A case of `class`.
+pub(super) fn case(class: &str, name: &str, result: CheckResult, detail: String) -> Case {
+    Case { class: format!("controller.{class}"), name: name.into(), time_s: 0.0, result, detail }
+}
+
+fn kept(holds: bool) -> CheckResult {
+    if holds { CheckResult::Passed } else { CheckResult::Failed }
+}
+
+/// Regular operation: every check that needs nothing but watching.
+pub(super) fn regular(phase: &Phase<'_>, arguments: &ConformanceArguments) -> Vec<Case> {
+    let commands = phase.commands().count();
+    let mut cases = vec![every_cycle("regular", phase, arguments)];
+    for (name, wrong, what) in [
+        ("length", Wrong::Length, "other than 5 bytes"),
+        ("checksum", Wrong::Checksum, "a wrong checksum"),
+        ("reserved-bits", Wrong::Reserved, "bits that no signal covers"),
+        ("range", Wrong::Range, "an opening beyond -2047 to 2047 counts"),
+    ] {
+        let broken = phase.broken(wrong);
+        let detail = format!("{broken} commands with {what}, {commands} good ones");
+        cases.push(case("regular", name, kept(broken == 0 && commands > 0), detail));
+    }
+    cases.extend([counter(phase), command_age(phase), identifiers(phase)]);
+    cases.extend(timing(phase, arguments));
+    cases
+}
+
+/// Every cycle is answered, by one command.
+pub(super) fn every_cycle(class: &str, phase: &Phase<'_>, arguments: &ConformanceArguments) -> Case {
+    let cycles = phase.cycles.len();
+    let mut counts = BTreeMap::new();
+    for (heard, _, age, _) in phase.commands() {
+        if let Some(age) = age {
+            *counts.entry(heard.cycle - age).or_insert(0_usize) += 1;
+        }
+    }
+    let count = |cycle: &u64| counts.get(cycle).copied().unwrap_or(0);
+    let missing: Vec<u64> =
+        phase.cycles.iter().map(|(cycle, _)| *cycle).filter(|cycle| count(cycle) == 0).collect();
+    let twice = phase.cycles.iter().filter(|(cycle, _)| count(cycle) > 1).count();
+    let allowed = match arguments.pace {
+        CheckPace::Real => (arguments.missing * cycles as f64).floor() as usize,
+        _ => 0,
+    };
+    let first = missing.first().map_or(String::new(), |cycle| format!(", the first being cycle {cycle}"));
+    let detail = format!(
+        "of {cycles} cycles {} without an answer{first}, {twice} with more than one; {allowed} of each are allowed",
+        missing.len()
+    );
+    case(class, "every-cycle", kept(missing.len() <= allowed && twice <= allowed && cycles > 0), detail)
+}
+
+/// The counter goes up by one with each command.
+fn counter(phase: &Phase<'_>) -> Case {
+    let steps: Vec<u8> = phase.commands().filter_map(|(_, _, _, step)| step).collect();
+    let breaks = steps.iter().filter(|step| **step != 1).count();
+    let example =
+        steps.iter().find(|step| **step != 1).map_or(String::new(), |step| format!(", such as by {step}"));
+    let detail = format!("of {} steps {breaks} were not by one{example}", steps.len());
+    case("regular", "counter", kept(breaks == 0 && !steps.is_empty()), detail)
+}
+
+/// Commands answer cycles that were sent, and are fresh.
+fn command_age(phase: &Phase<'_>) -> Case {
+    let mut ages: Vec<u64> = Vec::new();
+    let mut never_sent = 0;
+    for (_, _, age, _) in phase.commands() {
+        match age {
+            // Half of the echo's range: what seems that old answers a cycle that is still to come.
+            Some(age) if age < protocol::frames::ECHO_RANGE / 2 => ages.push(age),
+            _ => never_sent += 1,
+        }
+    }
+    ages.sort_unstable();
+    let (most, oldest) = (quantile(&ages, MOST), ages.last().copied());
+    let holds = never_sent == 0
+        && most.is_some_and(|age| age <= USUAL_AGE_CYCLES)
+        && oldest.is_some_and(|age| age <= STALE_AFTER_CYCLES);
+    let told = |age: Option<u64>| age.map_or("none".into(), |age| age.to_string());
+    let detail = format!(
+        "age in cycles: 99 % at most {}, oldest {} ({USUAL_AGE_CYCLES} and {STALE_AFTER_CYCLES} are allowed); {never_sent} \
+         echoed a cycle that was never sent",
+        told(most),
+        told(oldest)
+    );
+    case("regular", "command-age", kept(holds), detail)
+}
+
+/// It sends nothing but what is its own to send, as rig.dbc has it.
+fn identifiers(phase: &Phase<'_>) -> Case {
+    let mut others = phase.heard.iter().filter_map(|heard| match &heard.what {
+        What::NotItsOwn(frame) => Some(frame),
+        _ => None,
+    });
+    let (first, more) = (others.next(), others.count());
+    let detail = match first {
+        None => "nothing but frames that are its own in rig.dbc".into(),
+        Some(frame) => {
+            format!("{} frames that are malformed or another's to send, the first {frame}", more + 1)
+        }
+    };
+    case("regular", "identifiers", kept(first.is_none()), detail)
+}
+
+/// Cycle time, its spread, and the response; in real time only.
+fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
+    if arguments.pace != CheckPace::Real {
+        return ["cycle-time", "response"].map(|name| {
+            case("regular", name, CheckResult::Skipped, "simulated time: check it with --pace real".into())
+        });
+    }
+    let stamps: BTreeMap<u64, Option<u64>> = phase.cycles.iter().copied().collect();
+    let quiet = |cycle: u64| stamps.get(&cycle).copied().flatten();
+    let (mut spreads, mut periods, mut responses) = (Vec::new(), Vec::new(), Vec::new());
+    let mut last: Option<(u64, u64)> = None;
+    for (heard, _, age, _) in phase.commands() {
+        let Some(answered) = age.and_then(|age| heard.cycle.checked_sub(age)) else { continue };
+        if let Some(sent_ns) = quiet(answered) {
+            responses.push(heard.stamp_ns.saturating_sub(sent_ns));
+            if let Some((cycle, stamp_ns)) = last.filter(|(cycle, _)| *cycle + 1 == answered)
+                && quiet(cycle).is_some()
+            {
+                let period_ns = heard.stamp_ns.saturating_sub(stamp_ns);
+                periods.push(period_ns);
+                spreads.push(period_ns.abs_diff(1_000_000));
+            }
+        }
+        last = Some((answered, heard.stamp_ns));
+    }
+    spreads.sort_unstable();
+    responses.sort_unstable();
+    let us = |ns: Option<u64>| ns.map_or("none".into(), |ns| format!("{:.1}", ns as f64 / 1000.0));
+    let mean_ns = (!periods.is_empty()).then(|| periods.iter().sum::<u64>() / periods.len() as u64);
+    let disturbed = phase.cycles.iter().filter(|(_, stamp)| stamp.is_none()).count();
+    let beside = format!("{disturbed} cycles left out, in which this machine held the check up");
+    let spread = quantile(&spreads, MOST);
+    let cycle_time = format!(
+        "mean {} us, 99 % within {} us of 1 ms ({} are allowed), largest deviation {} us; {beside}",
+        us(mean_ns),
+        us(spread),
+        arguments.spread_us,
+        us(spreads.last().copied())
+    );
+    let response = quantile(&responses, MOST);
+    let answered = format!(
+        "from sensors to command: median {} us, 99 % within {} us ({} are allowed), longest {} us; {beside}",
+        us(quantile(&responses, 0.5)),
+        us(response),
+        arguments.response_us,
+        us(responses.last().copied())
+    );
+    let within = |ns: Option<u64>, us: u64| kept(ns.is_some_and(|ns| ns <= us * 1000));
+    [
+        case("regular", "cycle-time", within(spread, arguments.spread_us), cycle_time),
+        case("regular", "response", within(response, arguments.response_us), answered),
+    ]
+}
+
+/// Until when a valve was open after a cycle; `None` when nothing opened it any more.
+fn last_open(heard: &[Heard], window: Range<u64>) -> Option<u64> {
+    let open = |heard: &&Heard| {
+        window.contains(&heard.cycle) && matches!(heard.what, What::Command { opening, .. } if opening != 0.0)
+    };
+    heard.iter().rev().find(open).map(|heard| heard.cycle)
+}
+
+fn valve_shut(class: &str, heard: &[Heard], window: Range<u64>, within: u64) -> Case {
+    let began = window.start;
+    let last = last_open(heard, window.clone());
+    let after = last.map_or(0, |cycle| cycle - began + 1);
+    let detail = format!(
+        "the last command that opened the valve came in cycle {after} after it began ({within} are allowed); watched for {}",
+        window.end - began
+    );
+    case(class, "valve-shut", kept(after <= within), detail)
+}
+
+/// After an emergency stop the valve is shut, and stays so while it lasts.
+pub(super) fn emergency_stop(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
+    vec![valve_shut("emergency-stop", heard, window, STOP_WITHIN_CYCLES)]
+}
+
+/// Without sensors the valve is shut, nothing is answered that was not asked, and the others are told.
+pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
+    let class = "sensor-loss";
+    let during = || heard.iter().filter(|heard| window.contains(&heard.cycle));
+    let invented = during().filter(|heard| matches!(heard.what, What::Command { age: None, .. })).count();
+    let told = during().find(|heard| matches!(&heard.what, What::Stop(stop) if !stop.release));
+    let told = match told {
+        Some(heard) => (
+            CheckResult::Passed,
+            format!(
+                "tripped the emergency stop {} cycles after the last sensors",
+                heard.cycle - window.start + 1
+            ),
+        ),
+        None => {
+            (CheckResult::Skipped, "tripped no emergency stop: the rig asks for none, a partner may".into())
+        }
+    };
+    vec![
+        valve_shut(class, heard, window.clone(), LOSS_WITHIN_CYCLES),
+        case(
+            class,
+            "no-invented-echo",
+            kept(invented == 0),
+            format!("{invented} commands echoed a cycle whose sensors were never sent"),
+        ),
+        case(class, "told", told.0, told.1),
+    ]
+}
+
+/// The value that this share of sorted values does not exceed.
+fn quantile(sorted: &[u64], share: f64) -> Option<u64> {
+    let rank = (share * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.max(1) - 1).copied()
+}

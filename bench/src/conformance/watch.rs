@@ -1,0 +1,218 @@
+//! What a controller sent, frame by frame, with what is wrong about each. Pure: frames, stamps and cycles come from outside.
+//!
+//! A cycle number comes back from the 12 bits of the echo as the newest one that was sent and has these bits. A cycle that was
+//! never sent, because it was skipped or its sensors were lost, cannot be answered.
+
+use super::cli::CheckedAxis;
+use protocol::can::CanFrame;
+use protocol::checksum;
+use protocol::frames::{ALIVE_RANGE, DecodeError, ECHO_RANGE, EmergencyStop, Frame, MessageSpec};
+
+/// Frames that are kept of one controller; one that babbles is cut off here.
+const MOST_FRAMES: usize = 500_000;
+
+/// What a frame was.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum What {
+    /// A command as it should be.
+    Command {
+        /// Opening that it asks for, 0 without its enable bit.
+        opening: f64,
+        /// Cycles between the one that it answers and the newest that was sent; `None` when it answers none.
+        age: Option<u64>,
+        /// How far its counter went since the command before; `None` for the first.
+        step: Option<u8>,
+    },
+    /// A command that the rig would not take.
+    Broken(Wrong),
+    /// Its own emergency stop.
+    Stop(EmergencyStop),
+    /// Another frame that it may send.
+    Own,
+    /// A frame of its own that rig.dbc does not allow, or one that is not its to send: how candump shows it.
+    NotItsOwn(String),
+}
+
+/// What is wrong with a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wrong {
+    /// It has not five bytes.
+    Length,
+    /// Its checksum is not that of its identifier and data.
+    Checksum,
+    /// Bits that no signal covers are not 0.
+    Reserved,
+    /// A value beyond its range.
+    Range,
+}
+
+/// A frame of the controller.
+#[derive(Clone, Debug)]
+pub(super) struct Heard {
+    /// The newest cycle that was sent when it came.
+    pub(super) cycle: u64,
+    /// When it came, ns.
+    pub(super) stamp_ns: u64,
+    /// What it was.
+    pub(super) what: What,
+}
+
+/// Everything that was heard.
+pub(super) struct Watch {
+    command: &'static MessageSpec,
+    /// Nodes of rig.dbc whose frames it may send.
+    nodes: Vec<&'static str>,
+    /// By cycle: whether the sensors of the axis were sent.
+    sent: Vec<bool>,
+    last_alive: Option<u8>,
+    pub(super) heard: Vec<Heard>,
+    /// The opening that acts.
+    pub(super) opening: f64,
+}
+
+impl Watch {
+    /// Of the controller of an axis, or of `both_axes`.
+    pub(super) fn new(axis: CheckedAxis, both_axes: bool) -> Self {
+        let axes = [CheckedAxis::Drive, CheckedAxis::Load];
+        let nodes = axes.into_iter().filter(|one| *one == axis || both_axes);
+        Self {
+            nodes: nodes.map(|axis| axis.command().sender).collect(),
+            command: axis.command(),
+            sent: Vec::new(),
+            last_alive: None,
+            heard: Vec::new(),
+            opening: 0.0,
+        }
+    }
+
+    /// The sensors of `cycle` go out now, if they do.
+    pub(super) fn note_sent(&mut self, cycle: u64, with_sensors: bool) {
+        self.sent.resize(cycle as usize, false);
+        self.sent.push(with_sensors);
+    }
+
+    /// Takes a frame that came at `stamp_ns`, after the cycle noted last.
+    pub(super) fn take(&mut self, frame: &CanFrame, stamp_ns: u64) {
+        if self.heard.len() < MOST_FRAMES {
+            let what = self.judge(frame);
+            self.heard.push(Heard { cycle: (self.sent.len() as u64).saturating_sub(1), stamp_ns, what });
+        }
+    }
+
+    /// Whether it sent more than anybody could.
+    pub(super) fn babbles(&self) -> bool {
+        self.heard.len() >= MOST_FRAMES
+    }
+
+    fn judge(&mut self, frame: &CanFrame) -> What {
+        if frame.standard_id() == Some(self.command.id) {
+            return self.judge_command(frame);
+        }
+        let allowed = frame
+            .standard_id()
+            .and_then(MessageSpec::by_id)
+            .is_some_and(|spec| self.nodes.contains(&spec.sender));
+        match Frame::decode(frame) {
+            Ok(Frame::DriveEmergencyStop(stop) | Frame::LoadEmergencyStop(stop)) if allowed => {
+                What::Stop(stop)
+            }
+            Ok(_) if allowed => What::Own,
+            _ => What::NotItsOwn(frame.to_string()),
+        }
+    }
+
+    fn judge_command(&mut self, frame: &CanFrame) -> What {
+        let data = frame.data();
+        if data.len() != usize::from(self.command.length) {
+            return What::Broken(Wrong::Length);
+        }
+        let (crc, before) = data.split_last().expect("a command has five bytes");
+        if checksum::of(self.command.id, before) != *crc {
+            return What::Broken(Wrong::Checksum);
+        }
+        let command = match Frame::decode(frame) {
+            Ok(Frame::DriveValveCommand(command) | Frame::LoadValveCommand(command)) => command,
+            Err(DecodeError::ReservedBits { .. }) => return What::Broken(Wrong::Reserved),
+            _ => return What::Broken(Wrong::Range),
+        };
+        let modulo = ALIVE_RANGE as u8;
+        let step = self.last_alive.replace(command.alive);
+        let step = step.map(|last| (command.alive + modulo - last) % modulo);
+        let opening = if command.enable { command.opening } else { 0.0 };
+        self.opening = opening;
+        What::Command { opening, age: self.age(u64::from(command.echo)), step }
+    }
+
+    /// How old the newest cycle is that was sent and ends with these bits.
+    fn age(&self, echo: u64) -> Option<u64> {
+        let newest = (self.sent.len() as u64).checked_sub(1)?;
+        let age = newest.wrapping_sub(echo) % ECHO_RANGE;
+        let answered = newest.checked_sub(age)?;
+        self.sent[answered as usize].then_some(age)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::frames::{EmergencyStopReason, ValveCommand};
+
+    fn command(alive: u8, echo: u16) -> CanFrame {
+        let command = ValveCommand { opening: 0.5, alive, echo, enable: true };
+        Frame::DriveValveCommand(command).encode().unwrap()
+    }
+
+    /// What a controller is told to have sent, after cycles up to 4999 of which 4990 was skipped.
+    fn judged(frames: &[CanFrame]) -> Vec<What> {
+        let mut watch = Watch::new(CheckedAxis::Drive, false);
+        (0..5000).filter(|cycle| *cycle != 4990).for_each(|cycle| watch.note_sent(cycle, cycle != 4995));
+        frames.iter().for_each(|frame| watch.take(frame, 0));
+        watch.heard.into_iter().map(|heard| heard.what).collect()
+    }
+
+    #[test]
+    fn a_command_has_an_age_and_its_counter_a_step() {
+        let echo = |cycle: u16| cycle % 4096;
+        let frames =
+            [command(15, echo(4999)), command(0, echo(4998)), command(2, echo(4990)), command(2, echo(4995))];
+        let of = |age, step| What::Command { opening: 0.5, age, step };
+        let expected = [of(Some(0), None), of(Some(1), Some(1)), of(None, Some(2)), of(None, Some(0))];
+        assert_eq!(judged(&frames), expected);
+        // Of a cycle to come: the 12 bits are those of one long ago, which was sent.
+        assert_eq!(judged(&[command(0, echo(5001))]), [of(Some(4094), None)]);
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_command_is_told_apart() {
+        let good = command(0, 0);
+        let with = |change: &dyn Fn(&mut Vec<u8>), sum: bool| {
+            let mut data = good.data()[..4].to_vec();
+            change(&mut data);
+            data.push(checksum::of(0x110, &data) ^ u8::from(!sum));
+            CanFrame::new(0x110, &data)
+        };
+        let frames = [
+            CanFrame::new(0x110, &good.data()[..4]),
+            with(&|_| {}, false),
+            with(&|data| data[3] |= 0x80, true),
+            with(&|data| (data[0], data[1]) = (0, data[1] & 0xF0 | 0x08), true),
+        ];
+        let expected = [Wrong::Length, Wrong::Checksum, Wrong::Reserved, Wrong::Range].map(What::Broken);
+        assert_eq!(judged(&frames), expected);
+    }
+
+    #[test]
+    fn what_is_not_its_own_is_named() {
+        let stop = EmergencyStop { reason: EmergencyStopReason::SensorLoss, release: false };
+        let frames = [
+            Frame::DriveEmergencyStop(stop).encode().unwrap(),
+            Frame::LoadEmergencyStop(stop).encode().unwrap(),
+            CanFrame::new(0x150, &[0; 5]),
+            CanFrame::new(0x150, &[0; 4]),
+            CanFrame::from_raw(0x8000_0110, &[]),
+        ];
+        let not = |text: &str| What::NotItsOwn(text.into());
+        let expected = [What::Stop(stop), not("10B#0300"), What::Own, not("150#00000000"), not("00000110#")];
+        assert_eq!(judged(&frames), expected);
+    }
+}

@@ -1,0 +1,403 @@
+//! A door to a bus for programs that know no SocketCAN: the socketcand protocol over TCP.
+//!
+//! ```text
+//!   python-can ── TCP ──► client: session, bounded queue ──┐
+//!   SavvyCAN ──── TCP ──► client: session, bounded queue ──┼── one peer ── can:// or unix://
+//!   …                                                    ──┘
+//! ```
+//!
+//! One thread, one poll over the bus's socket, the listener and all clients. Nobody waits for anybody: a client that does not
+//! read fills its own queue and loses frames, counted and told; one that goes on not reading is parted with. The gateway is one peer
+//! of the bus, so it hands what a client sends to the other clients itself: a sender does not hear itself, everyone else does.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`parser`] | requests out of bytes |
+//! | [`session`] | the conversation with one client, without socket and clock |
+//! | `client` | a socket, its session and its queue |
+//! | [`cli`] | the command line |
+
+pub mod cli;
+mod client;
+pub mod parser;
+pub mod session;
+
+use crate::SummaryError;
+use cli::GatewayArguments;
+use client::{Client, ClientReport, Ended, LONGEST_FRAME};
+use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, Received};
+use protocol::can::CanFrame;
+use protocol::exit::Exit;
+use protocol::run_folder::{SCHEMA_VERSION, write_json};
+use realtime::Interrupt;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use serde::Serialize;
+use session::write_frame;
+use std::collections::VecDeque;
+use std::io::{self, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Frames of the bus, and connections, that are taken in one turn.
+const FRAMES_A_TURN: usize = 1024;
+const CONNECTIONS_A_TURN: usize = 64;
+/// Clients that have gone and whose reports are kept; of the others the sums alone.
+const REPORTS_KEPT: usize = 100;
+/// Time between two messages about the same.
+const TELL_EVERY: Duration = Duration::from_secs(1);
+
+/// What keeps a gateway from opening.
+#[derive(Debug, thiserror::Error)]
+pub enum GatewayError {
+    /// The bus cannot be opened.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// Nothing can be listened at.
+    #[error("cannot listen at {address}: {reason}; choose another with --listen, port 0 for a free one")]
+    Listen {
+        /// Where it was to listen.
+        address: SocketAddr,
+        /// What the system said.
+        reason: String,
+    },
+    /// The bus has no name that a client could write.
+    #[error("{0} has no name of 1 to 64 printable characters: give one with --name")]
+    Name(String),
+    /// The system gave no signal handler, or no poll.
+    #[error("{0}")]
+    System(io::Error),
+    /// The report cannot be written.
+    #[error(transparent)]
+    Report(SummaryError),
+}
+
+impl GatewayError {
+    /// The exit code that tells it.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        if matches!(self, Self::Bus(_)) { Exit::BusFailed } else { Exit::BadInput }
+    }
+}
+
+/// What a gateway counted.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema_version: u32,
+    bus: String,
+    name: String,
+    listened_at: SocketAddr,
+    connections: u64,
+    connections_refused: u64,
+    clients_at_a_time_max: usize,
+    frames_to_clients: u64,
+    frames_lost: u64,
+    frames_from_clients: u64,
+    frames_not_taken: u64,
+    /// Remote requests and error frames, for which the protocol has no form that clients read.
+    frames_not_carried: u64,
+    /// The last hundred.
+    clients: VecDeque<ClientReport>,
+    bus_counters: BusCounters,
+}
+
+/// Opens the door and serves until a signal comes.
+///
+/// # Errors
+/// [`GatewayError`] when bus or address cannot be had, or the report cannot be written.
+pub fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
+    let interrupt = Interrupt::watch().map_err(GatewayError::System)?;
+    let mut gateway = Gateway::open(arguments)?;
+    gateway.announce(arguments.read_only);
+    while !interrupt.came() {
+        gateway.turn().map_err(GatewayError::System)?;
+    }
+    let report = gateway.close();
+    // Whoever closed the pipe has read enough.
+    let _ = writeln!(
+        io::stdout(),
+        "gateway: {} clients, {} frames to them, {} lost, {} frames from them, {} connections refused",
+        report.connections,
+        report.frames_to_clients,
+        report.frames_lost,
+        report.frames_from_clients,
+        report.connections_refused
+    );
+    if let Some(file) = &arguments.report {
+        write_json(file, &report).map_err(|error| GatewayError::Report(SummaryError::write(file, error)))?;
+    }
+    Ok(Exit::Interrupted)
+}
+
+struct Gateway {
+    bus: Box<dyn Bus>,
+    bus_is_up: bool,
+    listener: TcpListener,
+    clients: Vec<Client>,
+    most_clients: usize,
+    queue_frames: u32,
+    read_only: bool,
+    began: Instant,
+    last_told: Instant,
+    refused_told: u64,
+    /// Frames may be left from the turn before.
+    more: bool,
+    text: String,
+    report: Report,
+}
+
+impl Gateway {
+    fn open(arguments: &GatewayArguments) -> Result<Self, GatewayError> {
+        let name = arguments.name.clone().or_else(|| name_of(&arguments.bus));
+        let name = name.ok_or_else(|| GatewayError::Name(arguments.bus.to_string()))?;
+        let listen = |reason: io::Error| GatewayError::Listen {
+            address: arguments.listen,
+            reason: reason.to_string(),
+        };
+        let bus = bus::open(&arguments.bus, Box::new(wall_clock_ns))?;
+        let listener = TcpListener::bind(arguments.listen).map_err(listen)?;
+        listener.set_nonblocking(true).map_err(listen)?;
+        let now = Instant::now();
+        let report = Report {
+            schema_version: SCHEMA_VERSION,
+            bus: arguments.bus.to_string(),
+            name,
+            listened_at: listener.local_addr().map_err(listen)?,
+            connections: 0,
+            connections_refused: 0,
+            clients_at_a_time_max: 0,
+            frames_to_clients: 0,
+            frames_lost: 0,
+            frames_from_clients: 0,
+            frames_not_taken: 0,
+            frames_not_carried: 0,
+            clients: VecDeque::new(),
+            bus_counters: BusCounters::default(),
+        };
+        Ok(Self {
+            bus_is_up: bus.is_up(),
+            bus,
+            listener,
+            clients: Vec::new(),
+            most_clients: usize::from(arguments.clients),
+            queue_frames: arguments.queue_frames,
+            read_only: arguments.read_only,
+            began: now,
+            last_told: now,
+            refused_told: 0,
+            more: false,
+            text: String::with_capacity(LONGEST_FRAME),
+            report,
+        })
+    }
+
+    fn announce(&self, read_only: bool) {
+        let Report { bus, name, listened_at, .. } = &self.report;
+        let sends = if read_only { ", which may not send" } else { "" };
+        eprintln!(
+            "gateway: {bus} as '{name}' at {listened_at} for socketcand clients{sends}; Ctrl-C ends it"
+        );
+        if !listened_at.ip().is_loopback() {
+            let what = if read_only { "read the bus" } else { "move the rig" };
+            eprintln!("gateway: warning: {listened_at} is not loopback: whoever reaches it can {what}");
+        }
+        if !self.bus_is_up {
+            eprintln!("gateway: {bus} has no host yet; waiting for it");
+        }
+    }
+
+    /// Waits for something to do, and does it.
+    fn turn(&mut self) -> io::Result<()> {
+        let (readable, someone_waits) = self.wait()?;
+        let now_ms = self.now_ms();
+        if someone_waits {
+            self.let_in(now_ms);
+        }
+        self.carry_from_the_bus(now_ms);
+        for (place, is_readable) in readable.into_iter().enumerate() {
+            if is_readable {
+                self.read(place, now_ms);
+                self.clients[place].tell_arrival();
+            }
+        }
+        let now_ms = self.now_ms();
+        self.clients.iter_mut().for_each(|client| client.write(now_ms));
+        self.let_go();
+        self.tell();
+        Ok(())
+    }
+
+    /// Which clients have sent something, and whether somebody waits at the door.
+    fn wait(&self) -> io::Result<(Vec<bool>, bool)> {
+        let now_ms = self.now_ms();
+        let pausing = self.clients.iter().any(|client| client.is_pausing(now_ms));
+        let milliseconds = match (self.more, self.bus.is_up()) {
+            (true, _) => 0,
+            (false, true) if !pausing => 200,
+            // Tries to come back every 100 ms; a pause has 30 ms.
+            _ => 10,
+        };
+        let timeout = Timespec { tv_sec: 0, tv_nsec: milliseconds * 1_000_000 };
+        let mut polled = vec![PollFd::new(&self.listener, PollFlags::IN)];
+        for client in &self.clients {
+            let out = if client.has_something_to_write(now_ms) { PollFlags::OUT } else { PollFlags::empty() };
+            polled.push(PollFd::new(client.stream(), PollFlags::IN | out));
+        }
+        if let Some(socket) = self.bus.socket() {
+            polled.push(PollFd::from_borrowed_fd(socket, PollFlags::IN));
+        }
+        match poll(&mut polled, Some(&timeout)) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let told = |polled: &PollFd<'_>| {
+            polled.revents().intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR)
+        };
+        let readable = polled[1..=self.clients.len()].iter().map(told).collect();
+        Ok((readable, told(&polled[0])))
+    }
+
+    fn let_in(&mut self, now_ms: u64) {
+        for _ in 0..CONNECTIONS_A_TURN {
+            let Ok((stream, address)) = self.listener.accept() else { return };
+            if self.clients.len() >= self.most_clients {
+                self.report.connections_refused += 1;
+                // Whether it reads this is its own affair; the socket's buffer takes it at once.
+                let _ = stream
+                    .set_nonblocking(true)
+                    .and_then(|()| (&stream).write(b"< error too many clients >"));
+                continue;
+            }
+            // A socket that takes no options is that of a client that has gone already.
+            if let Ok(client) = Client::new(stream, address, now_ms, self.queue_frames, self.read_only) {
+                self.clients.push(client);
+                self.report.connections += 1;
+            }
+        }
+        self.report.clients_at_a_time_max = self.report.clients_at_a_time_max.max(self.clients.len());
+    }
+
+    fn carry_from_the_bus(&mut self, now_ms: u64) {
+        self.more = true;
+        for _ in 0..FRAMES_A_TURN {
+            match self.bus.receive() {
+                Received::Frame(frame, stamp_ns) => {
+                    self.text.clear();
+                    if write_frame(&mut self.text, &frame, stamp_ns) {
+                        let raw = self.clients.iter_mut().filter(|client| client.is_raw());
+                        raw.for_each(|client| client.queue_frame(&self.text, now_ms));
+                    } else {
+                        self.report.frames_not_carried += 1;
+                    }
+                }
+                Received::Barrier(_) => {}
+                Received::Nothing => {
+                    self.more = false;
+                    break;
+                }
+            }
+        }
+        if self.bus.is_up() != self.bus_is_up {
+            self.bus_is_up = self.bus.is_up();
+            let how = if self.bus_is_up { "is there" } else { "is gone; waiting for it" };
+            eprintln!("gateway: {} {how}", self.report.bus);
+        }
+    }
+
+    fn read(&mut self, place: usize, now_ms: u64) {
+        let mut sent: Vec<CanFrame> = Vec::new();
+        let bus = &mut self.bus;
+        self.clients[place].read(&self.report.name, now_ms, |frame| {
+            let taken = bus.send(frame).is_ok();
+            if taken {
+                sent.push(*frame);
+            }
+            taken
+        });
+        for frame in sent {
+            self.text.clear();
+            write_frame(&mut self.text, &frame, wall_clock_ns(0));
+            let others = self.clients.iter_mut().enumerate().filter(|(other, _)| *other != place);
+            let raw = others.map(|(_, client)| client).filter(|client| client.is_raw());
+            raw.for_each(|client| client.queue_frame(&self.text, now_ms));
+        }
+    }
+
+    /// Removes who has gone, and keeps what was counted.
+    fn let_go(&mut self) {
+        let (gone, here) =
+            std::mem::take(&mut self.clients).into_iter().partition(|client| client.report.ended.is_some());
+        self.clients = here;
+        for client in gone {
+            tell_loss(&client);
+            self.account(client.report);
+        }
+    }
+
+    fn account(&mut self, of_client: ClientReport) {
+        let report = &mut self.report;
+        report.frames_to_clients += of_client.frames_to_client;
+        report.frames_lost += of_client.frames_lost;
+        report.frames_from_clients += of_client.frames_from_client;
+        report.frames_not_taken += of_client.frames_not_taken;
+        report.clients.push_back(of_client);
+        if report.clients.len() > REPORTS_KEPT {
+            report.clients.pop_front();
+        }
+    }
+
+    /// Tells, once a second at most, what was lost and who was refused since.
+    fn tell(&mut self) {
+        if self.last_told.elapsed() < TELL_EVERY {
+            return;
+        }
+        self.last_told = Instant::now();
+        for client in &mut self.clients {
+            tell_loss(client);
+            client.told_lost = client.report.frames_lost;
+        }
+        let refused = self.report.connections_refused;
+        if refused > std::mem::replace(&mut self.refused_told, refused) {
+            eprintln!(
+                "gateway: {refused} connections refused so far: {} clients are here, --clients N allows more",
+                self.clients.len()
+            );
+        }
+    }
+
+    fn close(mut self) -> Report {
+        self.clients.iter_mut().for_each(|client| client.end(Ended::GatewayEnded));
+        self.let_go();
+        self.report.bus_counters = *self.bus.counters();
+        self.report
+    }
+
+    fn now_ms(&self) -> u64 {
+        self.began.elapsed().as_millis() as u64
+    }
+}
+
+fn tell_loss(client: &Client) {
+    let report = &client.report;
+    if report.frames_lost > client.told_lost {
+        eprintln!(
+            "gateway: client {} reads too slowly: {} frames lost to it so far, {} delivered",
+            report.address, report.frames_lost, report.frames_to_client
+        );
+    }
+}
+
+/// The name of a bus as clients open it: the interface, or the file name of the socket.
+fn name_of(bus: &BusUrl) -> Option<String> {
+    let name = match bus {
+        BusUrl::Can { interface } => interface.clone(),
+        BusUrl::Unix { path, .. } => path.file_name()?.to_str()?.to_owned(),
+    };
+    let writable = |c: char| c.is_ascii_graphic() && c != '<' && c != '>';
+    (name.len() <= parser::LONGEST_NAME && name.chars().all(writable)).then_some(name)
+}
+
+/// The time of day `age_ns` ago, ns since the Unix epoch: what clients expect of a time stamp.
+fn wall_clock_ns(age_ns: u64) -> u64 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    (now.as_nanos() as u64).saturating_sub(age_ns)
+}

@@ -1,0 +1,228 @@
+//! One connection: its socket, its conversation, its bounded queue, and what was counted of it.
+//!
+//! Frames of the bus wait in the queue until the socket takes them; what does not fit is lost to this client alone, and
+//! counted. A reply that does not fit ends the connection: the client asks and does not read.
+
+use super::session::{Action, GREETING, Parting, Session};
+use protocol::can::CanFrame;
+use rustix::net::sockopt;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::time::Duration;
+
+/// Longest text of a frame: "< frame 1FFFFFFF 4294967295.999999 0011223344556677 >".
+pub(super) const LONGEST_FRAME: usize = 53;
+/// Room for replies beside the frames.
+const REPLIES: usize = 4096;
+/// What the kernel may hold for a client, bytes; it takes twice of it.
+const SEND_BUFFER: usize = 64 << 10;
+/// Something was queued for so long, and the client took nothing: it is gone or stands still.
+const STUCK_MS: u64 = 30_000;
+/// Silence after which the kernel asks whether the other side is still there, and time between two questions.
+const KEEP_ALIVE: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(10)];
+/// Bytes taken from a client in one turn, so that one that floods does not keep the others waiting.
+const READ_A_TURN: usize = 4096;
+
+/// Why a connection ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Ended {
+    /// The client closed it, or its machine went.
+    ByClient,
+    /// It read nothing for 30 s, or asked without reading the answers.
+    ReadsNothing,
+    /// The gateway ended.
+    GatewayEnded,
+    /// The session ended it.
+    #[serde(untagged)]
+    Parted(Parting),
+}
+
+/// What was counted of a client.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct ClientReport {
+    /// Where it came from.
+    pub(super) address: SocketAddr,
+    /// Frames of the bus that were queued for it.
+    pub(super) frames_to_client: u64,
+    /// Frames that its queue had no room for.
+    pub(super) frames_lost: u64,
+    /// Frames that it sent and the bus took.
+    pub(super) frames_from_client: u64,
+    /// Frames that it sent and the bus did not take.
+    pub(super) frames_not_taken: u64,
+    /// Requests that were refused.
+    pub(super) requests_refused: u64,
+    /// Why it is gone; none while it is here.
+    pub(super) ended: Option<Ended>,
+}
+
+/// A connection.
+pub(super) struct Client {
+    stream: TcpStream,
+    session: Session,
+    outgoing: VecDeque<u8>,
+    most_bytes: usize,
+    /// Bytes at the front of the queue that do not wait for the pause to be over.
+    at_once: usize,
+    last_progress_ms: u64,
+    pub(super) report: ClientReport,
+    announced: bool,
+    /// Losses that were told.
+    pub(super) told_lost: u64,
+}
+
+impl Client {
+    /// Greets a client that has come.
+    pub(super) fn new(
+        stream: TcpStream,
+        address: SocketAddr,
+        now_ms: u64,
+        queue_frames: u32,
+        read_only: bool,
+    ) -> io::Result<Self> {
+        stream.set_nonblocking(true)?;
+        stream.set_nodelay(true)?;
+        sockopt::set_socket_send_buffer_size(&stream, SEND_BUFFER)?;
+        sockopt::set_socket_keepalive(&stream, true)?;
+        sockopt::set_tcp_keepidle(&stream, KEEP_ALIVE[0])?;
+        sockopt::set_tcp_keepintvl(&stream, KEEP_ALIVE[1])?;
+        let mut client = Self {
+            stream,
+            session: Session::new(now_ms, read_only),
+            outgoing: VecDeque::new(),
+            most_bytes: queue_frames as usize * LONGEST_FRAME,
+            at_once: 0,
+            last_progress_ms: now_ms,
+            report: ClientReport {
+                address,
+                frames_to_client: 0,
+                frames_lost: 0,
+                frames_from_client: 0,
+                frames_not_taken: 0,
+                requests_refused: 0,
+                ended: None,
+            },
+            announced: false,
+            told_lost: 0,
+        };
+        client.reply(GREETING);
+        Ok(client)
+    }
+
+    pub(super) fn stream(&self) -> &TcpStream {
+        &self.stream
+    }
+
+    pub(super) fn is_raw(&self) -> bool {
+        self.session.is_raw()
+    }
+
+    /// Whether something may be written now.
+    pub(super) fn has_something_to_write(&self, now_ms: u64) -> bool {
+        self.ready_bytes(now_ms) > 0
+    }
+
+    /// Whether something waits for the pause to be over.
+    pub(super) fn is_pausing(&self, now_ms: u64) -> bool {
+        !self.session.pause_is_over(now_ms)
+    }
+
+    /// Tells, once, that it hears the bus from now on.
+    pub(super) fn tell_arrival(&mut self) {
+        if self.is_raw() && !std::mem::replace(&mut self.announced, true) {
+            eprintln!("gateway: client {} is on the bus", self.report.address);
+        }
+    }
+
+    /// Queues a frame's text, or counts it as lost.
+    pub(super) fn queue_frame(&mut self, text: &str, now_ms: u64) {
+        if self.outgoing.len() + text.len() > self.most_bytes {
+            self.report.frames_lost += 1;
+            return;
+        }
+        self.queue(text, now_ms);
+        self.report.frames_to_client += 1;
+    }
+
+    /// Takes what the client has sent; `send` puts a frame on the bus and tells whether it was taken.
+    pub(super) fn read(&mut self, bus: &str, now_ms: u64, mut send: impl FnMut(&CanFrame) -> bool) {
+        let mut bytes = [0; READ_A_TURN];
+        let read = match self.stream.read(&mut bytes) {
+            Ok(0) => return self.end(Ended::ByClient),
+            Ok(read) => read,
+            Err(error) if is_for_later(&error) => return,
+            Err(_) => return self.end(Ended::ByClient),
+        };
+        let mut actions = Vec::new();
+        self.session.take(&bytes[..read], bus, now_ms, &mut actions);
+        self.report.requests_refused = self.session.refused();
+        for action in actions {
+            match action {
+                Action::Reply(text) => self.reply(&text),
+                Action::Send(frame) if send(&frame) => self.report.frames_from_client += 1,
+                Action::Send(_) => self.report.frames_not_taken += 1,
+                Action::Part(why) => {
+                    self.write(now_ms);
+                    self.end(Ended::Parted(why));
+                }
+            }
+        }
+    }
+
+    /// Writes what the socket takes, and parts with a client that takes nothing or does not get to the point.
+    pub(super) fn write(&mut self, now_ms: u64) {
+        loop {
+            let ready = self.ready_bytes(now_ms);
+            if ready == 0 {
+                break;
+            }
+            let front = self.outgoing.as_slices().0;
+            match self.stream.write(&front[..front.len().min(ready)]) {
+                Ok(0) => return self.end(Ended::ByClient),
+                Ok(written) => {
+                    self.outgoing.drain(..written);
+                    self.at_once = self.at_once.saturating_sub(written);
+                    self.last_progress_ms = now_ms;
+                }
+                Err(error) if is_for_later(&error) => break,
+                Err(_) => return self.end(Ended::ByClient),
+            }
+        }
+        if self.session.is_overdue(now_ms) {
+            self.end(Ended::Parted(Parting::NoRawMode));
+        } else if !self.outgoing.is_empty() && now_ms.saturating_sub(self.last_progress_ms) >= STUCK_MS {
+            self.end(Ended::ReadsNothing);
+        }
+    }
+
+    /// Ends the conversation; the first reason stays.
+    pub(super) fn end(&mut self, why: Ended) {
+        self.report.ended.get_or_insert(why);
+    }
+
+    fn ready_bytes(&self, now_ms: u64) -> usize {
+        if self.session.pause_is_over(now_ms) { self.outgoing.len() } else { self.at_once }
+    }
+
+    fn reply(&mut self, text: &str) {
+        if self.outgoing.len() + text.len() > self.most_bytes + REPLIES {
+            return self.end(Ended::ReadsNothing);
+        }
+        self.outgoing.extend(text.as_bytes());
+        self.at_once = self.outgoing.len();
+    }
+
+    fn queue(&mut self, text: &str, now_ms: u64) {
+        if self.outgoing.is_empty() {
+            self.last_progress_ms = now_ms;
+        }
+        self.outgoing.extend(text.as_bytes());
+    }
+}
+
+fn is_for_later(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
+}

@@ -1,0 +1,67 @@
+//! Checks as test cases, for whatever shows tests.
+//!
+//! The format is the one that CI systems agree on: `testsuites`, `testsuite`, `testcase` with `failure` or `skipped`. The crates
+//! that write it bring a date library and a UUID generator for forty lines of text.
+
+use crate::soak::model::CheckResult;
+use std::fmt::Write;
+
+/// A check.
+pub(crate) struct Case {
+    /// What it belongs to.
+    pub(crate) class: String,
+    /// What was checked.
+    pub(crate) name: String,
+    /// How long it took, s.
+    pub(crate) time_s: f64,
+    /// How it ended.
+    pub(crate) result: CheckResult,
+    /// What was seen.
+    pub(crate) detail: String,
+}
+
+/// The text of a file with one suite; `name` is that of the suite, `time_s` what it took.
+pub(crate) fn text(name: &str, cases: &[Case], time_s: f64) -> String {
+    let count = |result| cases.iter().filter(|case| case.result == result).count();
+    let (tests, failures, skipped) = (cases.len(), count(CheckResult::Failed), count(CheckResult::Skipped));
+    let counts = format!(r#"tests="{tests}" failures="{failures}" errors="0""#);
+    let time = format!(r#"time="{time_s:.1}""#);
+    let name = escaped(name);
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"airbench {name}\" {counts} {time}>\n\
+         <testsuite name=\"{name}\" {counts} skipped=\"{skipped}\" {time}>\n"
+    );
+    cases.iter().for_each(|case| case.write(&mut text));
+    text.push_str("</testsuite>\n</testsuites>\n");
+    text
+}
+
+impl Case {
+    fn write(&self, text: &mut String) {
+        let [class, name, detail] = [&self.class, &self.name, &self.detail].map(|text| escaped(text));
+        let _ = write!(text, r#"<testcase classname="{class}" name="{name}" time="{:.1}">"#, self.time_s);
+        let _ = match self.result {
+            CheckResult::Passed => write!(text, "<system-out>{detail}</system-out>"),
+            CheckResult::Failed => write!(text, r#"<failure message="{detail}">{detail}</failure>"#),
+            CheckResult::Skipped => write!(text, r#"<skipped message="{detail}"/>"#),
+        };
+        text.push_str("</testcase>\n");
+    }
+}
+
+/// A text as it may stand in an attribute or between tags; characters that XML 1.0 does not know are replaced.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\n' | '\t' | '\r' => out.push(' '),
+            c if c < ' ' || ('\u{FFFE}'..='\u{FFFF}').contains(&c) => out.push('\u{FFFD}'),
+            c => out.push(c),
+        }
+    }
+    out
+}
