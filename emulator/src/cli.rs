@@ -116,7 +116,7 @@ pub struct RunArguments {
     /// Keep no flight recorder.
     #[arg(long)]
     pub no_flight: bool,
-    /// Ignore frames of the bench: hand force, link, weights.
+    /// Ignore frames of the bench: hand force, link, weights; and send no marks of faults, which are the bench's.
     #[arg(long)]
     pub no_bench_frames: bool,
     /// Take commands from standard input, one a line: emergency stop, linkage, weights, hands, faults; 'help' lists them.

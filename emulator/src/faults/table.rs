@@ -517,7 +517,7 @@ const MECHANICS: &[FaultSpec] = &[
             Some(3000.0),
             "a push from outside; positive extends the rod",
         )],
-        "the axis is pushed until its piston hits an end of the stroke, and then let go",
+        "the axis is pushed until its piston hits an end of the stroke, and then let go; trapped air may hold it off",
     ),
 ];
 
