@@ -90,7 +90,8 @@ pub enum FaultError {
 const PLACES_TOLD: usize = 12;
 
 /// Why a fault of the bus cannot be put into a run.
-pub const NEEDS_HOST: &str = "only the embedded bus that this emulator hosts can do it; use --bus unix:///PATH, and no other host on it";
+pub const NEEDS_HOST: &str =
+    "only the embedded bus that this emulator hosts can do it; use --bus unix:///PATH without another host";
 
 impl Fault {
     /// A fault of this name at this place, for comparisons: its numbers mean nothing.

@@ -1,8 +1,8 @@
 //! Every fault of the bus does what its row of the table says, in lockstep: seen by a member of the barrier, by the rig, and in
 //! the host's report.
 //!
-//! Faults last from 0.2 to 0.3 s of runs of 0.4 s. What the rig says in a cycle the member hears in that cycle; what the member says
-//! the rig has in the next.
+//! Faults last from 0.2 to 0.3 s of runs of 0.4 s. What the rig says in a cycle the member hears in that cycle; what the
+//! member says the rig has in the next.
 
 use protocol::can::CanFrame;
 use protocol::frames::{

@@ -2,9 +2,9 @@
 //!
 //! One thread, one epoll. A peer that does not read fills its socket's queue; what does not fit is dropped there
 //! and counted by peer and identifier, so that it can be held against the gaps that the peer sees. A frame that the
-//! wire loses (`wire`) is lost for all and counted by identifier; what else faults do to frames is carried out in `faulty`. In lockstep, [`super::lockstep`]
-//! decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's file and its lock are in
-//! `socket_file`.
+//! wire loses (`wire`) is lost for all and counted by identifier; what else faults do to frames is carried out in `faulty`.
+//! In lockstep, [`super::lockstep`] decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's
+//! file and its lock are in `socket_file`.
 
 mod closing;
 mod faulty;
