@@ -6,13 +6,13 @@ use super::table::{Group, Kind, all};
 use super::*;
 use plant::RigParameters;
 
-/// The fault of a row at one of its places, with each number at an end of its range where it has no default.
+/// The fault of a row at one of its places, with numbers that mean something where there is no default.
 fn some(spec: &'static FaultSpec, at: &str) -> Fault {
     let given: Vec<_> = spec
         .keys
         .iter()
         .filter(|key| key.default.is_none())
-        .map(|key| (key.name.to_owned(), Some(key.max), key.max.to_string()))
+        .map(|key| (key.name.to_owned(), Some(0.7 * key.max), String::new()))
         .collect();
     Fault::new(spec.name, Some(at), &given).unwrap()
 }
