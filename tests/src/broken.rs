@@ -178,7 +178,8 @@ impl Left {
             .collect();
         // Frames of one cycle keep their order; those that were lost on the way stand in the rig's own log all the same.
         let mut sent = frames.clone();
-        (sent.sort_unstable(), expected.sort_unstable());
+        sent.sort_unstable();
+        expected.sort_unstable();
         assert_eq!(sent, expected, "frames of the bench in bus.log");
         let active = self.truth.column("faults_active");
         let once = ["mechanical-unlink"];

@@ -220,6 +220,7 @@ impl FaultCourse {
             && !orders.give(WireOrder::End { number })
         {
             // The host has no room for orders: asked again in the next cycle.
+            self.entries[place].state = State::Active { until: Some(0) };
             return;
         }
         self.entries[place].state = State::Over;
