@@ -36,6 +36,8 @@ pub enum Command {
     /// List the effects that a rig file or a sealed file can switch on: names, places, numbers with unit and range, laws,
     /// sources.
     Effects(EffectsArguments),
+    /// List the faults that a script or a person at the console can put into a run: names, places, numbers with unit and range.
+    Faults(FaultsArguments),
     /// Print the worst-case load of the bus and each frame's worst-case response time, computed from rig.dbc.
     BusLoad(BusLoadArguments),
 }
@@ -66,6 +68,9 @@ pub struct RunArguments {
     /// alone. In place of the one that the experiment names.
     #[arg(long, value_name = "FILE")]
     pub sealed: Option<PathBuf>,
+    /// Script of faults: what breaks when; 'emulator faults' lists what can, emulator/docs/faults.md tells how.
+    #[arg(long, value_name = "FILE")]
+    pub faults: Option<PathBuf>,
     /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
     #[arg(long, default_value_os_t = run_folder::new_folder())]
     pub out: PathBuf,
@@ -111,10 +116,10 @@ pub struct RunArguments {
     /// Keep no flight recorder.
     #[arg(long)]
     pub no_flight: bool,
-    /// Ignore frames of the bench: hand force, link, weights.
+    /// Ignore frames of the bench: hand force, link, weights; and send no marks of faults, which are the bench's.
     #[arg(long)]
     pub no_bench_frames: bool,
-    /// Take commands from standard input, one a line: emergency stop, linkage, weights, hands; 'help' lists them.
+    /// Take commands from standard input, one a line: emergency stop, linkage, weights, hands, faults; 'help' lists them.
     /// What is typed is not reproducible, in lockstep neither.
     #[arg(long)]
     pub console: bool,
@@ -157,6 +162,20 @@ pub struct EffectsArguments {
     /// Print JSON instead of text.
     #[arg(long)]
     pub json: bool,
+}
+
+/// How to list the faults.
+#[derive(Args, Debug)]
+pub struct FaultsArguments {
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+    /// Print the table of emulator/docs/faults.md instead.
+    #[arg(long, conflicts_with = "json")]
+    pub markdown: bool,
+    /// Print nothing of the table, but check a script.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["json", "markdown"])]
+    pub check: Option<PathBuf>,
 }
 
 /// How to host a bus.

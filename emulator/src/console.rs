@@ -8,6 +8,8 @@
 //! among the events of `summary.json`. The end of the input closes the console, not the run. Starting and aborting
 //! experiments is no business of the rig: that is RunControl, on the bus.
 
+use crate::faults::overlay::on_wire;
+use crate::faults::{Fault, NEEDS_HOST};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use plant::scene::{Action, Part};
 use protocol::frames::{HAND_FORCE, SignalSpec};
@@ -24,6 +26,8 @@ link | unlink         the load's eye in the carriage
 weights KG            weights on the carriage, in all
 hand carriage N       a hand pushes in +x until the next such command; 0 lets go
 hand load N           the same on the load's eye
+fault NAME AT K=V …   breaks something, as 'emulator faults' lists it; without AT where there is one place
+mend NAME AT          mends it; 'mend all' mends everything
 help                  this list
 quit                  ends the run; everything is saved";
 
@@ -39,6 +43,10 @@ pub enum Command {
         /// In +x, N.
         force_n: f64,
     },
+    /// Something breaks.
+    Break(Fault),
+    /// Something is mended: what is broken like this, or everything.
+    Mend(Option<Fault>),
     /// End the run.
     Quit,
 }
@@ -48,6 +56,8 @@ pub enum Command {
 pub struct Limits {
     /// Most weights on the carriage, kg.
     pub added_limit_kg: f64,
+    /// Whether this emulator hosts the bus, so that faults can be on it.
+    pub hosts_bus: bool,
 }
 
 /// Opens the console on standard input.
@@ -107,6 +117,14 @@ fn parse(line: &str, limits: Limits) -> Result<Option<Line>, String> {
         ["release"] => act(Action::Release),
         ["link"] => act(Action::Link { until_s: None }),
         ["unlink"] => act(Action::Unlink),
+        ["fault", name, ref rest @ ..] => {
+            let fault = fault(name, rest, limits)?;
+            Ok(Some(Line::Command(Command::Break(fault))))
+        }
+        ["mend", "all"] => Ok(Some(Line::Command(Command::Mend(None)))),
+        ["mend", name, ref rest @ ..] if rest.len() < 2 => {
+            Ok(Some(Line::Command(Command::Mend(Some(like(name, rest)?)))))
+        }
         ["weights", kg] => {
             act(Action::Weights { added_mass_kg: number("weights", kg, (0.0, limits.added_limit_kg), "kg")? })
         }
@@ -119,10 +137,34 @@ fn parse(line: &str, limits: Limits) -> Result<Option<Line>, String> {
         ["weights", ..] => Err(format!("'{}': weights takes one number, KG", line.trim())),
         ["hand", ..] => Err(format!("'{}': hand takes 'carriage' or 'load', and a number, N", line.trim())),
         _ => Err(format!(
-            "'{}' is none of stop, release, link, unlink, weights KG, hand carriage N, hand load N, help, quit",
+            "'{}' is none of stop, release, link, unlink, weights KG, hand carriage N, hand load N, fault NAME AT K=V, \
+             mend NAME AT, help, quit",
             line.trim()
         )),
     }
+}
+
+/// A fault from its name and the words behind it: its place, and numbers as `key=value`.
+fn fault(name: &str, words: &[&str], limits: Limits) -> Result<Fault, String> {
+    let (numbers, places): (Vec<&str>, Vec<&str>) = words.iter().partition(|word| word.contains('='));
+    let ([] | [_]) = places[..] else {
+        return Err(format!("fault {name}: one place, not '{}'", places.join(" ")));
+    };
+    let numbers: Vec<_> = numbers
+        .into_iter()
+        .filter_map(|word| word.split_once('='))
+        .map(|(key, value)| (key.to_owned(), value.parse().ok(), value.to_owned()))
+        .collect();
+    let fault = Fault::new(name, places.first().copied(), &numbers).map_err(|error| error.to_string())?;
+    if on_wire(&fault).is_some() && !limits.hosts_bus {
+        return Err(format!("{name}: {NEEDS_HOST}"));
+    }
+    Ok(fault)
+}
+
+/// The fault of this name at this place, whatever its numbers.
+fn like(name: &str, place: &[&str]) -> Result<Fault, String> {
+    Fault::like(name, place.first().copied()).map_err(|error| error.to_string())
 }
 
 fn number(what: &str, text: &str, (least, most): (f64, f64), unit: &str) -> Result<f64, String> {
@@ -141,7 +183,7 @@ fn hand_signal(name: &str) -> &'static SignalSpec {
 mod tests {
     use super::*;
 
-    const LIMITS: Limits = Limits { added_limit_kg: 20.0 };
+    const LIMITS: Limits = Limits { added_limit_kg: 20.0, hosts_bus: true };
 
     /// Commands and answers of a whole input.
     fn said(input: &str) -> (Vec<Command>, Vec<String>) {
@@ -172,6 +214,28 @@ mod tests {
     }
 
     #[test]
+    fn faults_are_broken_and_mended_by_name_and_place() {
+        let (commands, answers) = said(
+            "fault valve-stuck drive\nfault hose-burst kv_m3_per_h=2 load.b\nfault bus-loss\nmend valve-stuck drive\n\
+             mend hose-burst load.b\nmend all\n",
+        );
+        assert_eq!(answers, [] as [String; 0]);
+        let [
+            Command::Break(stuck),
+            Command::Break(burst),
+            Command::Break(loss),
+            Command::Mend(Some(like)),
+            _,
+            Command::Mend(None),
+        ] = commands[..]
+        else {
+            panic!("{commands:?}")
+        };
+        assert_eq!((stuck, loss.place()), (like, "bus".into()));
+        assert_eq!((burst.place(), burst.values()[0]), ("load.b".into(), 2.0));
+    }
+
+    #[test]
     fn a_bad_line_is_answered_with_what_is_allowed_and_the_next_one_counts() {
         let cases = [
             ("start 3", "none of stop, release"),
@@ -184,6 +248,13 @@ mod tests {
             ("hand elbow 5", "'carriage' or 'load'"),
             ("hand load inf", "-2000 to 2000 N"),
             ("\u{fffd}", "none of"),
+            ("fault", "none of"),
+            ("fault valve drive", "'emulator faults' lists"),
+            ("fault valve-stuck", "one of drive, load"),
+            ("fault valve-stuck drive load", "one place"),
+            ("fault valve-offset drive", "needs offset; allowed: -1 to 1"),
+            ("fault valve-offset drive offset=nan", "offset = nan: allowed: -1 to 1"),
+            ("mend valve-stuck nowhere", "one of drive, load"),
         ];
         for (line, hint) in cases {
             let (commands, answers) = said(&format!("{line}\nlink\n"));

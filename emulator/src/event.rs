@@ -1,5 +1,6 @@
 //! What a run has to tell a person, each with its cycle.
 
+use crate::faults::mark::Mark;
 use plant::Axis;
 use plant::scene::{HandForces, Outcome};
 use serde::Serialize;
@@ -69,6 +70,8 @@ pub enum EventKind {
         /// Its identifier.
         id: u16,
     },
+    /// A fault was put into the run, ended, or could not be.
+    Fault(Mark),
     /// The plant's state is no longer finite: the run ends in silence.
     NotFinite,
     /// The bus went away.
@@ -167,6 +170,7 @@ impl fmt::Display for Event {
             EventKind::SecondRig { id } => {
                 write!(f, "frame {id:#05x} came from elsewhere: another rig is on this bus; stop one of them")
             }
+            EventKind::Fault(mark) => write!(f, "{mark}"),
             EventKind::NotFinite => write!(f, "fault not-finite: the plant's state is no longer finite"),
             EventKind::BusLost => write!(f, "the bus is gone; trying to come back"),
             EventKind::BusBack => write!(f, "the bus is back"),

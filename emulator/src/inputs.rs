@@ -3,6 +3,9 @@
 //! Sealed effects go into the plant and nowhere else: everything that describes the run is made of the rig file. What is wrong
 //! in a sealed file is told with line and key, because then no run begins.
 
+use crate::faults::NEEDS_HOST;
+use crate::faults::overlay::on_wire;
+use crate::faults::script::FaultScript;
 use crate::run::RunError;
 use crate::wire_limits;
 use plant::{Plant, RigParameters, Scene};
@@ -56,6 +59,43 @@ impl Inputs {
             RunError::Input(format!("{}: [rig] {error}", file.display()))
         })?;
         Ok(Self { rig_toml, experiment_toml, scene, rig: parameters, sealed: sealed.is_some(), plant })
+    }
+}
+
+/// A script of faults as read.
+pub struct Script {
+    /// The file as it stands.
+    pub toml: String,
+    /// The same, checked.
+    pub script: FaultScript,
+    file: String,
+}
+
+impl Script {
+    /// Reads and checks the file.
+    ///
+    /// # Errors
+    /// [`RunError::Input`] with file, line, key, value and allowed range.
+    pub fn read(path: &Path) -> Result<Self, RunError> {
+        let (toml, file) = (read(path)?, path.display().to_string());
+        let script =
+            FaultScript::from_toml(&toml, &file).map_err(|error| RunError::Input(error.to_string()))?;
+        Ok(Self { toml, script, file })
+    }
+
+    /// Refuses faults of the bus where nobody could carry them out.
+    ///
+    /// # Errors
+    /// [`RunError::Input`] with file and line.
+    pub fn check_host(&self, hosts_bus: bool) -> Result<(), RunError> {
+        let planned = self.script.faults.iter().find(|planned| on_wire(&planned.fault).is_some());
+        match planned.filter(|_| !hosts_bus) {
+            Some(planned) => Err(RunError::Input(format!(
+                "{}:{}: {}: {NEEDS_HOST}",
+                self.file, planned.line, planned.fault.spec.name
+            ))),
+            None => Ok(()),
+        }
     }
 }
 

@@ -11,6 +11,7 @@
 //! | [`telegrams`], [`wire_limits`] | the frames that the rig sends, and whether its numbers fit them |
 //! | [`recording`] | the queues out of the 1 ms path, the files, and the evidence of real time |
 //! | `finish` | histograms, summary, exit code |
+//! | [`faults`] | what is broken on purpose, when, and how it is told |
 //! | [`console`] | what a person types |
 //! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
 //! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
@@ -21,6 +22,7 @@ pub mod cli;
 pub mod console;
 pub mod event;
 pub mod exchange;
+pub mod faults;
 mod finish;
 pub mod host_thread;
 pub mod inputs;

@@ -4,7 +4,7 @@ use clap::Parser;
 use emulator::bus_load;
 use emulator::cli::{BusArguments, Cli, Command, DEFAULT_FIFO_PRIORITY};
 use emulator::run::{self, RunError};
-use emulator::{catalogue, seal};
+use emulator::{catalogue, faults, seal};
 use protocol::bus::BusUrl;
 use protocol::bus::host::Host;
 use protocol::exit::Exit;
@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Bus(arguments) => host_bus(&arguments),
         Command::Seal(arguments) => seal::seal(&arguments),
         Command::Effects(arguments) => catalogue::print(&arguments),
+        Command::Faults(arguments) => faults::listing::print(&arguments),
         Command::BusLoad(arguments) => bus_load::print(&arguments),
     };
     let exit = result.unwrap_or_else(|error| {

@@ -10,9 +10,10 @@
 
 use crate::cli::RunArguments;
 use crate::console::{self, Command};
+use crate::faults::course::FaultCourse;
 use crate::finish::finish;
 use crate::host_thread::HostThread;
-use crate::inputs::Inputs;
+use crate::inputs::{Inputs, Script};
 use crate::pace::{self, Limits, Pace, Paced, Ride, Shared};
 use crate::recording::evidence::{EvidenceSetup, PROCESS};
 use crate::recording::writer::{Writer, WriterSetup};
@@ -23,7 +24,7 @@ use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
-use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock};
+use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock, WireOrders};
 use protocol::exit::Exit;
 use protocol::flight_dump;
 use protocol::run_folder::{SCHEMA_VERSION, clear_results, write_json};
@@ -89,12 +90,20 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     }
     // Everything that can be refused is looked at before the folder is touched: it may hold an earlier run.
     let inputs = Inputs::read(&arguments.rig, arguments.experiment.as_deref(), arguments.sealed.as_deref())?;
+    let script = arguments.faults.as_deref().map(Script::read).transpose()?;
+    if let Some(script) = script.as_ref().filter(|_| !matches!(arguments.bus, BusUrl::Unix { .. })) {
+        script.check_host(false)?;
+    }
     let periodic = loop_config(arguments)?;
     let shared = watch_signals()?;
 
     // Simulated time in lockstep, where the log must not show the machine's clock.
     let simulated_ns = Arc::new(AtomicU64::new(0));
-    let (mut bus, host) = open_bus(arguments, stamp_clock(lockstep, &simulated_ns))?;
+    let OpenedBus { mut bus, host, orders } = open_bus(arguments, stamp_clock(lockstep, &simulated_ns))?;
+    if let Err(error) = script.as_ref().map_or(Ok(()), |script| script.check_host(orders.is_some())) {
+        host.map(HostThread::stop);
+        return Err(error);
+    }
     let started = RunStart::now(lockstep);
     let writer = match open_folder(arguments, &inputs, &started) {
         Ok(writer) => writer,
@@ -105,8 +114,11 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     };
     let (recorder, records) = recording::queues(lockstep);
     // From this thread: one of the rig loop's would inherit its priority.
-    let limits = console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg };
+    let limits =
+        console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg, hosts_bus: orders.is_some() };
     let console = arguments.console.then(|| console::open(limits));
+    let by_script = script.as_ref().map(|script| &script.script);
+    let faults = FaultCourse::new(by_script, arguments.console, orders);
 
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
@@ -120,6 +132,8 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
             simulated_ns: &simulated_ns,
             periodic,
             console,
+            script: script.as_ref(),
+            faults,
         };
         let rig_loop = scope.spawn(|| work.run(recorder, bus, &shared));
         tell_progress(&rig_loop, &shared);
@@ -189,16 +203,19 @@ struct RigWork<'a> {
     simulated_ns: &'a AtomicU64,
     periodic: PeriodicConfig,
     console: Option<Receiver<Command>>,
+    script: Option<&'a Script>,
+    faults: FaultCourse,
 }
 
 impl RigWork<'_> {
     fn run(self, recorder: Recorder, bus: &mut dyn Bus, shared: &Shared) -> Result<LoopOutcome, RunError> {
-        let Self { arguments, inputs, started, simulated_ns, periodic, console } = self;
+        let Self { arguments, inputs, started, simulated_ns, periodic, console, script, faults } = self;
         let grants = acquire_realtime(arguments);
-        describe(arguments, inputs, started, &grants)?;
+        describe(arguments, inputs, script, started, &grants)?;
         let mut station = Station::new(StationParts {
             plant: inputs.plant.clone(),
             people: People::new(&inputs.scene),
+            faults,
             console,
             sensors: Sensors::new(&inputs.rig, arguments.seed),
             recorder,
@@ -237,13 +254,18 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
     grants
 }
 
-/// The rig's peer, and the thread that hosts the bus where one is needed.
-fn open_bus(
-    arguments: &RunArguments,
-    clock: StampClock,
-) -> Result<(Box<dyn Bus>, Option<HostThread>), RunError> {
+/// The rig's peer, and who hosts the bus.
+struct OpenedBus {
+    bus: Box<dyn Bus>,
+    /// The thread that hosts the bus, where one is needed.
+    host: Option<HostThread>,
+    /// The way to the wire of a bus that is hosted here.
+    orders: Option<WireOrders>,
+}
+
+fn open_bus(arguments: &RunArguments, clock: StampClock) -> Result<OpenedBus, RunError> {
     let BusUrl::Unix { path, wire } = &arguments.bus else {
-        return Ok((bus::open(&arguments.bus, clock)?, None));
+        return Ok(OpenedBus { bus: bus::open(&arguments.bus, clock)?, host: None, orders: None });
     };
     let lockstep = arguments.pace == Pace::Lockstep;
     let barrier = lockstep.then(|| BarrierConfig {
@@ -251,16 +273,20 @@ fn open_bus(
         echo_ids: arguments.lockstep_echo.iter().map(|axis| axis.command_id()).collect(),
     });
     match Host::bind(path, *wire, barrier) {
-        Ok(host) if lockstep => Ok((Box::new(HostedRig::new(host, clock)), None)),
+        Ok(host) if lockstep => {
+            let orders = Some(host.wire_orders());
+            Ok(OpenedBus { bus: Box::new(HostedRig::new(host, clock)), host: None, orders })
+        }
         Ok(host) => {
+            let orders = Some(host.wire_orders());
             let fifo = (!arguments.no_realtime).then_some(arguments.fifo_priority + 1);
-            let thread = HostThread::start(host, fifo);
-            Ok((bus::open(&arguments.bus, clock)?, Some(thread)))
+            let host = Some(HostThread::start(host, fifo));
+            Ok(OpenedBus { bus: bus::open(&arguments.bus, clock)?, host, orders })
         }
         // A barrier has one rig, which is its host: a second emulator would take the first one's place.
         Err(BusError::HostExists { .. }) if !lockstep => {
             eprintln!("emulator: {} has a host already; joining it", arguments.bus);
-            Ok((bus::open(&arguments.bus, clock)?, None))
+            Ok(OpenedBus { bus: bus::open(&arguments.bus, clock)?, host: None, orders: None })
         }
         Err(error) => Err(error.into()),
     }
@@ -291,7 +317,8 @@ fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) ->
         epoch_offset_ns: started.epoch_offset_ns,
         linked: inputs.scene.linked,
         added_mass_kg: inputs.scene.added_mass_kg,
-        terms: inputs.plant.term_names(),
+        terms: truth_columns(arguments, inputs),
+        faults: can_break(arguments),
         evidence: started.unix_s.map(|started_unix_s| EvidenceSetup {
             full_timing: arguments.full_timing,
             flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
@@ -302,9 +329,22 @@ fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) ->
     .map_err(|error| RunError::output(folder, &error))
 }
 
+/// Whether there can be faults in the run.
+fn can_break(arguments: &RunArguments) -> bool {
+    arguments.faults.is_some() || arguments.console
+}
+
+/// Columns of `truth.csv` after the baseline's.
+fn truth_columns(arguments: &RunArguments, inputs: &Inputs) -> Vec<String> {
+    let mut columns = inputs.plant.term_names();
+    columns.extend(can_break(arguments).then(|| "faults_active".to_owned()));
+    columns
+}
+
 fn describe(
     arguments: &RunArguments,
     inputs: &Inputs,
+    script: Option<&Script>,
     started: &RunStart,
     grants: &Grants,
 ) -> Result<(), RunError> {
@@ -319,6 +359,7 @@ fn describe(
         seed: arguments.seed,
         rig_toml: inputs.rig_toml.clone(),
         experiment_toml: inputs.experiment_toml.clone(),
+        faults_toml: script.map(|script| script.toml.clone()),
         rig_setup: inputs.scene.clone(),
         sealed: inputs.sealed,
         realtime_granted: grants.granted().to_vec(),

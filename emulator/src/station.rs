@@ -13,6 +13,8 @@
 use crate::console::Command;
 use crate::event::{Event, EventKind};
 use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
+use crate::faults::course::{Broken, FaultCourse};
+use crate::faults::mark::Mark;
 use crate::recording::Recorder;
 use crate::telegrams::{self, CommandState, SaturatedSensors, TickCause};
 use crossbeam_channel::Receiver;
@@ -39,6 +41,7 @@ const LONGEST_WAIT_MS: u32 = 2000;
 const SCRIPT: usize = 0;
 const BUS: usize = 1;
 const CONSOLE: usize = 2;
+const FAULTS: usize = 3;
 
 /// What a station is made of.
 pub struct StationParts {
@@ -48,6 +51,8 @@ pub struct StationParts {
     pub sensors: Sensors,
     /// Who does what to it by hand.
     pub people: People,
+    /// What breaks.
+    pub faults: FaultCourse,
     /// What is typed at the console, if it is open.
     pub console: Option<Receiver<Command>>,
     /// Where cycles, frames and events go.
@@ -87,10 +92,11 @@ pub struct Station {
     sensors: Sensors,
     inputs: Inputs,
     people: People,
+    faults: FaultCourse,
     console: Option<Receiver<Command>>,
     quit_asked: bool,
-    /// Hands of the script, of the bus and of the console; their sum acts.
-    hands: [HandForces; 3],
+    /// Hands of the script, of the bus, of the console and of faults; their sum acts.
+    hands: [HandForces; 4],
     commands: [CommandIntake; 2],
     live: LiveCycles,
     recorder: Recorder,
@@ -110,7 +116,19 @@ impl Station {
     /// Puts the rig on its bus, before cycle 0.
     #[must_use]
     pub fn new(parts: StationParts) -> Self {
-        let StationParts { plant, mut sensors, people, console, recorder, bench_frames, lockstep } = parts;
+        let StationParts {
+            mut plant,
+            mut sensors,
+            people,
+            faults,
+            console,
+            recorder,
+            bench_frames,
+            lockstep,
+        } = parts;
+        if faults.possible() {
+            plant.expect_faults();
+        }
         let inputs = Inputs::default();
         // Replaced by the first cycle's own sample; a scratch value has no meaning, and costs a draw of noise.
         let readings = sensors.sample(&plant, &inputs);
@@ -119,9 +137,10 @@ impl Station {
             sensors,
             inputs,
             people,
+            faults,
             console,
             quit_asked: false,
-            hands: [HandForces::default(); 3],
+            hands: [HandForces::default(); 4],
             commands: Default::default(),
             live: LiveCycles::new(),
             recorder,
@@ -200,6 +219,9 @@ impl Station {
             };
             let saturated = std::mem::take(&mut self.saturated);
             self.send(&telegrams::status(&self.plant, &saturated, commands), bus);
+        }
+        if self.faults.possible() {
+            self.send_fault_marks(bus);
         }
         if bus.is_up() != self.bus_was_up {
             self.bus_was_up = bus.is_up();
@@ -294,18 +316,31 @@ impl Station {
             let opening = if self.plant.emergency_stop() { 0.0 } else { intake.opening() };
             *valve = plant::quantise_valve(opening);
         }
+        let mut terms = self.plant.terms(&self.inputs);
+        if self.faults.possible() {
+            terms.push(self.faults.active() as f64);
+        }
         self.recorder.cycle(CycleRecord {
             cycle,
             valve: self.inputs.valve,
             readings: self.readings,
             truth: self.plant.truth(&self.inputs),
-            terms: self.plant.terms(&self.inputs),
+            terms,
         });
         self.plant.step(&self.inputs);
     }
 
     fn send_tick(&mut self, cause: TickCause, cycle: u64, bus: &mut dyn Bus) {
         self.send(&telegrams::tick(cause, cycle, self.skipped, self.lockstep), bus);
+    }
+
+    /// Tells the bench what began and ended, where it listens.
+    fn send_fault_marks(&mut self, bus: &mut dyn Bus) {
+        while let Some((number, begins)) = self.faults.next_to_tell() {
+            if self.bench_frames {
+                self.send(&telegrams::fault_mark(number, begins), bus);
+            }
+        }
     }
 
     fn send(&mut self, frame: &Frame, bus: &mut dyn Bus) -> Option<u64> {
@@ -341,12 +376,17 @@ impl Station {
         let Self { people, plant, recorder, .. } = self;
         let tell = |outcome| recorder.event(Event { cycle, kind: EventKind::from(outcome) });
         self.hands[SCRIPT] = people.begin_cycle(cycle, plant, tell);
+        let Self { plant, sensors, inputs, faults, recorder, .. } = self;
+        faults.begin_cycle(cycle, Broken { plant, sensors, inputs }, |mark| {
+            recorder.event(Event { cycle, kind: EventKind::Fault(mark) });
+        });
+        self.hands[FAULTS] = self.faults.hands();
         self.hold_hands();
     }
 
     fn hold_hands(&mut self) {
-        let [script, bus, console] = self.hands;
-        (script + bus + console).put_into(&mut self.inputs);
+        let [script, bus, console, faults] = self.hands;
+        (script + bus + console + faults).put_into(&mut self.inputs);
     }
 
     fn act_by_hand(&mut self, action: Action, cycle: u64) {
@@ -363,8 +403,25 @@ impl Station {
                 *self.hands[CONSOLE].on(on) = force_n;
                 self.tell(cycle, self.hands[CONSOLE].into());
             }
+            Command::Break(fault) => self.break_or_mend(cycle, |course, broken, tell| {
+                course.break_by_hand(fault, broken, tell);
+            }),
+            Command::Mend(like) => self.break_or_mend(cycle, |course, broken, tell| {
+                course.mend(like.as_ref(), broken, tell);
+            }),
             Command::Quit => self.quit_asked = true,
         }
+    }
+
+    fn break_or_mend(
+        &mut self,
+        cycle: u64,
+        act: impl FnOnce(&mut FaultCourse, Broken<'_>, &mut dyn FnMut(Mark)),
+    ) {
+        let Self { plant, sensors, inputs, faults, recorder, .. } = self;
+        act(faults, Broken { plant, sensors, inputs }, &mut |mark| {
+            recorder.event(Event { cycle, kind: EventKind::Fault(mark) });
+        });
     }
 
     fn tell(&mut self, cycle: u64, kind: EventKind) {

@@ -36,6 +36,8 @@ pub struct RunDescription {
     pub rig_toml: String,
     /// The experiment file as it was read; null without one.
     pub experiment_toml: Option<String>,
+    /// The script of faults as it was read; null without one.
+    pub faults_toml: Option<String>,
     /// Initial state of the rig as used, and what people do to it when.
     pub rig_setup: Scene,
     /// Whether a sealed file was read, in which nobody but the rig looks; which effects it switches on stands in `truth.csv`

@@ -4,7 +4,7 @@ use plant::scene::RigCall;
 use plant::{AxisReadings, Plant};
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RIG_STATUS, RigStatus, Sensors, Tick,
+    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, FaultMark, Frame, RIG_STATUS, RigStatus, Sensors, Tick,
 };
 
 /// Sensors of one axis in `cycle`.
@@ -43,6 +43,12 @@ pub fn tick(cause: TickCause, cycle: u64, skipped: u64, lockstep: bool) -> Frame
 pub fn emergency_stop(call: RigCall) -> Frame {
     let release = call == RigCall::Release;
     Frame::RigEmergencyStop(EmergencyStop { reason: EmergencyStopReason::Operator, release })
+}
+
+/// The bench's mark that a fault of this number begins or ends.
+#[must_use]
+pub fn fault_mark(number: u16, begins: bool) -> Frame {
+    Frame::FaultMark(FaultMark { fault: number, active: begins })
 }
 
 /// What the rig's status needs besides plant and sensors.

@@ -21,6 +21,7 @@
 pub(crate) mod laws;
 
 use crate::chamber::{Air, Chambers, FlowLag};
+use crate::faults::Faults;
 use crate::lanes::{Mask, Pair};
 use crate::linkage::{Approach, Linkage};
 use crate::motion::{Motion, MotionSpan, Place};
@@ -90,6 +91,8 @@ pub(crate) struct Held {
     pub(crate) hand: Pair,
     pub(crate) stopped: bool,
     pub(crate) linked: bool,
+    /// Spools that do not move.
+    pub(crate) stuck: [bool; 2],
 }
 
 /// The supply node over one step.
@@ -125,10 +128,11 @@ impl Forces {
 }
 
 impl Integrator {
-    pub(crate) fn new(rig: &RigParameters, added_mass_kg: f64, substeps: u32) -> Self {
+    pub(crate) fn new(rig: &RigParameters, added_mass_kg: f64, substeps: u32, faults: &Faults) -> Self {
         let chambers = Chambers::of(rig);
-        let motion = Motion::new(rig, added_mass_kg);
-        let supply = Supply::new(rig.supply());
+        let [on_drive_kg, on_load_kg] = faults.added_masses_kg();
+        let motion = Motion::new(rig, [added_mass_kg + on_drive_kg, on_load_kg]);
+        let supply = Supply::new(rig.supply(), faults.supply);
         let span = |span_s: f64| Span {
             span_s,
             spool_to_middle: Pair::both(libm::exp(-span_s / 2.0 / rig.valve().spool_time_constant_s)),

@@ -16,6 +16,7 @@
 //! | `integrator.rs` | the substep that puts them together |
 //! | `truth.rs` | the list of all terms at an instant |
 //! | `sensors.rs` | noise, rounding, saturation |
+//! | `faults.rs` | what is broken, over all of these |
 //! | `tables.rs` | rows of the measurement file and of the true states |
 //!
 //! [`scene`] is what people do to it: setup, hands, emergency stop, linkage and weights, as an experiment file tells.
@@ -41,6 +42,7 @@
 
 mod chamber;
 pub mod effects;
+pub mod faults;
 mod integrator;
 mod lanes;
 mod linkage;

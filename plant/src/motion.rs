@@ -67,10 +67,11 @@ pub(crate) struct Place {
 }
 
 impl Motion {
-    pub(crate) fn new(rig: &RigParameters, added_mass_kg: f64) -> Self {
+    /// Of a rig with masses on top, kg: the carriage's, and what the load's rod carries.
+    pub(crate) fn new(rig: &RigParameters, [on_carriage_kg, on_load_kg]: [f64; 2]) -> Self {
         Motion {
-            masses_kg: [rig.mass().drive_kg + added_mass_kg, rig.mass().load_kg],
-            behind_sensor_kg: [rig.mass().carriage_kg + added_mass_kg, 0.0],
+            masses_kg: [rig.mass().drive_kg + on_carriage_kg, rig.mass().load_kg + on_load_kg],
+            behind_sensor_kg: [rig.mass().carriage_kg + on_carriage_kg, 0.0],
             stroke_m: rig.cylinder().stroke_m,
             levels: Levels::of(rig.friction()),
         }
@@ -259,7 +260,7 @@ mod tests {
     fn motion(viscous_n_per_mm_per_s: f64) -> Motion {
         let rig = RigParameters::baseline();
         let rig = rig.with("friction.viscous_n_per_mm_per_s", &[viscous_n_per_mm_per_s]).expect("in range");
-        Motion::new(&rig, 0.0)
+        Motion::new(&rig, [0.0; 2])
     }
 
     fn advance(viscous_n_per_mm_per_s: f64, axis: usize, from: Place, force: f64, span_s: f64) -> Place {

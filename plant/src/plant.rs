@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::effects::{Effects, Term, Terms};
+use crate::faults::{Faults, ValvesAtWork};
 use crate::integrator::laws::Baseline;
 use crate::integrator::{Held, Integrator, SUBSTEPS};
 use crate::lanes::Pair;
@@ -23,6 +24,10 @@ pub struct Plant {
     effects: Option<Box<Effects>>,
     substeps: u32,
     state: State,
+    faults: Faults,
+    valves: ValvesAtWork,
+    /// Effects of a rig without any, ready for faults that change laws.
+    spare: Option<Box<Effects>>,
 }
 
 /// Why linking is refused: the eye does not lie in the carriage's gap.
@@ -86,9 +91,11 @@ impl Plant {
     }
 
     fn assemble(rig: &RigParameters, state: State, substeps: u32) -> Self {
-        let integrator = Integrator::new(rig, state.added_mass_kg, substeps);
+        let faults = Faults::default();
+        let integrator = Integrator::new(rig, state.added_mass_kg, substeps, &faults);
         let effects = Effects::of(rig, &integrator, &state);
-        Plant { rig: Arc::new(rig.clone()), integrator, effects, substeps, state }
+        let (valves, spare) = (ValvesAtWork::default(), None);
+        Plant { rig: Arc::new(rig.clone()), integrator, effects, substeps, state, faults, valves, spare }
     }
 
     /// Advances by exactly 1 ms with the inputs held.
@@ -104,16 +111,24 @@ impl Plant {
             inputs.hand_force_carriage_n.is_finite() && inputs.hand_force_load_n.is_finite(),
             "{inputs:?}"
         );
-        let command = if self.state.emergency_stop {
+        let mut command = if self.state.emergency_stop {
             Pair::both(0.0)
         } else {
             Pair::new(inputs.valve[0], inputs.valve[1])
         };
+        let mut stuck = [false; 2];
+        if self.valves.any() {
+            let spools = self.state.axes.map(|axis| axis.spool);
+            let passed;
+            (passed, stuck) = self.valves.pass(command.to_array(), spools);
+            command = Pair::new(passed[0], passed[1]);
+        }
         let held = Held {
             command,
             hand: hand_forces(inputs),
             stopped: self.state.emergency_stop,
             linked: self.state.linked,
+            stuck,
         };
         if let Some(effects) = &mut self.effects {
             effects.begin_period(command.to_array());
@@ -237,13 +252,47 @@ impl Plant {
         self.state.linked = false;
     }
 
+    /// Takes the room that faults may need, so that [`Plant::set_faults`] allocates nothing; until then it does at its first
+    /// call.
+    pub fn expect_faults(&mut self) {
+        if !self.has_effects() && self.effects.is_none() && self.spare.is_none() {
+            self.spare = Some(Effects::new(&self.rig, &self.integrator, &self.state));
+        }
+    }
+
+    /// What is broken from now on, in place of what was; nothing in the default.
+    pub fn set_faults(&mut self, faults: &Faults) {
+        self.expect_faults();
+        self.faults = *faults;
+        self.valves.set(faults, self.state.axes.map(|axis| axis.spool));
+        self.integrator = Integrator::new(&self.rig, self.state.added_mass_kg, self.substeps, faults);
+        if !self.has_effects() {
+            if !faults.change_laws() {
+                // The baseline's own step goes on.
+                self.spare = self.effects.take().or(self.spare.take());
+            } else if let Some(mut effects) = self.spare.take() {
+                effects.begin(&self.integrator, &self.state);
+                self.effects = Some(effects);
+            }
+        }
+        if let Some(effects) = &mut self.effects {
+            effects.set_faults(faults);
+            effects.move_with(&self.integrator);
+        }
+    }
+
+    /// Whether the rig itself has effects, faults or not.
+    fn has_effects(&self) -> bool {
+        !self.rig.effects().is_empty() || !self.rig.tabulated().is_empty()
+    }
+
     /// Puts weights on the carriage or takes them off, kg in all; the velocity stays.
     ///
     /// # Errors
     /// [`SetupError::AddedMass`] if they are negative or more than the rig takes.
     pub fn set_added_mass_kg(&mut self, kg: f64) -> Result<(), SetupError> {
         self.state.added_mass_kg = check_added_mass(&self.rig, kg)?;
-        self.integrator = Integrator::new(&self.rig, kg, self.substeps);
+        self.integrator = Integrator::new(&self.rig, kg, self.substeps, &self.faults);
         if let Some(effects) = &mut self.effects {
             effects.move_with(&self.integrator);
         }

@@ -13,6 +13,7 @@
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
+use crate::faults::{SensorFault, SensorFaults};
 use crate::parameters::{RigParameters, SensorParameters};
 use crate::plant::Plant;
 use crate::state::Inputs;
@@ -22,6 +23,7 @@ use crate::state::Inputs;
 pub struct Sensors {
     parameters: SensorParameters,
     noise: Pcg64,
+    faults: SensorFaults,
 }
 
 /// One sample of one sensor, in SI.
@@ -49,7 +51,13 @@ pub struct AxisReadings {
 impl Sensors {
     /// Sensors of this rig whose noise is given by the seed.
     pub fn new(rig: &RigParameters, seed: u64) -> Self {
-        Sensors { parameters: *rig.sensors(), noise: Pcg64::seed_from_u64(seed) }
+        let faults = SensorFaults::new(!seed);
+        Sensors { parameters: *rig.sensors(), noise: Pcg64::seed_from_u64(seed), faults }
+    }
+
+    /// What is broken in the sensors from the next sample on: of drive and load; position, force, pressure a, pressure b.
+    pub fn set_faults(&mut self, faults: &[[SensorFault; 4]; 2]) {
+        self.faults.set(faults);
     }
 
     /// Samples all sensors at this instant, drive and load; to be taken before the period's step.
@@ -59,16 +67,22 @@ impl Sensors {
         let offsets_m = [0.0, parameters.load_position_offset_m];
         std::array::from_fn(|i| {
             let [position_m, force_n, a_pa, b_pa] = shown[i];
-            let [position, force] = self.gaussian_pair();
-            let [pressure_a, pressure_b] = self.gaussian_pair();
-            let position_m = position_m + offsets_m[i] + parameters.position_noise_m * position;
-            let force_n = force_n + parameters.force_noise_n * force;
-            let a_pa = a_pa + parameters.pressure_noise_pa * pressure_a;
-            let b_pa = b_pa + parameters.pressure_noise_pa * pressure_b;
+            let [position, force] = gaussian_pair(&mut self.noise);
+            let [pressure_a, pressure_b] = gaussian_pair(&mut self.noise);
+            let mut position_m = position_m + offsets_m[i] + parameters.position_noise_m * position;
+            let mut force_n = force_n + parameters.force_noise_n * force;
+            let mut a_pa = a_pa + parameters.pressure_noise_pa * pressure_a;
+            let mut b_pa = b_pa + parameters.pressure_noise_pa * pressure_b;
+            if self.faults.any() {
+                let values = [&mut position_m, &mut force_n, &mut a_pa, &mut b_pa];
+                values.into_iter().enumerate().for_each(|(channel, value)| {
+                    *value = self.faults.disturb(i, channel, *value);
+                });
+            }
             let pressure =
                 |pa| quantise(pa, parameters.pressure_step_pa(), 0.0, parameters.pressure_counts());
             let most_force = parameters.force_counts();
-            AxisReadings {
+            let mut readings = AxisReadings {
                 position: quantise(
                     position_m,
                     parameters.position_step_m(),
@@ -78,20 +92,29 @@ impl Sensors {
                 force: quantise(force_n, parameters.force_step_n(), -most_force, most_force),
                 pressure_a: pressure(a_pa),
                 pressure_b: pressure(b_pa),
+            };
+            if self.faults.any() {
+                let least_n = -most_force * parameters.force_step_n();
+                let AxisReadings { position, force, pressure_a, pressure_b } = &mut readings;
+                let shown = [(position, 0.0), (force, least_n), (pressure_a, 0.0), (pressure_b, 0.0)];
+                shown.into_iter().enumerate().for_each(|(channel, (reading, least))| {
+                    *reading = self.faults.show(i, channel, *reading, least);
+                });
             }
+            readings
         })
     }
+}
 
-    /// Two independent numbers of mean 0 and variance 1 [Box, Muller 1958, eq. 1].
-    fn gaussian_pair(&mut self) -> [f64; 2] {
-        // 53 random bits: (0, 1] for the logarithm, [0, 1) for the angle.
-        const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
-        let never_zero = ((self.noise.next_u64() >> 11) + 1) as f64 * STEP;
-        let turn = (self.noise.next_u64() >> 11) as f64 * STEP;
-        let radius = (-2.0 * libm::log(never_zero)).sqrt();
-        let (sine, cosine) = libm::sincos(std::f64::consts::TAU * turn);
-        [radius * cosine, radius * sine]
-    }
+/// Two independent numbers of mean 0 and variance 1 [Box, Muller 1958, eq. 1].
+pub(crate) fn gaussian_pair(noise: &mut Pcg64) -> [f64; 2] {
+    // 53 random bits: (0, 1] for the logarithm, [0, 1) for the angle.
+    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+    let never_zero = ((noise.next_u64() >> 11) + 1) as f64 * STEP;
+    let turn = (noise.next_u64() >> 11) as f64 * STEP;
+    let radius = (-2.0 * libm::log(never_zero)).sqrt();
+    let (sine, cosine) = libm::sincos(std::f64::consts::TAU * turn);
+    [radius * cosine, radius * sine]
 }
 
 /// Nearest step within the range of counts; a clipped value says so.
@@ -130,7 +153,7 @@ mod tests {
     #[test]
     fn the_noise_is_gaussian() {
         let mut sensors = Sensors::new(&RigParameters::baseline(), 7);
-        let draws: Vec<f64> = (0..100_000).flat_map(|_| sensors.gaussian_pair()).collect();
+        let draws: Vec<f64> = (0..100_000).flat_map(|_| gaussian_pair(&mut sensors.noise)).collect();
         let moment = |power| draws.iter().map(|x: &f64| x.powi(power)).sum::<f64>() / draws.len() as f64;
         // Standard errors of the moments of 2e5 draws: 0.0022, 0.0032, 0.0087, 0.022; five of each.
         assert!(moment(1).abs() < 0.011, "{}", moment(1));

@@ -12,6 +12,7 @@
 //!
 //! Source: rig-model.md, Emergency stop.
 
+use crate::faults::SupplyFault;
 use crate::parameters::SupplyParameters;
 
 /// The node's constants.
@@ -28,8 +29,13 @@ pub(crate) struct SupplyDecay {
 }
 
 impl Supply {
-    pub(crate) fn new(parameters: &SupplyParameters) -> Self {
-        Supply { parameters: *parameters }
+    /// The node; a fault puts its target and time constant in place of those of normal running and of a release.
+    pub(crate) fn new(parameters: &SupplyParameters, fault: Option<SupplyFault>) -> Self {
+        let mut parameters = *parameters;
+        if let Some(SupplyFault { pressure_pa, time_constant_s }) = fault {
+            (parameters.pressure_pa, parameters.recovery_time_constant_s) = (pressure_pa, time_constant_s);
+        }
+        Supply { parameters }
     }
 
     pub(crate) fn decay(&self, span_s: f64) -> SupplyDecay {
@@ -64,7 +70,7 @@ mod tests {
 
     #[test]
     fn the_node_decays_and_recovers_exponentially() {
-        let supply = Supply::new(RigParameters::baseline().supply());
+        let supply = Supply::new(RigParameters::baseline().supply(), None);
         // Oracle at t = 0, then one time constant: 1/e of the way is left.
         assert_eq!(supply.after(7e5, true, supply.decay(0.0)), 7e5);
         let left = (-1.0_f64).exp();
@@ -76,13 +82,13 @@ mod tests {
 
     #[test]
     fn normal_running_stands_still_to_the_bit() {
-        let supply = Supply::new(RigParameters::baseline().supply());
+        let supply = Supply::new(RigParameters::baseline().supply(), None);
         assert_eq!(supply.after(7e5, false, supply.decay(1e-4)), 7e5);
     }
 
     #[test]
     fn the_check_valves_shut_below_their_pilot_pressure() {
-        let supply = Supply::new(RigParameters::baseline().supply());
+        let supply = Supply::new(RigParameters::baseline().supply(), None);
         assert!(!supply.check_valves_shut(2.5e5) && supply.check_valves_shut(2.499e5));
     }
 }

@@ -6,6 +6,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
+use plant::faults::{AxisFaults, Faults, SensorFault, SupplyFault, ValveFault};
 use plant::{Axis, Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
 
 thread_local! {
@@ -32,10 +33,26 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+/// Something of every kind is broken.
+fn broken() -> (Faults, [[SensorFault; 4]; 2]) {
+    let axis = AxisFaults {
+        valve: ValveFault { offset: 0.1, limit: 0.9, lag_s: 0.01, ..ValveFault::default() },
+        friction_factor: 1.5,
+        added_mass_kg: 2.0,
+        leakage_m3_per_s: [1e-4; 2],
+        burst_kv_m3_per_h: [0.01, 0.0],
+    };
+    let supply = Some(SupplyFault { pressure_pa: 6e5, time_constant_s: 0.1 });
+    let sensor = SensorFault { noise: 0.1, dropout: 0.01, spike: 1.0, gain: 1.1, ..SensorFault::default() };
+    (Faults { axes: [axis; 2], supply }, [[sensor; 4]; 2])
+}
+
 /// Periods of a rig with everything in them that can happen; looks at truth, terms and sensors in each.
 fn periods_allocate_nothing(rig: &RigParameters) {
     let mut plant = Plant::new(rig, &Setup { linked: true, ..Setup::default() }).expect("good");
     let mut sensors = Sensors::new(rig, 1);
+    plant.expect_faults();
+    let (faults, of_sensors) = broken();
     let counted = ALLOCATIONS.with(Cell::get);
     assert!(counted > 0, "the counter counts");
     let mut sum = 0.0;
@@ -44,6 +61,14 @@ fn periods_allocate_nothing(rig: &RigParameters) {
             1000 => plant.trip_emergency_stop(),
             1500 => plant.release_emergency_stop(),
             2000 => plant.unlink(),
+            200 | 2200 => {
+                plant.set_faults(&faults);
+                sensors.set_faults(&of_sensors);
+            }
+            700 | 2700 => {
+                plant.set_faults(&Faults::default());
+                sensors.set_faults(&Default::default());
+            }
             _ => (),
         }
         let u = if k / 300 % 2 == 0 { 1.0 } else { -1.0 };

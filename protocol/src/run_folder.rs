@@ -36,7 +36,11 @@ pub const RESULTS: &[&str] = &[
     "stop.svg",
     "emulator.hlog",
     "emulator-timing.csv",
+    FAULTS_CSV,
 ];
+
+/// Table of the faults that were put into a run; only runs in which there can be some have it.
+pub const FAULTS_CSV: &str = "faults.csv";
 
 /// Files of a controller, `name` being that of its report, that it does not make in every run: it removes them at its start.
 #[must_use]

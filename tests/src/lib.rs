@@ -6,6 +6,7 @@
 //!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
+//!   broken ── a run with faults on purpose, and what it leaves
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   door ──── the gateway, and a client that does what it is told
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
@@ -24,6 +25,7 @@
 pub mod account;
 pub mod axis_table;
 pub mod binaries;
+pub mod broken;
 pub mod bus_cycles;
 pub mod disturb;
 pub mod door;

@@ -13,14 +13,48 @@ use system_tests::records::{count, json};
 use system_tests::scene::{LINKED, RESTLESS, Scene};
 use system_tests::turn;
 
+/// Faults that begin and end after the warm-up, mild enough for the run to go on as it does.
+const FAULTS: &str = r#"
+[[fault]]
+name = "position-sensor-noise"
+at = "load"
+from_s = 2.0
+to_s = 6.0
+[[fault]]
+name = "chamber-leak"
+at = "load.a"
+leakage_nl_per_min = 1.0
+from_s = 2.5
+to_s = 7.0
+[[fault]]
+name = "friction-rise"
+at = "drive"
+factor = 1.2
+when = "drive.position_m"
+above = 0.25
+from_s = 3.0
+for_s = 2.0
+[[fault]]
+name = "valve-slow"
+at = "load"
+from_s = 3.5
+to_s = 8.0
+[[fault]]
+name = "bus-loss"
+at = "bus.LoadChainValues"
+from_s = 4.0
+to_s = 8.0
+"#;
+
 #[test]
 fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
+    let faults = scene.write("faults.toml", FAULTS);
     let emulator = scene
         .emulator(Pace::Real)
         .build(Build::CountingAllocations)
-        .with("--seconds 11.5 --full-timing")
+        .with(&format!("--seconds 11.5 --full-timing --faults {}", faults.display()))
         .start();
     let stranger = scene.peer();
     let controller =
@@ -40,6 +74,7 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     assert_eq!(count(&summary, "/cycles"), 11_500);
     assert_eq!(count(&summary, "/frames_malformed"), 40);
     assert!(count(&controller, "/cycles_answered") > 10_000, "the controller took part throughout");
+    assert_eq!(system_tests::events::times(&system_tests::events::all(&summary), "fault"), 10);
     assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
     assert_eq!(count(&controller, "/allocations_in_cycle"), 0);
 }

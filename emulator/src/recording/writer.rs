@@ -7,13 +7,14 @@
 use super::Records;
 use super::evidence::{Evidence, EvidenceReport, EvidenceSetup};
 use crate::event::{Event, EventKind};
+use crate::faults::mark;
 use crate::pace::Shared;
 use plant::tables;
 use protocol::candump::{self, FrameRecord};
 use protocol::flight_dump::Log;
-use protocol::run_folder::LineFile;
+use protocol::run_folder::{FAULTS_CSV, LineFile};
 use realtime::{Clock, MonotonicClock};
-use std::io;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -45,6 +46,8 @@ pub struct WriterSetup {
     pub added_mass_kg: f64,
     /// Names of the plant's terms, the last columns of `truth.csv` and of no other file.
     pub terms: Vec<String>,
+    /// Whether there can be faults, which have a table of their own then.
+    pub faults: bool,
     /// What to keep of time; `None` in lockstep.
     pub evidence: Option<EvidenceSetup>,
 }
@@ -72,6 +75,7 @@ pub struct Writer {
     bus_log: LineFile,
     measurement: LineFile,
     truth: LineFile,
+    faults: Option<LineFile>,
     evidence: Option<Evidence>,
     pending: Vec<FrameRecord>,
     events_told: usize,
@@ -91,6 +95,10 @@ impl Writer {
         tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
         tables::write_truth_head(truth.lines(), &setup.terms)?;
         let log = Log { interface: setup.interface.clone(), epoch_offset_ns: setup.epoch_offset_ns };
+        let mut faults = setup.faults.then(|| open(FAULTS_CSV)).transpose()?;
+        if let Some(faults) = &mut faults {
+            writeln!(faults.lines(), "{}", mark::COLUMNS)?;
+        }
         let evidence = setup.evidence.as_ref();
         let evidence =
             evidence.map(|evidence| Evidence::create(setup.folder.clone(), log, evidence)).transpose()?;
@@ -101,6 +109,7 @@ impl Writer {
             bus_log,
             measurement,
             truth,
+            faults,
             evidence,
             pending,
             events_told: 0,
@@ -157,7 +166,7 @@ impl Writer {
         }
         self.write_frames(FRAME_DELAY_NS)?;
         for event in records.events.try_iter() {
-            self.tell(event);
+            self.tell(event)?;
         }
         Ok(())
     }
@@ -200,8 +209,11 @@ impl Writer {
     }
 
     /// Tells and keeps the event. Late wake-ups have a quota of their own, so that they hide nothing else.
-    fn tell(&mut self, event: Event) {
+    fn tell(&mut self, event: Event) -> io::Result<()> {
         self.report.event_count += 1;
+        if let (Some(faults), EventKind::Fault(mark)) = (&mut self.faults, &event.kind) {
+            mark.write(faults.lines(), event.cycle)?;
+        }
         if let Some(evidence) = &mut self.evidence {
             evidence.event(&event);
         }
@@ -220,12 +232,14 @@ impl Writer {
         } else if *told == most_told {
             eprintln!("emulator: {event}; further ones of this kind stand in summary.json only");
         }
+        Ok(())
     }
 
     fn flush(&mut self) -> io::Result<()> {
         self.bus_log.write_out()?;
         self.measurement.write_out()?;
         self.truth.write_out()?;
+        self.faults.as_mut().map_or(Ok(()), LineFile::write_out)?;
         self.evidence.as_mut().map_or(Ok(()), Evidence::flush)
     }
 
@@ -237,7 +251,9 @@ impl Writer {
         eprintln!("emulator: {message}");
         self.report.failure = Some(message);
         // One file failed; what waits for the others may still find room.
-        for file in [&mut self.bus_log, &mut self.measurement, &mut self.truth] {
+        for file in
+            [&mut self.bus_log, &mut self.measurement, &mut self.truth].into_iter().chain(&mut self.faults)
+        {
             let _ = file.write_out();
         }
         shared.output_failed.store(true, Ordering::Relaxed);

@@ -45,6 +45,7 @@ fn station(scene: &str) -> (Station, Records) {
         plant: Plant::new(&rig, &scene.setup()).unwrap(),
         sensors: Sensors::new(&rig, 1),
         people: People::new(&scene),
+        faults: FaultCourse::none(),
         console: None,
         recorder,
         bench_frames: true,

@@ -14,6 +14,7 @@ use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
 use super::tabulated::Seen;
 use super::{AxisEffects, Touched};
+use crate::faults::{Faults, Outlet};
 use crate::integrator::laws::{At, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
 use crate::lanes::{Mask, Pair};
@@ -35,6 +36,9 @@ pub(crate) struct Effects {
     pub(super) temperature_k: f64,
     pub(super) spool_time_constant_s: f64,
     file_linkage: LinkageParameters,
+    /// What is broken: friction levels times these, and ways out of the chambers a and b.
+    pub(super) friction_factors: [f64; 2],
+    outlets: [[Outlet; 2]; 2],
 }
 
 /// Below this speed an axis on bristles counts as resting: far below what moves it a sensor's step in a second. A guess.
@@ -46,9 +50,12 @@ pub(crate) const ALONG_X: [f64; 2] = [1.0, -1.0];
 impl Effects {
     /// The effects of a rig at rest in a state; `None` if the rig has none switched on.
     pub(crate) fn of(rig: &RigParameters, of: &Integrator, state: &State) -> Option<Box<Self>> {
-        if rig.effects().is_empty() && rig.tabulated().is_empty() {
-            return None;
-        }
+        let none = rig.effects().is_empty() && rig.tabulated().is_empty();
+        (!none).then(|| Self::new(rig, of, state))
+    }
+
+    /// The same for any rig; one without any moves by the baseline's laws, through this machinery.
+    pub(crate) fn new(rig: &RigParameters, of: &Integrator, state: &State) -> Box<Self> {
         let on = AxisEffects::of(rig);
         let mut effects = Box::new(Effects {
             memory: Memory::at_rest(&on, of, state),
@@ -60,13 +67,43 @@ impl Effects {
             temperature_k: rig.gas().temperature_k,
             spool_time_constant_s: rig.valve().spool_time_constant_s,
             file_linkage: *rig.linkage(),
+            friction_factors: [1.0; 2],
+            outlets: Default::default(),
         });
         effects.move_with(of);
         let forces = Forces::at(of, Some(&effects), &Lanes::load(state), Pair::both(0.0), state.linked);
         for (axis, channels) in effects.memory.channels.iter_mut().enumerate() {
             channels[1].iter_mut().for_each(|history| history.fill(forces.sensor_n(of, axis)));
         }
-        Some(effects)
+        effects
+    }
+
+    /// Forgets all, and stands at rest in a state; allocates nothing where no effect is on.
+    pub(crate) fn begin(&mut self, of: &Integrator, state: &State) {
+        self.memory = Memory::at_rest(&self.on, of, state);
+    }
+
+    /// What is broken in the laws from now on; [`Effects::move_with`] follows.
+    pub(crate) fn set_faults(&mut self, faults: &Faults) {
+        let droop = self.on[0].supply_droop.is_some();
+        for (axis, faults) in faults.axes.iter().enumerate() {
+            self.friction_factors[axis] = faults.friction_factor;
+            self.outlets[axis] = faults.outlets();
+            self.touched[axis] = self.on[axis].touched(droop);
+            self.touched[axis].air |= self.leaks(axis);
+            if !self.adds_air(axis) {
+                self.memory.moving.axes[axis].air_rate_w = [0.0; 2];
+            }
+        }
+    }
+
+    fn leaks(&self, axis: usize) -> bool {
+        self.outlets[axis].iter().any(Outlet::is_open)
+    }
+
+    /// Whether something but the valve's flow changes the air in the chambers of an axis.
+    fn adds_air(&self, axis: usize) -> bool {
+        self.on[axis].adds_air() || self.leaks(axis)
     }
 
     /// Terms of the linkage's numbers.
@@ -121,6 +158,11 @@ impl Effects {
         let (since_period_s, half_s) = (at.since_period_s(), at.span.span_s / 2.0);
         for (axis, spool) in spools.iter_mut().enumerate().filter(|(axis, _)| self.touched[*axis].spool) {
             let own = &mut carried.axes[axis];
+            if at.held.stuck[axis] {
+                (*spool, own.spool_rate_per_s) = (at.from.spool.to_array()[axis], 0.0);
+                own.spool = *spool;
+                continue;
+            }
             *spool = self.spool_over(axis, own, at, at.from.spool.to_array()[axis], since_period_s);
             own.spool = self.spool_over(axis, own, at, *spool, since_period_s + half_s);
         }
@@ -332,12 +374,18 @@ impl Laws for Effects {
         let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
         let mut stored = to.air().map(|air| air.stored.to_array());
         for axis in [0, 1] {
-            if !self.on[axis].adds_air() {
+            if !self.adds_air(axis) {
                 continue;
             }
             let lane = |pair: Pair| pair.to_array()[axis];
             let pressure_pa = middle.pressure.map(lane);
-            let leakage = self.leakage(of, axis, &seen(at, middle, axis)).map(|terms| terms.sum(0.0));
+            let mut leakage = self.leakage(of, axis, &seen(at, middle, axis)).map(|terms| terms.sum(0.0));
+            for (chamber, leakage) in leakage.iter_mut().enumerate().filter(|_| self.leaks(axis)) {
+                let lacks_pa = (of.atmospheric_pa() - pressure_pa[chamber]).abs();
+                let most = lacks_pa / lane(middle.per_volume[chamber]) / (normal_pa * span_s);
+                let outlet = &self.outlets[axis][chamber];
+                *leakage += outlet.inflow(pressure_pa[chamber], of.atmospheric_pa(), most);
+            }
             let own = &mut carried.axes[axis];
             for chamber in 0..2 {
                 // What lag and bounds have let in, as a mean flow over the step.

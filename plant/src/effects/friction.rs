@@ -78,22 +78,28 @@ impl Effects {
 
     /// Viscous friction in a direction, N s/m.
     pub(crate) fn viscous(&self, of: &Integrator, axis: usize, direction: f64) -> f64 {
-        self.viscous_term(of, axis, direction).sum(of.motion.levels().viscous_n_s_per_m[0]).max(0.0)
+        let sound = self.viscous_term(of, axis, direction).sum(of.motion.levels().viscous_n_s_per_m[0]);
+        sound.max(0.0) * self.friction_factors[axis]
     }
 
     /// All levels of an axis at a speed, both directions; none below 0, none easier to break away than to slide.
     pub(crate) fn levels(&self, of: &Integrator, axis: usize, at: &Rubbing, speed: f64) -> Levels {
         let file = *of.motion.levels();
+        let factor = self.friction_factors[axis];
         if !self.touched[axis].friction {
-            return file;
+            return Levels {
+                sliding_n: file.sliding_n.map(|level| level * factor),
+                break_away_n: file.break_away_n.map(|level| level * factor),
+                viscous_n_s_per_m: file.viscous_n_s_per_m.map(|level| level * factor),
+            };
         }
         let sliding = |speed, direction| {
-            self.sliding_level(of, axis, at, speed, direction).sum(file.sliding_n[0]).max(0.0)
+            self.sliding_level(of, axis, at, speed, direction).sum(file.sliding_n[0]).max(0.0) * factor
         };
         Levels {
             sliding_n: DIRECTIONS.map(|direction| sliding(speed, direction)),
             break_away_n: DIRECTIONS.map(|direction| {
-                let level = self.break_away_level(of, axis, at, direction).sum(file.break_away_n[0]);
+                let level = self.break_away_level(of, axis, at, direction).sum(file.break_away_n[0]) * factor;
                 level.max(sliding(0.0, direction))
             }),
             viscous_n_s_per_m: DIRECTIONS.map(|direction| self.viscous(of, axis, direction)),

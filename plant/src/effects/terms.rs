@@ -38,7 +38,11 @@ impl Terms {
         &self.values[..self.count]
     }
 
-    pub(crate) fn push(&mut self, value: f64) {
+    /// Adds a value of the caller's own behind those of the rig.
+    ///
+    /// # Panics
+    /// If there is no room: a rig with everything switched on leaves some.
+    pub fn push(&mut self, value: f64) {
         self.values[self.count] = value;
         self.count += 1;
     }

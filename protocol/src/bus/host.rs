@@ -2,11 +2,12 @@
 //!
 //! One thread, one epoll. A peer that does not read fills its socket's queue; what does not fit is dropped there
 //! and counted by peer and identifier, so that it can be held against the gaps that the peer sees. A frame that the
-//! wire loses (`wire`) is lost for all and counted by identifier. In lockstep, [`super::lockstep`]
-//! decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's file and its lock are in
-//! `socket_file`.
+//! wire loses (`wire`) is lost for all and counted by identifier; what else faults do to frames is carried out in `faulty`.
+//! In lockstep, [`super::lockstep`] decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's
+//! file and its lock are in `socket_file`.
 
 mod closing;
+mod faulty;
 mod modelled;
 
 use super::BusError;
@@ -14,9 +15,9 @@ use super::control::{Control, Kind, Role};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
 use super::packets::{self, Inbox, Outbox, Wait};
 use super::socket_file::SocketFile;
-use super::timed::TimedWire;
+use super::timed::{CYCLE_NS, Reported, TimedWire};
 use super::url::{BusUrl, WireOptions};
-use super::wire::Wire;
+use super::wire::{Fate, Wire};
 use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
 use crate::response_time;
 use crate::wire_time::WireEvent;
@@ -49,6 +50,8 @@ const RIG_HERE: PeerId = u64::MAX - 1;
 const TIMER: u64 = u64::MAX - 2;
 /// A peer that is gone, and of which frames were still on the wire.
 const GONE: PeerId = u64::MAX - 3;
+/// A node that is a fault of the wire.
+const BABBLER: PeerId = u64::MAX - 4;
 
 struct Peer {
     socket: OwnedFd,
@@ -76,6 +79,10 @@ pub struct Host {
     peers: BTreeMap<PeerId, Peer>,
     next_peer: PeerId,
     wire: Wire,
+    /// What the wire decided, and what its babbling nodes say; kept so that it need not be allocated anew.
+    fates: Vec<Fate>,
+    babble: Vec<CanFrame>,
+    began: Instant,
     timed: Option<TimedWire>,
     /// What the timed wire tells; kept so that it need not be allocated anew.
     wire_events: Vec<WireEvent>,
@@ -125,6 +132,9 @@ impl Host {
             peers: BTreeMap::new(),
             next_peer: 0,
             wire: Wire::new(&wire),
+            fates: Vec::new(),
+            babble: Vec::new(),
+            began: Instant::now(),
             timed,
             wire_events: Vec::new(),
             barrier: barrier.map(Barrier::new),
@@ -152,7 +162,10 @@ impl Host {
     /// Waits for packets, at most for `patience`, and carries them on.
     pub(super) fn turn(&mut self, patience: Timespec) -> io::Result<()> {
         let mut room = [const { MaybeUninit::uninit() }; EVENTS_A_TURN];
-        let mut events = wait(&self.epoll, &mut room, patience)?;
+        let mut events = wait(&self.epoll, &mut room, self.faults_patience(patience))?;
+        if self.barrier.is_none() {
+            self.advance_faults(self.began.elapsed().as_nanos() as u64);
+        }
         let wire_to_ns = self.wire_in_real_time().map(|timed| timed.time_ns(0));
         if wire_to_ns.is_some() {
             // Who comes is told once; all else again.
@@ -184,7 +197,7 @@ impl Host {
         let joined = barrier.join(RIG_HERE, Role::Rig, "rig".into());
         self.for_rig = joined.then(VecDeque::new);
         if let Some(timed) = self.timed.as_mut().filter(|_| joined) {
-            timed.join(RIG_HERE, None);
+            timed.join(RIG_HERE, Reported::Rig);
         }
         joined
     }
@@ -209,7 +222,7 @@ impl Host {
     /// What was counted so far.
     pub(super) fn report(&self) -> HostReport {
         let wire_time = self.timed.as_ref().map(|timed| timed.report(&self.report.peers));
-        HostReport { wire_time, ..self.report.clone() }
+        HostReport { wire_time, faults: self.wire.met().clone(), ..self.report.clone() }
     }
 
     /// Takes everyone who waits.
@@ -232,7 +245,7 @@ impl Host {
         if let Some(timed) = &mut self.timed {
             // Without stamps its frames enter when they are read: later, and never wrongly.
             let _ = packets::enable_stamps(socket.as_fd(), false);
-            timed.join(id, Some(self.report.peers.len()));
+            timed.join(id, Reported::Peer(self.report.peers.len()));
         }
         self.peers.insert(id, Peer { socket, report: self.report.peers.len(), outbox: Outbox::new() });
         let before_it_came = self.report.on_wire.clone();
@@ -325,17 +338,19 @@ impl Host {
         }
     }
 
-    /// Puts one frame on the wire: to everyone but its sender and the `deaf`. What a member of the barrier gets leaves with
-    /// its Go.
+    /// Puts one frame on the wire, which may do something to it.
     fn deliver(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
-        self.report.frames += 1;
-        if self.wire.loses_next() {
-            self.report.injected_loss.count(frame);
-            if let Some(barrier) = &mut self.barrier {
-                barrier.lost(frame, None);
-            }
-            return;
+        self.wire.note_speaker(frame, from);
+        if self.wire.is_plain() {
+            self.carry(frame, from, deaf);
+        } else {
+            self.deliver_through_faults(frame, from, deaf);
         }
+    }
+
+    /// Carries a frame to everyone but its sender and the `deaf`. What a member of the barrier gets leaves with its Go.
+    fn carry(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
+        self.report.frames += 1;
         self.report.on_wire.count(frame);
         let bytes = frame.to_bytes();
         if let Some(for_rig) = &mut self.for_rig
@@ -389,6 +404,7 @@ impl Host {
     }
 
     fn carry_out(&mut self, release: Release) {
+        self.advance_faults(u64::from(release.cycle) * CYCLE_NS);
         if self.timed.is_some() {
             self.carry_through_wire(&release);
         } else {

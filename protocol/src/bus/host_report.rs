@@ -89,6 +89,9 @@ pub struct HostReport {
     pub on_wire: FramesById,
     /// Packets that were neither frame nor control packet.
     pub malformed: u64,
+    /// Frames that met a fault of the wire, by its name and by identifier; those of a babbling node are those that it said.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub faults: BTreeMap<&'static str, FramesById>,
     /// The peers in the order in which they came.
     pub peers: Vec<PeerReport>,
     /// What a wire that keeps time counted; left out where it takes none.

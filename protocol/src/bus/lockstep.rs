@@ -112,6 +112,11 @@ impl Barrier {
         }
     }
 
+    /// The cycle that the barrier is in.
+    pub(super) fn cycle(&self) -> u32 {
+        self.cycle
+    }
+
     /// Whether it is the members' turn, who have the rig's frames then.
     pub(super) fn members_act(&self) -> bool {
         self.phase == Phase::MembersAct

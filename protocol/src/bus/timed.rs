@@ -30,12 +30,23 @@ const NS_PER_S: u64 = 1_000_000_000;
 /// Nanoseconds of simulated time in a cycle of the barrier.
 pub(super) const CYCLE_NS: u64 = 1_000_000;
 
+/// How a node is told of.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Reported {
+    /// The rig that lives in the host's process.
+    Rig,
+    /// A node that is a fault.
+    Babbler,
+    /// By its place among the reported peers.
+    Peer(usize),
+}
+
 /// The model, and who is which of its nodes.
 pub(super) struct TimedWire {
     model: WireModel,
     nodes: BTreeMap<PeerId, NodeId>,
-    /// Name of each node: its place among the reported peers; `None` for the rig in the host.
-    reported: Vec<Option<usize>>,
+    /// Each node as it is told of.
+    reported: Vec<Reported>,
     timer: OwnedFd,
     /// What the timer was set to, ns of the model's time.
     armed_ns: Option<u64>,
@@ -60,8 +71,8 @@ impl TimedWire {
         }))
     }
 
-    /// A peer comes onto the wire; `reported` is its place among the reported peers, `None` for the rig in the host.
-    pub(super) fn join(&mut self, peer: PeerId, reported: Option<usize>) {
+    /// A peer comes onto the wire.
+    pub(super) fn join(&mut self, peer: PeerId, reported: Reported) {
         let node = self.model.join();
         self.nodes.insert(peer, node);
         self.reported.push(reported);
@@ -76,6 +87,11 @@ impl TimedWire {
     /// The peer of a node that is still there.
     pub(super) fn peer_of(&self, node: NodeId) -> Option<PeerId> {
         self.nodes.iter().find(|(_, of_peer)| **of_peer == node).map(|(peer, _)| *peer)
+    }
+
+    /// Whether a peer is on the wire.
+    pub(super) fn knows(&self, peer: PeerId) -> bool {
+        self.nodes.contains_key(&peer)
     }
 
     /// A peer's frame arrived at `at_ns` of the model's time.
@@ -141,7 +157,11 @@ impl TimedWire {
     pub(super) fn report(&self, peers: &[PeerReport]) -> WireTimeReport {
         let mut report = WireTimeReport { delivered_late: self.late, ..self.model.report() };
         for (node, reported) in report.nodes.iter_mut().zip(&self.reported) {
-            node.name = reported.map_or_else(|| "rig".into(), |place| peers[place].name.clone());
+            node.name = match reported {
+                Reported::Rig => "rig".into(),
+                Reported::Babbler => "babbling node".into(),
+                Reported::Peer(place) => peers[*place].name.clone(),
+            };
         }
         report
     }

@@ -1,0 +1,182 @@
+//! Faults on purpose: what can be broken, when it is, and how it is told.
+//!
+//! ```text
+//!   faults.toml ── script.rs ──┐                              ┌─► plant::faults      valve, hose, friction, supply, sensors
+//!   console ────── parse ──────┴─► course.rs, once a cycle ───┼─► protocol wire      by orders to the bus's host
+//!                                        │                    └─► hands              a push towards an end of the stroke
+//!                                        └─► marks: events, faults.csv, truth.csv, a frame of the bench
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`table`] | every fault: name, places, numbers with unit and range, description; nothing about them stands elsewhere |
+//! | [`script`] | a file of faults with their times and conditions, checked |
+//! | [`course`] | faults in the course of a run |
+//! | [`overlay`] | what those that are active do to plant, sensors and hands |
+//! | [`mark`] | that a fault began or ended, for every log |
+//! | [`listing`] | `emulator faults`: the table for a person, a program, a page |
+
+pub mod course;
+pub mod listing;
+pub mod mark;
+pub mod overlay;
+pub mod script;
+pub mod table;
+
+use table::{FaultSpec, MOST_KEYS};
+
+/// A fault of the table at a place, with its numbers, each within its range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What is known of it.
+    pub spec: &'static FaultSpec,
+    /// Its place, as an index into those of the table.
+    place: u8,
+    /// Its numbers, in the order of the table's keys.
+    values: [f64; MOST_KEYS],
+}
+
+/// Why something is no fault of the table.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FaultError {
+    /// Not in the table.
+    #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are")]
+    Unknown(String),
+    /// Not at this place.
+    #[error("at = '{at}': {fault} is at {allowed}")]
+    Place {
+        /// The fault.
+        fault: &'static str,
+        /// The place as written.
+        at: String,
+        /// Where it can be.
+        allowed: String,
+    },
+    /// No number of this fault.
+    #[error("unknown key {key} = {value}; {fault} has {known}")]
+    Key {
+        /// The fault.
+        fault: &'static str,
+        /// The key as written.
+        key: String,
+        /// The value as written.
+        value: String,
+        /// The keys that it has.
+        known: String,
+    },
+    /// A number that has no default is not there.
+    #[error("{fault} needs {key}; allowed: {range}")]
+    Missing {
+        /// The fault.
+        fault: &'static str,
+        /// The key.
+        key: &'static str,
+        /// Allowed values.
+        range: String,
+    },
+    /// Out of range, not finite, or no number.
+    #[error("{key} = {value}: allowed: {range}")]
+    Value {
+        /// The key.
+        key: String,
+        /// The value as written.
+        value: String,
+        /// Allowed values.
+        range: String,
+    },
+}
+
+/// Most places of a fault that a message names.
+const PLACES_TOLD: usize = 12;
+
+/// Why a fault of the bus cannot be put into a run.
+pub const NEEDS_HOST: &str =
+    "only the embedded bus that this emulator hosts can do it; use --bus unix:///PATH without another host";
+
+impl Fault {
+    /// A fault of this name at this place, for comparisons: its numbers mean nothing.
+    ///
+    /// # Errors
+    /// [`FaultError`] with what is allowed.
+    pub fn like(name: &str, at: Option<&str>) -> Result<Self, FaultError> {
+        let spec = table::spec(name).ok_or_else(|| FaultError::Unknown(name.to_owned()))?;
+        let numbers: Vec<_> =
+            spec.keys.iter().map(|key| (key.name.to_owned(), Some(key.max), String::new())).collect();
+        Self::new(name, at, &numbers)
+    }
+
+    /// The fault of this name at this place (`None`: where it can be at one place only, or at the bus as a whole), with the
+    /// numbers that are given by key: as number, and as written.
+    ///
+    /// # Errors
+    /// [`FaultError`] with what is allowed.
+    pub fn new(
+        name: &str,
+        at: Option<&str>,
+        numbers: &[(String, Option<f64>, String)],
+    ) -> Result<Self, FaultError> {
+        let spec = table::spec(name).ok_or_else(|| FaultError::Unknown(name.to_owned()))?;
+        let places = spec.places.names();
+        let place = match at {
+            Some(at) => places.iter().position(|place| place == at),
+            None => spec.places.has_usual_place().then_some(0),
+        };
+        let place = place.ok_or_else(|| {
+            let told = places.iter().take(PLACES_TOLD).cloned().collect::<Vec<_>>().join(", ");
+            let more = if places.len() > PLACES_TOLD { ", …: 'emulator faults' has all" } else { "" };
+            let at = at.unwrap_or_default().to_owned();
+            FaultError::Place { fault: spec.name, at, allowed: format!("one of {told}{more}") }
+        })?;
+        if let Some((key, _, value)) =
+            numbers.iter().find(|(key, ..)| spec.keys.iter().all(|known| known.name != key))
+        {
+            let known: Vec<_> = spec.keys.iter().map(|key| key.name).collect();
+            let known = if known.is_empty() { "no numbers".to_owned() } else { known.join(", ") };
+            let (key, value) = (key.clone(), value.clone());
+            return Err(FaultError::Key { fault: spec.name, key, value, known });
+        }
+        let mut values = [0.0; MOST_KEYS];
+        for (value, key) in values.iter_mut().zip(spec.keys) {
+            let given = numbers.iter().rev().find(|(name, ..)| name == key.name);
+            *value = match (given, key.default) {
+                (Some((_, Some(number), _)), _) if key.allows(*number) => *number,
+                (Some((name, _, written)), _) => {
+                    let (key_name, value) = (name.clone(), written.clone());
+                    return Err(FaultError::Value { key: key_name, value, range: key.range() });
+                }
+                (None, Some(default)) => default,
+                (None, None) => {
+                    let range = key.range();
+                    return Err(FaultError::Missing { fault: spec.name, key: key.name, range });
+                }
+            };
+        }
+        Ok(Self { spec, place: place as u8, values })
+    }
+
+    /// Its place by name.
+    #[must_use]
+    pub fn place(&self) -> String {
+        self.spec.places.names().swap_remove(usize::from(self.place))
+    }
+
+    /// Its place among those of its kind.
+    #[must_use]
+    pub fn place_index(&self) -> usize {
+        usize::from(self.place)
+    }
+
+    /// Its numbers by their keys.
+    pub fn numbers(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.spec.keys.iter().map(|key| key.name).zip(self.values)
+    }
+
+    /// Its numbers, in the order of the table's keys.
+    #[must_use]
+    pub fn values(&self) -> [f64; MOST_KEYS] {
+        self.values
+    }
+}
+
+#[cfg(test)]
+mod tests;

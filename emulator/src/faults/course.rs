@@ -1,0 +1,268 @@
+//! Faults in the course of a run: what is due in a cycle begins and ends, once for every cycle, missed ones too.
+//!
+//! ```text
+//!   Waiting ── its time, and its condition ──► Active ── its time, somebody mends it, the piston hit ──► Over
+//!      └────── its time passes before its condition holds ────────────────────────────────────────────────┘
+//! ```
+//!
+//! Nothing here allocates after construction, and while nothing waits and nothing is active a cycle costs one comparison.
+
+use super::Fault;
+use super::mark::{Cause, Mark, What};
+use super::overlay::{Overlay, on_wire};
+use super::script::{Condition, FaultScript, Until};
+use super::table::Kind;
+use plant::scene::HandForces;
+use plant::{Axis, Inputs, Plant, Sensors};
+use protocol::bus::{WireOrder, WireOrders};
+
+/// Faults that people may have put in by hand and not mended, at once.
+const MOST_BY_HAND: usize = 64;
+/// Frames that may wait to be sent to the bench: all of a script may begin in one cycle, and end in the next.
+const MARKS: usize = 2048;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Waiting { from: u64, when: Option<Condition>, until: Option<Until> },
+    Active { until: Option<u64> },
+    Over,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    number: u16,
+    fault: Fault,
+    cause: Cause,
+    state: State,
+}
+
+/// All faults of a run.
+pub struct FaultCourse {
+    entries: Vec<Entry>,
+    room: usize,
+    /// Whether something waits or is active.
+    busy: bool,
+    next_number: u16,
+    seed: u64,
+    orders: Option<WireOrders>,
+    overlay: Overlay,
+    to_tell: Vec<(u16, bool)>,
+    /// Whether there can be any in this run.
+    possible: bool,
+}
+
+/// What a cycle's faults act on.
+pub struct Broken<'a> {
+    /// The plant at the cycle's start.
+    pub plant: &'a mut Plant,
+    /// Its sensors.
+    pub sensors: &'a mut Sensors,
+    /// What acted on it so far.
+    pub inputs: &'a Inputs,
+}
+
+impl FaultCourse {
+    /// The faults of a script, and room for those of people when `by_hand`. `orders` is the way to the bus's host, where there
+    /// is one.
+    #[must_use]
+    pub fn new(script: Option<&FaultScript>, by_hand: bool, orders: Option<WireOrders>) -> Self {
+        let planned = script.map_or(&[][..], |script| &script.faults);
+        let possible = script.is_some() || by_hand;
+        let room = planned.len() + if by_hand { MOST_BY_HAND } else { 0 };
+        let mut entries = Vec::with_capacity(room);
+        entries.extend(planned.iter().zip(1..).map(|(planned, number)| Entry {
+            number,
+            fault: planned.fault,
+            cause: Cause::Script { line: planned.line },
+            state: State::Waiting { from: planned.from, when: planned.when, until: planned.until },
+        }));
+        Self {
+            busy: !entries.is_empty(),
+            next_number: entries.len() as u16 + 1,
+            entries,
+            room,
+            seed: script.map_or(1, |script| script.seed),
+            orders,
+            overlay: Overlay::default(),
+            to_tell: Vec::with_capacity(if possible { MARKS } else { 0 }),
+            possible,
+        }
+    }
+
+    /// None, and none to come.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::new(None, false, None)
+    }
+
+    /// Whether there can be any in this run.
+    #[must_use]
+    pub fn possible(&self) -> bool {
+        self.possible
+    }
+
+    /// Number of active faults.
+    #[must_use]
+    pub fn active(&self) -> usize {
+        if !self.busy {
+            return 0;
+        }
+        self.entries.iter().filter(|entry| matches!(entry.state, State::Active { .. })).count()
+    }
+
+    /// What is pushed from outside, in +x.
+    #[must_use]
+    pub fn hands(&self) -> HandForces {
+        self.overlay.hands
+    }
+
+    /// The next mark for the bench's frame: number of the fault, and whether it begins.
+    pub fn next_to_tell(&mut self) -> Option<(u16, bool)> {
+        if self.to_tell.is_empty() { None } else { Some(self.to_tell.remove(0)) }
+    }
+
+    /// Lets begin and end what is due in `cycle`, before the sensors are sampled.
+    pub fn begin_cycle(&mut self, cycle: u64, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+        if !self.busy {
+            return;
+        }
+        let mut truth = None;
+        let mut changed = false;
+        for place in 0..self.entries.len() {
+            let entry = self.entries[place];
+            match entry.state {
+                State::Over => {}
+                State::Waiting { from, .. } if cycle < from => {}
+                State::Waiting { until: Some(Until::Cycle(to)), .. } if cycle >= to => {
+                    self.entries[place].state = State::Over;
+                    self.tell(place, What::NeverBegan, &mut tell);
+                }
+                State::Waiting { when, until, .. } => {
+                    let met = when.is_none_or(|when| {
+                        let truth = truth.get_or_insert_with(|| broken.plant.truth(broken.inputs));
+                        when.holds(truth, broken.inputs.valve)
+                    });
+                    if met {
+                        let until = until.map(|until| match until {
+                            Until::Cycle(to) => to,
+                            Until::After(cycles) => cycle + cycles,
+                        });
+                        self.start(place, until, broken.plant, &mut tell);
+                        changed = true;
+                    }
+                }
+                State::Active { until } => {
+                    let mended = until.is_some_and(|until| cycle >= until);
+                    if mended || has_hit(&entry.fault, broken.plant) {
+                        self.stop(place, &mut tell);
+                        changed = true;
+                    }
+                }
+            }
+        }
+        if changed {
+            self.put_into(broken);
+        }
+        self.busy = self.entries.iter().any(|entry| entry.state != State::Over);
+    }
+
+    /// Breaks something by hand, from this cycle on.
+    pub fn break_by_hand(&mut self, fault: Fault, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+        let (number, cause) = (self.next_number, Cause::Console);
+        self.entries.retain(|entry| entry.state != State::Over || entry.cause != Cause::Console);
+        let wire = on_wire(&fault).is_none() || self.orders.is_some();
+        if self.entries.len() >= self.room || number == u16::MAX || !wire {
+            tell(Mark { number, what: What::Refused, fault, cause });
+            return;
+        }
+        self.next_number += 1;
+        self.entries.push(Entry { number, fault, cause, state: State::Active { until: None } });
+        self.start(self.entries.len() - 1, None, broken.plant, &mut tell);
+        self.put_into(broken);
+        self.busy = true;
+    }
+
+    /// Mends what is active, whoever broke it: all of it, or the faults that are `like` this one by name and place.
+    pub fn mend(&mut self, like: Option<&Fault>, broken: Broken<'_>, mut tell: impl FnMut(Mark)) {
+        for place in 0..self.entries.len() {
+            let Entry { fault, state, .. } = self.entries[place];
+            let meant = like.is_none_or(|like| {
+                like.spec.name == fault.spec.name && like.place_index() == fault.place_index()
+            });
+            if meant && matches!(state, State::Active { .. }) {
+                self.stop(place, &mut tell);
+            }
+        }
+        self.put_into(broken);
+    }
+
+    fn start(&mut self, place: usize, until: Option<u64>, plant: &mut Plant, tell: &mut impl FnMut(Mark)) {
+        let Entry { number, fault, .. } = self.entries[place];
+        let mut state = State::Active { until };
+        if fault.spec.kind == Kind::Unlink {
+            // Parted rods stay parted: it happens once.
+            plant.unlink();
+            state = State::Over;
+        }
+        let refused = on_wire(&fault).is_some_and(|(fault, frames)| {
+            // Each fault draws for itself.
+            let order = WireOrder::Begin { number, fault, frames, seed: self.seed ^ u64::from(number) << 32 };
+            !self.orders.as_ref().is_some_and(|orders| orders.give(order))
+        });
+        self.entries[place].state = if refused { State::Over } else { state };
+        self.tell(place, if refused { What::Refused } else { What::Begins }, tell);
+    }
+
+    fn stop(&mut self, place: usize, tell: &mut impl FnMut(Mark)) {
+        let Entry { number, fault, .. } = self.entries[place];
+        if on_wire(&fault).is_some()
+            && let Some(orders) = &self.orders
+            && !orders.give(WireOrder::End { number })
+        {
+            // The host has no room for orders: asked again in the next cycle.
+            self.entries[place].state = State::Active { until: Some(0) };
+            return;
+        }
+        self.entries[place].state = State::Over;
+        self.tell(place, What::Ends, tell);
+    }
+
+    fn tell(&mut self, place: usize, what: What, tell: &mut impl FnMut(Mark)) {
+        let Entry { number, fault, cause, .. } = self.entries[place];
+        tell(Mark { number, what, fault, cause });
+        let happened = matches!(what, What::Begins | What::Ends);
+        if happened && self.to_tell.len() < self.to_tell.capacity() {
+            self.to_tell.push((number, what == What::Begins));
+        }
+    }
+
+    /// Sets everything that is active into plant and sensors.
+    fn put_into(&mut self, broken: Broken<'_>) {
+        let before = self.overlay;
+        self.overlay = Overlay::default();
+        for entry in self.entries.iter().filter(|entry| matches!(entry.state, State::Active { .. })) {
+            self.overlay.put(&entry.fault, broken.plant.rig());
+        }
+        if self.overlay.plant != before.plant {
+            broken.plant.set_faults(&self.overlay.plant);
+        }
+        if self.overlay.sensors != before.sensors {
+            broken.sensors.set_faults(&self.overlay.sensors);
+        }
+    }
+}
+
+/// Whether a push to an end of the stroke has come to it.
+fn has_hit(fault: &Fault, plant: &Plant) -> bool {
+    if fault.spec.kind != Kind::EndStopHit {
+        return false;
+    }
+    let axis = Axis::ALL[fault.place_index()];
+    let extension_m = plant.state().axis(axis).extension_m;
+    // Away from the other end, where it may have begun.
+    let towards_far_end = fault.values()[0] > 0.0;
+    plant.at_an_end(axis) && (extension_m > 0.0) == towards_far_end
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+//! `emulator faults`: the table of faults for a person, for a program, and for the page; and a script checked.
+
+use super::script::{FaultScript, signals};
+use super::table::{FaultKey, FaultSpec, Places, all};
+use crate::cli::FaultsArguments;
+use crate::run::RunError;
+use protocol::exit::Exit;
+use protocol::run_folder::SCHEMA_VERSION;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+/// Prints the table, or checks a script.
+///
+/// # Errors
+/// [`RunError::Input`] for a script that is none.
+pub fn print(arguments: &FaultsArguments) -> Result<Exit, RunError> {
+    let text = if let Some(path) = &arguments.check {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| RunError::Input(format!("cannot read {}: {error}", path.display())))?;
+        let script = FaultScript::from_toml(&text, &path.display().to_string())
+            .map_err(|error| RunError::Input(error.to_string()))?;
+        format!("{}: {} fault(s), each as the table allows", path.display(), script.faults.len())
+    } else if arguments.json {
+        serde_json::to_string_pretty(&as_json()).unwrap_or_default()
+    } else if arguments.markdown {
+        as_markdown()
+    } else {
+        let rows: Vec<_> = all().map(as_text).collect();
+        format!("{}\nconditions are on: {}", rows.join(""), signals().collect::<Vec<_>>().join(", "))
+    };
+    // Whoever closed the pipe has read enough.
+    let _ = writeln!(std::io::stdout(), "{text}");
+    Ok(Exit::Good)
+}
+
+/// Places in words; those of frames are as many as `rig.dbc` has messages.
+fn places(places: Places) -> String {
+    match places {
+        Places::Frames => "bus (all frames), or bus.NAME with a frame's name in rig.dbc".to_owned(),
+        _ => places.names().join(", "),
+    }
+}
+
+fn default(key: &FaultKey) -> String {
+    key.default.map_or_else(|| "has to be given".to_owned(), |value| format!("default {value}"))
+}
+
+fn as_text(spec: &FaultSpec) -> String {
+    let mut text = format!("{}\n    {}\n    at {}\n", spec.name, spec.about, places(spec.places));
+    for key in spec.keys {
+        let _ = writeln!(text, "    {}: {}; {}; {}", key.name, key.meaning, key.range(), default(key));
+    }
+    text
+}
+
+fn as_json() -> Value {
+    let faults: Vec<Value> = all().map(fault).collect();
+    json!({
+        "schema_version": SCHEMA_VERSION,
+        "faults": faults,
+        "conditions": signals().collect::<Vec<_>>(),
+    })
+}
+
+fn fault(spec: &FaultSpec) -> Value {
+    let number = |key: &FaultKey| {
+        json!({
+            "key": key.name,
+            "unit": key.unit,
+            "min": key.min,
+            "max": key.max,
+            "whole": key.whole,
+            "default": key.default,
+            "meaning": key.meaning,
+        })
+    };
+    json!({
+        "fault": spec.name,
+        "group": spec.group.name(),
+        "about": spec.about,
+        "places": spec.places.names(),
+        "keys": spec.keys.iter().map(number).collect::<Vec<_>>(),
+    })
+}
+
+/// The table of the page.
+fn as_markdown() -> String {
+    let mut text = String::from("| fault | at | numbers | what happens |\n|---|---|---|---|\n");
+    for spec in all() {
+        let number =
+            |key: &FaultKey| format!("`{}` {}, {}: {}", key.name, key.range(), default(key), key.meaning);
+        let numbers = spec.keys.iter().map(number).collect::<Vec<_>>().join("; ");
+        let _ = writeln!(text, "| `{}` | {} | {numbers} | {} |", spec.name, places(spec.places), spec.about);
+    }
+    text.trim_end().to_owned()
+}

@@ -1,0 +1,287 @@
+//! The table: every fault that can be put into a run, and everything that is known of one before it happens.
+//!
+//! The reader of scripts, the console, the listing, the page and the tests all read it; a new fault is a row, and an arm in
+//! [`super::overlay`] that says what it does. This file says what a row is, `rows.rs` has them.
+
+mod rows;
+
+use plant::faults::SensorFault;
+use protocol::bus::WireNode;
+use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND, LOAD_SENSORS, LOAD_VALVE_COMMAND, MESSAGES};
+
+/// Most numbers that a fault has.
+pub const MOST_KEYS: usize = 3;
+
+/// A row of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultSpec {
+    /// Name, as in scripts and at the console.
+    pub name: &'static str,
+    /// What it concerns.
+    pub group: Group,
+    /// Where it can be.
+    pub places: Places,
+    /// Its numbers.
+    pub keys: &'static [FaultKey],
+    /// What happens, in a sentence.
+    pub about: &'static str,
+    /// What it is to the code.
+    pub kind: Kind,
+}
+
+/// A number of a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultKey {
+    /// Name, ending in its unit.
+    pub name: &'static str,
+    /// Unit; `1` for a plain number.
+    pub unit: &'static str,
+    /// Least allowed value.
+    pub min: f64,
+    /// Largest allowed value.
+    pub max: f64,
+    /// Value when nothing is said; without one it has to be.
+    pub default: Option<f64>,
+    /// Whether it is a whole number.
+    pub whole: bool,
+    /// What it is.
+    pub meaning: &'static str,
+}
+
+/// What a fault concerns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// A sensor.
+    Sensor,
+    /// A valve.
+    Valve,
+    /// The supply of air.
+    Supply,
+    /// A chamber or its hose.
+    Air,
+    /// What moves.
+    Mechanics,
+    /// Frames and nodes.
+    Bus,
+}
+
+/// Where faults of a kind can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Places {
+    /// `drive` or `load`.
+    Axis,
+    /// A chamber, or its sensor.
+    Chamber,
+    /// The supply of both axes.
+    Supply,
+    /// What joins the rods.
+    Linkage,
+    /// All frames, or those of one identifier by its name in `rig.dbc`.
+    Frames,
+    /// Frames that have a counter.
+    Counted,
+    /// The bus itself.
+    Bus,
+    /// A node on it.
+    Node,
+}
+
+/// What a fault is to the code.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// Of a sensor: which channel of the axis, or that of the chamber.
+    Sensor(Channel, SensorKind),
+    /// The spool stays.
+    ValveStuck,
+    /// A lag before the spool.
+    ValveSlow,
+    /// Added to the command.
+    ValveOffset,
+    /// The most opening.
+    ValveLimited,
+    /// No command arrives.
+    ValveDead,
+    /// Less pressure at the node.
+    SupplySag,
+    /// No pressure at the node.
+    SupplyLoss,
+    /// A gap to the atmosphere.
+    Leak,
+    /// A hole to the atmosphere.
+    Burst,
+    /// Friction times a factor.
+    FrictionRise,
+    /// The rods part.
+    Unlink,
+    /// Mass on top.
+    AddedMass,
+    /// A push to an end of the stroke.
+    EndStopHit,
+    /// Frames or nodes.
+    Bus(BusKind),
+}
+
+/// Channels of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Position.
+    Position,
+    /// Force.
+    Force,
+    /// Pressure of the chamber that the place names.
+    Pressure,
+}
+
+/// What is broken in a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SensorKind {
+    /// Shows one value.
+    Stuck,
+    /// An error that grows.
+    Drift,
+    /// A constant error.
+    Offset,
+    /// A factor.
+    Gain,
+    /// Random errors.
+    Noise,
+    /// The low end of the range.
+    Dropout,
+    /// Errors of single samples.
+    Spike,
+    /// Coarse steps.
+    Quantisation,
+}
+
+/// What is broken on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BusKind {
+    /// Frames are lost.
+    Loss,
+    /// They come later.
+    Delay,
+    /// They come more than once.
+    Duplication,
+    /// They overtake each other.
+    Reordering,
+    /// Bits are inverted.
+    Corruption,
+    /// Too short or too long.
+    WrongLength,
+    /// A counter is off.
+    WrongCounter,
+    /// A node babbles.
+    Babbling,
+    /// A node is off the bus.
+    BusOff,
+}
+
+/// Nodes in the order of their places.
+pub const NODES: [(&str, WireNode); 3] = [
+    ("rig", WireNode::Rig),
+    ("drive-controller", WireNode::DriveController),
+    ("load-controller", WireNode::LoadController),
+];
+
+impl Places {
+    /// All places, by name.
+    #[must_use]
+    pub fn names(self) -> Vec<String> {
+        let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        let frame = |name: &str| format!("bus.{name}");
+        match self {
+            Self::Axis => own(&["drive", "load"]),
+            Self::Chamber => own(&["drive.a", "drive.b", "load.a", "load.b"]),
+            Self::Supply => own(&["supply"]),
+            Self::Linkage => own(&["linkage"]),
+            Self::Bus => own(&["bus"]),
+            Self::Node => NODES.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            Self::Counted => COUNTED.iter().map(|(name, _)| frame(name)).collect(),
+            Self::Frames => std::iter::once("bus".to_owned())
+                .chain(MESSAGES.iter().map(|spec| frame(spec.name)))
+                .collect(),
+        }
+    }
+
+    /// Whether the first place is meant when none is named.
+    #[must_use]
+    pub fn has_usual_place(self) -> bool {
+        matches!(self, Self::Supply | Self::Linkage | Self::Bus | Self::Frames)
+    }
+
+    /// The identifier that a place of frames names; `None` for all frames.
+    #[must_use]
+    pub fn frame_id(self, place: usize) -> Option<u16> {
+        match self {
+            Self::Frames => place.checked_sub(1).map(|message| MESSAGES[message].id),
+            Self::Counted => Some(COUNTED[place].1),
+            _ => None,
+        }
+    }
+}
+
+const COUNTED: [(&str, u16); 4] = [
+    (DRIVE_SENSORS.name, DRIVE_SENSORS.id),
+    (LOAD_SENSORS.name, LOAD_SENSORS.id),
+    (DRIVE_VALVE_COMMAND.name, DRIVE_VALVE_COMMAND.id),
+    (LOAD_VALVE_COMMAND.name, LOAD_VALVE_COMMAND.id),
+];
+
+impl FaultKey {
+    /// Whether the value is one; a NaN lies in no range.
+    #[must_use]
+    pub fn allows(&self, value: f64) -> bool {
+        (self.min..=self.max).contains(&value) && (!self.whole || value == value.trunc())
+    }
+
+    /// The allowed values in words.
+    #[must_use]
+    pub fn range(&self) -> String {
+        let whole = if self.whole { "whole numbers from " } else { "" };
+        let unit = if self.unit == "1" { "" } else { self.unit };
+        format!("{whole}{} to {} {unit}", self.min, self.max).trim_end().to_owned()
+    }
+}
+
+impl Group {
+    /// In words, as a heading.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Valve => "valve",
+            Self::Supply => "supply",
+            Self::Air => "air",
+            Self::Mechanics => "mechanics",
+            Self::Bus => "bus",
+        }
+    }
+}
+
+pub use rows::TABLE;
+
+/// All rows.
+pub fn all() -> impl Iterator<Item = &'static FaultSpec> {
+    TABLE.iter().flat_map(|rows| rows.iter())
+}
+
+/// The row of a name.
+#[must_use]
+pub fn spec(name: &str) -> Option<&'static FaultSpec> {
+    all().find(|spec| spec.name == name)
+}
+
+/// Puts a sensor's fault with its numbers into what else is broken in it.
+pub(super) fn put_sensor(kind: SensorKind, values: [f64; MOST_KEYS], into: &mut SensorFault) {
+    let [first, second, _] = values;
+    match kind {
+        SensorKind::Stuck => into.stuck = true,
+        SensorKind::Drift => into.drift_per_s += first,
+        SensorKind::Offset => into.offset += first,
+        SensorKind::Gain => into.gain *= first,
+        SensorKind::Noise => into.noise = into.noise.hypot(first),
+        SensorKind::Dropout => into.dropout = into.dropout.max(first),
+        SensorKind::Spike => (into.spike, into.spike_every) = (first, second as u32),
+        SensorKind::Quantisation => into.step = into.step.max(first),
+    }
+}

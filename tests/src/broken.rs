@@ -1,0 +1,206 @@
+//! Runs in lockstep with a script of faults, and everything that they leave: the rig with one member that opens the valves as it
+//! is told and writes down what it hears.
+
+use crate::launch::Pace;
+use crate::records::{Table, bus_log, json};
+use crate::scene::Scene;
+use protocol::can::CanFrame;
+use protocol::frames::{Frame, ValveCommand};
+use serde_json::Value;
+use std::path::Path;
+
+/// A run to be made.
+#[derive(Clone, Copy)]
+pub struct Plan<'a> {
+    /// `[rig]` of the experiment, with what follows it.
+    pub rig: &'a str,
+    /// The script; empty for none.
+    pub faults: &'a str,
+    /// Options of the bus's URL.
+    pub bus: &'a str,
+    /// Length, cycles.
+    pub cycles: usize,
+    /// Openings of drive and load that are commanded in answer to a cycle; `None` says nothing.
+    pub act: fn(u32) -> Option<[f64; 2]>,
+}
+
+impl Default for Plan<'_> {
+    fn default() -> Self {
+        let act = |_| Some([0.0, 0.0]);
+        Self { rig: "carriage_position_m = 0.25\n", faults: "", bus: "", cycles: 400, act }
+    }
+}
+
+/// What a run left.
+pub struct Left {
+    /// Its folder.
+    pub scene: Scene,
+    /// `measurement.csv`.
+    pub measurement: Table,
+    /// `truth.csv`.
+    pub truth: Table,
+    /// `summary.json`.
+    pub summary: Value,
+    /// `bus.log`, as the rig had it.
+    pub log: Vec<CanFrame>,
+    /// What the member heard in each cycle.
+    pub heard: Vec<Vec<CanFrame>>,
+}
+
+/// A row of `faults.csv`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Row {
+    /// Cycle.
+    pub cycle: usize,
+    /// Number of the fault.
+    pub number: u16,
+    /// `begins`, `ends`, …
+    pub what: String,
+    /// Name of the fault.
+    pub fault: String,
+    /// Its place.
+    pub at: String,
+    /// Its numbers, as `key=value;key=value`.
+    pub numbers: String,
+    /// Who asked for it.
+    pub cause: String,
+}
+
+/// The rows of a `faults.csv`.
+///
+/// # Panics
+/// When one is not whole.
+#[must_use]
+pub fn rows(path: &Path) -> Vec<Row> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("time_s,number,what,fault,at,numbers,cause"), "head of {}", path.display());
+    let row = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {
+        [time_s, number, what, fault, at, numbers, cause] => Row {
+            cycle: (time_s.parse::<f64>().expect("a time") * 1000.0).round() as usize,
+            number: number.parse().expect("a number"),
+            what: what.into(),
+            fault: fault.into(),
+            at: at.into(),
+            numbers: numbers.into(),
+            cause: cause.into(),
+        },
+        _ => panic!("no row: {line}"),
+    };
+    lines.map(row).collect()
+}
+
+impl Plan<'_> {
+    /// Makes the run.
+    ///
+    /// # Panics
+    /// When it does not end as it should.
+    #[must_use]
+    pub fn run(&self) -> Left {
+        let scene = Scene::new(&format!("title = \"broken\"\n[rig]\n{}", self.rig));
+        let mut emulator = scene.emulator(Pace::Lockstep).with("--seconds");
+        emulator = emulator.with(&format!("{}", self.cycles as f64 * 1e-3));
+        if !self.bus.is_empty() {
+            emulator = emulator.bus(format!("{}?{}", scene.url(), self.bus));
+        }
+        if !self.faults.is_empty() {
+            let script = scene.write("faults.toml", self.faults);
+            emulator = emulator.with("--faults").with(&script.display().to_string());
+        }
+        let emulator = emulator.start();
+        let mut heard = Vec::new();
+        let mut alive = 0;
+        scene.peer().take_part("member", |peer, cycle, frames| {
+            heard.push(frames.to_vec());
+            let Some(openings) = (self.act)(cycle) else { return };
+            alive = (alive + 1) % 16;
+            let echo = (cycle % 4096) as u16;
+            let [drive, load] = openings.map(|opening| ValveCommand { opening, alive, echo, enable: true });
+            for frame in [Frame::DriveValveCommand(drive), Frame::LoadValveCommand(load)] {
+                peer.send(&frame.encode().expect("an opening").to_bytes());
+            }
+        });
+        let _ = emulator.wait().expect_code(0);
+        let measurement = Table::read(&scene.path("emulator/measurement.csv"));
+        measurement.expect_no_hole();
+        assert_eq!(measurement.len(), self.cycles);
+        Left {
+            measurement,
+            truth: Table::read(&scene.path("emulator/truth.csv")),
+            summary: json(&scene.path("emulator/summary.json")),
+            log: bus_log(&scene.path("emulator/bus.log")),
+            heard,
+            scene,
+        }
+    }
+}
+
+impl Left {
+    /// The rows of its `faults.csv`.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        rows(&self.scene.path("emulator/faults.csv"))
+    }
+
+    /// Holds that every log tells the same faults: table, summary, frames of the bench, and the count beside the truth.
+    ///
+    /// # Panics
+    /// When one does not.
+    pub fn expect_marks_in_every_log(&self) {
+        let rows = self.rows();
+        assert!(!rows.is_empty(), "a script without a mark");
+        let events: Vec<_> = self.summary["events"].as_array().expect("events").iter().collect();
+        let events: Vec<_> = events
+            .into_iter()
+            .filter_map(|event| Some((event["cycle"].as_u64()? as usize, event["kind"].get("fault")?)))
+            .map(|(cycle, mark)| {
+                let text = |key: &str| mark[key].as_str().unwrap_or_default().to_owned();
+                (cycle, mark["number"].as_u64().unwrap_or(0) as u16, text("what"), text("fault"), text("at"))
+            })
+            .collect();
+        let told: Vec<_> = rows
+            .iter()
+            .map(|row| (row.cycle, row.number, row.what.clone(), row.fault.clone(), row.at.clone()))
+            .collect();
+        assert_eq!(events, told, "summary.json and faults.csv");
+        let frames: Vec<_> = self
+            .log
+            .iter()
+            .filter_map(|frame| match Frame::decode(frame) {
+                Ok(Frame::FaultMark(mark)) => Some((mark.fault, mark.active)),
+                _ => None,
+            })
+            .collect();
+        let mut expected: Vec<_> = rows
+            .iter()
+            .filter(|row| row.what == "begins" || row.what == "ends")
+            .map(|row| (row.number, row.what == "begins"))
+            .collect();
+        // Frames of one cycle keep their order; those that were lost on the way stand in the rig's own log all the same.
+        let mut sent = frames.clone();
+        sent.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(sent, expected, "frames of the bench in bus.log");
+        let active = self.truth.column("faults_active");
+        let once = ["mechanical-unlink"];
+        for (cycle, count) in active.iter().enumerate() {
+            let before = |what: &str| {
+                rows.iter()
+                    .filter(|row| {
+                        row.what == what && row.cycle <= cycle && !once.contains(&row.fault.as_str())
+                    })
+                    .count()
+            };
+            assert_eq!(*count as usize, before("begins") - before("ends"), "faults_active in cycle {cycle}");
+        }
+    }
+
+    /// Frames of an identifier that the member heard, by the cycle.
+    #[must_use]
+    pub fn heard_of(&self, id: u16) -> Vec<Vec<CanFrame>> {
+        let of_id = |frames: &Vec<CanFrame>| {
+            frames.iter().filter(|frame| frame.standard_id() == Some(id)).copied().collect()
+        };
+        self.heard.iter().map(of_id).collect()
+    }
+}

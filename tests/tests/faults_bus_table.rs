@@ -1,0 +1,235 @@
+//! Every fault of the bus does what its row of the table says, in lockstep: seen by a member of the barrier, by the rig, and in
+//! the host's report.
+//!
+//! Faults last from 0.2 to 0.3 s of runs of 0.4 s. What the rig says in a cycle the member hears in that cycle; what the
+//! member says the rig has in the next.
+
+use protocol::can::CanFrame;
+use protocol::frames::{
+    DRIVE_SENSORS, DRIVE_VALVE_COMMAND, Frame, LOAD_SENSORS, LOAD_VALVE_COMMAND, RIG_STATUS, TICK,
+};
+use serde_json::Value;
+use system_tests::broken::{Left, Plan};
+use system_tests::events;
+use system_tests::records::{count, count_of_id};
+
+const BEGINS: usize = 200;
+const ENDS: usize = 300;
+
+fn fault(name: &str, at: &str, numbers: &str) -> String {
+    format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = 0.2\nto_s = 0.3\n{numbers}\n")
+}
+
+fn run_over(bus: &str, faults: &str) -> Left {
+    let left = Plan { faults, bus, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
+    left.expect_marks_in_every_log();
+    left
+}
+
+fn run(name: &str, at: &str, numbers: &str) -> Left {
+    run_over("", &fault(name, at, numbers))
+}
+
+/// Frames that met the fault, by the host's report.
+fn met(left: &Left, name: &str, id: u16) -> u64 {
+    let table = &left.summary["bus_host"]["faults"][name];
+    if table.is_null() { 0 } else { count_of_id(table, &format!("{id:03X}")) }
+}
+
+fn alive(frame: &CanFrame) -> u64 {
+    match Frame::decode(frame) {
+        Ok(Frame::DriveSensors(sensors) | Frame::LoadSensors(sensors)) => u64::from(sensors.alive),
+        Ok(Frame::DriveValveCommand(command) | Frame::LoadValveCommand(command)) => u64::from(command.alive),
+        other => panic!("no counter in {other:?}"),
+    }
+}
+
+/// Counters of the drive's sensors that the member heard, cycle by cycle.
+fn counters(left: &Left, id: u16) -> Vec<Vec<u64>> {
+    left.heard_of(id).iter().map(|frames| frames.iter().map(alive).collect()).collect()
+}
+
+/// What a sound bus brings: one frame in each cycle, with the cycle's counter.
+fn sound(cycle: usize) -> Vec<u64> {
+    vec![cycle as u64 % 16]
+}
+
+fn expect_sound_outside(heard: &[Vec<u64>], ends: usize) {
+    for (cycle, heard) in heard.iter().enumerate().filter(|(cycle, _)| !(BEGINS..ends).contains(cycle)) {
+        assert_eq!(*heard, sound(cycle), "cycle {cycle}");
+    }
+}
+
+#[test]
+fn lost_frames_are_lost_for_all_and_counted() {
+    let left = run("bus-loss", "bus.DriveSensors", "");
+    let heard = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&heard, ENDS);
+    assert!(heard[BEGINS..ENDS].iter().all(Vec::is_empty), "not one is heard");
+    expect_sound_outside(&counters(&left, LOAD_SENSORS.id), 0);
+    assert_eq!(met(&left, "bus-loss", DRIVE_SENSORS.id), 100);
+    assert_eq!(count_of_id(&left.summary["bus_host"]["injected_loss"], "120"), 100);
+    // A half of all frames, commands among them: the rig finds the gaps in their counters.
+    let left = run("bus-loss", "bus", "probability = 0.5");
+    let lost = count(&left.summary, "/drive_commands/lost");
+    let met_commands = met(&left, "bus-loss", DRIVE_VALVE_COMMAND.id);
+    assert_eq!(lost, met_commands, "gaps are what was lost");
+    // Binomial of 100 by a half: 50 with a deviation of 5; five of them.
+    assert!((25..=75).contains(&met_commands), "{met_commands}");
+}
+
+#[test]
+fn the_bus_url_loses_by_the_same_fault_from_start_to_end() {
+    let left = Plan { bus: "loss=0.5&seed=3", act: |_| Some([0.0; 2]), ..Plan::default() }.run();
+    let lost = count_of_id(&left.summary["bus_host"]["injected_loss"], "120");
+    assert_eq!(met(&left, "bus-loss", DRIVE_SENSORS.id), lost);
+    let heard = counters(&left, DRIVE_SENSORS.id).iter().map(Vec::len).sum::<usize>();
+    assert_eq!(heard as u64 + lost, 400);
+}
+
+#[test]
+fn delayed_frames_come_so_much_later_in_their_order() {
+    let left = run("bus-delay", "bus.LoadSensors", "delay_ms = 7");
+    let heard = counters(&left, LOAD_SENSORS.id);
+    assert!(heard[BEGINS..BEGINS + 7].iter().all(Vec::is_empty), "{:?}", &heard[BEGINS..BEGINS + 7]);
+    for (cycle, heard) in heard.iter().enumerate().take(ENDS).skip(BEGINS + 7) {
+        assert_eq!(*heard, sound(cycle - 7), "cycle {cycle}");
+    }
+    // What is under way at the end comes at once, before the first that is not delayed.
+    let last: Vec<u64> = (ENDS - 7..=ENDS).map(|cycle| cycle as u64 % 16).collect();
+    assert_eq!(heard[ENDS], last);
+    assert_eq!(met(&left, "bus-delay", LOAD_SENSORS.id), 100);
+}
+
+#[test]
+fn commands_that_are_delayed_beyond_their_age_shut_the_valve() {
+    let left = run("bus-delay", "bus.DriveValveCommand", "delay_ms = 30");
+    let valve = left.measurement.column("drive_valve");
+    assert!(valve[BEGINS - 1] > 0.29 && valve[BEGINS + 25..ENDS].iter().all(|opening| *opening == 0.0));
+    assert!(left.measurement.column("load_valve")[BEGINS..ENDS].iter().all(|opening| *opening > 0.19));
+    assert!(count(&left.summary, "/drive_commands/refused_stale") > 50);
+    let told = events::all(&left.summary);
+    assert_eq!(events::times(&told, "command-stale"), 1, "{told:?}");
+}
+
+#[test]
+fn frames_come_more_than_once_and_overtake_each_other() {
+    let left = run("bus-duplication", "bus.DriveSensors", "probability = 1.0\ncopies = 2");
+    let heard = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&heard, ENDS);
+    for (cycle, heard) in heard.iter().enumerate().take(ENDS).skip(BEGINS) {
+        assert_eq!(*heard, vec![cycle as u64 % 16; 3], "cycle {cycle}");
+    }
+    let left = run("bus-duplication", "bus.DriveValveCommand", "probability = 1.0");
+    assert!(count(&left.summary, "/frames_duplicate") >= 100, "the rig finds them");
+
+    let left = run("bus-reordering", "bus.DriveSensors", "probability = 1.0");
+    let heard = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&heard, ENDS);
+    for cycle in (BEGINS..ENDS).step_by(2) {
+        let (first, second) = (cycle as u64 % 16, (cycle as u64 + 1) % 16);
+        assert_eq!(
+            [&heard[cycle][..], &heard[cycle + 1][..]],
+            [&[][..], &[second, first][..]],
+            "cycle {cycle}"
+        );
+    }
+    assert_eq!(met(&left, "bus-reordering", DRIVE_SENSORS.id), 50);
+}
+
+#[test]
+fn corrupted_and_cut_commands_are_refused_and_the_valve_shuts() {
+    for (name, numbers) in
+        [("bus-corruption", "probability = 1.0"), ("wrong-length", "probability = 1.0\nbytes = 4")]
+    {
+        let left = run(name, "bus.DriveValveCommand", numbers);
+        assert_eq!(count(&left.summary, "/frames_malformed"), 100, "{name}");
+        assert_eq!(met(&left, name, DRIVE_VALVE_COMMAND.id), 100);
+        let valve = left.measurement.column("drive_valve");
+        assert!(
+            valve[BEGINS + 25..ENDS].iter().all(|opening| *opening == 0.0),
+            "{name}: no wrong command acts"
+        );
+        let others =
+            valve.iter().filter(|opening| **opening != 0.0 && (**opening - 0.3).abs() > 1e-3).count();
+        assert_eq!(others, 0, "{name}: an opening that nobody commanded");
+        assert!(valve[ENDS + 5] > 0.29, "{name}: it follows again");
+        let lengths: Vec<_> = left
+            .log
+            .iter()
+            .filter(|frame| frame.standard_id() == Some(DRIVE_VALVE_COMMAND.id))
+            .map(|frame| frame.data().len())
+            .collect();
+        let short = lengths.iter().filter(|length| **length == 4).count();
+        assert_eq!(short, if name == "wrong-length" { 100 } else { 0 }, "{name}: in the log as it came");
+    }
+}
+
+#[test]
+fn a_counter_that_is_off_is_found_and_never_malformed() {
+    let left = run("wrong-counter", "bus.DriveValveCommand", "probability = 0.2");
+    let off = met(&left, "wrong-counter", DRIVE_VALVE_COMMAND.id);
+    assert!((1..=45).contains(&off), "binomial of 100 by 0.2: 20 with a deviation of 4; {off}");
+    let of_drive = |key: &str| count(&left.summary, &format!("/drive_commands/{key}"));
+    assert!(of_drive("lost") + of_drive("breaks") + of_drive("two_sources") > 0);
+    assert_eq!(count(&left.summary, "/frames_malformed"), 0, "length and checksum are right");
+    assert_eq!(count(&left.summary, "/load_commands/lost"), 0);
+    let left = run("wrong-counter", "bus.DriveSensors", "probability = 1.0\nstep = 3");
+    let heard = counters(&left, DRIVE_SENSORS.id);
+    expect_sound_outside(&heard, ENDS);
+    assert!((BEGINS..ENDS).all(|cycle| heard[cycle] == [(cycle as u64 + 3) % 16]));
+}
+
+/// Bits of the frames of a wire that keeps time, by identifier and in all, ppm of the time observed.
+fn load_ppm(summary: &Value) -> u64 {
+    count(summary, "/bus_host/wire_time/load_ppm")
+}
+
+#[test]
+fn a_babbling_node_raises_the_load_of_the_bus_and_takes_the_others_time() {
+    let wire = "bitrate=1000000";
+    let quiet = run_over(wire, "[[fault]]\nname = \"bus-loss\"\nat = \"bus.Tick\"\nprobability = 0.0\n");
+    let babble = fault("babbling-node", "bus", "id = 16\nframes_per_ms = 3.0");
+    let loud = run_over(wire, &babble);
+    assert_eq!(met(&loud, "babbling-node", 16), 300);
+    // 300 frames of 8 bytes in 0.4 s: 111 to 135 us each, so 8.3 to 10.1 % more.
+    let more = load_ppm(&loud.summary) - load_ppm(&quiet.summary);
+    assert!((83_000..=102_000).contains(&more), "{more} ppm more");
+    let longest = |left: &Left| count(&left.summary, "/bus_host/wire_time/identifiers/120/response_ns/max");
+    assert!(longest(&loud) > longest(&quiet), "a lower identifier goes first");
+    let nodes = loud.summary["bus_host"]["wire_time"]["nodes"].as_array().expect("nodes").clone();
+    assert!(nodes.iter().any(|node| node["name"] == "babbling node" && node["sent"] == 300), "{nodes:?}");
+    // Over a wire that takes no time everybody hears it all the same.
+    let heard = run_over("", &babble).heard_of(16);
+    assert_eq!(heard.iter().map(Vec::len).sum::<usize>(), 300);
+    assert_eq!(count(&loud.summary, "/frames_ignored/unknown"), 300, "the rig hears it, and minds it not");
+}
+
+#[test]
+fn a_node_that_is_off_the_bus_is_not_heard_and_hears_nothing() {
+    let left = run("bus-off", "rig", "");
+    for id in [DRIVE_SENSORS.id, LOAD_SENSORS.id, TICK.id, RIG_STATUS.id] {
+        let heard = left.heard_of(id);
+        assert!(heard[BEGINS..ENDS].iter().all(Vec::is_empty), "{id:#x} is heard");
+        assert!(heard[ENDS..].iter().any(|frames| !frames.is_empty()), "{id:#x} does not come back");
+    }
+    let valve = left.measurement.column("drive_valve");
+    assert!(valve[BEGINS + 25..ENDS].iter().all(|opening| *opening == 0.0), "no command comes through");
+
+    // The member is both controllers: it hears nothing, and no command of it comes through.
+    let left = run("bus-off", "load-controller", "");
+    assert!(left.heard[BEGINS + 1..ENDS].iter().all(Vec::is_empty));
+    for axis in ["drive", "load"] {
+        let valve = left.measurement.column(&format!("{axis}_valve"));
+        assert!(valve[BEGINS + 25..ENDS].iter().all(|opening| *opening == 0.0), "{axis}");
+        assert!(valve[ENDS + 5] > 0.19, "{axis} is back");
+    }
+    assert_eq!(met(&left, "bus-off", LOAD_VALVE_COMMAND.id), 100);
+    let missed: u64 = left.summary["bus_host"]["peers"]
+        .as_array()
+        .expect("peers")
+        .iter()
+        .map(|peer| count_of_id(&peer["missed_in_bus_off"], "120"))
+        .sum();
+    assert_eq!(missed, 100, "what it missed is counted");
+}

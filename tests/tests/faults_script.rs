@@ -1,0 +1,99 @@
+//! Scripts of faults: the same bytes from the same one, refused when wrong, and a table of which no row is forgotten.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::broken::Plan;
+use system_tests::launch::Pace;
+use system_tests::scene::{SHORT, Scene};
+
+#[test]
+fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() {
+    let script = "seed = 3\n[[fault]]\nname = \"position-sensor-noise\"\nat = \"drive\"\n\
+                  [[fault]]\nname = \"bus-loss\"\nprobability = 0.1\n\
+                  [[fault]]\nname = \"chamber-leak\"\nat = \"load.b\"\nleakage_nl_per_min = 50\n";
+    let run = |faults| Plan { faults, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
+    let [one, other] = [run(script), run(script)];
+    for name in ["measurement.csv", "truth.csv", "bus.log", "faults.csv"] {
+        let path = |left: &Left| left.scene.path("emulator").join(name);
+        assert!(one.scene.same(&path(&one), &path(&other)), "{name} differs");
+    }
+    let later = "[[fault]]\nname = \"valve-dead\"\nat = \"drive\"\nfrom_s = 50\n";
+    let [without, waiting] = [run(""), run(later)];
+    let path = |left: &Left| left.scene.path("emulator/measurement.csv");
+    assert!(without.scene.same(&path(&without), &path(&waiting)), "a fault that waits changes nothing");
+    assert!(!without.scene.path("emulator/faults.csv").exists());
+}
+
+fn listing(arguments: &[&str]) -> String {
+    let output =
+        Command::new(executable(Program::Emulator, Build::Shipped)).arg("faults").args(arguments).output();
+    let output = output.expect("the emulator starts");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// What `faults_table.rs` and `faults_bus_table.rs` assert, by name.
+#[test]
+fn every_row_of_the_table_has_its_effect_asserted() {
+    let json: serde_json::Value = serde_json::from_str(&listing(&["--json"])).expect("JSON");
+    let text = |file: &str| std::fs::read_to_string(workspace().join("tests/tests").join(file)).expect(file);
+    let sources = text("faults_table.rs") + &text("faults_bus_table.rs");
+    let (plain, faults) = (listing(&[]), json["faults"].as_array().expect("faults"));
+    let mut groups = BTreeSet::new();
+    for fault in faults {
+        let name = fault["fault"].as_str().expect("a name");
+        groups.insert(fault["group"].as_str().expect("a group"));
+        // Sensors are asserted by their kinds, for all quantities at once.
+        let asserted = name.split_once("-sensor-").map_or(name, |(_, kind)| kind);
+        assert!(sources.contains(&format!("\"{asserted}\"")), "{name}: no effect is asserted");
+        assert!(plain.contains(name) && fault["about"].as_str().is_some_and(|about| plain.contains(about)));
+        for key in fault["keys"].as_array().expect("keys") {
+            assert!(
+                key["min"].is_number() && key["max"].is_number() && key["unit"].is_string(),
+                "{name}: {key}"
+            );
+        }
+    }
+    assert_eq!(groups, BTreeSet::from(["air", "bus", "mechanics", "sensor", "supply", "valve"]));
+}
+
+#[test]
+fn the_page_has_the_table() {
+    let page = std::fs::read_to_string(workspace().join("emulator/docs/faults.md")).expect("the page");
+    let table = listing(&["--markdown"]);
+    assert!(page.contains(table.trim()), "put the output of 'emulator faults --markdown' into faults.md");
+}
+
+#[test]
+fn a_script_that_is_wrong_is_refused_with_line_key_value_and_range_before_anything_is_touched() {
+    let stuck = "[[fault]]\nname = \"valve-offset\"\nat = \"drive\"\n";
+    for (script, hints) in [
+        (
+            "[[fault]]\nname = \"valve-stick\"\n".to_owned(),
+            vec![":2:", "'valve-stick' is unknown", "emulator faults"],
+        ),
+        (format!("{stuck}offset = 1.5\n"), vec![":4: offset = 1.5", "allowed: -1 to 1"]),
+        (format!("{stuck}offset = nan\n"), vec![":4: offset = nan", "allowed: -1 to 1"]),
+        (format!("{stuck}ofset = 0.1\n"), vec![":4:", "ofset = 0.1", "valve-offset has offset"]),
+        ("[[fault]\n".to_owned(), vec![":1: not TOML"]),
+    ] {
+        let scene = Scene::new(SHORT);
+        let path = scene.write("faults.toml", &script);
+        let emulator = scene.emulator(Pace::Real).with(&format!("--faults {}", path.display())).start();
+        let ended = emulator.wait().expect_code(2);
+        let _ = ended.expect_said(&[path.to_str().expect("UTF-8")]).expect_said(&hints);
+        assert!(!scene.path("emulator").exists(), "no folder before the script is good");
+    }
+    let scene = Scene::new(SHORT);
+    let missing = scene.emulator(Pace::Real).with("--faults /nowhere/faults.toml").start();
+    let _ = missing.wait().expect_code(2).expect_said(&["cannot read /nowhere/faults.toml"]);
+    let path = scene.write("faults.toml", "\n[[fault]]\nname = \"bus-loss\"\n");
+    let emulator =
+        scene.emulator(Pace::Real).bus("can://vcan0").with(&format!("--faults {}", path.display()));
+    let _ = emulator
+        .start()
+        .wait()
+        .expect_code(2)
+        .expect_said(&[":2: bus-loss: only the embedded bus", "unix:///PATH"]);
+}
