@@ -7,8 +7,9 @@
 //! opening_limit = 0.8
 //! ```
 //!
-//! It holds numbers and nothing else: algorithms, libraries and linearisations stand in program files, and a set is for a program that
-//! has its variables. `controller parameters` and a client of XCP write one; `--parameters` loads it, before `--set`.
+//! It holds numbers and nothing else: algorithms, libraries and linearisations stand in program files, and a set is for a
+//! program that has its variables. `controller parameters` and a client of XCP write one; `--parameters` loads it, before
+//! `--set`.
 
 use crate::program::Variable;
 use plant::Axis;

@@ -151,7 +151,7 @@ fn open_xcp(
         let queues = Queues { notes: note_sender.clone(), returned };
         let title = inputs.program_title(axis);
         // In simulated time everything is the same in each run, seeds too.
-        let random = if arguments.pace == Pace::Real { random().map_err(RunError::input)? } else { [0; 16] };
+        let random = if arguments.pace == Pace::Real { random()? } else { [0; 16] };
         ports.push(Port::new(controller, &title, config, random, queues).map_err(RunError::input)?);
         let (variables, values) = (program.variables().to_vec(), program.values().to_vec());
         let described = Described { axis, title: &title, variables: &variables };
@@ -165,9 +165,13 @@ fn open_xcp(
 }
 
 /// Where seeds begin: what the system holds for random.
-fn random() -> io::Result<[u8; 16]> {
+fn random() -> Result<[u8; 16], RunError> {
+    const SOURCE: &str = "/dev/urandom";
     let mut bytes = [0; 16];
-    std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+    let read = std::fs::File::open(SOURCE).and_then(|mut source| source.read_exact(&mut bytes));
+    read.map_err(|error| {
+        RunError::Input(format!("cannot read {SOURCE}: {error}; --xcp needs it for its seeds"))
+    })?;
     Ok(bytes)
 }
 

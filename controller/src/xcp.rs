@@ -8,8 +8,8 @@
 //!                 port ─► queue ─► clerk, in the recorder's thread: files, what a person is told
 //! ```
 //!
-//! Off unless `--xcp` asks for it. [`slave`] is a function over bytes; [`port`] puts it on the bus, after the commands to the valves.
-//! Everything that can be seen or changed stands in tables, of which [`a2l`] makes the file that tools read. For users:
+//! Off unless `--xcp` asks for it. [`slave`] is a function over bytes; [`port`] puts it on the bus, after the commands to the
+//! valves. Everything that can be seen or changed stands in tables, of which [`a2l`] makes the file that tools read. For users:
 //! `controller/docs/xcp.md`.
 
 pub mod a2l;

@@ -42,9 +42,10 @@ class AirbenchBus(can.BusABC):
 
     def _recv_internal(self, timeout):
         until = None if timeout is None else time.monotonic() + timeout
-        while not self.closed:
-            left = None if until is None else max(0.0, until - time.monotonic()) * 1000
-            if not self.poll.poll(left):
+        # A bus that is never silent must not keep whoever has waited long enough.
+        left = timeout
+        while not self.closed and (left is None or left >= 0):
+            if not self.poll.poll(None if left is None else left * 1000):
                 return None, False
             try:
                 packet = self.socket.recv(64)
@@ -61,7 +62,8 @@ class AirbenchBus(can.BusABC):
                 raw_id, length, data = FRAME.unpack(packet)
                 if self.wanted is None or raw_id in self.wanted:
                     return self._message(raw_id, length, data), self.wanted is not None
-        if timeout:
+            left = None if until is None else until - time.monotonic()
+        if self.closed and timeout:
             time.sleep(timeout)
         return None, False
 

@@ -54,7 +54,7 @@ class Rows(DaqOnlinePolicy):
         pass
 
     def on_daq_list(self, daq_list, timestamp0, timestamp1, payload):
-        self.rows.append([timestamp1, *payload])
+        self.rows.append(payload)
 
     def finalize(self):
         pass
@@ -90,7 +90,12 @@ class Client:
 
     def close(self):
         self.master.disconnect()
+        self.leave()
+
+    def leave(self):
+        """Without a word; and waits for the thread that reads, which would take what is for the next one."""
         self.master.close()
+        self.master.transport.listener.join()
 
     def key(self, seed):
         return hmac.new(self.secret, bytes(seed), hashlib.sha256).digest()[:8]
@@ -127,7 +132,8 @@ class Client:
     def set_count(self, name, value):
         return self.write(self.address(name), struct.pack("<I", value))
 
-    def refusal_of(self, ask):
+    @staticmethod
+    def refusal_of(ask):
         try:
             ask()
         except XcpResponseError as refusal:
@@ -173,10 +179,9 @@ def protection(client):
     seen["protected"] = bool(client.master.getStatus().resourceProtectionStatus.calpag)
     client.secret = b"not the secret, that much is sure"
     seen["wrong_key"] = client.refusal_of(lambda: client.master.cond_unlock("calpag"))
-    client.master.close()
+    client.leave()
     client.secret = SECRET
     client.open()
-    seen["in_the_pause"] = client.refusal_of(lambda: client.master.cond_unlock("calpag"))
     client.wait_cycles(1001)
     client.master.cond_unlock("calpag")
     seen["unlocked"] = not client.master.getStatus().resourceProtectionStatus.calpag
@@ -288,7 +293,7 @@ def whole(client):
     seen["parameter_set"] = parameter_set(client)
     seen["trace"] = trace(client, TRACE)
     client.close()
-    seen["daq"] = daq(client, ["position_m", "main_chain"], 10_000)
+    seen["daq"] = daq(client, ["cycle", "position_m", "main_chain"], 10_000)
     client.close()
     return seen
 
@@ -297,7 +302,7 @@ def measure(client):
     """What needs no key, for a controller among others."""
     seen = {"identity": identity(client)}
     client.close()
-    seen["daq"] = daq(client, ["position_m", "main_chain"], 1000)
+    seen["daq"] = daq(client, ["cycle", "position_m", "main_chain"], 1000)
     client.close()
     return seen
 

@@ -6,6 +6,7 @@
 //!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
+//!   xcp ───── a client of the controllers' XCP, packet by packet, and the foreign one in Python
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   own ───── algorithms in C, built as a user builds them
@@ -39,3 +40,4 @@ pub mod skip;
 pub mod study;
 pub mod tune;
 pub mod turn;
+pub mod xcp;

@@ -1,7 +1,7 @@
 //! The A2L file of an axis, made of the tables that define its parameters, controls and signals: nothing is written in it twice.
 //!
-//! What is the same for every program stands in `frame.a2l`: the protocol's numbers and their A2ML. Names are those of files with the
-//! axis in front, `drive.algorithm.gain_per_s`; what A2L allows in no name becomes `_`.
+//! What is the same for every program stands in `frame.a2l`: the protocol's numbers and their A2ML. Names are those of files
+//! with the axis in front, `drive.algorithm.gain_per_s`; what A2L allows in no name becomes `_`.
 //!
 //! Source: ASAM MCD-2 MC 1.7.1.
 
@@ -373,3 +373,6 @@ struct Place {
     format: Format,
     conversion: String,
 }
+
+#[cfg(test)]
+mod tests;

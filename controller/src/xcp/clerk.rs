@@ -1,7 +1,7 @@
 //! What a slave cannot do in the 1 ms path: files of parameter sets, and words for a person. It runs in the recorder's thread.
 //!
-//! A set is stored to `controller-drive-parameters.toml` or `controller-load-parameters.toml` of the run's folder, and loaded from
-//! there; no other file is read or written on a client's behalf.
+//! A set is stored to `controller-drive-parameters.toml` or `controller-load-parameters.toml` of the run's folder, and loaded
+//! from there; no other file is read or written on a client's behalf.
 
 use crate::parameter_set;
 use crate::program::Variable;
@@ -56,7 +56,7 @@ pub enum Note {
 #[derive(Debug)]
 pub struct Returned {
     /// The copy, whose room serves again.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// Whether it is in the file.
     pub stored: bool,
 }
@@ -68,7 +68,7 @@ pub struct Book {
     /// Its variables.
     pub variables: Vec<Variable>,
     /// Their values at the start.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// Back to its port.
     pub returned: Sender<Returned>,
 }

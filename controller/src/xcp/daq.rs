@@ -6,9 +6,10 @@
 //!   packet = number of the ODT | time stamp, 2 bytes, in the first ODT of a list if asked for | up to 7 bytes of entries
 //! ```
 //!
-//! All entries of a list are taken in the same cycle, after the answer to the sensors. Their packets leave at once, as far as so many
-//! may leave in a cycle; the others follow in the next ones. So the reserve of the bus is kept: lists that would need more than that in
-//! the long run are refused at their start ([`Refusal::DaqConfig`]). The time stamp is the rig's cycle, low 16 bits.
+//! All entries of a list are taken in the same cycle, after the answer to the sensors. Their packets leave at once, as far as
+//! so many may leave in a cycle; the others follow in the next ones. So the reserve of the bus is kept: lists that would need
+//! more than that in the long run are refused at their start ([`Refusal::DaqConfig`]). The time stamp is the rig's cycle, low
+//! 16 bits.
 //!
 //! Everything has its place from the start: nothing here allocates.
 
@@ -238,8 +239,8 @@ impl Daq {
     /// Writes the next entry.
     ///
     /// # Errors
-    /// [`Refusal::Sequence`] with none pointed at; [`Refusal::OutOfRange`] for a size that no packet holds, alone or with the others
-    /// of its ODT; [`Refusal::AccessDenied`] for memory that is not there; [`Refusal::DaqActive`] while a list runs.
+    /// [`Refusal::Sequence`] with none pointed at; [`Refusal::OutOfRange`] for a size that no packet holds, alone or with the
+    /// others of its ODT; [`Refusal::AccessDenied`] for memory that is not there; [`Refusal::DaqActive`] while a list runs.
     pub fn write(&mut self, image: &Image, entry: Entry) -> Result<(), Refusal> {
         self.idle()?;
         let (odt, place) = self.pointer.ok_or(Refusal::Sequence)?;

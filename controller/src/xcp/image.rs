@@ -10,9 +10,9 @@
 //!   0x51…, 52…, 53…, 54…_0000  its channels                             double each    read
 //! ```
 //!
-//! A transfer stays within a region. A value is written whole or not at all: what comes of it in a packet that ends within it waits
-//! for the packet that goes on there, and any other write forgets it. All values of a block are checked before the first is taken.
-//! A change acts from the next cycle on. Reading and writing allocate nothing.
+//! A transfer stays within a region. A value is written whole or not at all: what comes of it in a packet that ends within it
+//! waits for the packet that goes on there, and any other write forgets it. All values of a block are checked before the first
+//! is taken. A change acts from the next cycle on. Reading and writing allocate nothing.
 
 use super::packet::Refusal;
 use super::signals::{COUNT, Format, SIGNALS};

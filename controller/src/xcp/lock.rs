@@ -4,9 +4,9 @@
 //!   key = first 8 bytes of HMAC-SHA256(secret, seed)
 //! ```
 //!
-//! The secret stands in the configuration of the controller and in that of the client; on the bus there are only seed and key. Seeds
-//! are made of the same function over a random start and a count, so that none comes twice. A wrong key ends the session, and no seed
-//! is given out for [`PAUSE`] cycles. Without a secret nothing is ever unlocked.
+//! The secret stands in the configuration of the controller and in that of the client; on the bus there are only seed and key.
+//! Seeds are made of the same function over a random start and a count, so that none comes twice. A wrong key ends the session,
+//! and no seed is given out for [`PAUSE`] cycles. Without a secret nothing is ever unlocked.
 //!
 //! Source: RFC 2104 (HMAC), FIPS 180-4 (SHA-256), ASAM MCD-1 XCP 1.1, part 2, GET_SEED and UNLOCK.
 
@@ -138,6 +138,13 @@ impl Lock {
     }
 }
 
+/// The key to a seed.
+#[must_use]
+pub fn key(secret: &[u8], seed: [u8; BYTES]) -> [u8; BYTES] {
+    let whole = mac(secret).chain_update(seed).finalize().into_bytes();
+    std::array::from_fn(|byte| whole[byte])
+}
+
 fn mac(secret: &[u8]) -> Hmac<Sha256> {
     Hmac::new_from_slice(secret).unwrap_or_else(|_| unreachable!("HMAC takes a secret of any length"))
 }
@@ -163,9 +170,7 @@ mod tests {
     }
 
     fn key(seed: [u8; BYTES]) -> [u8; BYTES] {
-        let mut key = [0; BYTES];
-        key.copy_from_slice(&mac(SECRET).chain_update(seed).finalize().into_bytes()[..BYTES]);
-        key
+        super::key(SECRET, seed)
     }
 
     fn turn(lock: &mut Lock, key: [u8; BYTES]) -> Turned {

@@ -1,8 +1,9 @@
-//! The place of a slave on the bus: commands wait here for the end of the controller's work in a cycle, answers and DAQ packets leave.
+//! The place of a slave on the bus: commands wait here for the end of the controller's work in a cycle, answers and DAQ packets
+//! leave.
 //!
 //! In real time a command is answered in the wake-up that it causes, in lockstep in its cycle. At most [`COMMANDS`] are
-//! answered at a time and [`INBOX`] wait; what a flood brings beyond that is dropped and counted. Nothing here allocates, locks, prints
-//! or blocks: what needs a file goes to the [`super::clerk`] by a queue.
+//! answered at a time and [`INBOX`] wait; what a flood brings beyond that is dropped and counted. Nothing here allocates,
+//! locks, prints or blocks: what needs a file goes to the [`super::clerk`] by a queue.
 
 use super::a2l::{self, A2lError, Described};
 use super::clerk::{Note, Returned};

@@ -1,7 +1,7 @@
 //! What can be measured in a controller: one table, of which A2L, DAQ lists and the trigger buffer are made.
 //!
-//! A signal is a number of the cycle that was just answered, in SI. On the wire of XCP it is a float of four bytes or a count, so that
-//! it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
+//! A signal is a number of the cycle that was just answered, in SI. On the wire of XCP it is a float of four bytes or a count,
+//! so that it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
 
 use crate::axis::{AxisController, AxisRecord};
 use crate::parameters::Parameter;

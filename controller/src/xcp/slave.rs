@@ -6,8 +6,8 @@
 //!   next_daq() ─► packet or none                          what DAQ lists have to send
 //! ```
 //!
-//! It knows no bus, no clock, no controller: what it changes it tells its [`Desk`]. Whatever the bytes are, it answers, refuses or
-//! keeps silent, and a session that is not open answers CONNECT alone. Nothing here allocates, locks, prints or blocks.
+//! It knows no bus, no clock, no controller: what it changes it tells its [`Desk`]. Whatever the bytes are, it answers, refuses
+//! or keeps silent, and a session that is not open answers CONNECT alone. Nothing here allocates, locks, prints or blocks.
 //!
 //! Source: ASAM MCD-1 XCP 1.1, part 2.
 
@@ -220,6 +220,8 @@ impl Slave {
         self.connected = false;
         self.lock.shut();
         self.daq.stop();
+        // What waits is for nobody.
+        while self.daq.next().is_some() {}
         self.address = None;
         self.block.whole = 0;
         self.image.forget();

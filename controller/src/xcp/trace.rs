@@ -1,4 +1,5 @@
-//! The trigger buffer of the paper's controllers: up to four signals, sampled around the moment in which a fifth crosses a threshold.
+//! The trigger buffer of the paper's controllers: up to four signals, sampled around the moment in which a fifth crosses a
+//! threshold.
 //!
 //! ```text
 //!   idle ── arm ──► filling ── pre-trigger samples are there ──► armed ── source crosses the threshold ──► triggered
@@ -6,9 +7,10 @@
 //!    └───────────── arm = 0, or the rig began anew ──────────── ready ◄────────── length samples are there ───┘
 //! ```
 //!
-//! A sample is taken every so many cycles; in each of them the source is compared with what it was in the one before. The sample in
-//! which it has crossed is number `pre_trigger_samples`, counted from 0. Cycles that never came leave no sample: each says its own
-//! cycle. What is set counts from the next arming on. The buffer is made at the start; taking a sample allocates nothing.
+//! A sample is taken every so many cycles; in each of them the source is compared with what it was in the one before. The
+//! sample in which it has crossed is number `pre_trigger_samples`, counted from 0. Cycles that never came leave no sample: each
+//! says its own cycle. What is set counts from the next arming on. The buffer is made at the start; taking a sample allocates
+//! nothing.
 
 use super::signals::{COUNT, Format, SIGNALS};
 use crate::parameters::Parameter;
@@ -40,8 +42,8 @@ pub const LOAD_SET: usize = ARM + 1;
 /// Last place of the table of signals.
 const LAST: f64 = (COUNT - 1) as f64;
 
-/// What can be written besides the parameters of the program. Whole numbers lie in memory as counts of four bytes, others as floats
-/// of eight.
+/// What can be written besides the parameters of the program. Whole numbers lie in memory as counts of four bytes, others as
+/// floats of eight.
 pub static CONTROLS: [Parameter; LOAD_SET + 1] = [
     signal("trace.source", 17.0, "signal that is compared with the threshold, by its place"),
     Parameter::new(("trace.threshold", ""), [-1e9, 1e9], 0.0, "threshold, in the unit of the source"),

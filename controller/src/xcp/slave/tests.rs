@@ -5,9 +5,7 @@ use super::super::image::{CONTROL, PARAMETERS, SIGNAL};
 use super::super::lock;
 use super::super::packet::{ERROR, RESPONSE};
 use super::*;
-use hmac::{Hmac, KeyInit, Mac};
 use proptest::prelude::*;
-use sha2::Sha256;
 
 const SECRET: &[u8] = b"sixteen bytes ok";
 
@@ -83,8 +81,7 @@ impl Talk {
 }
 
 fn key(seed: [u8; lock::BYTES]) -> [u8; lock::BYTES] {
-    let mac = Hmac::<Sha256>::new_from_slice(SECRET).unwrap().chain_update(seed).finalize();
-    mac.into_bytes()[..8].try_into().unwrap()
+    lock::key(SECRET, seed)
 }
 
 #[test]
