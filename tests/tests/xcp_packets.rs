@@ -13,14 +13,12 @@ const START: u32 = 852;
 /// Address of `algorithm.gain_per_s` in the scene's program: after five numbers of the pre-controller and one of its own task.
 const GAIN: u32 = 0x1000_0000 + 8 * 6;
 
+/// What is to be said in all, after what was answered so far.
+type Script = dyn Fn(&[[u8; 8]]) -> Vec<Vec<u8>>;
+
 /// Runs the short experiment in lockstep with a client that says `script`, a command each so many cycles; gives what was
 /// answered.
-fn run(
-    scene: &Scene,
-    options: &str,
-    axes: &[&str],
-    script: &dyn Fn(&[[u8; 8]]) -> Vec<Vec<u8>>,
-) -> Vec<[u8; 8]> {
+fn run(scene: &Scene, options: &str, axes: &[&str], script: &Script) -> Vec<[u8; 8]> {
     let members = axes.len() + 1;
     let emulator = scene.emulator(Pace::Lockstep).with(&format!("--members {members}")).start();
     let launch = |axis: &&str| scene.axis_controller(Pace::Lockstep, axis).with(options).start();

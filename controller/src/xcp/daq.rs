@@ -435,7 +435,7 @@ impl Daq {
     }
 
     /// The next packet to leave.
-    pub fn next(&mut self) -> Option<Packet> {
+    pub fn next_packet(&mut self) -> Option<Packet> {
         if self.queued == 0 {
             return None;
         }

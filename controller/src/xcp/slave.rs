@@ -170,7 +170,7 @@ impl Slave {
 
     /// The next DAQ packet to be sent.
     pub fn next_daq(&mut self) -> Option<Packet> {
-        let packet = self.daq.next()?;
+        let packet = self.daq.next_packet()?;
         self.counters.daq_packets += 1;
         Some(packet)
     }
@@ -221,7 +221,7 @@ impl Slave {
         self.lock.shut();
         self.daq.stop();
         // What waits is for nobody.
-        while self.daq.next().is_some() {}
+        while self.daq.next_packet().is_some() {}
         self.address = None;
         self.block.whole = 0;
         self.image.forget();

@@ -38,7 +38,7 @@ fn leaving(daq: &mut Daq, image: &mut Image, cycles: u64) -> Vec<Vec<u8>> {
     let cycle = |cycle: u64| {
         image.refresh(cycle, &[cycle as f64; COUNT], &[25.0, 1.0, 15.0]);
         daq.cycle(cycle, image);
-        (0..daq.per_cycle()).filter_map(|_| daq.next()).map(|packet| packet[0]).collect()
+        (0..daq.per_cycle()).filter_map(|_| daq.next_packet()).map(|packet| packet[0]).collect()
     };
     (0..cycles).map(cycle).collect()
 }
@@ -103,8 +103,8 @@ fn a_packet_holds_number_stamp_and_values_of_one_cycle() {
     image.refresh(0x12345, &[2.5; COUNT], &[25.0, 1.0, 15.0]);
     daq.cycle(0x12345, &image);
     let [a, b, c, d] = 2.5_f32.to_le_bytes();
-    assert_eq!(daq.next(), Some([0, 0x45, 0x23, a, b, c, d, 0]));
-    assert_eq!(daq.next(), None);
+    assert_eq!(daq.next_packet(), Some([0, 0x45, 0x23, a, b, c, d, 0]));
+    assert_eq!(daq.next_packet(), None);
 }
 
 #[test]
