@@ -220,6 +220,9 @@ def parameter_set(client):
     assert sorted(places) == list(range(start, start + length, 8)), places
     client.set(gain, 44.0)
     client.master.getCommModeInfo()
+    one = struct.pack("<d", 45.0)
+    seen["push_of_one"] = client.refusal_of(lambda: client.master.push(client.address(gain), 0, one))
+    seen["gain_after_push"] = client.number(gain)
     block = before[:240]
     client.master.setMta(start)
     client.master.push(start, 0, block)
@@ -298,19 +301,24 @@ def whole(client):
     return seen
 
 
-def measure(client):
+def measure(client, names=("cycle", "position_m", "main_chain")):
     """What needs no key, for a controller among others."""
     seen = {"identity": identity(client)}
     client.close()
-    seen["daq"] = daq(client, ["cycle", "position_m", "main_chain"], 1000)
+    seen["daq"] = daq(client, names, 1000)
     client.close()
     return seen
+
+
+def watch(client):
+    """The same with one packet a cycle: one that is lost on the way to a slow client takes no other along."""
+    return measure(client, ("cycle", "main_chain"))
 
 
 def main():
     scenario, bus, folder, axis, file, *member = sys.argv[1:]
     client = Client(bus, folder, axis, member[0] if member else None)
-    seen = {"whole": whole, "measure": measure}[scenario](client)
+    seen = {"whole": whole, "measure": measure, "watch": watch}[scenario](client)
     client.bus.shutdown()
     Path(file).write_text(json.dumps(seen), encoding="utf-8")
 

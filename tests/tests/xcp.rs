@@ -22,24 +22,26 @@ fn numbers(value: &Value) -> Vec<f64> {
     list.iter().map(|number| number.as_f64().expect("a number")).collect()
 }
 
-/// Rows of a DAQ list by their cycle: position and state of the main chain.
-fn daq_rows(seen: &Value) -> Vec<(usize, f64, f64)> {
+/// Rows of a DAQ list by their cycle: position, if it was asked for, and state of the main chain.
+fn daq_rows(seen: &Value) -> Vec<(usize, Option<f64>, f64)> {
     let headers: Vec<_> = seen["headers"].as_array().expect("headers").iter().map(Value::as_str).collect();
-    let place =
-        |name: &str| headers.iter().position(|header| *header == Some(name)).expect("it was asked for");
-    let [cycle, position, state] = ["cycle", "position_m", "main_chain"].map(place);
+    let place = |name: &str| headers.iter().position(|header| *header == Some(name));
+    let [cycle, state] = ["cycle", "main_chain"].map(|name| place(name).expect("it was asked for"));
+    let position = place("position_m");
     let rows = seen["rows"].as_array().expect("rows").iter().map(numbers);
-    rows.map(|row| (row[cycle] as usize, row[position], row[state])).collect()
+    rows.map(|row| (row[cycle] as usize, position.map(|place| row[place]), row[state])).collect()
 }
 
 /// The rows of DAQ are those of the controller's own table, rounded to floats of four bytes.
 #[track_caller]
-fn expect_rows_of(table: &AxisTable, rows: &[(usize, f64, f64)]) {
+fn expect_rows_of(table: &AxisTable, rows: &[(usize, Option<f64>, f64)]) {
     let positions = table.numbers("position_m");
     let at: BTreeMap<usize, usize> = table.cycles().into_iter().zip(0..).collect();
     for (cycle, position, state) in rows {
         let row = at[cycle];
-        assert_eq!(*position as f32, positions[row] as f32, "position in cycle {cycle}");
+        if let Some(position) = position {
+            assert_eq!(*position as f32, positions[row] as f32, "position in cycle {cycle}");
+        }
         assert_eq!(*state == 5.0, table.texts("main_chain")[row] == "experiment", "state in cycle {cycle}");
     }
 }
@@ -99,6 +101,9 @@ fn pyxcp_reads_writes_is_refused_measures_without_a_gap_and_triggers() {
         "{stored}"
     );
     assert_eq!((&set["gain_loaded"], &set["block_restores"]), (&17.125.into(), &true.into()));
+
+    // pyXCP 0.29 begins a block of one double and goes on with another: nothing of it may be taken, and the client must learn it.
+    assert_eq!((&set["push_of_one"], &set["gain_after_push"]), (&"ERR_SEQUENCE".into(), &44.0.into()));
 
     expect_trace(&scene, &drive, &seen["trace"]);
     let rows = daq_rows(&seen["daq"]);
@@ -166,12 +171,13 @@ fn two_processes_are_measured_at_once_each_under_identifiers_of_its_own() {
         );
         let rows = daq_rows(&seen["daq"]);
         assert!(rows.len() >= 1000 && rows.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1), "{axis}");
-        let states: Vec<_> = rows.iter().map(|(_, position, _)| *position).collect();
+        let positions: Vec<_> = rows.iter().filter_map(|(_, position, _)| *position).collect();
         // The drive moves; the load is parked at the end of its stroke, offset of its sensor included.
         assert!(
-            states.iter().all(|position| (*position > 0.45) == (axis == "load")),
+            positions.len() == rows.len()
+                && positions.iter().all(|position| (*position > 0.45) == (axis == "load")),
             "{axis}: {:?}",
-            &states[..3]
+            &positions[..3]
         );
     }
     end(emulator, controllers);
@@ -187,7 +193,7 @@ fn in_real_time_every_cycle_that_was_answered_was_measured() {
     let controller = scene.controller(Pace::Real).with(&options).start();
     wait_for_a2l(&scene, "controller", "drive");
     scene.wait_for_rows("emulator", 100);
-    let seen = Foreign::start(&scene, "measure", "controller", "drive", false).wait();
+    let seen = Foreign::start(&scene, "watch", "controller", "drive", false).wait();
     end(emulator, vec![controller]);
     let drive = AxisTable::read(&scene.path("controller/controller-drive.csv"));
     let rows = daq_rows(&seen["daq"]);
