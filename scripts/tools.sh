@@ -6,6 +6,8 @@ tools=${tools:?set by scripts/test}
 
 # PyPI packages by version: clients that the tests hold the product against.
 python_packages=(cantools==45.1.0 crccheck==1.3.1 hdrhistogram==0.10.3 python-can==4.6.1)
+# Clients of XCP.
+python_packages+=(pyxcp==0.29.20 pya2ldb==1.0.355)
 gungraun_version=0.20.0
 
 install_tools() {

@@ -25,11 +25,35 @@ pub enum Command {
     Rehearse(Box<RehearseArguments>),
     /// List the algorithms with their parameters, and the parameters of the tasks around them.
     Algorithms,
+    /// Print the parameters of both axes as a parameter set, for --parameters.
+    Parameters(Box<FileArguments>),
+    /// Print the A2L file of an axis, for tools that speak XCP.
+    A2l(Box<A2lArguments>),
     /// Try an algorithm from a shared library and print what it offers.
     CheckLibrary(Library),
     /// Try it in this very process, which it may end; `check-library` and program files start this.
     #[command(hide = true)]
     ProbeLibrary(Library),
+}
+
+/// What an A2L file is made for.
+#[derive(Args, Debug)]
+pub struct A2lArguments {
+    /// What is controlled.
+    #[command(flatten)]
+    pub files: FileArguments,
+    /// The axis.
+    #[arg(long, value_enum)]
+    pub axis: OneAxis,
+}
+
+/// One of the axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OneAxis {
+    /// The drive.
+    Drive,
+    /// The load.
+    Load,
 }
 
 /// An algorithm as a file.
@@ -92,6 +116,9 @@ pub struct FileArguments {
     /// Program file of the load axis, in place of the experiment's.
     #[arg(long)]
     pub load_program: Option<PathBuf>,
+    /// Parameter set in place of the programs' numbers, as 'controller parameters' or XCP writes it; --set goes before it.
+    #[arg(long, value_name = "FILE")]
+    pub parameters: Option<PathBuf>,
     /// A variable in place of the program's, such as drive.algorithm.gain_per_s=30; may be repeated.
     #[arg(long, value_name = "AXIS.TASK.NAME=VALUE")]
     pub set: Vec<String>,
@@ -121,6 +148,10 @@ pub struct RunArguments {
     /// Look for changes of the program files while running, and take over their numbers.
     #[arg(long)]
     pub watch: bool,
+    /// Let XCP on CAN measure the controllers (drive 0x1E0 and 0x1E1, load 0x1E2 and 0x1E3), and change their parameters with the
+    /// key of FILE; without FILE nothing can be changed. See controller/docs/xcp.md.
+    #[arg(long, value_name = "FILE", num_args = 0..=1)]
+    pub xcp: Option<Option<PathBuf>>,
     /// Write the timing of every cycle, not of the worst ones alone: controller-timing.csv, some 200 bytes a cycle; with --pace
     /// real.
     #[arg(long)]

@@ -19,6 +19,7 @@
 //! | [`experiment`], [`setup`] | experiment files, and controllers made of them |
 //! | [`rehearsal`], [`rehearse`] | the plant inside the controller, and its command |
 //! | [`figures`] | dynamic and static error |
+//! | [`xcp`], [`parameter_set`] | measuring and tuning by XCP on CAN, parameter sets as files |
 //! | [`run`], [`recording`], [`report`], [`watch`], [`listing`], [`cli`] | around it |
 
 pub mod algorithm;
@@ -33,6 +34,7 @@ pub mod guard;
 pub mod linearisation;
 pub mod listing;
 pub mod pace;
+pub mod parameter_set;
 pub mod parameters;
 pub mod plugin;
 pub mod post_controller;
@@ -50,3 +52,4 @@ pub mod setup;
 pub mod station;
 pub mod timing;
 pub mod watch;
+pub mod xcp;

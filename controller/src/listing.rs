@@ -2,9 +2,15 @@
 
 use crate::algorithm::Quantity;
 use crate::algorithms::SHIPPED;
+use crate::axis::AxisController;
 use crate::chains::{force, matching, settled};
+use crate::cli::{A2lArguments, FileArguments, OneAxis};
 use crate::parameters::Parameter;
-use crate::{post_controller, pre_controller};
+use crate::run::RunError;
+use crate::setup::{Inputs, Mode};
+use crate::xcp::a2l::{self, Described};
+use crate::{parameter_set, post_controller, pre_controller};
+use plant::Axis;
 use protocol::exit::Exit;
 use std::io::{self, Write};
 
@@ -14,6 +20,45 @@ pub fn print() -> Exit {
     // A closed pipe is the reader's wish.
     let _ = write(&mut io::stdout().lock());
     Exit::Good
+}
+
+/// Prints the parameters of the axes that the experiment speaks of, as a parameter set.
+///
+/// # Errors
+/// [`RunError::Input`] for files that cannot be used.
+pub fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> {
+    let inputs = Inputs::read(files)?;
+    let mut texts = Vec::new();
+    for axis in Axis::ALL.into_iter().filter(|axis| inputs.programs[axis.index()].is_some()) {
+        let controller = controller(&inputs, axis)?;
+        let program = controller.program();
+        texts.push(parameter_set::text(axis, program.variables(), program.values()));
+    }
+    // A closed pipe is the reader's wish.
+    let _ = write!(io::stdout(), "{}", texts.join("\n"));
+    Ok(Exit::Good)
+}
+
+/// Prints the A2L file of an axis.
+///
+/// # Errors
+/// [`RunError::Input`] for files that cannot be used.
+pub fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
+    let inputs = Inputs::read(&arguments.files)?;
+    let axis = match arguments.axis {
+        OneAxis::Drive => Axis::Drive,
+        OneAxis::Load => Axis::Load,
+    };
+    let controller = controller(&inputs, axis)?;
+    let described =
+        Described { axis, title: &inputs.program_title(axis), variables: controller.program().variables() };
+    let text = a2l::text(&described).map_err(RunError::input)?;
+    let _ = writeln!(io::stdout(), "{text}");
+    Ok(Exit::Good)
+}
+
+fn controller(inputs: &Inputs, axis: Axis) -> Result<AxisController, RunError> {
+    inputs.controller(axis, Mode { partner_needed: false, real_time: false, forever: false })
 }
 
 fn write(out: &mut impl Write) -> io::Result<()> {

@@ -15,6 +15,8 @@ fn main() -> ExitCode {
         Command::Run(arguments) => controller::run::run(&arguments),
         Command::Rehearse(arguments) => controller::rehearse::run(&arguments),
         Command::Algorithms => Ok(controller::listing::print()),
+        Command::Parameters(files) => controller::listing::print_parameters(&files),
+        Command::A2l(arguments) => controller::listing::print_a2l(&arguments),
         Command::CheckLibrary(library) => command::check_library(&library.file).map_err(RunError::from),
         Command::ProbeLibrary(library) => Ok(command::probe_library(&library.file)),
     };

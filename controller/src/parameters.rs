@@ -62,12 +62,18 @@ impl Parameter {
         self
     }
 
+    /// Whether `value` lies in the range; NaN lies in none. For the 1 ms path, which makes no texts.
+    #[must_use]
+    pub fn allows(&self, value: f64) -> bool {
+        (self.least..=self.most).contains(&value) && !(self.whole && value.fract() != 0.0)
+    }
+
     /// `value` if it lies in the range; NaN lies in none.
     ///
     /// # Errors
     /// [`OutOfRange`] with name, value and range.
     pub fn check(&self, value: f64) -> Result<f64, OutOfRange> {
-        if (self.least..=self.most).contains(&value) && !(self.whole && value.fract() != 0.0) {
+        if self.allows(value) {
             return Ok(value);
         }
         let Self { name, unit, least, most, .. } = self;

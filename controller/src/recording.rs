@@ -7,6 +7,7 @@ use crate::guard::Stuck;
 use crate::station::News;
 use crate::timing::ledger::{Ledger, TimingFigures};
 use crate::watch::Watcher;
+use crate::xcp::clerk::Clerk;
 use crossbeam_channel::{Receiver, TryRecvError};
 use plant::Axis;
 use protocol::frames::MainChainState;
@@ -99,6 +100,8 @@ pub struct Writer {
     pub news: Receiver<News>,
     /// Who looks at the program files, if anybody does.
     pub watcher: Option<Watcher>,
+    /// Who does what XCP asks for, if it may.
+    pub clerk: Option<Clerk>,
     /// Who records what the stopwatch stamped, where time is real.
     pub ledger: Option<Ledger>,
 }
@@ -117,7 +120,7 @@ impl Writer {
     /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
     /// which does not return, when an algorithm never does, with everything written.
     pub fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
-        let Self { mut tables, records, news, mut watcher, mut ledger } = self;
+        let Self { mut tables, records, news, mut watcher, mut clerk, mut ledger } = self;
         let mut told = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
@@ -135,6 +138,9 @@ impl Writer {
             };
             if let Some(watcher) = &mut watcher {
                 watcher.look();
+            }
+            if let Some(clerk) = &mut clerk {
+                clerk.look();
             }
             for item in news.try_iter() {
                 eprintln!("controller: {}", sentence(item));

@@ -6,6 +6,7 @@ use crate::rig_view::RigView;
 use crate::setup::Inputs;
 use crate::station::{IgnoredFrames, News, Station};
 use crate::timing::ledger::TimingFigures;
+use crate::xcp::port::PortCounters;
 use plant::Axis;
 use protocol::bus::BusCounters;
 use protocol::frames::MainChainState;
@@ -98,6 +99,9 @@ pub struct AxisReport {
     pub program_file: Option<String>,
     /// Values of all variables at the end.
     pub variables: BTreeMap<String, f64>,
+    /// What XCP did; absent where it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub xcp: Option<PortCounters>,
 }
 
 impl AxisReport {
@@ -129,6 +133,7 @@ impl AxisReport {
                 .map(|variable| variable.name.clone())
                 .zip(values.copied())
                 .collect(),
+            xcp: None,
         }
     }
 
@@ -136,7 +141,8 @@ impl AxisReport {
     #[must_use]
     pub fn of_station(station: &Station, inputs: &Inputs) -> BTreeMap<&'static str, Self> {
         let of = |controller: &AxisController| {
-            (controller.axis().name(), Self::new(controller, station.view(), inputs))
+            let report = Self::new(controller, station.view(), inputs);
+            (controller.axis().name(), Self { xcp: station.xcp(controller.axis()), ..report })
         };
         station.controllers().map(of).collect()
     }

@@ -1,5 +1,6 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
+use crate::axis::AxisController;
 use crate::cli::{Axes, Pace, RunArguments};
 use crate::farewell;
 use crate::guard::STUCK;
@@ -8,12 +9,16 @@ use crate::plugin::PluginError;
 use crate::recording::{Tables, Writer, Written};
 use crate::report::{self, AxisReport, Report};
 use crate::setup::{Inputs, Mode};
-use crate::station::{IgnoredFrames, Outlets, Station};
+use crate::station::{Change, IgnoredFrames, Outlets, Station};
 use crate::timing::Stopwatch;
 use crate::timing::ledger::TimingFigures;
 use crate::timing::setup::{self, RunStart};
 use crate::watch;
-use crossbeam_channel::bounded;
+use crate::xcp::a2l::{self, Described};
+use crate::xcp::clerk::{Book, Clerk};
+use crate::xcp::config::XcpConfig;
+use crate::xcp::port::{Port, Queues};
+use crossbeam_channel::{Sender, bounded};
 use plant::Axis;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
@@ -21,7 +26,7 @@ use protocol::flight_dump;
 use protocol::run_folder::{SCHEMA_VERSION, clear, controller_results, write_json};
 use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, Request};
 use std::collections::BTreeMap;
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 use std::time::Duration;
 
@@ -29,6 +34,9 @@ use std::time::Duration;
 const ROW_QUEUE: usize = 32 * 1024;
 const NEWS_QUEUE: usize = 1024;
 const CHANGE_QUEUE: usize = 1024;
+const NOTE_QUEUE: usize = 1024;
+/// One copy of an axis's parameters is under way at most.
+const RETURNED_QUEUE: usize = 2;
 
 /// What keeps the controllers from running.
 #[derive(Debug, thiserror::Error)]
@@ -79,6 +87,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         return Err(RunError::Input("--alone needs --axis drive or --axis load".into()));
     }
     let inputs = Inputs::read(&arguments.files)?;
+    let xcp = XcpConfig::asked(arguments.xcp.as_ref()).map_err(RunError::input)?;
     let real_time = arguments.pace == Pace::Real;
     let mode = Mode { partner_needed: !arguments.alone, real_time, forever: arguments.files.repeat };
     let axes = arguments.axis.list();
@@ -99,7 +108,11 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (news_sender, news) = bounded(NEWS_QUEUE);
     let (change_sender, changes) = bounded(CHANGE_QUEUE);
     let outlets = Outlets { records: record_sender, news: news_sender, changes, waits: !real_time };
-    let station = Station::new(controllers, outlets);
+    let (ports, clerk) = match &xcp {
+        Some(config) => open_xcp(arguments, &inputs, config, &controllers, &change_sender)?,
+        None => (Vec::new(), None),
+    };
+    let station = Station::new(controllers, outlets).with_xcp(ports);
     let watcher = arguments.watch.then(|| watch::Watcher::new(&inputs, axes, change_sender));
     let started = RunStart::now();
     let timing = real_time.then(|| setup::begin(arguments, &started, signals.freeze)).transpose()?;
@@ -108,7 +121,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let asking = &signals.interrupt;
         let writer = scope.spawn(move || {
-            let writer = Writer { tables, records, news, watcher, ledger };
+            let writer = Writer { tables, records, news, watcher, clerk, ledger };
             writer.run(|| asking.ask(), || end_stuck(out, axes))
         });
         let bus = bus.as_mut();
@@ -119,6 +132,47 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         let written = join(writer);
         save(arguments, &inputs, Ended { started, finished: finished?, written })
     })
+}
+
+/// A port for each controller, and the clerk behind them; their A2L files go into the run's folder.
+fn open_xcp(
+    arguments: &RunArguments,
+    inputs: &Inputs,
+    config: &XcpConfig,
+    controllers: &[AxisController],
+    changes: &Sender<Change>,
+) -> Result<(Vec<Port>, Option<Clerk>), RunError> {
+    let out = &arguments.files.out;
+    let (note_sender, notes) = bounded(NOTE_QUEUE);
+    let (mut ports, mut books) = (Vec::new(), Vec::new());
+    for controller in controllers {
+        let (axis, program) = (controller.axis(), controller.program());
+        let (returned_sender, returned) = bounded(RETURNED_QUEUE);
+        let queues = Queues { notes: note_sender.clone(), returned };
+        let title = inputs.program_title(axis);
+        // In simulated time everything is the same in each run, seeds too.
+        let random = if arguments.pace == Pace::Real { random()? } else { [0; 16] };
+        ports.push(Port::new(controller, &title, config, random, queues).map_err(RunError::input)?);
+        let (variables, values) = (program.variables().to_vec(), program.values().to_vec());
+        let described = Described { axis, title: &title, variables: &variables };
+        let path = out.join(a2l::file_name(axis));
+        let text = a2l::text(&described).map_err(RunError::input)?;
+        std::fs::write(&path, text)
+            .map_err(|error| RunError::Output(format!("{}: {error}", path.display())))?;
+        books.push(Book { axis, variables, values, returned: returned_sender });
+    }
+    Ok((ports, Some(Clerk::new(notes, books, changes.clone(), out))))
+}
+
+/// Where seeds begin: what the system holds for random.
+fn random() -> Result<[u8; 16], RunError> {
+    const SOURCE: &str = "/dev/urandom";
+    let mut bytes = [0; 16];
+    let read = std::fs::File::open(SOURCE).and_then(|mut source| source.read_exact(&mut bytes));
+    read.map_err(|error| {
+        RunError::Input(format!("cannot read {SOURCE}: {error}; --xcp needs it for its seeds"))
+    })?;
+    Ok(bytes)
 }
 
 /// Signals that a run looks at.

@@ -8,6 +8,7 @@ use crate::chains::settled::Bounds;
 use crate::chains::{force, main};
 use crate::cli::FileArguments;
 use crate::experiment::{AxisExperiment, During, Experiment, Prepare, SetPoints};
+use crate::parameter_set::{self, Setting};
 use crate::program::file::Source;
 use crate::program::{Program, Task};
 use crate::run::RunError;
@@ -28,8 +29,8 @@ pub struct Inputs {
     pub experiment_toml: String,
     /// Programs of drive and load, as they stand; `None` for an axis that the experiment leaves out.
     pub programs: [Option<Source>; 2],
-    /// Variables set on the command line: axis, name, value.
-    overrides: Vec<(Axis, String, f64)>,
+    /// Variables set by a parameter set or on the command line, in this order.
+    overrides: Vec<Setting>,
     experiment_file: PathBuf,
 }
 
@@ -78,11 +79,19 @@ impl Inputs {
                 RunError::Input(format!("{place}: program of the {} axis: {error}", axis.name()))
             })?);
         }
-        let overrides = files.set.iter().map(|text| parse_override(text)).collect::<Result<Vec<_>, _>>()?;
-        if let Some((axis, name, _)) = overrides.iter().find(|(axis, ..)| programs[axis.index()].is_none()) {
+        let mut overrides = match &files.parameters {
+            Some(path) => parameter_set::read(path).map_err(RunError::input)?,
+            None => Vec::new(),
+        };
+        for text in &files.set {
+            overrides.push(parse_override(text)?);
+        }
+        if let Some(Setting { axis, name, place, .. }) =
+            overrides.iter().find(|setting| programs[setting.axis.index()].is_none())
+        {
             let axis = axis.name();
             return Err(RunError::Input(format!(
-                "--set {axis}.{name}: {} has no [{axis}], so that axis has no variables",
+                "{place}{axis}.{name}: {} has no [{axis}], so that axis has no variables",
                 files.experiment.display()
             )));
         }
@@ -125,11 +134,10 @@ impl Inputs {
             sections(&self.experiment).find(|(other, _)| *other == axis).map(|(_, section)| section);
         let mut program = self.program(axis, mode.real_time)?;
         self.check_kind(axis, section, &program)?;
-        for (_, name, value) in self.overrides.iter().filter(|(of, ..)| *of == axis) {
-            let place = place(&program, axis, name)?;
-            program
-                .set(place, *value)
-                .map_err(|error| RunError::Input(format!("--set {}.{error}", axis.name())))?;
+        for Setting { name, value, place: at, .. } in self.overrides.iter().filter(|one| one.axis == axis) {
+            let told = |error: String| RunError::Input(format!("{at}{error}"));
+            let place = place(&program, axis, name).map_err(|error| told(error.to_string()))?;
+            program.set(place, *value).map_err(|error| told(format!("{}.{error}", axis.name())))?;
         }
         let changes = section.map_or(Ok(Vec::new()), |section| self.changes(axis, section, &program))?;
         let main = self.main_config(section, &program, mode);
@@ -149,6 +157,14 @@ impl Inputs {
         let shut = Source::shut();
         let source = self.programs[axis.index()].as_ref().unwrap_or(&shut);
         source.program(axis, &self.rig, real_time).map_err(RunError::input)
+    }
+
+    /// Title of the program of an axis.
+    #[must_use]
+    pub fn program_title(&self, axis: Axis) -> String {
+        self.programs[axis.index()]
+            .as_ref()
+            .map_or_else(|| Source::shut().title, |source| source.title.clone())
     }
 
     fn check_kind(
@@ -303,12 +319,13 @@ fn place(program: &Program, axis: Axis, name: &str) -> Result<usize, RunError> {
 }
 
 /// `drive.algorithm.gain_per_s=30`.
-fn parse_override(text: &str) -> Result<(Axis, String, f64), RunError> {
+fn parse_override(text: &str) -> Result<Setting, RunError> {
     let parse = || {
         let (name, value) = text.split_once('=')?;
         let (axis, name) = name.split_once('.')?;
         let axis = Axis::ALL.into_iter().find(|known| known.name() == axis)?;
-        Some((axis, name.trim().to_owned(), value.trim().parse().ok()?))
+        let (name, value) = (name.trim().to_owned(), value.trim().parse().ok()?);
+        Some(Setting { axis, name, value, place: "--set ".into() })
     };
     parse().ok_or_else(|| {
         RunError::Input(format!(

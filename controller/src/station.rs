@@ -12,6 +12,7 @@
 use crate::axis::{Answer, AxisController, AxisRecord};
 use crate::chains::main::MainCause;
 use crate::rig_view::{RigView, TickNews};
+use crate::xcp::port::{Port, PortCounters};
 use crossbeam_channel::{Receiver, Sender};
 use plant::Axis;
 use protocol::bus::Bus;
@@ -127,6 +128,8 @@ struct Seat {
     stopped_for: u64,
     /// Ticks since the last own sensors.
     silent_ticks: u64,
+    /// Where XCP reaches it, if that was asked for.
+    xcp: Option<Port>,
 }
 
 /// The controllers of a process on the bus.
@@ -143,8 +146,14 @@ impl Station {
     /// Puts the controllers, one or two, on the bus.
     #[must_use]
     pub fn new(controllers: Vec<AxisController>, outlets: Outlets) -> Self {
-        let seat =
-            |controller| Seat { controller, mail: Mail::new(), answered: 0, stopped_for: 0, silent_ticks: 0 };
+        let seat = |controller| Seat {
+            controller,
+            mail: Mail::new(),
+            answered: 0,
+            stopped_for: 0,
+            silent_ticks: 0,
+            xcp: None,
+        };
         Self {
             view: RigView::default(),
             seats: controllers.into_iter().map(seat).collect(),
@@ -155,8 +164,22 @@ impl Station {
         }
     }
 
+    /// Lets XCP reach the controllers, each through the port of its axis.
+    #[must_use]
+    pub fn with_xcp(mut self, ports: Vec<Port>) -> Self {
+        for port in ports {
+            if let Some(seat) = self.seats.iter_mut().find(|seat| seat.controller.axis() == port.axis()) {
+                seat.xcp = Some(port);
+            }
+        }
+        self
+    }
+
     /// Takes a frame; tells whose sensors it was.
     pub fn take(&mut self, frame: &CanFrame) -> Option<Axis> {
+        if self.seats.iter_mut().filter_map(|seat| seat.xcp.as_mut()).any(|port| port.take(frame)) {
+            return None;
+        }
         match Frame::decode(frame) {
             Ok(Frame::DriveSensors(sensors)) => return Some(self.take_sensors(Axis::Drive, sensors)),
             Ok(Frame::LoadSensors(sensors)) => return Some(self.take_sensors(Axis::Load, sensors)),
@@ -170,6 +193,7 @@ impl Station {
                         seat.controller.restart();
                         seat.mail.0.clear();
                         seat.silent_ticks = 0;
+                        seat.xcp.iter_mut().for_each(Port::restart);
                     });
                     self.tell(News::RigRestarted);
                 }
@@ -210,10 +234,19 @@ impl Station {
                     matches!(seat.controller.state(), MainChainState::Aborted | MainChainState::Fault)
                         && !seat.controller.may_restart();
                 seat.stopped_for = if stopped { seat.stopped_for + 1 } else { 0 };
+                if let Some(port) = &mut seat.xcp {
+                    port.observe(&seat.controller, cycle, &sensors, &answer.command);
+                }
                 self.send(place, cycle, &answer, bus);
                 cycles[axis.index()] = Some(cycle);
             } else if self.seats[place].silent_ticks >= SILENT_TICKS {
                 self.speak_without_sensors(place, bus);
+            }
+        }
+        // When all valves have their commands.
+        for Seat { controller, xcp, .. } in &mut self.seats {
+            if let Some(port) = xcp {
+                port.serve(controller.program_mut(), bus);
             }
         }
         cycles
@@ -291,6 +324,13 @@ impl Station {
     /// The controllers of this process.
     pub fn controllers(&self) -> impl Iterator<Item = &AxisController> {
         self.seats.iter().map(|seat| &seat.controller)
+    }
+
+    /// What the port of `axis` counted; `None` without XCP.
+    #[must_use]
+    pub fn xcp(&self, axis: Axis) -> Option<PortCounters> {
+        let seat = self.seats.iter().find(|seat| seat.controller.axis() == axis)?;
+        seat.xcp.as_ref().map(Port::counters)
     }
 
     /// Whether `axis` is one of ours.

@@ -7,6 +7,7 @@
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   broken ── a run with faults on purpose, and what it leaves
+//!   xcp ───── a client of the controllers' XCP, packet by packet, and the foreign one in Python
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   door ──── the gateway, and a client that does what it is told
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
@@ -45,3 +46,4 @@ pub mod skip;
 pub mod study;
 pub mod tune;
 pub mod turn;
+pub mod xcp;

@@ -9,9 +9,11 @@ use protocol::can::CanFrame;
 use system_tests::axis_table::AxisTable;
 use system_tests::binaries::Build;
 use system_tests::launch::Pace;
+use system_tests::peer::Peer;
 use system_tests::records::{count, json};
 use system_tests::scene::{LINKED, RESTLESS, Scene};
 use system_tests::turn;
+use system_tests::xcp::{self, Talk};
 
 /// Faults that begin and end after the warm-up, mild enough for the run to go on as it does.
 const FAULTS: &str = r#"
@@ -57,11 +59,12 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
         .with(&format!("--seconds 11.5 --full-timing --faults {}", faults.display()))
         .start();
     let stranger = scene.peer();
-    let controller =
-        scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat --full-timing").start();
-    // Frames to be refused come along: the paths that refuse are part of the 1 ms path too.
+    let options = format!("--repeat --full-timing --xcp {}", xcp::config(&scene).display());
+    let controller = scene.controller(Pace::Real).build(Build::CountingAllocations).with(&options).start();
+    // Frames to be refused come along: the paths that refuse are part of the 1 ms path too. So is XCP, in all that it does.
     for row in (1000..11_000).step_by(500) {
         scene.wait_for_rows("emulator", row);
+        tune(&scene.peer(), row);
         for bad in [&[1, 2, 3, 4, 5][..], &[0; 3]] {
             stranger.send(&CanFrame::new(0x110, bad).to_bytes());
         }
@@ -77,6 +80,48 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     assert_eq!(system_tests::events::times(&system_tests::events::all(&summary), "fault"), 10);
     assert_eq!(count(&summary, "/allocations_in_cycle"), 0);
     assert_eq!(count(&controller, "/allocations_in_cycle"), 0);
+    let xcp = &controller["axes"]["drive"]["xcp"];
+    assert!(count(xcp, "/changed") >= 18 && count(xcp, "/daq_packets") > 5000, "XCP was at work: {xcp}");
+    assert!(scene.path("controller/controller-drive-parameters.toml").exists(), "and stored a set");
+}
+
+/// A client comes for a moment: the first time it unlocks and starts to measure, then it changes a gain, with and without
+/// success, triggers, reads, stores and loads.
+fn tune(peer: &Peer, row: usize) {
+    let talk = Talk(peer);
+    if row == 1000 {
+        talk.unlock();
+        for packet in [
+            &[0xD6][..],
+            &[0xD5, 0, 1, 0],
+            &[0xD4, 0, 0, 0, 1],
+            &[0xD3, 0, 0, 0, 0, 1],
+            &[0xE2, 0, 0, 0, 0, 0],
+            &[0xE1, 0xFF, 4, 0, 4, 0, 0, 0x30],
+            &[0xDE, 1, 0, 0],
+        ] {
+            let _ = talk.good(packet);
+        }
+        return;
+    }
+    // The gain is the seventh number of the scene's program; arming and loading are the last two controls.
+    let (gain, arm) = (0x1000_0000 + 8 * 6, 0x2000_0000 + 8 * 10);
+    talk.write(gain, 30.0 + row as f64 * 1e-3);
+    talk.to(gain);
+    let _ = talk.good(&[0xF0, 6, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(talk.ask(&[0xF0, 2, 0, 0x7F])[..2], [0xFE, 0x22], "too large a gain is refused");
+    talk.to(arm);
+    let _ = talk.good(&[0xF0, 4, 1, 0, 0, 0]);
+    talk.to(0x5100_0000);
+    let _ = talk.good(&[0xF5, 7]);
+    let _ = talk.good(&[0xF3, 0, 0, 0, 0, 16, 0, 0]);
+    if row == 2000 {
+        let _ = talk.good(&[0xF9, 1, 0, 0]);
+    }
+    if row == 3000 {
+        talk.to(arm + 8);
+        let _ = talk.good(&[0xF0, 4, 1, 0, 0, 0]);
+    }
 }
 
 #[test]

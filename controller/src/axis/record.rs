@@ -61,7 +61,7 @@ pub struct AxisRecord {
 
 impl AxisController {
     /// The row of `cycle`.
-    pub(super) fn record(&self, cycle: u64, sensors: &Sensors, command: &ValveCommand) -> AxisRecord {
+    pub(crate) fn record(&self, cycle: u64, sensors: &Sensors, command: &ValveCommand) -> AxisRecord {
         let geometry = self.program.geometry();
         let status = self.status();
         let asked = self.asked.as_ref();

@@ -25,6 +25,7 @@ fn controllers(experiment: &str, load: &str, set: &[&str]) -> Result<Vec<AxisCon
     };
     let (_, _) = (write("drive.toml", DRIVE), write("load.toml", load));
     let inputs = Inputs::read(&FileArguments {
+        parameters: None,
         rig: concat!(env!("CARGO_MANIFEST_DIR"), "/../plant/rig.toml").into(),
         experiment: write("experiment.toml", experiment),
         out: "unused".into(),

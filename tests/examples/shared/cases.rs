@@ -41,6 +41,7 @@ impl Case {
         let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller");
         let program = |name: Option<&str>| Some(room.join(format!("programs/{}.toml", name?)));
         let files = FileArguments {
+            parameters: None,
             rig: room.join("../plant/rig.toml"),
             experiment: room.join(format!("experiments/{}.toml", made.experiment)),
             out: PathBuf::new(),

@@ -193,6 +193,7 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
     let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
     let set = unsettled(moved);
     let files = FileArguments {
+        parameters: None,
         rig: workspace().join("plant/rig.toml"),
         experiment,
         out: PathBuf::new(),

@@ -1,0 +1,41 @@
+//! XCP on CAN: measuring, tuning and a triggered trace of a running controller, by the tools of the field.
+//!
+//! ```text
+//!   bus ─ 0x1E0 ─► port ─► slave ─► image ◄── signals, parameters        each axis has its own
+//!       ◄ 0x1E1 ──┘          ├── lock: seed and key                      0x1E2 and 0x1E3: the load's
+//!                            ├── daq: lists
+//!                            └── trace: trigger buffer
+//!                 port ─► queue ─► clerk, in the recorder's thread: files, what a person is told
+//! ```
+//!
+//! Off unless `--xcp` asks for it. [`slave`] is a function over bytes; [`port`] puts it on the bus, after the commands to the
+//! valves. Everything that can be seen or changed stands in tables, of which [`a2l`] makes the file that tools read. For users:
+//! `controller/docs/xcp.md`.
+
+pub mod a2l;
+pub mod alone;
+pub mod clerk;
+pub mod config;
+pub mod daq;
+pub mod image;
+pub mod lock;
+pub mod packet;
+pub mod port;
+pub mod signals;
+pub mod slave;
+pub mod trace;
+
+use plant::Axis;
+use protocol::frames::{DRIVE_XCP_COMMAND, DRIVE_XCP_RESPONSE, LOAD_XCP_COMMAND, LOAD_XCP_RESPONSE};
+
+/// Name of the only event: a cycle was answered.
+pub const EVENT_NAME: &str = "cycle of 1 ms";
+
+/// Identifiers of an axis: commands to it, and what comes from it.
+#[must_use]
+pub fn identifiers(axis: Axis) -> (u16, u16) {
+    match axis {
+        Axis::Drive => (DRIVE_XCP_COMMAND.id, DRIVE_XCP_RESPONSE.id),
+        Axis::Load => (LOAD_XCP_COMMAND.id, LOAD_XCP_RESPONSE.id),
+    }
+}

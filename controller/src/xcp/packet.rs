@@ -1,0 +1,187 @@
+//! Packets of XCP on CAN: commands, refusals, and reading and writing their fields, in Intel byte order.
+//!
+//! A packet is 1 to 8 bytes; what we send is padded to 8 with zeros, as `rig.dbc` says.
+//!
+//! Source: ASAM MCD-1 XCP 1.1, part 2 (protocol layer) and part 3 (XCP on CAN).
+
+/// Bytes of a packet: MAX_CTO and MAX_DTO.
+pub const BYTES: usize = 8;
+/// A packet as it is sent.
+pub type Packet = [u8; BYTES];
+
+/// First byte of a good answer.
+pub const RESPONSE: u8 = 0xFF;
+/// First byte of a refusal.
+pub const ERROR: u8 = 0xFE;
+/// First byte of an event.
+pub const EVENT: u8 = 0xFD;
+/// Event: the parameter set was stored.
+pub const EVENT_STORED: u8 = 0x03;
+/// Highest first byte of a DAQ packet.
+pub const LAST_PID: u8 = 0xFB;
+
+/// Commands by their first byte.
+pub mod command {
+    /// Begins a session.
+    pub const CONNECT: u8 = 0xFF;
+    /// Ends it.
+    pub const DISCONNECT: u8 = 0xFE;
+    /// Tells the session's state.
+    pub const GET_STATUS: u8 = 0xFD;
+    /// Begins anew after a time-out.
+    pub const SYNCH: u8 = 0xFC;
+    /// Tells how to talk to the slave.
+    pub const GET_COMM_MODE_INFO: u8 = 0xFB;
+    /// Tells who the slave is.
+    pub const GET_ID: u8 = 0xFA;
+    /// Asks for the parameter set to be stored.
+    pub const SET_REQUEST: u8 = 0xF9;
+    /// Asks for a seed.
+    pub const GET_SEED: u8 = 0xF8;
+    /// Hands over the key to it.
+    pub const UNLOCK: u8 = 0xF7;
+    /// Sets the address that the next transfers begin at.
+    pub const SET_MTA: u8 = 0xF6;
+    /// Reads from there.
+    pub const UPLOAD: u8 = 0xF5;
+    /// Reads from an address of its own.
+    pub const SHORT_UPLOAD: u8 = 0xF4;
+    /// Checksum over memory.
+    pub const BUILD_CHECKSUM: u8 = 0xF3;
+    /// Writes.
+    pub const DOWNLOAD: u8 = 0xF0;
+    /// Goes on with a block.
+    pub const DOWNLOAD_NEXT: u8 = 0xEF;
+    /// Empties a DAQ list.
+    pub const CLEAR_DAQ_LIST: u8 = 0xE3;
+    /// Sets where the next entry is written.
+    pub const SET_DAQ_PTR: u8 = 0xE2;
+    /// Writes an entry.
+    pub const WRITE_DAQ: u8 = 0xE1;
+    /// Sets event, prescaler and mode of a list.
+    pub const SET_DAQ_LIST_MODE: u8 = 0xE0;
+    /// Tells them.
+    pub const GET_DAQ_LIST_MODE: u8 = 0xDF;
+    /// Starts, stops or selects a list.
+    pub const START_STOP_DAQ_LIST: u8 = 0xDE;
+    /// Starts or stops the selected ones.
+    pub const START_STOP_SYNCH: u8 = 0xDD;
+    /// Tells the time.
+    pub const GET_DAQ_CLOCK: u8 = 0xDC;
+    /// Reads an entry.
+    pub const READ_DAQ: u8 = 0xDB;
+    /// What DAQ can do.
+    pub const GET_DAQ_PROCESSOR_INFO: u8 = 0xDA;
+    /// Sizes and time stamps of DAQ.
+    pub const GET_DAQ_RESOLUTION_INFO: u8 = 0xD9;
+    /// What an event is.
+    pub const GET_DAQ_EVENT_INFO: u8 = 0xD7;
+    /// Gives all lists back.
+    pub const FREE_DAQ: u8 = 0xD6;
+    /// Makes lists.
+    pub const ALLOC_DAQ: u8 = 0xD5;
+    /// Makes ODTs of a list.
+    pub const ALLOC_ODT: u8 = 0xD4;
+    /// Makes entries of an ODT.
+    pub const ALLOC_ODT_ENTRY: u8 = 0xD3;
+}
+
+/// Why a command is refused; the number crosses the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Refusal {
+    /// The answer to SYNCH: the command processor begins anew.
+    Synch = 0x00,
+    /// What was asked for before is not done yet.
+    Busy = 0x10,
+    /// Not while DAQ runs.
+    DaqActive = 0x11,
+    /// No such command here.
+    Unknown = 0x20,
+    /// Too short, or a field that means nothing.
+    Syntax = 0x21,
+    /// A value or place out of range.
+    OutOfRange = 0x22,
+    /// Never written, or only at the start.
+    WriteProtected = 0x23,
+    /// Nothing there, or not now.
+    AccessDenied = 0x24,
+    /// Not before UNLOCK.
+    AccessLocked = 0x25,
+    /// Not in this order.
+    Sequence = 0x29,
+    /// Lists that cannot run so.
+    DaqConfig = 0x2A,
+    /// No room.
+    MemoryOverflow = 0x30,
+}
+
+/// The fields of a command.
+#[derive(Clone, Copy)]
+pub struct Fields<'a>(pub &'a [u8]);
+
+impl<'a> Fields<'a> {
+    /// Byte `at`.
+    ///
+    /// # Errors
+    /// [`Refusal::Syntax`] when the packet is shorter; so for all fields.
+    pub fn byte(self, at: usize) -> Result<u8, Refusal> {
+        self.0.get(at).copied().ok_or(Refusal::Syntax)
+    }
+
+    /// The two bytes from `at` on.
+    ///
+    /// # Errors
+    /// As [`Fields::byte`].
+    pub fn word(self, at: usize) -> Result<u16, Refusal> {
+        Ok(u16::from_le_bytes([self.byte(at)?, self.byte(at + 1)?]))
+    }
+
+    /// The four bytes from `at` on.
+    ///
+    /// # Errors
+    /// As [`Fields::byte`].
+    pub fn long(self, at: usize) -> Result<u32, Refusal> {
+        let [low, high] = [self.word(at)?, self.word(at + 2)?];
+        Ok(u32::from(low) | u32::from(high) << 16)
+    }
+
+    /// So many bytes from `at` on.
+    ///
+    /// # Errors
+    /// As [`Fields::byte`].
+    pub fn bytes(self, at: usize, count: usize) -> Result<&'a [u8], Refusal> {
+        self.0.get(at..at + count).ok_or(Refusal::Syntax)
+    }
+}
+
+/// A good answer with these bytes behind its first.
+///
+/// # Panics
+/// With more than 7 bytes, which no command here has.
+#[must_use]
+pub fn response(bytes: &[u8]) -> Packet {
+    let mut packet = [0; BYTES];
+    packet[0] = RESPONSE;
+    packet[1..=bytes.len()].copy_from_slice(bytes);
+    packet
+}
+
+/// A refusal.
+#[must_use]
+pub fn refusal(why: Refusal) -> Packet {
+    [ERROR, why as u8, 0, 0, 0, 0, 0, 0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_that_is_not_there_is_a_syntax_error() {
+        let fields = Fields(&[0xF6, 0x01, 0x02, 0x03, 0x04]);
+        assert_eq!(fields.long(1), Ok(0x0403_0201));
+        assert_eq!(fields.long(2), Err(Refusal::Syntax));
+        assert_eq!(fields.bytes(3, 3), Err(Refusal::Syntax));
+    }
+}

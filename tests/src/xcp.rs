@@ -1,0 +1,158 @@
+//! Clients of the controllers' XCP: one of our own, packet by packet over a [`Peer`], and the foreign one in Python.
+
+use crate::binaries::{Build, Program, executable, workspace};
+use crate::peer::{Packet, Peer};
+use crate::process::{Ended, PATIENCE, Running};
+use crate::records::json;
+use crate::scene::Scene;
+use controller::xcp::lock;
+use protocol::can::CanFrame;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Secret of the write protection, as it stands in [`config`]'s file and in the Python client.
+pub const SECRET: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// Writes the configuration of XCP with the secret, and room for two DAQ packets a cycle.
+#[must_use]
+pub fn config(scene: &Scene) -> PathBuf {
+    let hex: String = SECRET.iter().map(|byte| format!("{byte:02x}")).collect();
+    scene.write("xcp.toml", &format!("key = \"{hex}\"\ndaq_packets_per_cycle = 2\n"))
+}
+
+/// A command to the drive's controller, padded as `rig.dbc` has it.
+#[must_use]
+pub fn command(packet: &[u8]) -> CanFrame {
+    let mut bytes = [0; 8];
+    bytes[..packet.len()].copy_from_slice(packet);
+    CanFrame::new(0x1E0, &bytes)
+}
+
+/// What the drive's controller says over XCP in a frame, if it is one of its.
+#[must_use]
+pub fn said(frame: &CanFrame) -> Option<[u8; 8]> {
+    (frame.standard_id() == Some(0x1E1)).then(|| frame.data().try_into().expect("padded to 8 bytes"))
+}
+
+/// A client of the drive's controller in real time.
+pub struct Talk<'a>(pub &'a Peer);
+
+impl Talk<'_> {
+    /// Says a command and waits for its answer, whatever else comes meanwhile.
+    ///
+    /// # Panics
+    /// When none comes.
+    #[must_use]
+    pub fn ask(&self, packet: &[u8]) -> [u8; 8] {
+        self.0.send(&command(packet).to_bytes());
+        loop {
+            match self.0.receive(PATIENCE) {
+                Some(Packet::Frame(frame)) => match said(&frame) {
+                    Some(answer) if answer[0] >= 0xFE => return answer,
+                    _ => {}
+                },
+                other => panic!("no answer to {packet:02X?} but {other:?}"),
+            }
+        }
+    }
+
+    /// Says a command that must be answered well.
+    ///
+    /// # Panics
+    /// When it is refused.
+    #[track_caller]
+    pub fn good(&self, packet: &[u8]) -> [u8; 7] {
+        let [first, rest @ ..] = self.ask(packet);
+        assert_eq!(first, 0xFF, "{packet:02X?} is refused: {rest:02X?}");
+        rest
+    }
+
+    /// Connects and unlocks.
+    pub fn unlock(&self) {
+        self.good(&[0xFF, 0]);
+        let first = self.good(&[0xF8, 0, 1]);
+        let second = self.good(&[0xF8, 1, 0]);
+        let seed = [&first[1..7], &second[1..3]].concat().try_into().expect("8 bytes");
+        let [a, b, c, d, e, f, g, h] = lock::key(&SECRET, seed);
+        self.good(&[0xF7, 8, a, b, c, d, e, f]);
+        self.good(&[0xF7, 2, g, h]);
+    }
+
+    /// Sets where the next transfer begins.
+    pub fn to(&self, address: u32) {
+        let [a, b, c, d] = address.to_le_bytes();
+        self.good(&[0xF6, 0, 0, 0, a, b, c, d]);
+    }
+
+    /// Writes a number of eight bytes.
+    pub fn write(&self, address: u32, value: f64) {
+        let [a, b, c, d, e, f, g, h] = value.to_le_bytes();
+        self.to(address);
+        self.good(&[0xF0, 6, a, b, c, d, e, f]);
+        self.good(&[0xF0, 2, g, h]);
+    }
+}
+
+/// pyXCP, at work.
+pub struct Foreign {
+    running: Running,
+    seen: PathBuf,
+}
+
+impl Foreign {
+    /// Starts a scenario of `tests/python/xcp_client.py` at the controller of `axis`, whose files are in `folder`. A `member`
+    /// takes part in the lockstep barrier.
+    ///
+    /// # Panics
+    /// Without the Python environment that `scripts/test` makes.
+    #[must_use]
+    pub fn start(scene: &Scene, scenario: &str, folder: &str, axis: &str, member: bool) -> Self {
+        let python = std::env::var_os("AIRBENCH_PYTHON")
+            .map_or_else(|| workspace().join("target/tools/venv/bin/python"), PathBuf::from);
+        assert!(python.exists(), "{} is missing: run scripts/test, which makes it", python.display());
+        let scripts = workspace().join("tests/python");
+        let seen = scene.path(&format!("seen-{axis}.json"));
+        let mut command = Command::new(python);
+        command
+            .env("PYTHONPATH", &scripts)
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .arg(scripts.join("xcp_client.py"));
+        command.arg(scenario).arg(scene.socket()).arg(scene.path(folder)).arg(axis).arg(&seen);
+        if member {
+            command.arg(format!("client-{axis}"));
+        }
+        Self { running: Running::start("pyXCP", &mut command), seen }
+    }
+
+    /// What it has seen at its end.
+    ///
+    /// # Panics
+    /// When it failed, with what it said.
+    #[must_use]
+    pub fn wait(self) -> Value {
+        let Ended { code, stderr, stdout, .. } = self.running.wait();
+        assert_eq!(code, Some(0), "pyXCP failed:\n{stdout}\n{stderr}");
+        json(&self.seen)
+    }
+}
+
+/// Waits until the controller has written the A2L file of an axis: then its bus is about to open.
+pub fn wait_for_a2l(scene: &Scene, folder: &str, axis: &str) {
+    let path: &Path = &scene.path(folder).join(format!("controller-{axis}.a2l"));
+    crate::process::wait_until("the A2L file", || path.exists());
+}
+
+/// What the controller prints for the scene's files under a command such as `parameters`.
+///
+/// # Panics
+/// When it refuses.
+#[must_use]
+pub fn print_with(scene: &Scene, command: &str, options: &[&str]) -> String {
+    let mut program = Command::new(executable(Program::Controller, Build::Shipped));
+    program.arg(command).arg("--rig").arg(scene.path("rig.toml"));
+    program.arg("--experiment").arg(scene.path("experiment.toml")).args(options);
+    let Ended { code, stdout, stderr, .. } = Running::start("controller", &mut program).wait();
+    assert_eq!(code, Some(0), "{stderr}");
+    stdout
+}
