@@ -1,5 +1,6 @@
 //! The bench's command line.
 
+use crate::export::cli::ExportArguments;
 use crate::latency_table::LatencyTableArguments;
 use crate::ping_pong::cli::{PingPongArguments, PongArguments};
 use crate::probe::cli::ProbeArguments;
@@ -45,6 +46,8 @@ pub enum Command {
     PingPong(PingPongArguments),
     /// Print the table of ratios of a latency report, in Markdown.
     LatencyTable(LatencyTableArguments),
+    /// Write a log of the bus as CSV, MDF4, ASC or BLF.
+    Export(ExportArguments),
     /// The process that answers; ping-pong starts it.
     #[command(hide = true)]
     Pong(PongArguments),

@@ -23,11 +23,14 @@
 //! | [`latency_table`] | the table of ratios that `scripts/latency` ends with |
 //! | [`report`] | the latency report |
 //! | [`soak`] | emulator and controllers over hours, every frame accounted for |
+//! | [`recorded_log`] | a log of the bus, checked to its last line |
+//! | [`export`] | a log as CSV, MDF4, ASC, BLF |
 //! | [`cli`] | the command line |
 
 pub mod cli;
 pub mod compare;
 pub mod drawing;
+pub mod export;
 pub mod figures;
 pub mod grid;
 pub mod join;
@@ -37,6 +40,7 @@ pub mod picture;
 pub mod ping_pong;
 pub mod probe;
 pub mod record;
+pub mod recorded_log;
 pub mod report;
 pub mod reports;
 pub mod runs;

@@ -9,7 +9,7 @@ use bench::runs::{self, Run, RunsError};
 use bench::soak::SoakError;
 use bench::soak::processes::become_child;
 use bench::{
-    SummaryError, compare, figures, join, latency_table, picture, probe, soak, spread, table, thresholds,
+    SummaryError, compare, export, figures, join, latency_table, picture, probe, soak, spread, table, thresholds,
 };
 use clap::Parser;
 use protocol::exit::Exit;
@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::LatencyTable(arguments) => {
             latency_table::table(&arguments).map(|text| print(&text)).map(|()| Exit::Good).map_err(Into::into)
         }
+        Command::Export(arguments) => export::run(&arguments).map_err(Into::into),
         Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
         Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
         Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
