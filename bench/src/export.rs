@@ -56,7 +56,9 @@ pub enum ExportError {
     #[error("--every-ms goes with --to csv: the others hold every frame with its own time")]
     EveryMs,
     /// A table without end.
-    #[error("a row every {every_ms} ms makes more than {MOST_HELD_ROWS} rows of this log: cut it, or take a longer time")]
+    #[error(
+        "a row every {every_ms} ms makes more than {MOST_HELD_ROWS} rows of this log: cut it, or take a longer time"
+    )]
     TooManyRows {
         /// Time between two rows, ms.
         every_ms: u32,
@@ -104,7 +106,8 @@ fn as_signals(
     every_ms: Option<u32>,
 ) -> Result<Told, ExportError> {
     let signals = Signals::of(log);
-    for (left_out, what) in signals.left_out.iter().zip(LEFT_OUT).filter(|(left_out, _)| left_out.frames > 0) {
+    for (left_out, what) in signals.left_out.iter().zip(LEFT_OUT).filter(|(left_out, _)| left_out.frames > 0)
+    {
         let file = log.file.display();
         warn(&format!("{file}:{}: {} frames {what} are left out", left_out.first_line, left_out.frames));
     }
@@ -149,7 +152,9 @@ fn as_frames(
     match foreign::write(part, log, format, &python)? {
         None => Ok((format!("{told}, read back equal"), Exit::Good)),
         Some(said) => {
-            warn(&format!("what was written does not read back as it was: {said} (frames, and the first of them)"));
+            warn(&format!(
+                "what was written does not read back as it was: {said} (frames, and the first of them)"
+            ));
             Ok((told, Exit::BoundBroken))
         }
     }

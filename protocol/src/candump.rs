@@ -73,7 +73,8 @@ pub fn parse_line(line: &str) -> Result<Line<'_>, LineError> {
         LineError { column: line[..bytes].chars().count() + 1, problem }
     };
     let text = line.trim_end();
-    let inner = text.strip_prefix('(').ok_or_else(|| at(text, "a line begins with '(SECONDS.MICROSECONDS)'"))?;
+    let inner =
+        text.strip_prefix('(').ok_or_else(|| at(text, "a line begins with '(SECONDS.MICROSECONDS)'"))?;
     let (stamp, rest) = inner.split_once(") ").ok_or_else(|| at(inner, "the time stamp ends with ') '"))?;
     let stamp_ns = read_stamp(stamp).ok_or_else(|| {
         at(stamp, "a time stamp is SECONDS.FRACTION in digits, the fraction of 1 to 9, below 584 years")
@@ -83,7 +84,8 @@ pub fn parse_line(line: &str) -> Result<Line<'_>, LineError> {
         rest.split_once(' ').ok_or_else(|| at(rest, "after the time stamp come interface and frame"))?;
     let word = frame.trim_start().split(' ').next().filter(|word| !word.is_empty());
     let word = word.ok_or_else(|| at(frame, "after the interface comes a frame, as 120#0011"))?;
-    let (id, data) = word.split_once('#').ok_or_else(|| at(word, "a frame is IDENTIFIER#DATA, as 120#0011"))?;
+    let (id, data) =
+        word.split_once('#').ok_or_else(|| at(word, "a frame is IDENTIFIER#DATA, as 120#0011"))?;
     let raw_id = read_identifier(id).map_err(|problem| at(id, problem))?;
     let frame = read_frame(raw_id, data).map_err(|problem| at(data, problem))?;
     Ok(Line { interface, record: FrameRecord { stamp_ns, frame } })

@@ -80,8 +80,13 @@ fn data_type(signal: &SignalSpec) -> DataType {
 
 /// What a signal means, with the names of its states.
 fn comment(signal: &SignalSpec) -> String {
-    let states: Vec<_> = signal.values.iter().enumerate().map(|(raw, name)| format!("{raw} {name}")).collect();
-    if states.is_empty() { signal.comment.to_owned() } else { format!("{} {}", signal.comment, states.join(", ")) }
+    let states: Vec<_> =
+        signal.values.iter().enumerate().map(|(raw, name)| format!("{raw} {name}")).collect();
+    if states.is_empty() {
+        signal.comment.to_owned()
+    } else {
+        format!("{} {}", signal.comment, states.join(", "))
+    }
 }
 
 /// Seconds from the origin to the stamp; the difference is exact before it is rounded once.

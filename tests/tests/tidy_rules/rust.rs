@@ -226,6 +226,7 @@ const DIMENSIONLESS: &[&str] = &[
     "confidence",            // probability
     "factor",                // of a DBC signal, whose unit is a field beside it
     "offset",                // the same
+    "range",                 // of a variable, whose unit is a field beside it
     "min",                   // the same, and of a key of the parameter table
     "max",                   // the same
     "value",                 // of a reading, whose unit its sensor has
