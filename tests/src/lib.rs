@@ -6,6 +6,7 @@
 //!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
+//!   foreign_python  scripts with the packages that the product is held against
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   own ───── algorithms in C, built as a user builds them
@@ -25,6 +26,7 @@ pub mod binaries;
 pub mod bus_cycles;
 pub mod disturb;
 pub mod events;
+pub mod foreign_python;
 pub mod guest;
 pub mod hidden;
 pub mod launch;
