@@ -3,8 +3,7 @@
     convert_log.py asc|blf OUT < LOG
 
 Prints `equal N` when what was written reads back as it was, else `different N FIRST`: N frames, the first of them FIRST. Times count
-from the first frame; ASC keeps them to 1 us, BLF to 1 ns. What is on the bus of a rig is told apart; the content of an error frame is
-not in an ASC.
+from the first frame; ASC keeps them to 1 us, BLF to 1 ns. The content of an error frame is not in an ASC.
 """
 
 import sys
@@ -20,11 +19,10 @@ SHORTEST_S = 1.5e-6
 def main():
     kind, out = sys.argv[1], sys.argv[2]
     frames = list(can.CanutilsLogReader(sys.stdin))
-    # Interfaces get the numbers that these formats have for them, from 1 on; python-can keeps channels as a number from 0.
-    numbers = {name: number for number, name in enumerate(dict.fromkeys(frame.channel for frame in frames))}
     with (can.ASCWriter if kind == "asc" else can.BLFWriter)(out) as writer:
         for frame in frames:
-            frame.channel = numbers[frame.channel]
+            # can0, can1 …: numbers from 0 in python-can, from 1 in the file.
+            frame.channel = int(frame.channel.removeprefix("can"))
             writer.on_message_received(frame)
     read = list((can.ASCReader if kind == "asc" else can.BLFReader)(out))
     for place, (one, other) in enumerate(zip(frames, read)):

@@ -3,7 +3,7 @@
 //! A run's folder stands for its `bus.log`, and its `summary.json` says when cycle 0 began: times then count from there, as they
 //! do in `measurement.csv`. A log alone counts from its first frame.
 //!
-//! Frames are kept in memory, 32 bytes each: an hour of a rig with both controllers some 600 MB.
+//! Frames are kept in memory, 33 bytes each: an hour of a rig with both controllers some 600 MB.
 
 use protocol::candump::{LogError, LogLine, LogReader};
 use std::fs::File;
@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 const LOG_NAME: &str = "bus.log";
 /// A summary whose cycle 0 lies farther from the log's first frame is of another run, s.
 const NEAR_ZERO_S: f64 = 60.0;
+
+/// Most interfaces of one log.
+const MOST_INTERFACES: usize = 64;
 
 /// What keeps a log from being read.
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +37,14 @@ pub enum RecordedLogError {
         /// Line, column and what is wrong.
         error: LogError,
     },
+    /// Names of interfaces without end.
+    #[error("{file}:{line}: more than {MOST_INTERFACES} interfaces: is this a log of 'candump -L'?")]
+    ManyInterfaces {
+        /// The file.
+        file: PathBuf,
+        /// Line of the first that is too many.
+        line: u64,
+    },
     /// No frame in it.
     #[error("{0} holds no frame")]
     Empty(PathBuf),
@@ -46,6 +57,8 @@ pub struct RecordedLog {
     pub file: PathBuf,
     /// Its frames in the order of the file; at least one.
     pub frames: Vec<LogLine>,
+    /// Which of `interfaces` each frame was seen at.
+    pub seen_at: Vec<u8>,
     /// Names of the interfaces, each once, in the order in which they come.
     pub interfaces: Vec<String>,
     /// The last line, when it was cut and left out.
@@ -66,23 +79,29 @@ impl RecordedLog {
             RecordedLogError::Open { file, reason }
         })?;
         let mut reader = LogReader::new(BufReader::with_capacity(1 << 20, opened));
-        let (mut frames, mut interfaces): (Vec<LogLine>, Vec<String>) = (Vec::new(), Vec::new());
+        let (mut frames, mut seen_at, mut interfaces) = (Vec::new(), Vec::new(), Vec::<String>::new());
         loop {
             match reader.read() {
                 Ok(Some((_, name))) if interface.is_some_and(|wanted| wanted != name) => {}
                 Ok(Some((line, name))) => {
-                    frames.push(line);
-                    if !interfaces.iter().any(|known| known == name) {
-                        interfaces.push(name.to_owned());
+                    let known = interfaces.iter().position(|known| known == name);
+                    if known.is_none() && interfaces.len() == MOST_INTERFACES {
+                        return Err(RecordedLogError::ManyInterfaces { file, line: line.line });
                     }
+                    let place = known.unwrap_or_else(|| {
+                        interfaces.push(name.to_owned());
+                        interfaces.len() - 1
+                    });
+                    frames.push(line);
+                    seen_at.push(place as u8); // below the most
                 }
                 Ok(None) => break,
                 Err(error) => return Err(RecordedLogError::Line { file, error }),
             }
         }
-        let Some(first) = frames.first() else { return Err(RecordedLogError::Empty(file)) };
+        let Some(first): Option<&LogLine> = frames.first() else { return Err(RecordedLogError::Empty(file)) };
         let cycle_zero_ns = told_zero_ns(&file, first.record.stamp_ns);
-        Ok(Self { file, cut_line: reader.cut_line(), frames, interfaces, cycle_zero_ns })
+        Ok(Self { file, cut_line: reader.cut_line(), frames, seen_at, interfaces, cycle_zero_ns })
     }
 
     /// The stamp from which times count, ns of the log's epoch: cycle 0, or the first frame.
@@ -140,8 +159,17 @@ mod tests {
         let (_folder, file) = written("a.log", "(0.1) a 120#\n(0.2) b 121#\n(0.3) a 122#\n(0.");
         let all = RecordedLog::read(&file, None).unwrap();
         assert_eq!((all.frames.len(), all.interfaces.len(), all.cut_line), (3, 2, Some(4)));
+        assert_eq!(all.seen_at, [0, 1, 0]);
         assert_eq!(RecordedLog::read(&file, Some("b")).unwrap().frames[0].line, 2);
         assert!(matches!(RecordedLog::read(&file, Some("c")), Err(RecordedLogError::Empty(_))));
+    }
+
+    #[test]
+    fn interfaces_without_end_are_refused() {
+        let text: String = (0..70).map(|number| format!("(0.1) can{number} 120#\n")).collect();
+        let (_folder, file) = written("a.log", &text);
+        let error = RecordedLog::read(&file, None).unwrap_err().to_string();
+        assert!(error.contains("a.log:65: more than 64 interfaces"), "{error}");
     }
 
     #[test]

@@ -267,7 +267,10 @@ extern "C" fn fmi2Terminate(component: *mut c_void) -> Status {
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
-    on(component, |own| Ok(own.simulation.reset().map(|()| Status::Ok)?))
+    on(component, |own| {
+        own.simulation.reset()?;
+        Ok(Status::Ok)
+    })
 }
 
 #[unsafe(no_mangle)]

@@ -40,7 +40,7 @@ pub enum Refusal {
     #[error("{0} cannot be set {1}")]
     NotSettable(String, &'static str),
     /// The value is out of range, or none.
-    #[error("{name} = {value}: allowed are {least} to {most} {unit}")]
+    #[error("{name} = {value}: allowed are {least} to {most}{}", spaced(unit))]
     OutOfRange {
         /// The variable.
         name: String,
@@ -210,8 +210,9 @@ impl Simulation {
         }
         self.expect(&[Mode::Stepping], "fmi2DoStep", "fmi2ExitInitializationMode")?;
         let stands_s = self.time_s();
-        // Not `>`: NaN must be refused, too.
-        if !((at_s - stands_s).abs() <= TOLERANCE_S) {
+        // Asked this way round, NaN is refused, too.
+        let follows = (at_s - stands_s).abs() <= TOLERANCE_S;
+        if !follows {
             let text = format!("a step from {at_s} s, but the plant stands at {stands_s} s");
             return Err(Refusal::Time(format!("{text}: steps follow each other, or restore a state before")));
         }
@@ -481,6 +482,11 @@ fn find<'v>(
         own.ok_or(Refusal::Reference(*reference, kind))
     };
     references.iter().map(one).collect()
+}
+
+/// A unit behind a number.
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
 fn in_range(own: &Variable, value: f64) -> Result<(), Refusal> {

@@ -14,8 +14,6 @@ use std::process::{Command, Stdio};
 const SCRIPT: &str = include_str!("../../python/convert_log.py");
 /// What the script ends with where python-can is not installed.
 const NO_PYTHON_CAN: i32 = 77;
-/// The interface that all lines get.
-const INTERFACE: &str = "can0";
 
 /// Writes `out`, which need not have the format's ending, and tells what was not equal when it was read back.
 pub(super) fn write(
@@ -38,11 +36,16 @@ pub(super) fn write(
         .map_err(|error| failed(error.to_string()))?;
     if let Some(input) = child.stdin.take() {
         let mut lines = BufWriter::new(input);
+        // Channels of these formats are numbers.
+        let names: Vec<_> = (0..log.interfaces.len()).map(|number| format!("can{number}")).collect();
         // A script that ended early says so by its exit code.
         let _ = log
             .frames
             .iter()
-            .try_for_each(|logged| write_line(&mut lines, INTERFACE, 0, &logged.record))
+            .zip(&log.seen_at)
+            .try_for_each(|(logged, place)| {
+                write_line(&mut lines, &names[usize::from(*place)], 0, &logged.record)
+            })
             .and_then(|()| lines.flush());
     }
     let done = child.wait_with_output().map_err(|error| failed(error.to_string()))?;

@@ -84,6 +84,7 @@ mod tests {
         let frames = LogReader::new(text.as_bytes()).map(Result::unwrap).collect();
         let log = RecordedLog {
             file: "a.log".into(),
+            seen_at: Vec::new(),
             frames,
             interfaces: vec!["a".into()],
             cut_line: None,

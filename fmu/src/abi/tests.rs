@@ -17,10 +17,11 @@ unsafe extern "C" fn log(
     SAID.lock().unwrap().push((status, text(message).unwrap_or_default()));
 }
 
+type Plain = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
+
 fn callbacks() -> Callbacks {
-    let plain: unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char) = log;
     // SAFETY: no variable argument is passed, and the named ones travel alike.
-    let logger = unsafe { std::mem::transmute::<_, Logger>(plain) };
+    let logger = unsafe { std::mem::transmute::<Plain, Logger>(log) };
     let null = std::ptr::null();
     Callbacks {
         logger: Some(logger),

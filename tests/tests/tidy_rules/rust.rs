@@ -28,6 +28,7 @@ const FORBIDDEN_EDGES: &[(&str, &[&str])] = &[
     ("protocol", &["realtime", "plant", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
     ("realtime", &["protocol", "plant", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
     ("plant", &["protocol", "realtime", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
+    ("fmu", &["protocol", "realtime", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
     ("emulator", &["controller", "bench", "discrepancy", "system-tests"]),
     ("controller", &["emulator", "bench", "discrepancy", "system-tests"]),
     ("discrepancy", &["emulator", "system-tests"]),
