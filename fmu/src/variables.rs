@@ -242,7 +242,9 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_every_row_of_the_plants_tables_is_a_variable() {
-        let rig = RigParameters::baseline().with_effect("piston-leakage", "load", &[]).unwrap();
+        let rig = RigParameters::baseline()
+            .with_effect("piston-leakage", "load", &[("leakage_nl_per_min", 5.0)])
+            .unwrap();
         let list = of(&rig).unwrap();
         let names: BTreeSet<_> = list.iter().map(|own| own.name.as_str()).collect();
         assert_eq!(names.len(), list.len());

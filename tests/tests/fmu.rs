@@ -78,7 +78,9 @@ fn the_fmu_of_a_rig_with_effects_gives_what_the_plant_gives() {
     const CYCLES: usize = 800;
     let scene = Scene::new(SHORT);
     let rig_toml = fs::read_to_string(scene.path("rig.toml")).expect("the rig file");
-    let rig_toml = format!("{rig_toml}\n[effects.piston-leakage.drive]\n[effects.stribeck-friction.load]\n");
+    let rig_toml = format!(
+        "{rig_toml}\n[effects.piston-leakage.drive]\nleakage_nl_per_min = 5\n[effects.stribeck-friction.load]\nvelocity_mm_per_s = 10\n"
+    );
     let rig_file = scene.write("effects.toml", &rig_toml);
     let rig = RigParameters::from_toml(&rig_toml, "effects.toml")
         .and_then(|rig| rig.with("supply.pressure_bar", &[6.0]));
