@@ -144,6 +144,19 @@ fn asammdf_reads_the_same_values_units_and_times_from_the_mdf4() {
     }
 }
 
+#[test]
+fn an_mdf4_begins_when_its_log_does() {
+    let scene = Scene::new(SHORT);
+    let log = scene.write("dated.log", "(1700000000.000250) a 160#0100\n(1700000000.000500) a 160#0200\n");
+    let out = scene.path("dated.mf4");
+    let _ = export(&log, "mdf4", &out, &[]).expect_code(0);
+    let read: Value = serde_json::from_str(&run_script("read_mdf4.py", &[&out])).expect("JSON");
+    let start_s = read["start"].as_f64().expect("a number");
+    // Python's times of day have microseconds.
+    assert!((start_s - 1_700_000_000.000_25).abs() < 2e-6, "{start_s}");
+    assert_eq!(read["channels"]["RunControl.command"]["times"], serde_json::json!([0.0, 0.000_25]));
+}
+
 /// A log with a date, of two interfaces, with all kinds of frames.
 const FOREIGN: &str = "(1700000000.000250) can0 120#0011223344556677\n\
                        (1700000000.000500) can1 1ABCDEF0#01\n\
