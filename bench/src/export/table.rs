@@ -30,28 +30,29 @@ pub(super) fn write(out: &mut impl Write, signals: &Signals, rows: Rows) -> io::
     }
 }
 
-/// A row for each stamp; a message that comes twice at one stamp makes a second row.
+/// A row for each stamp; where a message comes twice at one stamp, its second frame makes a second row.
 fn as_stamped(out: &mut impl Write, signals: &Signals, origin_ns: u64) -> io::Result<u64> {
     let courses = &signals.courses;
-    let mut all: Vec<(u64, u32, u32)> = Vec::new();
+    // Stamp, how many of the same message and stamp came before, message, data.
+    let mut all: Vec<(u64, u32, u32, u64)> = Vec::new();
     for (place, course) in courses.iter().enumerate() {
-        all.extend(course.frames.iter().enumerate().map(|(row, frame)| (frame.0, row as u32, place as u32)));
-    }
-    // Stable, so that frames of one message at one stamp keep their order.
-    all.sort_by_key(|(stamp_ns, _, _)| *stamp_ns);
-    let (mut count, mut at) = (0, 0);
-    let mut cells: Vec<Option<u64>> = vec![None; courses.len()];
-    while let Some(&(stamp_ns, _, _)) = all.get(at) {
-        cells.fill(None);
-        while let Some(&(same_ns, row, place)) = all.get(at) {
-            let cell = &mut cells[place as usize];
-            if same_ns != stamp_ns || cell.is_some() {
-                break;
+        let begin = all.len();
+        all.extend(course.frames.iter().map(|(stamp_ns, word)| (*stamp_ns, 0, place as u32, *word)));
+        // Stable, so that frames of one stamp keep their order.
+        all[begin..].sort_by_key(|frame| frame.0);
+        for at in begin + 1..all.len() {
+            if all[at].0 == all[at - 1].0 {
+                all[at].1 = all[at - 1].1 + 1;
             }
-            *cell = Some(courses[place as usize].frames[row as usize].1);
-            at += 1;
         }
-        row(out, courses, stamp_ns, origin_ns, &cells)?;
+    }
+    all.sort_by_key(|frame| (frame.0, frame.1));
+    let mut count = 0;
+    let mut cells: Vec<Option<u64>> = vec![None; courses.len()];
+    for frames in all.chunk_by(|one, other| (one.0, one.1) == (other.0, other.1)) {
+        cells.fill(None);
+        frames.iter().for_each(|(_, _, place, word)| cells[*place as usize] = Some(*word));
+        row(out, courses, frames[0].0, origin_ns, &cells)?;
         count += 1;
     }
     Ok(count)
