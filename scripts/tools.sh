@@ -5,10 +5,13 @@
 tools=${tools:?set by scripts/test}
 
 # PyPI packages by version: clients that the tests hold the product against.
-python_packages=(cantools==45.1.0 crccheck==1.3.1 hdrhistogram==0.10.3 python-can==4.6.1)
-# Clients of XCP.
-python_packages+=(pyxcp==0.29.20 pya2ldb==1.0.355)
+python_packages=(
+    cantools==45.1.0 crccheck==1.3.1 hdrhistogram==0.10.3
+    asammdf==8.8.28 fmpy==0.3.32 numpy==2.4.6 pandas==3.1.1 python-can==4.6.1
+    pyxcp==0.29.20 pya2ldb==1.0.355 # clients of XCP
+)
 gungraun_version=0.20.0
+cargo_fuzz_version=0.13.2
 
 install_tools() {
     install_compiler && install_valgrind && install_python && install_gungraun
@@ -56,6 +59,13 @@ install_rt_tests() { need_program cyclictest rt-tests libnuma1; }
 install_stress_ng() {
     # shellcheck disable=SC2046 # a list of names
     need_program stress-ng stress-ng $(apt-cache depends stress-ng 2>/dev/null | sed -n 's/^ *Depends: \(lib[a-z0-9.+-]*\)$/\1/p')
+}
+
+# Builds the targets of fuzz/, with libFuzzer, which is C++.
+install_cargo_fuzz() {
+    command -v g++ >/dev/null || need_packages g++ || return 1
+    [ -x "$tools/bin/cargo-fuzz" ] && "$tools/bin/cargo-fuzz" --version | grep -q "$cargo_fuzz_version" && return
+    cargo install --quiet --locked cargo-fuzz --version "$cargo_fuzz_version" --root "$tools"
 }
 
 # The benchmark's floor is C; a Rust toolchain links with a C compiler anyway.

@@ -1,10 +1,13 @@
 //! The bench's command line.
 
 use crate::conformance::cli::ConformanceArguments;
+use crate::export::cli::ExportArguments;
+use crate::export_fmu::ExportFmuArguments;
 use crate::gateway::cli::GatewayArguments;
 use crate::latency_table::LatencyTableArguments;
 use crate::ping_pong::cli::{PingPongArguments, PongArguments};
 use crate::probe::cli::ProbeArguments;
+use crate::replay::cli::ReplayArguments;
 use crate::soak::cli::{ChildArguments, SoakArguments};
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
@@ -51,6 +54,12 @@ pub enum Command {
     CheckController(Box<ConformanceArguments>),
     /// Print the table of ratios of a latency report, in Markdown.
     LatencyTable(LatencyTableArguments),
+    /// Write a log of the bus as CSV, MDF4, ASC or BLF.
+    Export(ExportArguments),
+    /// Put a recorded log back on a bus by absolute time, and tell its timing error.
+    Replay(ReplayArguments),
+    /// Write the plant as a Functional Mock-up Unit, FMI 2.0 for co-simulation.
+    ExportFmu(ExportFmuArguments),
     /// The process that answers; ping-pong starts it.
     #[command(hide = true)]
     Pong(PongArguments),

@@ -25,12 +25,18 @@
 //! | [`conformance`] | whether a foreign controller keeps the contract of the bus |
 //! | [`gateway`] | a door to a bus for clients of the socketcand protocol |
 //! | [`soak`] | emulator and controllers over hours, every frame accounted for |
+//! | [`recorded_log`] | a log of the bus, checked to its last line |
+//! | [`export`] | a log as CSV, MDF4, ASC, BLF |
+//! | [`replay`] | a log put back on a bus, by absolute time |
+//! | [`export_fmu`] | the plant as an FMU |
 //! | [`cli`] | the command line |
 
 pub mod cli;
 pub mod compare;
 pub mod conformance;
 pub mod drawing;
+pub mod export;
+pub mod export_fmu;
 pub mod figures;
 pub mod gateway;
 pub mod grid;
@@ -42,6 +48,8 @@ pub mod picture;
 pub mod ping_pong;
 pub mod probe;
 pub mod record;
+pub mod recorded_log;
+pub mod replay;
 pub mod report;
 pub mod reports;
 pub mod runs;

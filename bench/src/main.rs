@@ -6,12 +6,14 @@ use bench::cli::{
 use bench::conformance::{self, ConformanceError};
 use bench::gateway::{self, GatewayError};
 use bench::ping_pong::{self, PingPongError};
+use bench::replay::ReplayError;
 use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
 use bench::soak::SoakError;
 use bench::soak::processes::become_child;
 use bench::{
-    SummaryError, compare, figures, join, latency_table, picture, probe, soak, spread, table, thresholds,
+    SummaryError, compare, export, export_fmu, figures, join, latency_table, picture, probe, replay, soak,
+    spread, table, thresholds,
 };
 use clap::Parser;
 use protocol::exit::Exit;
@@ -36,6 +38,9 @@ fn main() -> ExitCode {
         Command::LatencyTable(arguments) => {
             latency_table::table(&arguments).map(|text| print(&text)).map(|()| Exit::Good).map_err(Into::into)
         }
+        Command::Replay(arguments) => return told(replay::run(&arguments), ReplayError::exit),
+        Command::ExportFmu(arguments) => export_fmu::run(&arguments).map_err(Into::into),
+        Command::Export(arguments) => export::run(&arguments).map_err(Into::into),
         Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
         Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
         Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),

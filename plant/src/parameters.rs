@@ -190,6 +190,20 @@ impl RigParameters {
         Self::from_entries(self.entries.with(path, numbers)?)
     }
 
+    /// The same rig with several keys changed at once, so that only the outcome must fit together.
+    ///
+    /// # Errors
+    /// [`ParameterError`] as from a file that says so.
+    pub fn with_all<'a>(
+        &self,
+        changes: impl IntoIterator<Item = (&'a str, &'a [f64])>,
+    ) -> Result<Self, ParameterError> {
+        let mut changes = changes.into_iter();
+        Self::from_entries(
+            changes.try_fold(self.entries.clone(), |entries, (path, numbers)| entries.with(path, numbers))?,
+        )
+    }
+
     /// The numbers of a key, `table.key`, in the file's unit.
     ///
     /// # Panics

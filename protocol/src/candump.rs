@@ -1,9 +1,14 @@
-//! One line of a candump log, as `candump -L` writes it.
+//! Logs as `candump -L` writes them: a line, written and read, and a [`LogReader`] over a whole one.
 //!
-//! `(SSSSSSSSSS.UUUUUU) IFACE ID#HEX`, six decimals, upper case, no comments: python-can, cantools and SavvyCAN read it.
+//! `(SSSSSSSSSS.UUUUUU) IFACE ID#HEX`, six decimals, upper case, no comments: python-can, cantools and SavvyCAN read it. Readers
+//! take anything: what is no line is told with its column, and a [`LogReader`] adds the line.
+
+mod reader;
 
 use crate::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
 use std::io::{self, Write};
+
+pub use reader::{LogError, LogLine, LogProblem, LogReader, MOST_LINE_BYTES};
 
 /// A frame and its time.
 #[derive(Clone, Copy, Debug)]
@@ -29,53 +34,119 @@ pub fn write_line(
     writeln!(out, "({seconds:010}.{fraction:06}) {interface} {}", record.frame)
 }
 
-/// Reads one line, stamps and all, from whatever interface it is; `None` when it is none.
+/// What is wrong with a line of a log, and from which character on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("column {column}: {problem}")]
+pub struct LineError {
+    /// Character at which it begins, from 1.
+    pub column: usize,
+    /// What, and what would be right.
+    pub problem: &'static str,
+}
+
+/// A line of a log: a frame with its time, and where it was seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Line<'a> {
+    /// Name of the interface.
+    pub interface: &'a str,
+    /// The frame and its time; ns since the log's epoch.
+    pub record: FrameRecord,
+}
+
+/// Reads one line, stamps and all, from whatever interface it is; `None` when it is none ([`parse_line`] says why).
+#[must_use]
+pub fn read_line(line: &str) -> Option<FrameRecord> {
+    parse_line(line).ok().map(|line| line.record)
+}
+
+/// Reads one line. Nothing is allocated.
 ///
 /// Seconds may have any number of digits and fractions up to nine, as tools other than ours write them; a direction after
 /// the data (`candump -x`) is passed over.
-#[must_use]
-pub fn read_line(line: &str) -> Option<FrameRecord> {
-    let (stamp, rest) = line.trim_end().strip_prefix('(')?.split_once(") ")?;
+///
+/// # Errors
+/// [`LineError`] with the column, from 1.
+pub fn parse_line(line: &str) -> Result<Line<'_>, LineError> {
+    let at = |part: &str, problem| {
+        // `part` is a piece of `line`: its place is the distance of the two.
+        let bytes = part.as_ptr() as usize - line.as_ptr() as usize;
+        LineError { column: line[..bytes].chars().count() + 1, problem }
+    };
+    let text = line.trim_end();
+    let inner =
+        text.strip_prefix('(').ok_or_else(|| at(text, "a line begins with '(SECONDS.MICROSECONDS)'"))?;
+    let (stamp, rest) = inner.split_once(") ").ok_or_else(|| at(inner, "the time stamp ends with ') '"))?;
+    let stamp_ns = read_stamp(stamp).ok_or_else(|| {
+        at(stamp, "a time stamp is SECONDS.FRACTION in digits, the fraction of 1 to 9, below 584 years")
+    })?;
+    let rest = rest.trim_start();
+    let (interface, frame) =
+        rest.split_once(' ').ok_or_else(|| at(rest, "after the time stamp come interface and frame"))?;
+    let word = frame.trim_start().split(' ').next().filter(|word| !word.is_empty());
+    let word = word.ok_or_else(|| at(frame, "after the interface comes a frame, as 120#0011"))?;
+    let (id, data) =
+        word.split_once('#').ok_or_else(|| at(word, "a frame is IDENTIFIER#DATA, as 120#0011"))?;
+    let raw_id = read_identifier(id).map_err(|problem| at(id, problem))?;
+    let frame = read_frame(raw_id, data).map_err(|problem| at(data, problem))?;
+    Ok(Line { interface, record: FrameRecord { stamp_ns, frame } })
+}
+
+fn read_stamp(stamp: &str) -> Option<u64> {
     let (seconds, fraction) = stamp.split_once('.')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     if !digits(seconds) || !digits(fraction) || fraction.len() > 9 {
         return None;
     }
     let fraction_ns = fraction.parse::<u64>().ok()? * 10_u64.pow(9 - fraction.len() as u32);
-    let stamp_ns = seconds.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(fraction_ns)?;
-    let (_interface, frame) = rest.trim_start().split_once(' ')?;
-    let (id, data) = frame.split_whitespace().next()?.split_once('#')?;
-    Some(FrameRecord { stamp_ns, frame: read_frame(id, data)? })
+    seconds.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(fraction_ns)
 }
 
-fn read_frame(id: &str, data: &str) -> Option<CanFrame> {
-    let hex = |text: &str| text.bytes().all(|byte| byte.is_ascii_hexdigit());
-    if !hex(id) {
-        return None;
-    }
-    let number = u32::from_str_radix(id, 16).ok()?;
-    let raw_id = match id.len() {
-        3 if number < 0x800 => number,
+fn read_identifier(id: &str) -> Result<u32, &'static str> {
+    let number = u32::from_str_radix(id, 16).ok().filter(|_| is_hex(id));
+    let number = number.ok_or("an identifier is hexadecimal")?;
+    match id.len() {
+        3 if number < 0x800 => Ok(number),
+        3 => Err("an identifier of 3 digits is at most 7FF"),
         // An error frame brings its flag along.
-        8 if number & ERROR_FLAG == 0 => number | EXTENDED_FLAG,
-        8 => number,
-        _ => return None,
-    };
-    if let Some(length) = data.strip_prefix('R') {
-        let known = length.is_empty() || length.parse::<u8>().is_ok_and(|length| length <= 8);
-        return known.then(|| CanFrame::from_raw(raw_id | REMOTE_FLAG, &[]));
+        8 if number < 2 * ERROR_FLAG => Ok(if number < ERROR_FLAG { number | EXTENDED_FLAG } else { number }),
+        8 => Err("an identifier of 8 digits is at most 1FFFFFFF, that of an error frame at most 3FFFFFFF"),
+        _ => Err("an identifier has 3 digits, or 8 when it is extended"),
     }
-    if !hex(data) {
-        return None;
+}
+
+fn read_frame(raw_id: u32, data: &str) -> Result<CanFrame, &'static str> {
+    if data.starts_with('#') {
+        return Err("this is a CAN FD frame ('##'), and only classic frames are read");
+    }
+    if let Some(length) = data.strip_prefix('R') {
+        let asked = match length.as_bytes() {
+            [] => Some(0),
+            [digit @ b'0'..=b'8'] => Some(usize::from(digit - b'0')),
+            _ => None,
+        };
+        let asked = asked.ok_or("after the 'R' of a remote request comes nothing, or a length of 0 to 8")?;
+        return Ok(CanFrame::from_raw(raw_id | REMOTE_FLAG, &[0; 8][..asked]));
+    }
+    if !is_hex(data) {
+        return Err("data are hexadecimal digits");
     }
     let mut bytes = [0; 8];
-    let pairs = data.as_bytes().chunks(2);
-    let count = pairs.len();
-    for (byte, pair) in bytes.get_mut(..count)?.iter_mut().zip(pairs) {
-        let text = std::str::from_utf8(pair).ok().filter(|text| text.len() == 2)?;
-        *byte = u8::from_str_radix(text, 16).ok()?;
+    let count = data.len() / 2;
+    if count > bytes.len() {
+        return Err("data are at most 8 bytes");
     }
-    Some(CanFrame::from_raw(raw_id, &bytes[..count]))
+    if data.len() % 2 == 1 {
+        return Err("a byte has two digits");
+    }
+    for (byte, pair) in bytes.iter_mut().zip(data.as_bytes().chunks(2)) {
+        let digit = |digit: u8| char::from(digit).to_digit(16).unwrap_or(0) as u8;
+        *byte = digit(pair[0]) << 4 | digit(pair[1]);
+    }
+    Ok(CanFrame::from_raw(raw_id, &bytes[..count]))
+}
+
+fn is_hex(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
 #[cfg(test)]
@@ -89,6 +160,7 @@ mod tests {
             CanFrame::new(0x7FF, &[]),
             CanFrame::from_raw(EXTENDED_FLAG | 0x1234_5678, &[1; 8]),
             CanFrame::from_raw(REMOTE_FLAG | 0x123, &[]),
+            CanFrame::from_raw(REMOTE_FLAG | 0x123, &[0; 5]),
             CanFrame::from_raw(ERROR_FLAG | 4, &[0; 8]),
         ] {
             let mut line = Vec::new();
@@ -115,6 +187,28 @@ mod tests {
             assert!(read_line(line).is_none(), "{line}");
         }
         assert!(read_line("(1700000000.123456789) can0 120#00 R").is_some(), "candump -x");
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_by_column() {
+        for (line, column, words) in [
+            ("", 1, "begins with"),
+            ("(1.0 bus0 120#00", 2, "ends with ') '"),
+            ("(1.0x) bus0 120#00", 2, "in digits"),
+            ("(1.0) bus0", 7, "interface and frame"),
+            ("(1.0) büs0 12#00", 12, "3 digits"),
+            ("(1.0) bus0 800#00", 12, "at most 7FF"),
+            ("(1.0) bus0 120#0", 16, "two digits"),
+            ("(1.0) bus0 120##100", 16, "CAN FD"),
+            ("(1.0) bus0 120#R9", 16, "length of 0 to 8"),
+            ("(1.0) bus0 40000000#", 12, "at most 1FFFFFFF"),
+            ("(1.0) bus0 120#001122334455667788", 16, "at most 8 bytes"),
+            ("(18446744074.0) bus0 120#00", 2, "584 years"),
+        ] {
+            let error = parse_line(line).unwrap_err();
+            assert!(error.column == column && error.problem.contains(words), "{line}: {error}");
+        }
+        assert_eq!(parse_line("(1.0) vcan0 120#00").unwrap().interface, "vcan0");
     }
 
     #[test]

@@ -86,6 +86,10 @@ fn build(features: &[&str]) -> PathBuf {
     for program in if features.is_empty() { &all[..] } else { &counting[..] } {
         cargo.args(["--package", program.name(), "--bin", program.name()]);
     }
+    if features.is_empty() {
+        // What `bench export-fmu` packs.
+        cargo.args(["--package", "plant-fmu", "--lib"]);
+    }
     if !features.is_empty() {
         let target =
             std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);

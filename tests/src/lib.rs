@@ -8,6 +8,7 @@
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   broken ── a run with faults on purpose, and what it leaves
 //!   xcp ───── a client of the controllers' XCP, packet by packet, and the foreign one in Python
+//!   foreign_python  scripts with the packages that the product is held against
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   door ──── the gateway, and a client that does what it is told
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
@@ -32,6 +33,7 @@ pub mod disturb;
 pub mod door;
 pub mod events;
 pub mod firmware;
+pub mod foreign_python;
 pub mod guest;
 pub mod hidden;
 pub mod launch;

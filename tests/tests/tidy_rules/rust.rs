@@ -28,6 +28,7 @@ const FORBIDDEN_EDGES: &[(&str, &[&str])] = &[
     ("protocol", &["realtime", "plant", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
     ("realtime", &["protocol", "plant", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
     ("plant", &["protocol", "realtime", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
+    ("fmu", &["protocol", "realtime", "emulator", "controller", "bench", "discrepancy", "system-tests"]),
     ("emulator", &["controller", "bench", "discrepancy", "system-tests"]),
     ("controller", &["emulator", "bench", "discrepancy", "system-tests"]),
     ("discrepancy", &["emulator", "system-tests"]),
@@ -226,6 +227,7 @@ const DIMENSIONLESS: &[&str] = &[
     "confidence",            // probability
     "factor",                // of a DBC signal, whose unit is a field beside it
     "offset",                // the same
+    "range",                 // of a variable, whose unit is a field beside it
     "min",                   // the same, and of a key of the parameter table
     "max",                   // the same
     "value",                 // of a reading, whose unit its sensor has

@@ -1,0 +1,186 @@
+//! What a run put on the bus, in the files that other tools read: CSV, MDF4, ASC, BLF.
+//!
+//! ```text
+//!   bus.log ─► recorded_log.rs ─┬─► signals.rs (rig.dbc) ─┬─► table.rs   CSV
+//!                               │                         └─► mdf4.rs    MDF4
+//!                               └─► frames ── python-can ───► foreign.rs ASC, BLF
+//! ```
+//!
+//! The file appears when it is whole: it is written beside its place as `FILE.part` and renamed. How each format looks:
+//! `bench/docs/logs.md`.
+
+pub mod cli;
+mod foreign;
+mod mdf4;
+mod signals;
+mod table;
+
+use crate::recorded_log::{RecordedLog, RecordedLogError};
+use cli::{ExportArguments, Format};
+use protocol::exit::Exit;
+use signals::{LEFT_OUT, Signals};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use table::Rows;
+
+/// Most rows of a table that is held: a log with a hole of years makes none that fills a disk.
+const MOST_HELD_ROWS: u64 = 100_000_000;
+
+/// What keeps a log from being exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The log is none.
+    #[error(transparent)]
+    Log(#[from] RecordedLogError),
+    /// The file cannot be written.
+    #[error("cannot write {file}: {reason}")]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+    /// The python that python-can runs in did not do it.
+    #[error(
+        "{python}: {reason}; asc and blf want a python with python-can 4 ('python3 -m venv VENV', \
+         'VENV/bin/pip install python-can==4.6.1'): name it with --python VENV/bin/python, or in AIRBENCH_PYTHON"
+    )]
+    Python {
+        /// The program.
+        python: PathBuf,
+        /// What it said.
+        reason: String,
+    },
+    /// An option that another format has.
+    #[error("--every-ms goes with --to csv: the others hold every frame with its own time")]
+    EveryMs,
+    /// A table without end.
+    #[error(
+        "a row every {every_ms} ms makes more than {MOST_HELD_ROWS} rows of this log: cut it, or take a longer time"
+    )]
+    TooManyRows {
+        /// Time between two rows, ms.
+        every_ms: u32,
+    },
+}
+
+/// Exports a log and tells on standard output what became of it.
+///
+/// # Errors
+/// [`ExportError`]; there is no file then, or the one that was there before.
+pub fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
+    let ExportArguments { to, out, every_ms, .. } = arguments;
+    if every_ms.is_some() && *to != Format::Csv {
+        return Err(ExportError::EveryMs);
+    }
+    let log = RecordedLog::read(&arguments.source, arguments.interface.as_deref())?;
+    log.tell_cut_line();
+    let part = part_of(out);
+    let done = match to {
+        Format::Csv | Format::Mdf4 => as_signals(&part, &log, *to, *every_ms),
+        Format::Asc | Format::Blf => as_frames(&part, &log, *to, arguments.python.as_deref()),
+    };
+    let renamed = done.and_then(|told| {
+        std::fs::rename(&part, out).map_err(|error| ExportError::write(out, error)).map(|()| told)
+    });
+    match renamed {
+        Ok((told, exit)) => {
+            say(&format!("{}: {told}", out.display()));
+            Ok(exit)
+        }
+        Err(error) => {
+            // What is half is of no use; that it cannot be removed either changes nothing.
+            let _ = std::fs::remove_file(&part);
+            Err(error)
+        }
+    }
+}
+
+type Told = (String, Exit);
+
+fn as_signals(
+    part: &Path,
+    log: &RecordedLog,
+    format: Format,
+    every_ms: Option<u32>,
+) -> Result<Told, ExportError> {
+    let signals = Signals::of(log);
+    for (left_out, what) in signals.left_out.iter().zip(LEFT_OUT).filter(|(left_out, _)| left_out.frames > 0)
+    {
+        let file = log.file.display();
+        warn(&format!("{file}:{}: {} frames {what} are left out", left_out.first_line, left_out.frames));
+    }
+    let frames: usize = signals.courses.iter().map(|course| course.frames.len()).sum();
+    let channels: usize = signals.courses.iter().map(|course| course.spec.signals.len()).sum();
+    let origin = if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" };
+    let origin_ns = log.origin_ns();
+    let written = |error: &dyn std::fmt::Display| ExportError::write(part, error);
+    let rows = if format == Format::Csv {
+        let stamps = || log.frames.iter().map(|logged| logged.record.stamp_ns);
+        let length_ns = stamps().max().unwrap_or(0) - stamps().min().unwrap_or(0);
+        if let Some(every_ms) = every_ms
+            && length_ns / (u64::from(every_ms) * 1_000_000) > MOST_HELD_ROWS
+        {
+            return Err(ExportError::TooManyRows { every_ms });
+        }
+        let rows = create(part).and_then(|mut file| {
+            let rows = table::write(&mut file, &signals, Rows { origin_ns, every_ms })?;
+            file.flush().map(|()| rows)
+        });
+        format!(" in {} rows", rows.map_err(|error| written(&error))?)
+    } else {
+        let path = part.to_str().ok_or_else(|| written(&"its name is no UTF-8"))?;
+        mdf4::write(path, &signals, origin_ns).map_err(|error| written(&error))?;
+        format!(" in {} groups", signals.courses.len())
+    };
+    let told = format!("{channels} signals of {frames} frames{rows}; time counts from {origin}");
+    Ok((told, Exit::Good))
+}
+
+fn as_frames(
+    part: &Path,
+    log: &RecordedLog,
+    format: Format,
+    python: Option<&Path>,
+) -> Result<Told, ExportError> {
+    // Whether the place can be written is found out here, in words of our own.
+    create(part).map_err(|error| ExportError::write(part, error))?;
+    let named = std::env::var_os("AIRBENCH_PYTHON").map(PathBuf::from);
+    let python = python.map(Path::to_owned).or(named).unwrap_or_else(|| "python3".into());
+    let told = format!("{} frames", log.frames.len());
+    match foreign::write(part, log, format, &python)? {
+        None => Ok((format!("{told}, read back equal"), Exit::Good)),
+        Some(said) => {
+            warn(&format!(
+                "what was written does not read back as it was: {said} (frames, and the first of them)"
+            ));
+            Ok((told, Exit::BoundBroken))
+        }
+    }
+}
+
+fn create(path: &Path) -> io::Result<BufWriter<File>> {
+    File::create(path).map(|file| BufWriter::with_capacity(1 << 20, file))
+}
+
+fn part_of(out: &Path) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
+}
+
+fn say(text: &str) {
+    // A reader that has gone, as `| head` does, has seen enough.
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+fn warn(text: &str) {
+    let _ = writeln!(io::stderr(), "bench: {text}");
+}
+
+impl ExportError {
+    fn write(file: &Path, reason: impl ToString) -> Self {
+        Self::Write { file: file.into(), reason: reason.to_string() }
+    }
+}

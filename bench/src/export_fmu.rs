@@ -1,0 +1,125 @@
+//! Puts the plant into an FMU: description, shared library, rig file and a page, in one archive.
+//!
+//! The shared library `libplant_fmu.so` is built with the bench (`cargo build --release -p bench -p plant-fmu`) and looked for
+//! beside it. The same files give the same archive, to the byte.
+
+use clap::Args;
+use plant_fmu::{MODEL_IDENTIFIER, RIG_FILE, description};
+use protocol::exit::Exit;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+const PAGE: &str = include_str!("../../fmu/docs/index.html");
+
+/// What becomes an FMU.
+#[derive(Args, Debug)]
+pub struct ExportFmuArguments {
+    /// The rig file, with its effects.
+    #[arg(long, value_name = "FILE")]
+    pub rig: PathBuf,
+    /// The FMU to write.
+    #[arg(long, value_name = "FILE.fmu")]
+    pub out: PathBuf,
+    /// The shared library of the plant [default: libplant_fmu.so beside this program].
+    #[arg(long, value_name = "FILE")]
+    pub library: Option<PathBuf>,
+}
+
+/// What keeps an FMU from being written.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportFmuError {
+    /// A file cannot be read.
+    #[error("cannot read {file}: {reason}")]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// The rig file is none.
+    #[error("{0}")]
+    Rig(String),
+    /// The shared library is not there.
+    #[error(
+        "no {name} beside {program}: build it with 'cargo build --release -p plant-fmu', or name it with --library",
+        name = library_name()
+    )]
+    NoLibrary {
+        /// This program.
+        program: PathBuf,
+    },
+    /// The FMU cannot be written.
+    #[error("cannot write {file}: {reason}")]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+/// Writes the FMU and tells where it is.
+///
+/// # Errors
+/// [`ExportFmuError`]; there is no file then, or the one that was there before.
+pub fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
+    let ExportFmuArguments { rig, out, library } = arguments;
+    let rig_toml = String::from_utf8(read(rig)?).map_err(|error| ExportFmuError::Read {
+        file: rig.clone(),
+        reason: error.utf8_error().to_string(),
+    })?;
+    let described =
+        description::of_file(&rig_toml, &rig.display().to_string()).map_err(ExportFmuError::Rig)?;
+    let library = match library {
+        Some(library) => read(library)?,
+        None => read(&beside()?)?,
+    };
+    let part = PathBuf::from([out.as_os_str(), ".part".as_ref()].join("".as_ref()));
+    let written =
+        write(&part, &described.xml, &library, &rig_toml).and_then(|()| std::fs::rename(&part, out));
+    written.map_err(|error| {
+        // What is half is of no use; that it cannot be removed either changes nothing.
+        let _ = std::fs::remove_file(&part);
+        ExportFmuError::Write { file: out.clone(), reason: error.to_string() }
+    })?;
+    // A reader that has gone has seen enough.
+    let _ =
+        writeln!(io::stdout(), "{}: FMI 2.0 co-simulation, linux64, guid {}", out.display(), described.guid);
+    Ok(Exit::Good)
+}
+
+fn library_name() -> String {
+    format!("lib{MODEL_IDENTIFIER}.so")
+}
+
+/// The library beside this program, where cargo puts it: on its own, or as what the program was built with.
+fn beside() -> Result<PathBuf, ExportFmuError> {
+    let program = std::env::current_exe().unwrap_or_default();
+    let folder = program.parent().unwrap_or(Path::new("."));
+    let places = [folder.join(library_name()), folder.join("deps").join(library_name())];
+    places.into_iter().find(|place| place.is_file()).ok_or(ExportFmuError::NoLibrary { program })
+}
+
+fn write(file: &Path, description: &str, library: &[u8], rig_toml: &str) -> io::Result<()> {
+    let mut archive = ZipWriter::new(File::create(file)?);
+    // No time of day: the same content is the same file.
+    let plain =
+        SimpleFileOptions::default().compression_method(CompressionMethod::Deflated).unix_permissions(0o644);
+    for (name, content) in [
+        ("modelDescription.xml".to_owned(), description.as_bytes()),
+        (format!("binaries/linux64/{MODEL_IDENTIFIER}.so"), library),
+        (format!("resources/{RIG_FILE}"), rig_toml.as_bytes()),
+        ("documentation/index.html".to_owned(), PAGE.as_bytes()),
+    ] {
+        archive.start_file(name, plain)?;
+        archive.write_all(content)?;
+    }
+    archive.finish()?.sync_all()
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, ExportFmuError> {
+    std::fs::read(file).map_err(|error| ExportFmuError::Read { file: file.into(), reason: error.to_string() })
+}

@@ -1,0 +1,188 @@
+//! A log of the bus (`candump -L`) as it was recorded: checked to its last line before anything is made of it.
+//!
+//! A run's folder stands for its `bus.log`, and its `summary.json` says when cycle 0 began: times then count from there, as they
+//! do in `measurement.csv`. A log alone counts from its first frame.
+//!
+//! Frames are kept in memory, 33 bytes each: an hour of a rig with both controllers some 600 MB.
+
+use protocol::candump::{LogError, LogLine, LogReader};
+use std::fs::File;
+use std::io::{BufReader, Write};
+use std::path::{Path, PathBuf};
+
+/// A run's log in its folder.
+const LOG_NAME: &str = "bus.log";
+/// A summary whose cycle 0 lies farther from the log's first frame is of another run, s.
+const NEAR_ZERO_S: f64 = 60.0;
+
+/// Most interfaces of one log.
+const MOST_INTERFACES: usize = 64;
+
+/// What keeps a log from being read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordedLogError {
+    /// The file cannot be opened.
+    #[error("cannot read {file}: {reason}; give a run's folder, or a log of 'candump -L'")]
+    Open {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// A line that is none.
+    #[error("{file}:{error}")]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// Line, column and what is wrong.
+        error: LogError,
+    },
+    /// Names of interfaces without end.
+    #[error("{file}:{line}: more than {MOST_INTERFACES} interfaces: is this a log of 'candump -L'?")]
+    ManyInterfaces {
+        /// The file.
+        file: PathBuf,
+        /// Line of the first that is too many.
+        line: u64,
+    },
+    /// No frame in it.
+    #[error("{0} holds no frame")]
+    Empty(PathBuf),
+}
+
+/// A log that was read.
+#[derive(Clone, Debug)]
+pub struct RecordedLog {
+    /// The file.
+    pub file: PathBuf,
+    /// Its frames in the order of the file; at least one.
+    pub frames: Vec<LogLine>,
+    /// Which of `interfaces` each frame was seen at.
+    pub seen_at: Vec<u8>,
+    /// Names of the interfaces, each once, in the order in which they come.
+    pub interfaces: Vec<String>,
+    /// The last line, when it was cut and left out.
+    pub cut_line: Option<u64>,
+    /// When cycle 0 began, ns of the log's epoch, where the run's summary tells it.
+    pub cycle_zero_ns: Option<u64>,
+}
+
+impl RecordedLog {
+    /// Reads `path`, a run's folder or a log; with `interface`, what was seen there alone.
+    ///
+    /// # Errors
+    /// [`RecordedLogError`] with file, line and column.
+    pub fn read(path: &Path, interface: Option<&str>) -> Result<Self, RecordedLogError> {
+        let file = if path.is_dir() { path.join(LOG_NAME) } else { path.to_owned() };
+        let opened = File::open(&file).map_err(|error| {
+            let (file, reason) = (file.clone(), error.to_string());
+            RecordedLogError::Open { file, reason }
+        })?;
+        let mut reader = LogReader::new(BufReader::with_capacity(1 << 20, opened));
+        let (mut frames, mut seen_at, mut interfaces) = (Vec::new(), Vec::new(), Vec::<String>::new());
+        loop {
+            match reader.read() {
+                Ok(Some((_, name))) if interface.is_some_and(|wanted| wanted != name) => {}
+                Ok(Some((line, name))) => {
+                    let known = interfaces.iter().position(|known| known == name);
+                    if known.is_none() && interfaces.len() == MOST_INTERFACES {
+                        return Err(RecordedLogError::ManyInterfaces { file, line: line.line });
+                    }
+                    let place = known.unwrap_or_else(|| {
+                        interfaces.push(name.to_owned());
+                        interfaces.len() - 1
+                    });
+                    frames.push(line);
+                    seen_at.push(place as u8); // below the most
+                }
+                Ok(None) => break,
+                Err(error) => return Err(RecordedLogError::Line { file, error }),
+            }
+        }
+        let Some(first): Option<&LogLine> = frames.first() else { return Err(RecordedLogError::Empty(file)) };
+        let cycle_zero_ns = told_zero_ns(&file, first.record.stamp_ns);
+        Ok(Self { file, cut_line: reader.cut_line(), frames, seen_at, interfaces, cycle_zero_ns })
+    }
+
+    /// The stamp from which times count, ns of the log's epoch: cycle 0, or the first frame.
+    #[must_use]
+    pub fn origin_ns(&self) -> u64 {
+        self.cycle_zero_ns.unwrap_or_else(|| self.frames[0].record.stamp_ns)
+    }
+
+    /// Tells on standard error what was left out.
+    pub fn tell_cut_line(&self) {
+        if let Some(line) = self.cut_line {
+            let file = self.file.display();
+            // Nobody may be there to read it.
+            let _ = writeln!(
+                std::io::stderr(),
+                "bench: {file}:{line}: the last line is cut, and left out: its writer was killed"
+            );
+        }
+    }
+}
+
+/// When cycle 0 began, from the `summary.json` beside a run's log.
+fn told_zero_ns(file: &Path, first_ns: u64) -> Option<u64> {
+    if file.file_name()? != LOG_NAME {
+        return None;
+    }
+    let text = std::fs::read_to_string(file.parent()?.join("summary.json")).ok()?;
+    let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
+    let zero_s = summary.get("bus_log_cycle_zero_s")?.as_f64()?;
+    // Stamps of a log are whole microseconds, and so is its zero: a number of this size is not exact below them.
+    let near = zero_s >= 0.0 && (zero_s - first_ns as f64 * 1e-9).abs() < NEAR_ZERO_S;
+    near.then(|| (zero_s * 1e6).round() as u64 * 1000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(name: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(name);
+        std::fs::write(&file, text).unwrap();
+        (folder, file)
+    }
+
+    #[test]
+    fn a_wrong_line_is_told_with_file_line_and_column() {
+        let (_folder, file) = written("a.log", "(0.000001) a 120#\n(0.000002) a 120#0\n\n");
+        let error = RecordedLog::read(&file, None).unwrap_err().to_string();
+        assert!(error.contains("a.log:2:18: a byte has two digits"), "{error}");
+    }
+
+    #[test]
+    fn one_interface_of_several_can_be_taken() {
+        let (_folder, file) = written("a.log", "(0.1) a 120#\n(0.2) b 121#\n(0.3) a 122#\n(0.");
+        let all = RecordedLog::read(&file, None).unwrap();
+        assert_eq!((all.frames.len(), all.interfaces.len(), all.cut_line), (3, 2, Some(4)));
+        assert_eq!(all.seen_at, [0, 1, 0]);
+        assert_eq!(RecordedLog::read(&file, Some("b")).unwrap().frames[0].line, 2);
+        assert!(matches!(RecordedLog::read(&file, Some("c")), Err(RecordedLogError::Empty(_))));
+    }
+
+    #[test]
+    fn interfaces_without_end_are_refused() {
+        let text: String = (0..70).map(|number| format!("(0.1) can{number} 120#\n")).collect();
+        let (_folder, file) = written("a.log", &text);
+        let error = RecordedLog::read(&file, None).unwrap_err().to_string();
+        assert!(error.contains("a.log:65: more than 64 interfaces"), "{error}");
+    }
+
+    #[test]
+    fn times_count_from_cycle_zero_where_the_summary_is_of_this_run() {
+        let (folder, _file) = written("bus.log", "(1700000000.000500) a 120#\n");
+        let origin_ns = || RecordedLog::read(folder.path(), None).unwrap().origin_ns();
+        assert_eq!(origin_ns(), 1_700_000_000_000_500_000);
+        for (zero, expected_ns) in
+            [("1700000000.000123", 1_700_000_000_000_123_000), ("1.5", 1_700_000_000_000_500_000)]
+        {
+            let summary = format!("{{\"bus_log_cycle_zero_s\": {zero}}}");
+            std::fs::write(folder.path().join("summary.json"), summary).unwrap();
+            assert_eq!(origin_ns(), expected_ns);
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Puts a recorded log back on a bus by absolute time, and tells how exactly.
+//!
+//! ```text
+//!   bus.log ─► recorded_log.rs ─► schedule.rs: when is what due ─► listen: a live rig? ─► play.rs ─► replay.json, replay.hlog
+//!                                   └─ kind.rs: whose frame is it       └─ refused
+//! ```
+//!
+//! A log holds commands of the past. On a bus with a live rig its valves would follow them, and controllers would be told the
+//! past by a log's sensors: both are refused before the first frame, and end the replay when a rig comes alive later.
+//!
+//! Nothing is sent of a log that is not right to its last line.
+
+pub mod cli;
+pub mod kind;
+mod play;
+mod schedule;
+
+use crate::recorded_log::{RecordedLog, RecordedLogError};
+use cli::ReplayArguments;
+use play::{End, Played, heard_of_a_rig, play};
+use protocol::bus::{self, Bus, BusError, StampClock};
+use protocol::exit::Exit;
+use protocol::run_folder::{SCHEMA_VERSION, write_json};
+use realtime::{Clock, Interrupt, MonotonicClock, Request, write_hlog};
+use schedule::{LONGEST, Schedule};
+use serde_json::json;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Time between two looks for the bus.
+const LOOK_PERIOD: Duration = Duration::from_millis(10);
+
+/// What keeps a log from being replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The log is none.
+    #[error(transparent)]
+    Log(#[from] RecordedLogError),
+    /// The log has several interfaces.
+    #[error("{file} holds frames of {names}: choose one with --interface NAME")]
+    Interfaces {
+        /// The log.
+        file: PathBuf,
+        /// The interfaces.
+        names: String,
+    },
+    /// The log lasts too long.
+    #[error("{file}:{line}: this frame is more than {} days after the first one: cut the log", LONGEST.as_secs() / 86400)]
+    TooLong {
+        /// The log.
+        file: PathBuf,
+        /// The line.
+        line: u64,
+    },
+    /// Everything was left out.
+    #[error("nothing of {0} is left to be sent")]
+    Nothing(PathBuf),
+    /// A rig is live, and the log would disturb it.
+    #[error(
+        "a rig is live on {bus} ({heard} of its frames in {listened_ms} ms), and the log holds {commands} commands and {of_the_rig} \
+         frames of a rig, all of the past: leave them out with --leave-out commands,rig, or take another bus"
+    )]
+    LiveRig {
+        /// The bus.
+        bus: String,
+        /// Frames of the live rig.
+        heard: u64,
+        /// Time of listening, ms.
+        listened_ms: u64,
+        /// Commands that would have been sent.
+        commands: u64,
+        /// Frames of a rig that would have been sent.
+        of_the_rig: u64,
+    },
+    /// The bus cannot be opened.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The bus is not there.
+    #[error("{0} is not there; an embedded bus needs a host: 'emulator bus --bus URL'")]
+    NoBus(String),
+    /// The system gave no signal handler.
+    #[error("signals cannot be watched: {0}")]
+    Signals(io::Error),
+    /// A file cannot be written.
+    #[error("cannot write {file}: {reason}")]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+}
+
+impl ReplayError {
+    /// The exit code that the error leads to.
+    #[must_use]
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Bus(_) | Self::NoBus(_) => Exit::BusFailed,
+            _ => Exit::BadInput,
+        }
+    }
+}
+
+/// Replays a log, and tells on standard output what was done; in a folder too, if asked.
+///
+/// # Errors
+/// [`ReplayError`]: nothing was sent, save for [`ReplayError::Write`].
+pub fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
+    let log = RecordedLog::read(&arguments.source, arguments.interface.as_deref())?;
+    log.tell_cut_line();
+    if log.interfaces.len() > 1 {
+        return Err(ReplayError::Interfaces { file: log.file, names: log.interfaces.join(", ") });
+    }
+    let schedule = Schedule::of(&log, &arguments.leave_out)
+        .map_err(|long| ReplayError::TooLong { file: log.file.clone(), line: long.line })?;
+    if schedule.frames.is_empty() {
+        return Err(ReplayError::Nothing(log.file));
+    }
+    if let Some(out) = &arguments.out {
+        std::fs::create_dir_all(out).map_err(|error| ReplayError::write(out, error))?;
+    }
+    let interrupt = Interrupt::watch().map_err(ReplayError::Signals)?;
+    let clock: StampClock = Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns));
+    let mut bus = bus::open(&arguments.bus, clock)?;
+    if !connected(bus.as_mut(), Duration::from_secs(arguments.wait_s), &interrupt) {
+        return if interrupt.came() { Ok(Exit::Interrupted) } else { Err(no_bus(arguments)) };
+    }
+    let heard = listen(bus.as_mut(), Duration::from_millis(arguments.listen_ms), &interrupt);
+    if heard > 0 && schedule.disturbs_a_rig() {
+        return Err(ReplayError::LiveRig {
+            bus: arguments.bus.to_string(),
+            heard,
+            listened_ms: arguments.listen_ms,
+            commands: schedule.commands,
+            of_the_rig: schedule.of_the_rig,
+        });
+    }
+    let length_s = schedule.frames[schedule.frames.len() - 1].after_ns as f64 * 1e-9;
+    say(&format!("replaying {} frames over {length_s:.3} s on {}", schedule.frames.len(), arguments.bus));
+    let request = match arguments.priority {
+        Some(priority) => Request::for_a_loop(priority, arguments.cpu),
+        None => Request { cpu: arguments.cpu, ..Request::default() },
+    };
+    let grants = realtime::acquire(&request);
+    grants.refusals().iter().for_each(|refusal| warn(&format!("warning: {refusal}")));
+    let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let spin = Duration::from_micros(arguments.spin_us);
+    let played = play(bus.as_mut(), &MonotonicClock, &schedule, spin, &interrupt);
+    tell(&schedule, &played);
+    if let Some(out) = &arguments.out {
+        write(out, arguments, &log, &schedule, &played, started)?;
+    }
+    Ok(match played.end {
+        End::Interrupted => Exit::Interrupted,
+        End::LiveRig => Exit::BusFailed,
+        End::Whole if played.dropped > 0 => Exit::BusFailed,
+        End::Whole => Exit::Good,
+    })
+}
+
+fn connected(bus: &mut dyn Bus, patience: Duration, interrupt: &Interrupt) -> bool {
+    let until = MonotonicClock.now() + patience;
+    loop {
+        bus.receive();
+        if bus.is_up() || interrupt.came() || MonotonicClock.now() >= until {
+            return bus.is_up();
+        }
+        MonotonicClock.wait_until(MonotonicClock.now() + LOOK_PERIOD);
+    }
+}
+
+/// Frames of a rig that come within so long; a rig sends thousands a second.
+fn listen(bus: &mut dyn Bus, length: Duration, interrupt: &Interrupt) -> u64 {
+    let until = MonotonicClock.now() + length;
+    let mut heard = 0;
+    while MonotonicClock.now() < until && !interrupt.came() {
+        heard += heard_of_a_rig(bus);
+        MonotonicClock.wait_until(until.min(MonotonicClock.now() + LOOK_PERIOD));
+    }
+    heard + heard_of_a_rig(bus)
+}
+
+fn tell(schedule: &Schedule, played: &Played) {
+    let Schedule { left_out, error_frames, disordered, .. } = schedule;
+    let total = schedule.frames.len();
+    let how = match played.end {
+        End::Whole => "",
+        End::Interrupted => ", then interrupted",
+        End::LiveRig => ", then stopped: a rig came alive on the bus, and what follows would disturb it",
+    };
+    say(&format!("sent {} of {total} frames{how}", played.sent));
+    for (count, what) in [
+        (*left_out, "frames of the log left out, as told"),
+        (*error_frames, "error frames of the log left out: nobody can send them"),
+        (*disordered, "frames with a stamp before an earlier line's, sent with that one"),
+        (played.dropped, "frames that the bus did not take"),
+    ] {
+        if count > 0 {
+            say(&format!("{count} {what}"));
+        }
+    }
+    say(&format!("timing error: {}", played.error_ns.percentiles()));
+}
+
+fn write(
+    out: &Path,
+    arguments: &ReplayArguments,
+    log: &RecordedLog,
+    schedule: &Schedule,
+    played: &Played,
+    started: Duration,
+) -> Result<(), ReplayError> {
+    let (table, histogram) = (out.join("replay.json"), out.join("replay.hlog"));
+    let end = match played.end {
+        End::Whole => "whole",
+        End::Interrupted => "interrupted",
+        End::LiveRig => "live-rig",
+    };
+    let told = json!({
+        "schema": "airbench-replay",
+        "schema_version": SCHEMA_VERSION,
+        "log": log.file,
+        "bus": arguments.bus.to_string(),
+        "ended": end,
+        "frames_in_log": log.frames.len(),
+        "frames_scheduled": schedule.frames.len(),
+        "frames_sent": played.sent,
+        "frames_dropped": played.dropped,
+        "frames_left_out": schedule.left_out,
+        "error_frames_left_out": schedule.error_frames,
+        "frames_disordered": schedule.disordered,
+        "timing_error_ns": played.error_ns,
+    });
+    write_json(&table, &told).map_err(|error| ReplayError::write(&table, error))?;
+    let parts = [("replay-timing-error", played.error_ns.histogram())];
+    let length = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(started);
+    write_hlog(&histogram, &parts, started.as_secs_f64(), length)
+        .map_err(|error| ReplayError::write(&histogram, error))
+}
+
+fn no_bus(arguments: &ReplayArguments) -> ReplayError {
+    ReplayError::NoBus(arguments.bus.to_string())
+}
+
+fn say(text: &str) {
+    // A reader that has gone has seen enough.
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+fn warn(text: &str) {
+    let _ = writeln!(io::stderr(), "bench: {text}");
+}
+
+impl ReplayError {
+    fn write(file: &Path, reason: impl ToString) -> Self {
+        Self::Write { file: file.into(), reason: reason.to_string() }
+    }
+}

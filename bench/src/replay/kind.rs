@@ -1,0 +1,124 @@
+//! Whose frame is it, and may it be sent: what a log holds, by identifier.
+//!
+//! | kind | frames | beside a live rig |
+//! |---|---|---|
+//! | command | of controllers, console and bench in `rig.dbc` | stale: valves would follow the past |
+//! | rig | of the rig in `rig.dbc` | a second rig: controllers would be told the past |
+//! | other | identifiers that `rig.dbc` does not know | nobody of ours acts on them |
+//!
+//! An error frame is what an interface told its own host; nobody can send it.
+
+use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG};
+use protocol::frames::MessageSpec;
+use std::str::FromStr;
+
+/// The node of `rig.dbc` that the emulator is.
+const RIG: &str = "Rig";
+
+/// Whose a frame is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Sent by a controller, the console or the bench.
+    Command,
+    /// Sent by the rig.
+    Rig,
+    /// Unknown to `rig.dbc`.
+    Other,
+    /// An error frame.
+    Error,
+}
+
+/// What is left out of a replay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LeftOut {
+    /// All of [`Kind::Command`].
+    Commands,
+    /// All of [`Kind::Rig`].
+    Rig,
+    /// An identifier, with the flag of an extended one.
+    Identifier(u32),
+}
+
+/// A word that is no part of a log.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is neither 'commands' nor 'rig' nor an identifier of 3 or 8 hexadecimal digits")]
+pub struct NotToBeLeftOut(String);
+
+impl Kind {
+    /// Of a frame, by its identifier: a malformed frame of the rig is still one that only a rig sends.
+    #[must_use]
+    pub fn of(frame: &CanFrame) -> Self {
+        if frame.raw_id() & ERROR_FLAG != 0 {
+            return Self::Error;
+        }
+        match frame.standard_id().and_then(MessageSpec::by_id) {
+            Some(spec) if spec.sender == RIG => Self::Rig,
+            Some(_) => Self::Command,
+            None => Self::Other,
+        }
+    }
+}
+
+impl LeftOut {
+    /// Whether it is about the frame.
+    #[must_use]
+    pub fn names(self, frame: &CanFrame) -> bool {
+        match self {
+            Self::Commands => Kind::of(frame) == Kind::Command,
+            Self::Rig => Kind::of(frame) == Kind::Rig,
+            Self::Identifier(id) => frame.raw_id() & (EXTENDED_FLAG | 0x1FFF_FFFF) == id,
+        }
+    }
+}
+
+impl FromStr for LeftOut {
+    type Err = NotToBeLeftOut;
+
+    fn from_str(text: &str) -> Result<Self, NotToBeLeftOut> {
+        let hex = text.bytes().all(|byte| byte.is_ascii_hexdigit());
+        let number = u32::from_str_radix(text, 16).ok().filter(|_| hex);
+        match (text, text.len(), number) {
+            ("commands", _, _) => Ok(Self::Commands),
+            ("rig", _, _) => Ok(Self::Rig),
+            (_, 3, Some(id)) if id < 0x800 => Ok(Self::Identifier(id)),
+            (_, 8, Some(id)) if id < 0x2000_0000 => Ok(Self::Identifier(id | EXTENDED_FLAG)),
+            _ => Err(NotToBeLeftOut(text.into())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::can::REMOTE_FLAG;
+
+    #[test]
+    fn a_frame_is_its_senders() {
+        for (raw_id, kind) in [
+            (0x110, Kind::Command),
+            (0x160, Kind::Command),
+            (0x108, Kind::Command),
+            (0x109, Kind::Rig),
+            (0x120, Kind::Rig),
+            (0x7FF, Kind::Other),
+            (EXTENDED_FLAG | 0x110, Kind::Other),
+            (ERROR_FLAG | 4, Kind::Error),
+        ] {
+            assert_eq!(Kind::of(&CanFrame::from_raw(raw_id, &[])), kind, "{raw_id:X}");
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_is_named_by_word_or_identifier() {
+        let frame = |raw_id| CanFrame::from_raw(raw_id, &[]);
+        let left_out = |text: &str| text.parse::<LeftOut>().unwrap();
+        assert!(left_out("commands").names(&frame(0x111)) && !left_out("commands").names(&frame(0x121)));
+        assert!(left_out("rig").names(&frame(0x121)) && !left_out("rig").names(&frame(0x111)));
+        assert!(left_out("7fF").names(&frame(REMOTE_FLAG | 0x7FF)));
+        assert!(!left_out("000007FF").names(&frame(0x7FF)));
+        assert!(left_out("000007FF").names(&frame(EXTENDED_FLAG | 0x7FF)));
+        for text in ["", "command", "800", "+12", "20000000", "12"] {
+            assert!(text.parse::<LeftOut>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,581 @@
+//! The C interface of FMI 2.0: pointers become values here and nowhere else, and no panic crosses.
+//!
+//! Each function is a few lines around [`Simulation`]: it turns pointers into slices, catches a panic, tells a refusal by the
+//! importer's logger and gives a status. After a panic the instance is dead: every further call gives `fmi2Fatal`.
+//!
+//! What the `// SAFETY:` comments lean on, and what cannot be proved here:
+//! - *The standard.* An importer promises that a component came from `fmi2Instantiate` and was not freed, that it is used by one
+//!   thread at a time, that arrays are as long as it says, and that strings end in a zero. Null is checked.
+//! - *The logger* is C with variable arguments; a `%` of a message is doubled, since it is a format.
+//!
+//! Source: FMI 2.0.4, sections 2.1 and 4.2; `fmi2FunctionTypes.h`.
+#![allow(unsafe_code)] // foreign pointers and exported names; nothing else in the crate is
+#![allow(missing_docs, non_snake_case)] // the names and their meaning are the standard's
+
+use crate::description;
+use crate::simulation::{Refusal, Simulation};
+use plant::RigParameters;
+use std::ffi::{CStr, CString, c_char, c_double, c_int, c_uint, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::ptr::null_mut;
+
+/// `fmi2Status`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub(crate) enum Status {
+    Ok = 0,
+    Warning = 1,
+    Discard = 2,
+    Error = 3,
+    Fatal = 4,
+}
+
+type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
+
+/// `fmi2CallbackFunctions`.
+#[repr(C)]
+pub(crate) struct Callbacks {
+    logger: Option<Logger>,
+    allocate_memory: *const c_void,
+    free_memory: *const c_void,
+    step_finished: *const c_void,
+    environment: *mut c_void,
+}
+
+/// `fmi2CoSimulation` of `fmi2Type`.
+const CO_SIMULATION: c_int = 1;
+/// `fmi2LastSuccessfulTime` and `fmi2Terminated` of `fmi2StatusKind`.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
+const TERMINATED: c_int = 3;
+
+/// What an importer holds.
+struct Component {
+    simulation: Simulation,
+    teller: Teller,
+    dead: bool,
+}
+
+/// The way to the importer's log.
+struct Teller {
+    name: CString,
+    logger: Option<Logger>,
+    environment: *mut c_void,
+}
+
+impl Teller {
+    fn tell(&self, status: Status, text: &str) {
+        let Some(logger) = self.logger else { return };
+        let category = match status {
+            Status::Ok | Status::Warning => c"logStatusWarning",
+            Status::Discard | Status::Error => c"logStatusError",
+            Status::Fatal => c"logStatusFatal",
+        };
+        let message = text.replace('%', "%%").replace('\0', " ");
+        let Ok(message) = CString::new(message) else { return };
+        // SAFETY: the importer's own function and environment; the texts live until it returns.
+        unsafe {
+            logger(self.environment, self.name.as_ptr(), status, category.as_ptr(), message.as_ptr());
+        }
+    }
+}
+
+/// Does `work` on a component, if it is one and alive.
+fn on(component: *mut c_void, work: impl FnOnce(&mut Component) -> Result<Status, Refusal>) -> Status {
+    // SAFETY: an importer hands in what `fmi2Instantiate` gave, to one thread at a time (see the head).
+    let Some(component) = (unsafe { component.cast::<Component>().as_mut() }) else { return Status::Error };
+    if component.dead {
+        return Status::Fatal;
+    }
+    match catch_unwind(AssertUnwindSafe(|| work(component))) {
+        Ok(Ok(status)) => status,
+        Ok(Err(refusal)) => {
+            component.teller.tell(Status::Error, &refusal.to_string());
+            Status::Error
+        }
+        Err(_) => {
+            component.dead = true;
+            component
+                .teller
+                .tell(Status::Fatal, "a bug of the FMU: the instance cannot be used any more; free it");
+            Status::Fatal
+        }
+    }
+}
+
+/// A slice of an importer's array; an empty one may be null.
+fn slice<'a, T>(start: *const T, count: usize) -> &'a [T] {
+    if count == 0 || start.is_null() {
+        return &[];
+    }
+    // SAFETY: the array is as long as the importer says (see the head).
+    unsafe { std::slice::from_raw_parts(start, count) }
+}
+
+fn slice_mut<'a, T>(start: *mut T, count: usize) -> &'a mut [T] {
+    if count == 0 || start.is_null() {
+        return &mut [];
+    }
+    // SAFETY: as above, and nobody else holds it during the call.
+    unsafe { std::slice::from_raw_parts_mut(start, count) }
+}
+
+/// References and values of a get or set, when both are there.
+fn both<R, V>(component: &Component, references: &[R], values: &[V], count: usize) -> bool {
+    let there = references.len() == count && values.len() == count;
+    if !there {
+        component.teller.tell(Status::Error, "a null pointer in place of value references or values");
+    }
+    there
+}
+
+fn text(pointer: *const c_char) -> Option<String> {
+    // SAFETY: a string of the importer ends in a zero (see the head).
+    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned())
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+    c"default".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetVersion() -> *const c_char {
+    c"2.0".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetDebugLogging(
+    component: *mut c_void,
+    _logging_on: c_int,
+    _count: usize,
+    _categories: *const *const c_char,
+) -> Status {
+    // Warnings and errors are told in any case, and there is nothing below them.
+    on(component, |_| Ok(Status::Ok))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Instantiate(
+    name: *const c_char,
+    kind: c_int,
+    guid: *const c_char,
+    resources: *const c_char,
+    callbacks: *const Callbacks,
+    _visible: c_int,
+    _logging_on: c_int,
+) -> *mut c_void {
+    // SAFETY: the importer's structure, which it keeps for the life of the instance.
+    let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return null_mut() };
+    let name = text(name).and_then(|name| CString::new(name).ok()).unwrap_or_default();
+    let teller = Teller { name, logger: callbacks.logger, environment: callbacks.environment };
+    let made = catch_unwind(AssertUnwindSafe(|| instantiate(kind, text(guid), text(resources))));
+    match made {
+        Ok(Ok(simulation)) => Box::into_raw(Box::new(Component { simulation, teller, dead: false })).cast(),
+        Ok(Err(reason)) => {
+            teller.tell(Status::Error, &reason);
+            null_mut()
+        }
+        Err(_) => {
+            teller.tell(Status::Fatal, "a bug of the FMU: there is no instance");
+            null_mut()
+        }
+    }
+}
+
+fn instantiate(kind: c_int, guid: Option<String>, resources: Option<String>) -> Result<Simulation, String> {
+    if kind != CO_SIMULATION {
+        return Err("this FMU is for co-simulation: instantiate it with fmi2CoSimulation".into());
+    }
+    let resources = resources.ok_or("fmuResourceLocation is missing: the rig file lies there")?;
+    let folder = folder_of(&resources).ok_or_else(|| {
+        format!("fmuResourceLocation {resources}: give a file URI, as file:///tmp/plant/resources")
+    })?;
+    let file = folder.join(crate::RIG_FILE);
+    let rig_toml =
+        std::fs::read_to_string(&file).map_err(|error| format!("cannot read {}: {error}", file.display()))?;
+    let rig = RigParameters::from_toml(&rig_toml, &file.display().to_string())
+        .map_err(|error| error.to_string())?;
+    let description = description::of(&rig, &rig_toml).map_err(|error| error.to_string())?;
+    if guid.as_deref() != Some(description.guid.as_str()) {
+        return Err(format!(
+            "this FMU was put together from two builds, or its files were edited: its library wants guid {}, and was given {}; \
+             export it anew with 'bench export-fmu'",
+            description.guid,
+            guid.as_deref().unwrap_or("none")
+        ));
+    }
+    Simulation::new(rig).map_err(|error| error.to_string())
+}
+
+/// The folder that a file URI names [RFC 8089], with or without an authority.
+fn folder_of(uri: &str) -> Option<PathBuf> {
+    let rest = uri.strip_prefix("file:")?;
+    let path = match rest.strip_prefix("//") {
+        Some(rest) => &rest[rest.find('/')?..],
+        None => rest,
+    };
+    let (mut bytes, mut left) = (Vec::with_capacity(path.len()), path.as_bytes());
+    while let Some((first, rest)) = left.split_first() {
+        left = rest;
+        match (first, rest) {
+            (b'%', [high, low, ..]) => {
+                let digit = |byte: &u8| char::from(*byte).to_digit(16);
+                bytes.push((digit(high)? << 4 | digit(low)?) as u8);
+                left = &rest[2..];
+            }
+            (byte, _) => bytes.push(*byte),
+        }
+    }
+    String::from_utf8(bytes).ok().filter(|path| path.starts_with('/')).map(PathBuf::from)
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2FreeInstance(component: *mut c_void) {
+    if !component.is_null() {
+        // SAFETY: made by `fmi2Instantiate`, and freed once (see the head).
+        drop(unsafe { Box::from_raw(component.cast::<Component>()) });
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetupExperiment(
+    component: *mut c_void,
+    _tolerance_defined: c_int,
+    _tolerance: c_double,
+    start_s: c_double,
+    _stop_defined: c_int,
+    _stop_s: c_double,
+) -> Status {
+    on(component, |own| own.simulation.set_start(start_s).map(|()| Status::Ok))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2EnterInitializationMode(component: *mut c_void) -> Status {
+    on(component, |own| own.simulation.enter_initialisation().map(|()| Status::Ok))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2ExitInitializationMode(component: *mut c_void) -> Status {
+    on(component, |own| own.simulation.exit_initialisation().map(|()| Status::Ok))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Terminate(component: *mut c_void) -> Status {
+    on(component, |own| own.simulation.terminate().map(|()| Status::Ok))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
+    on(component, |own| {
+        own.simulation.reset()?;
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetReal(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *mut c_double,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice_mut(values, count));
+        if !both(own, references, values, count) {
+            return Ok(Status::Error);
+        }
+        own.simulation.reals(references, values).map(|()| Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetInteger(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *mut c_int,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice_mut(values, count));
+        if !both(own, references, values, count) {
+            return Ok(Status::Error);
+        }
+        own.simulation.integers(references, values).map(|()| Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetBoolean(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *mut c_int,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice_mut(values, count));
+        if !both(own, references, values, count) {
+            return Ok(Status::Error);
+        }
+        let mut flags = vec![false; count];
+        own.simulation.booleans(references, &mut flags)?;
+        values.iter_mut().zip(flags).for_each(|(value, flag)| *value = c_int::from(flag));
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetString(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    _values: *mut *const c_char,
+) -> Status {
+    on(component, |_| no_strings(slice(references, count)))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetReal(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *const c_double,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice(values, count));
+        if !both(own, references, values, count) {
+            return Ok(Status::Error);
+        }
+        own.simulation.set_reals(references, values).map(|()| Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetInteger(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *const c_int,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice(values, count));
+        if !both(own, references, values, count) {
+            return Ok(Status::Error);
+        }
+        own.simulation.set_integers(references, values).map(|()| Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetBoolean(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *const c_int,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice(values, count));
+        if !both(own, references, values, count) {
+            return Ok(Status::Error);
+        }
+        let flags: Vec<_> = values.iter().map(|value| *value != 0).collect();
+        own.simulation.set_booleans(references, &flags).map(|()| Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetString(
+    component: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    _values: *const *const c_char,
+) -> Status {
+    on(component, |_| no_strings(slice(references, count)))
+}
+
+fn no_strings(references: &[c_uint]) -> Result<Status, Refusal> {
+    references.first().map_or(Ok(Status::Ok), |first| Err(Refusal::Reference(*first, "String")))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2DoStep(
+    component: *mut c_void,
+    at_s: c_double,
+    step_s: c_double,
+    _no_set_state_prior: c_int,
+) -> Status {
+    on(component, |own| {
+        let stepped = own.simulation.step(at_s, step_s)?;
+        Ok(stepped.warning.map_or(Status::Ok, |warning| {
+            own.teller.tell(Status::Warning, &warning);
+            Status::Warning
+        }))
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetFMUstate(component: *mut c_void, state: *mut *mut c_void) -> Status {
+    on(component, |own| {
+        // SAFETY: the importer's variable for a state (see the head).
+        let Some(state) = (unsafe { state.as_mut() }) else { return Ok(null_state(own)) };
+        let kept = own.simulation.clone();
+        // SAFETY: null, or a state of this FMU that was not freed.
+        match unsafe { state.cast::<Simulation>().as_mut() } {
+            Some(before) => *before = kept,
+            None => *state = Box::into_raw(Box::new(kept)).cast(),
+        }
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetFMUstate(component: *mut c_void, state: *mut c_void) -> Status {
+    on(component, |own| {
+        // SAFETY: a state of this FMU that was not freed.
+        let Some(kept) = (unsafe { state.cast::<Simulation>().as_ref() }) else { return Ok(null_state(own)) };
+        own.simulation = kept.clone();
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2FreeFMUstate(component: *mut c_void, state: *mut *mut c_void) -> Status {
+    on(component, |_| {
+        // SAFETY: the importer's variable for a state.
+        let Some(state) = (unsafe { state.as_mut() }).filter(|state| !state.is_null()) else {
+            return Ok(Status::Ok);
+        };
+        // SAFETY: made by `fmi2GetFMUstate`, and freed once: the variable is null afterwards.
+        drop(unsafe { Box::from_raw(state.cast::<Simulation>()) });
+        *state = null_mut();
+        Ok(Status::Ok)
+    })
+}
+
+fn null_state(own: &Component) -> Status {
+    own.teller.tell(Status::Error, "a null pointer in place of an FMU state");
+    Status::Error
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SerializedFMUstateSize(
+    component: *mut c_void,
+    _state: *mut c_void,
+    _size: *mut usize,
+) -> Status {
+    unsupported(component, "canSerializeFMUstate")
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SerializeFMUstate(
+    component: *mut c_void,
+    _state: *mut c_void,
+    _bytes: *mut c_char,
+    _size: usize,
+) -> Status {
+    unsupported(component, "canSerializeFMUstate")
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2DeSerializeFMUstate(
+    component: *mut c_void,
+    _bytes: *const c_char,
+    _size: usize,
+    _state: *mut *mut c_void,
+) -> Status {
+    unsupported(component, "canSerializeFMUstate")
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetDirectionalDerivative(
+    component: *mut c_void,
+    _unknowns: *const c_uint,
+    _unknown_count: usize,
+    _knowns: *const c_uint,
+    _known_count: usize,
+    _known_differentials: *const c_double,
+    _unknown_differentials: *mut c_double,
+) -> Status {
+    unsupported(component, "providesDirectionalDerivative")
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetRealInputDerivatives(
+    component: *mut c_void,
+    _references: *const c_uint,
+    _count: usize,
+    _orders: *const c_int,
+    _values: *const c_double,
+) -> Status {
+    unsupported(component, "canInterpolateInputs")
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetRealOutputDerivatives(
+    component: *mut c_void,
+    _references: *const c_uint,
+    _count: usize,
+    _orders: *const c_int,
+    _values: *mut c_double,
+) -> Status {
+    unsupported(component, "maxOutputDerivativeOrder")
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2CancelStep(component: *mut c_void) -> Status {
+    unsupported(component, "canRunAsynchronuously")
+}
+
+fn unsupported(component: *mut c_void, attribute: &str) -> Status {
+    on(component, |own| {
+        own.teller
+            .tell(Status::Error, &format!("not supported: modelDescription.xml does not set {attribute}"));
+        Ok(Status::Error)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetStatus(component: *mut c_void, _kind: c_int, _value: *mut Status) -> Status {
+    on(component, |_| Ok(Status::Discard))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, value: *mut c_double) -> Status {
+    on(component, |own| {
+        // SAFETY: the importer's variable.
+        match (kind, unsafe { value.as_mut() }) {
+            (LAST_SUCCESSFUL_TIME, Some(value)) => *value = own.simulation.time_s(),
+            _ => return Ok(Status::Discard),
+        }
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetIntegerStatus(component: *mut c_void, _kind: c_int, _value: *mut c_int) -> Status {
+    on(component, |_| Ok(Status::Discard))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetBooleanStatus(component: *mut c_void, kind: c_int, value: *mut c_int) -> Status {
+    on(component, |_| {
+        // SAFETY: the importer's variable.
+        match (kind, unsafe { value.as_mut() }) {
+            (TERMINATED, Some(value)) => *value = 0,
+            _ => return Ok(Status::Discard),
+        }
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetStringStatus(
+    component: *mut c_void,
+    _kind: c_int,
+    _value: *mut *const c_char,
+) -> Status {
+    on(component, |_| Ok(Status::Discard))
+}
+
+#[cfg(test)]
+mod tests;

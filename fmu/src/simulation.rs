@@ -1,0 +1,502 @@
+//! The FMU behind its C interface: modes, time, inputs and what they do to the plant. Safe, and without a clock of its own.
+//!
+//! ```text
+//!   Instantiated ──enter──► Initialising ──exit──► Stepping ──terminate──► Terminated
+//!        ▲                                            │ the state is no longer finite
+//!        └───────────────── reset ◄───────────────────┴► Failed
+//! ```
+//!
+//! A step is a whole number of milliseconds, the plant's period. A valve command that is set at t_k is latched at t_k+1 and acts
+//! over [t_k+1, t_k+2), as on the bus [bus.md, Time]; hands, emergency stop and linkage act from t_k on, as people do.
+
+use crate::variables::{self, Causality, Kind, Role, Variable};
+use plant::parameters::table::KEYS;
+use plant::{AxisReadings, Inputs, ParameterError, Plant, RigParameters, Sensors, Setup, SetupError};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The plant's period, s.
+const PERIOD_S: f64 = 1e-3;
+/// How far a communication point may be off by its importer's rounding, s.
+const TOLERANCE_S: f64 = 1e-6;
+/// Most periods of one step, some 11 days.
+const MOST_PERIODS: f64 = 1e9;
+
+/// Why a call is refused; nothing has changed then.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// The call belongs into another mode.
+    #[error("{call} belongs after {after}")]
+    Mode {
+        /// The call.
+        call: &'static str,
+        /// What must have been called before.
+        after: &'static str,
+    },
+    /// No variable of this type has this reference.
+    #[error("value reference {0} is no {1} of this FMU; see its modelDescription.xml")]
+    Reference(u32, &'static str),
+    /// The variable cannot be set, or not now.
+    #[error("{0} cannot be set {1}")]
+    NotSettable(String, &'static str),
+    /// The value is out of range, or none.
+    #[error("{name} = {value}: allowed are {least} to {most}{}", spaced(unit))]
+    OutOfRange {
+        /// The variable.
+        name: String,
+        /// What was to be set, in the variable's unit.
+        value: f64,
+        /// Smallest allowed value.
+        least: f64,
+        /// Largest allowed value.
+        most: f64,
+        /// Unit.
+        unit: &'static str,
+    },
+    /// Parameters that do not fit together.
+    #[error("{0}")]
+    Parameters(#[from] ParameterError),
+    /// A rig that cannot be set up so.
+    #[error("{0}")]
+    Setup(#[from] SetupError),
+    /// Time that is not where the plant stands, or a step that is no whole number of milliseconds.
+    #[error("{0}")]
+    Time(String),
+    /// The plant's state is no longer finite: latched until a reset.
+    #[error(
+        "the plant's state is no longer finite, at {at_s} s; reset the FMU, and look at the inputs before"
+    )]
+    NotFinite {
+        /// When, s.
+        at_s: f64,
+    },
+}
+
+/// What a step has to tell although it was done.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stepped {
+    /// The rods could not be linked: why not.
+    pub warning: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Instantiated,
+    Initialising,
+    Stepping,
+    Terminated,
+    Failed,
+}
+
+/// The plant while it runs.
+#[derive(Clone, Debug)]
+struct Running {
+    plant: Plant,
+    sensors: Sensors,
+    readings: [AxisReadings; 2],
+    /// Acting valve commands.
+    acting: [f64; 2],
+    /// Periods since the start.
+    period: u64,
+    /// The linkage was asked for and refused, and that was told.
+    told: bool,
+}
+
+/// What an importer may set, save the numbers of the rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Asked {
+    valve: [f64; 2],
+    hand_n: [f64; 2],
+    emergency_stop: bool,
+    link: bool,
+    setup: Setup,
+    seed: i32,
+}
+
+/// One instance; its clone is its state.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    variables: Arc<Vec<Variable>>,
+    rig: Arc<RigParameters>,
+    /// Keys of the rig that were set, in the rig file's units.
+    numbers: BTreeMap<usize, Vec<f64>>,
+    asked: Asked,
+    start_s: f64,
+    mode: Mode,
+    /// There from the initialisation on.
+    running: Option<Box<Running>>,
+}
+
+impl Simulation {
+    /// An instance of a rig, with all parameters at their start values.
+    ///
+    /// # Errors
+    /// [`SetupError`]: the rig does not take the default set-up.
+    pub fn new(rig: RigParameters) -> Result<Self, SetupError> {
+        let variables = Arc::new(variables::of(&rig)?);
+        let asked = Asked {
+            valve: [0.0; 2],
+            hand_n: [0.0; 2],
+            emergency_stop: false,
+            link: false,
+            setup: variables::start_setup(&rig),
+            seed: 1,
+        };
+        let (rig, numbers) = (Arc::new(rig), BTreeMap::new());
+        let (mode, running) = (Mode::Instantiated, None);
+        Ok(Self { variables, rig, numbers, asked, start_s: 0.0, mode, running })
+    }
+
+    /// Back to where it was instantiated, all values at their start.
+    ///
+    /// # Errors
+    /// [`SetupError`]: never, since the rig was taken once.
+    pub fn reset(&mut self) -> Result<(), SetupError> {
+        *self = Self::new(self.rig.as_ref().clone())?;
+        Ok(())
+    }
+
+    /// Says where time begins, s.
+    ///
+    /// # Errors
+    /// [`Refusal::Mode`], and [`Refusal::Time`] for a start that is not finite.
+    pub fn set_start(&mut self, start_s: f64) -> Result<(), Refusal> {
+        self.expect(&[Mode::Instantiated], "fmi2SetupExperiment", "fmi2Instantiate or fmi2Reset")?;
+        if !start_s.is_finite() {
+            return Err(Refusal::Time(format!("startTime = {start_s}: give a finite number of seconds")));
+        }
+        self.start_s = start_s;
+        Ok(())
+    }
+
+    /// Enters the initialisation.
+    ///
+    /// # Errors
+    /// [`Refusal::Mode`].
+    pub fn enter_initialisation(&mut self) -> Result<(), Refusal> {
+        self.expect(&[Mode::Instantiated], "fmi2EnterInitializationMode", "fmi2Instantiate or fmi2Reset")?;
+        self.mode = Mode::Initialising;
+        Ok(())
+    }
+
+    /// Sets the plant up and leaves the initialisation.
+    ///
+    /// # Errors
+    /// [`Refusal::Mode`], [`Refusal::Parameters`], [`Refusal::Setup`].
+    pub fn exit_initialisation(&mut self) -> Result<(), Refusal> {
+        self.expect(&[Mode::Initialising], "fmi2ExitInitializationMode", "fmi2EnterInitializationMode")?;
+        self.set_up()?;
+        self.mode = Mode::Stepping;
+        Ok(())
+    }
+
+    /// Ends the simulation; values can still be read.
+    ///
+    /// # Errors
+    /// [`Refusal::Mode`].
+    pub fn terminate(&mut self) -> Result<(), Refusal> {
+        self.expect(&[Mode::Stepping, Mode::Failed], "fmi2Terminate", "fmi2ExitInitializationMode")?;
+        self.mode = Mode::Terminated;
+        Ok(())
+    }
+
+    /// Moves from the communication point `at_s` on by `step_s`.
+    ///
+    /// # Errors
+    /// [`Refusal::Mode`], [`Refusal::Time`], [`Refusal::NotFinite`].
+    pub fn step(&mut self, at_s: f64, step_s: f64) -> Result<Stepped, Refusal> {
+        if self.mode == Mode::Failed {
+            return Err(Refusal::NotFinite { at_s: self.time_s() });
+        }
+        self.expect(&[Mode::Stepping], "fmi2DoStep", "fmi2ExitInitializationMode")?;
+        let stands_s = self.time_s();
+        // Asked this way round, NaN is refused, too.
+        let follows = (at_s - stands_s).abs() <= TOLERANCE_S;
+        if !follows {
+            let text = format!("a step from {at_s} s, but the plant stands at {stands_s} s");
+            return Err(Refusal::Time(format!("{text}: steps follow each other, or restore a state before")));
+        }
+        let periods = (step_s / PERIOD_S).round();
+        let whole = (step_s - periods * PERIOD_S).abs() <= TOLERANCE_S;
+        if !(whole && (1.0..=MOST_PERIODS).contains(&periods)) {
+            let text =
+                format!("a step of {step_s} s: the plant moves by whole milliseconds, from 0.001 s on");
+            return Err(Refusal::Time(text));
+        }
+        let asked = self.asked;
+        let running = self.running.as_mut().expect("there from the initialisation on");
+        let warning = running.act(&asked);
+        for _ in 0..periods as u64 {
+            running.period(&asked);
+        }
+        if !running.plant.state().is_finite() {
+            self.mode = Mode::Failed;
+            return Err(Refusal::NotFinite { at_s: self.time_s() });
+        }
+        Ok(Stepped { warning })
+    }
+
+    /// Where the plant stands, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.start_s + self.running.as_ref().map_or(0, |running| running.period) as f64 * PERIOD_S
+    }
+
+    /// The values of Real variables, in the units of the description.
+    ///
+    /// # Errors
+    /// [`Refusal::Reference`], and what keeps the plant from being set up while it is initialised.
+    pub fn reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
+        let variables = Arc::clone(&self.variables);
+        let list = find(&variables, references, "Real", |kind| matches!(kind, Kind::Real(_)))?;
+        let outputs = list.iter().any(|own| own.causality == Causality::Output);
+        if outputs {
+            self.ready()?;
+        }
+        let running = self.running.as_deref();
+        let inputs = inputs(&self.asked, running.map_or([0.0; 2], |running| running.acting));
+        let truth = running.filter(|_| outputs).map(|running| running.plant.truth(&inputs).values());
+        let terms = running
+            .filter(|_| list.iter().any(|own| matches!(own.role, Role::Term(_))))
+            .map(|running| running.plant.terms(&inputs));
+        for (own, value) in list.iter().zip(values) {
+            *value = match own.role {
+                Role::Valve(axis) => self.asked.valve[axis],
+                Role::Hand(place) => self.asked.hand_n[place],
+                Role::CarriagePosition => self.asked.setup.carriage_position_m,
+                Role::AddedMass => self.asked.setup.added_mass_kg,
+                Role::Rig(key, place) => self.number(key)[place],
+                Role::Truth(place) => truth.map_or(0.0, |truth| truth[place]),
+                Role::Term(place) => terms.map_or(0.0, |terms| terms.values()[place]),
+                Role::Measured(axis, channel) => {
+                    running.map_or(0.0, |running| shown(&running.readings[axis], channel))
+                }
+                Role::Acting(axis) => inputs.valve[axis],
+                Role::EmergencyStop | Role::Link | Role::Linked | Role::Seed => 0.0,
+            };
+        }
+        Ok(())
+    }
+
+    /// The values of Boolean variables.
+    ///
+    /// # Errors
+    /// As [`Simulation::reals`].
+    pub fn booleans(&mut self, references: &[u32], values: &mut [bool]) -> Result<(), Refusal> {
+        let variables = Arc::clone(&self.variables);
+        let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
+        if list.iter().any(|own| own.causality == Causality::Output) {
+            self.ready()?;
+        }
+        let plant = self.running.as_ref().map(|running| &running.plant);
+        for (own, value) in list.iter().zip(values) {
+            *value = match own.role {
+                Role::EmergencyStop => self.asked.emergency_stop,
+                Role::Link => self.asked.link,
+                Role::Linked => plant.is_some_and(Plant::linked),
+                _ => plant.is_some_and(Plant::check_valves_shut),
+            };
+        }
+        Ok(())
+    }
+
+    /// The values of Integer variables.
+    ///
+    /// # Errors
+    /// [`Refusal::Reference`].
+    pub fn integers(&self, references: &[u32], values: &mut [i32]) -> Result<(), Refusal> {
+        find(&self.variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
+        values.fill(self.asked.seed);
+        Ok(())
+    }
+
+    /// Sets Real variables, all or none.
+    ///
+    /// # Errors
+    /// [`Refusal::Reference`], [`Refusal::NotSettable`], [`Refusal::OutOfRange`].
+    pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refusal> {
+        let variables = Arc::clone(&self.variables);
+        let list = find(&variables, references, "Real", |kind| matches!(kind, Kind::Real(_)))?;
+        for (own, value) in list.iter().zip(values) {
+            self.settable(own)?;
+            in_range(own, *value)?;
+        }
+        for (own, value) in list.iter().zip(values) {
+            match own.role {
+                Role::Valve(axis) => self.asked.valve[axis] = *value,
+                Role::Hand(place) => self.asked.hand_n[place] = *value,
+                Role::CarriagePosition => self.asked.setup.carriage_position_m = *value,
+                Role::AddedMass => self.asked.setup.added_mass_kg = *value,
+                Role::Rig(key, place) => {
+                    let mut numbers = self.number(key).to_vec();
+                    numbers[place] = *value;
+                    self.numbers.insert(key, numbers);
+                }
+                _ => {}
+            }
+        }
+        self.changed();
+        Ok(())
+    }
+
+    /// Sets Boolean variables, all or none.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_reals`].
+    pub fn set_booleans(&mut self, references: &[u32], values: &[bool]) -> Result<(), Refusal> {
+        let variables = Arc::clone(&self.variables);
+        let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
+        list.iter().try_for_each(|own| self.settable(own))?;
+        for (own, value) in list.iter().zip(values) {
+            match own.role {
+                Role::EmergencyStop => self.asked.emergency_stop = *value,
+                _ => self.asked.link = *value,
+            }
+        }
+        self.changed();
+        Ok(())
+    }
+
+    /// Sets Integer variables, all or none.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_reals`].
+    pub fn set_integers(&mut self, references: &[u32], values: &[i32]) -> Result<(), Refusal> {
+        let variables = Arc::clone(&self.variables);
+        let list = find(&variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
+        for (own, value) in list.iter().zip(values) {
+            self.settable(own)?;
+            in_range(own, f64::from(*value))?;
+        }
+        if let Some(value) = values.last() {
+            self.asked.seed = *value;
+        }
+        self.changed();
+        Ok(())
+    }
+
+    fn expect(&self, modes: &[Mode], call: &'static str, after: &'static str) -> Result<(), Refusal> {
+        if modes.contains(&self.mode) { Ok(()) } else { Err(Refusal::Mode { call, after }) }
+    }
+
+    fn settable(&self, own: &Variable) -> Result<(), Refusal> {
+        let before = matches!(self.mode, Mode::Instantiated | Mode::Initialising);
+        match own.causality {
+            Causality::Output => Err(Refusal::NotSettable(own.name.clone(), "at all: it is an output")),
+            Causality::Parameter if !before => Err(Refusal::NotSettable(
+                own.name.clone(),
+                "after the initialisation: it is a fixed parameter",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// What was set before the start makes another start.
+    fn changed(&mut self) {
+        if self.mode == Mode::Initialising {
+            self.running = None;
+        }
+    }
+
+    /// The numbers of a key, set or of the rig file.
+    fn number(&self, key: usize) -> &[f64] {
+        self.numbers.get(&key).map_or_else(|| self.rig.numbers(&KEYS[key].path()), Vec::as_slice)
+    }
+
+    /// Outputs are known from the initialisation on.
+    fn ready(&mut self) -> Result<(), Refusal> {
+        if self.mode == Mode::Instantiated {
+            return Err(Refusal::Mode { call: "reading an output", after: "fmi2EnterInitializationMode" });
+        }
+        self.set_up()
+    }
+
+    fn set_up(&mut self) -> Result<(), Refusal> {
+        if self.running.is_some() {
+            return Ok(());
+        }
+        let paths: Vec<_> =
+            self.numbers.iter().map(|(key, numbers)| (KEYS[*key].path(), numbers.as_slice())).collect();
+        let rig = self.rig.with_all(paths.iter().map(|(path, numbers)| (path.as_str(), *numbers)))?;
+        let setup = Setup { linked: self.asked.link, ..self.asked.setup };
+        let mut plant = Plant::new(&rig, &setup)?;
+        if self.asked.emergency_stop {
+            plant.trip_emergency_stop();
+        }
+        let mut sensors = Sensors::new(&rig, u64::from(self.asked.seed.cast_unsigned()));
+        let inputs = inputs(&self.asked, [0.0; 2]);
+        // The emulator draws once before its first cycle; equal draws give equal noise.
+        sensors.sample(&plant, &inputs);
+        let readings = sensors.sample(&plant, &inputs);
+        let (acting, period, told) = ([0.0; 2], 0, false);
+        self.running = Some(Box::new(Running { plant, sensors, readings, acting, period, told }));
+        Ok(())
+    }
+}
+
+impl Running {
+    /// What people do at the begin of a step.
+    fn act(&mut self, asked: &Asked) -> Option<String> {
+        if asked.emergency_stop && !self.plant.emergency_stop() {
+            self.plant.trip_emergency_stop();
+        } else if !asked.emergency_stop && self.plant.emergency_stop() {
+            self.plant.release_emergency_stop();
+        }
+        if !asked.link {
+            self.told = false;
+            self.plant.unlink();
+            return None;
+        }
+        let refused = self.plant.link().err()?;
+        let first = !std::mem::replace(&mut self.told, true);
+        first.then(|| format!("{refused}; the rods stay apart until it does"))
+    }
+
+    /// One period: what acts acts, the command is latched for the next one, the sensors are sampled at its begin.
+    fn period(&mut self, asked: &Asked) {
+        self.plant.step(&inputs(asked, self.acting));
+        self.acting = asked.valve.map(plant::quantise_valve);
+        self.readings = self.sensors.sample(&self.plant, &inputs(asked, self.acting));
+        self.period += 1;
+    }
+}
+
+fn inputs(asked: &Asked, valve: [f64; 2]) -> Inputs {
+    let [hand_force_carriage_n, hand_force_load_n] = asked.hand_n;
+    Inputs { valve, hand_force_carriage_n, hand_force_load_n }
+}
+
+fn shown(readings: &AxisReadings, channel: usize) -> f64 {
+    [readings.position, readings.force, readings.pressure_a, readings.pressure_b][channel].value
+}
+
+/// The variables of these references, all of one type.
+fn find<'v>(
+    variables: &'v [Variable],
+    references: &[u32],
+    kind: &'static str,
+    is: impl Fn(Kind) -> bool,
+) -> Result<Vec<&'v Variable>, Refusal> {
+    let one = |reference: &u32| {
+        let own = variables.get(*reference as usize).filter(|own| is(own.kind));
+        own.ok_or(Refusal::Reference(*reference, kind))
+    };
+    references.iter().map(one).collect()
+}
+
+/// A unit behind a number.
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+fn in_range(own: &Variable, value: f64) -> Result<(), Refusal> {
+    let (least, most) = own.range.unwrap_or((f64::MIN, f64::MAX));
+    // NaN lies in no range.
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(Refusal::OutOfRange { name: own.name.clone(), value, least, most, unit: own.unit })
+}
+
+#[cfg(test)]
+mod tests;

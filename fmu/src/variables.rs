@@ -1,0 +1,283 @@
+//! The variables of the FMU: inputs, parameters and outputs, each a row of one of the plant's tables.
+//!
+//! | variables | rows of |
+//! |---|---|
+//! | valve commands, hands, emergency stop, linkage | this file |
+//! | set-up of the run | [`plant::Setup`] |
+//! | `supply.pressure_bar` … | [`plant::parameters::table::KEYS`], in the rig file's units |
+//! | `drive_position_m` … | [`plant::Truth::COLUMNS`] |
+//! | terms of switched-on effects | [`plant::Plant::term_names`] |
+//! | `drive_position_measured_m` … | the sensors |
+//!
+//! A value reference is the place in the list, from 0, whatever the type.
+
+use plant::parameters::table::KEYS;
+use plant::{Plant, RigParameters, Setup, SetupError, Truth};
+
+/// What a variable stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Valve command of drive or load.
+    Valve(usize),
+    /// A hand's push on the carriage (0) or on the load's eye (1).
+    Hand(usize),
+    /// Emergency stop asked for.
+    EmergencyStop,
+    /// Linkage asked for.
+    Link,
+    /// Where the carriage stands at the start.
+    CarriagePosition,
+    /// Weights on the carriage.
+    AddedMass,
+    /// Seed of the sensors' noise.
+    Seed,
+    /// A number of the rig: key and place in it.
+    Rig(usize, usize),
+    /// A column of [`Truth`].
+    Truth(usize),
+    /// A term of an effect.
+    Term(usize),
+    /// What a sensor shows: axis and channel (position, force, pressure a, pressure b).
+    Measured(usize, usize),
+    /// The valve command that acts in this cycle.
+    Acting(usize),
+    /// Whether the rods are linked.
+    Linked,
+}
+
+/// The type of a variable, with its start value where it has one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// A 64-bit number.
+    Real(Option<f64>),
+    /// A 32-bit number.
+    Integer(Option<i32>),
+    /// A flag.
+    Boolean(Option<bool>),
+}
+
+/// What the importer does with a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Causality {
+    /// Set before the start, and not again.
+    Parameter,
+    /// Set between steps.
+    Input,
+    /// Read.
+    Output,
+}
+
+/// One variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Name, unique.
+    pub name: String,
+    /// What it stands for.
+    pub role: Role,
+    /// Type and start value.
+    pub kind: Kind,
+    /// What the importer does with it.
+    pub causality: Causality,
+    /// Whether it changes at instants only.
+    pub discrete: bool,
+    /// Unit, empty for none.
+    pub unit: &'static str,
+    /// Allowed values, in the variable's unit.
+    pub range: Option<(f64, f64)>,
+    /// What it is.
+    pub about: String,
+}
+
+/// All variables of a rig.
+///
+/// # Errors
+/// [`SetupError`]: the rig does not take the default set-up, so that nothing can be asked of it.
+pub fn of(rig: &RigParameters) -> Result<Vec<Variable>, SetupError> {
+    let plant = Plant::new(rig, &start_setup(rig))?;
+    Ok([inputs(), setup(rig), numbers(rig), truths(), terms(&plant), measured()].concat())
+}
+
+/// The default set-up: that of the plant, save where the rig is shorter.
+#[must_use]
+pub fn start_setup(rig: &RigParameters) -> Setup {
+    let setup = Setup::default();
+    Setup { carriage_position_m: setup.carriage_position_m.min(rig.cylinder().stroke_m), ..setup }
+}
+
+const AXES: [&str; 2] = ["drive", "load"];
+
+fn variable(name: impl Into<String>, role: Role, kind: Kind, about: impl Into<String>) -> Variable {
+    let (name, about) = (name.into(), about.into());
+    let unit = unit_of(&name);
+    Variable { name, role, kind, causality: Causality::Output, discrete: false, unit, range: None, about }
+}
+
+fn inputs() -> Vec<Variable> {
+    let mut list = Vec::new();
+    for (place, axis) in AXES.iter().enumerate() {
+        let about = format!(
+            "Valve command of the {axis}, rounded to 1/2047; set before a step, it acts from one millisecond after the step's begin, as on the bus"
+        );
+        let valve = variable(format!("{axis}_valve"), Role::Valve(place), Kind::Real(Some(0.0)), about);
+        list.push(Variable { range: Some((-1.0, 1.0)), ..valve });
+    }
+    for (place, on) in ["carriage", "load"].iter().enumerate() {
+        let about = format!("A hand's push on the {}, in +x", ["carriage", "load's eye"][place]);
+        let name = format!("hand_force_{on}_N");
+        list.push(variable(name, Role::Hand(place), Kind::Real(Some(0.0)), about));
+    }
+    let stop = "Discharges the supply and shuts the valves, while true";
+    list.push(variable("emergency_stop", Role::EmergencyStop, Kind::Boolean(Some(false)), stop));
+    let link = "Whether the load's eye shall sit in the carriage; at the start it is put there, later it must lie in the gap";
+    list.push(variable("link", Role::Link, Kind::Boolean(Some(false)), link));
+    list.into_iter().map(|own| Variable { causality: Causality::Input, discrete: true, ..own }).collect()
+}
+
+fn setup(rig: &RigParameters) -> Vec<Variable> {
+    let start = start_setup(rig);
+    let position = "Carriage position at the start";
+    let mass = "Weights on the carriage";
+    let seed = "Seed of the sensors' noise; the same seed gives the same noise as in a run";
+    let list = [
+        Variable {
+            range: Some((0.0, rig.cylinder().stroke_m)),
+            ..variable(
+                "carriage_position_m",
+                Role::CarriagePosition,
+                Kind::Real(Some(start.carriage_position_m)),
+                position,
+            )
+        },
+        Variable {
+            range: Some((0.0, rig.mass().added_limit_kg)),
+            ..variable("added_mass_kg", Role::AddedMass, Kind::Real(Some(start.added_mass_kg)), mass)
+        },
+        Variable {
+            range: Some((0.0, f64::from(i32::MAX))),
+            ..variable("sensor_seed", Role::Seed, Kind::Integer(Some(1)), seed)
+        },
+    ];
+    list.map(|own| Variable { causality: Causality::Parameter, ..own }).to_vec()
+}
+
+fn numbers(rig: &RigParameters) -> Vec<Variable> {
+    let mut list = Vec::new();
+    for (place, key) in KEYS.iter().enumerate() {
+        for (index, number) in rig.numbers(&key.path()).iter().enumerate() {
+            let name = if key.count == 1 { key.path() } else { format!("{}[{}]", key.path(), index + 1) };
+            let own = variable(name, Role::Rig(place, index), Kind::Real(Some(*number)), key.meaning);
+            list.push(Variable {
+                causality: Causality::Parameter,
+                unit: key.unit.name(),
+                range: Some((key.min, key.max)),
+                ..own
+            });
+        }
+    }
+    list
+}
+
+fn truths() -> Vec<Variable> {
+    let column = |(place, name): (usize, &&str)| {
+        let flag = *name == "check_valves_shut";
+        let kind = if flag { Kind::Boolean(None) } else { Kind::Real(None) };
+        let about = "True state or term, as in truth.csv (plant/src/truth.rs says what it is)";
+        Variable { discrete: flag, ..variable(*name, Role::Truth(place), kind, about) }
+    };
+    Truth::COLUMNS.iter().enumerate().map(column).collect()
+}
+
+fn terms(plant: &Plant) -> Vec<Variable> {
+    let about = "What a switched-on effect adds to its balance, as in truth.csv";
+    let term = |(place, name)| variable(name, Role::Term(place), Kind::Real(None), about);
+    plant.term_names().into_iter().enumerate().map(term).collect()
+}
+
+fn measured() -> Vec<Variable> {
+    let channels =
+        ["position_measured_m", "force_measured_N", "pressure_a_measured_Pa", "pressure_b_measured_Pa"];
+    let mut list = Vec::new();
+    for (axis, name) in AXES.iter().enumerate() {
+        for (channel, suffix) in channels.iter().enumerate() {
+            let about = "What the sensor shows, with noise, rounded and clipped, as in measurement.csv";
+            let role = Role::Measured(axis, channel);
+            list.push(variable(format!("{name}_{suffix}"), role, Kind::Real(None), about));
+        }
+        let about = "The valve command that acts over the millisecond to come";
+        list.push(variable(format!("{name}_valve_acting"), Role::Acting(axis), Kind::Real(None), about));
+    }
+    let about = "Whether the load's eye sits in the carriage";
+    list.push(variable("linked", Role::Linked, Kind::Boolean(None), about));
+    list.into_iter().map(|own| Variable { discrete: true, ..own }).collect()
+}
+
+/// Endings of names and the units that they say; longer ones first.
+const UNITS: &[(&str, &str)] = &[
+    ("_m_per_s2", "m/s^2"),
+    ("_m3_per_s", "m^3/s"),
+    ("_m_per_s", "m/s"),
+    ("_n_s_per_m", "N s/m"),
+    ("_n_per_m", "N/m"),
+    ("_m2", "m^2"),
+    ("_m3", "m^3"),
+    ("_kg", "kg"),
+    ("_Pa", "Pa"),
+    ("_pa", "Pa"),
+    ("_J", "J"),
+    ("_N", "N"),
+    ("_n", "N"),
+    ("_m", "m"),
+    ("_k", "K"),
+    ("_s", "s"),
+];
+
+fn unit_of(name: &str) -> &'static str {
+    UNITS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_are_unique_and_every_row_of_the_plants_tables_is_a_variable() {
+        let rig = RigParameters::baseline()
+            .with_effect("piston-leakage", "load", &[("leakage_nl_per_min", 5.0)])
+            .unwrap();
+        let list = of(&rig).unwrap();
+        let names: BTreeSet<_> = list.iter().map(|own| own.name.as_str()).collect();
+        assert_eq!(names.len(), list.len());
+        assert!(Truth::COLUMNS.iter().all(|column| names.contains(column)));
+        let numbers: usize = KEYS.iter().map(|key| key.count).sum();
+        assert_eq!(list.iter().filter(|own| matches!(own.role, Role::Rig(..))).count(), numbers);
+        assert!(list.iter().any(|own| matches!(own.role, Role::Term(_))), "the leakage has terms");
+    }
+
+    #[test]
+    fn starts_lie_in_their_ranges_and_outputs_have_none() {
+        for own in of(&RigParameters::baseline()).unwrap() {
+            let start = match own.kind {
+                Kind::Real(start) => start,
+                Kind::Integer(start) => start.map(f64::from),
+                Kind::Boolean(start) => start.map(|flag| f64::from(u8::from(flag))),
+            };
+            assert_eq!(start.is_none(), own.causality == Causality::Output, "{}", own.name);
+            if let (Some(start), Some((least, most))) = (start, own.range) {
+                assert!((least..=most).contains(&start), "{}", own.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_name_ends_with_its_unit() {
+        for (name, unit) in [
+            ("drive_rod_acceleration_m_per_s2", "m/s^2"),
+            ("load_edge_flow_a_m3_per_s", "m^3/s"),
+            ("supply_pressure_Pa", "Pa"),
+            ("drive_spool", ""),
+        ] {
+            assert_eq!(unit_of(name), unit, "{name}");
+        }
+    }
+}

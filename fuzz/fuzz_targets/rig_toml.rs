@@ -1,0 +1,26 @@
+//! Rig files: any text is refused with a message, or makes a plant that moves and stays finite; also as a file of effects.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use plant::{Inputs, Plant, RigParameters, Setup};
+
+/// Periods that a plant is moved by.
+const PERIODS: usize = 3;
+
+fuzz_target!(|text: &str| {
+    if let Ok(rig) = RigParameters::from_toml(text, "rig.toml") {
+        moves(&rig);
+    }
+    if let Ok(rig) = RigParameters::baseline().with_effects_of(text, "effects.toml") {
+        moves(&rig);
+    }
+});
+
+fn moves(rig: &RigParameters) {
+    let setup = Setup { carriage_position_m: rig.cylinder().stroke_m / 2.0, ..Setup::default() };
+    let mut plant = Plant::new(rig, &setup).expect("half of the stroke lies within it");
+    for _ in 0..PERIODS {
+        plant.step(&Inputs { valve: [1.0, -1.0], ..Inputs::default() });
+    }
+    assert!(plant.state().is_finite(), "{:?}", plant.state());
+}

@@ -1,0 +1,30 @@
+//! Python packages that the product is held against, in scripts of `tests/python`.
+
+use crate::binaries::workspace;
+use crate::process::Running;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The python that has them: `AIRBENCH_PYTHON`, else that of `target/tools/venv`, which `scripts/test` makes.
+///
+/// # Panics
+/// When there is none.
+#[must_use]
+pub fn python() -> PathBuf {
+    let python = std::env::var_os("AIRBENCH_PYTHON")
+        .map_or_else(|| workspace().join("target/tools/venv/bin/python"), PathBuf::from);
+    assert!(python.exists(), "{} is missing: run scripts/test, which makes it", python.display());
+    python
+}
+
+/// Runs a script of `tests/python` and gives what it printed.
+///
+/// # Panics
+/// When it fails, with what it said.
+#[must_use]
+pub fn run_script(name: &str, arguments: &[impl AsRef<OsStr>]) -> String {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python").join(name);
+    let mut command = Command::new(python());
+    Running::start(name, command.arg(script).args(arguments)).wait().expect_code(0).stdout
+}

@@ -1,0 +1,234 @@
+//! A run's log in the files of other tools: CSV against the run's own tables, MDF4 as asammdf reads it, ASC and BLF as
+//! python-can reads them; what is no log is refused by line and column.
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use system_tests::binaries::{Build, Program, executable};
+use system_tests::foreign_python::{python, run_script};
+use system_tests::launch::Pace;
+use system_tests::process::{Ended, Running};
+use system_tests::records::Table;
+use system_tests::scene::{SHORT, Scene};
+
+/// A run in lockstep, made once.
+fn run_folder() -> PathBuf {
+    static RUN: OnceLock<Scene> = OnceLock::new();
+    let scene = RUN.get_or_init(|| {
+        let scene = Scene::new(SHORT);
+        let emulator = scene.emulator(Pace::Lockstep).start();
+        let controller = scene.controller(Pace::Lockstep).start();
+        let _ = (emulator.wait().expect_code(0), controller.wait().expect_code(0));
+        scene
+    });
+    scene.path("emulator")
+}
+
+fn export(source: &Path, format: &str, out: &Path, options: &[&str]) -> Ended {
+    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    bench.env("AIRBENCH_PYTHON", python()).arg("export").arg(source).args(["--to", format, "--out"]).arg(out);
+    Running::start("bench export", bench.args(options)).wait()
+}
+
+/// Columns of a CSV; where a cell is empty there is no value.
+fn columns(file: &Path) -> BTreeMap<String, Vec<Option<f64>>> {
+    let text = fs::read_to_string(file).expect("the export is there");
+    let mut lines = text.lines().map(|line| line.split(','));
+    let head: Vec<_> = lines.next().expect("a head").collect();
+    let mut table: BTreeMap<String, Vec<Option<f64>>> = BTreeMap::new();
+    for line in lines {
+        let cells: Vec<_> = line.collect();
+        assert_eq!(cells.len(), head.len());
+        for (name, cell) in head.iter().zip(cells) {
+            let value = (!cell.is_empty()).then(|| cell.parse().expect("a number"));
+            table.entry((*name).to_owned()).or_default().push(value);
+        }
+    }
+    table
+}
+
+fn close(one: f64, other: f64) -> bool {
+    (one - other).abs() <= 1e-9 * one.abs().max(1.0)
+}
+
+/// Columns of measurement.csv and the signals that carry them.
+const CARRIED: [(&str, &str); 8] = [
+    ("drive_position_m", "DriveSensors.position_m"),
+    ("drive_force_N", "DriveSensors.force_n"),
+    ("drive_pressure_a_Pa", "DriveSensors.pressure_a_pa"),
+    ("drive_pressure_b_Pa", "DriveSensors.pressure_b_pa"),
+    ("load_position_m", "LoadSensors.position_m"),
+    ("load_force_N", "LoadSensors.force_n"),
+    ("load_pressure_a_Pa", "LoadSensors.pressure_a_pa"),
+    ("load_pressure_b_Pa", "LoadSensors.pressure_b_pa"),
+];
+
+#[test]
+fn a_csv_holds_the_signals_of_the_measurement_at_its_times() {
+    let folder = run_folder();
+    let out = folder.join("every.csv");
+    let told = export(&folder, "csv", &out, &["--every-ms", "1"]).expect_code(0);
+    assert!(told.stdout.contains("time counts from cycle 0"), "{}", told.stdout);
+    let (exported, measured) = (columns(&out), Table::read(&folder.join("measurement.csv")));
+    let times: Vec<f64> = exported["time_s"].iter().flatten().copied().collect();
+    let first = times.iter().position(|time_s| *time_s == 0.0).expect("a row for cycle 0");
+    assert!(measured.len() > 1000);
+    for (column, signal) in CARRIED {
+        for (cycle, value) in measured.column(column).into_iter().enumerate() {
+            let row = first + cycle;
+            assert!(close(times[row], cycle as f64 * 1e-3));
+            assert!(exported[signal][row].is_some_and(|own| close(own, value)), "{signal} in cycle {cycle}");
+        }
+    }
+    // In lockstep a command is delivered at the begin of the cycle in which it acts.
+    let valves = measured.column("drive_valve");
+    assert!(valves.iter().any(|valve| *valve != 0.0));
+    for (cycle, valve) in valves.into_iter().enumerate().skip(5) {
+        let sent = exported["DriveValveCommand.opening"][first + cycle].expect("after the first cycles");
+        let enabled = exported["DriveValveCommand.enable"][first + cycle] == Some(1.0);
+        assert!(close(if enabled { sent } else { 0.0 }, valve), "cycle {cycle}: {sent} and {valve}");
+    }
+}
+
+#[test]
+fn without_a_grid_every_frame_is_in_the_csv_once() {
+    let folder = run_folder();
+    let out = folder.join("stamps.csv");
+    let _ = export(&folder.join("bus.log"), "csv", &out, &[]).expect_code(0);
+    let log = fs::read_to_string(folder.join("bus.log")).expect("the log");
+    let table = columns(&out);
+    for (identifier, signal) in
+        [(" 120#", "DriveSensors.alive"), (" 130#", "Tick.cycle"), (" 110#", "DriveValveCommand.alive")]
+    {
+        let rows = table[signal].iter().flatten().count();
+        assert_eq!(rows, log.matches(identifier).count(), "{signal}");
+    }
+}
+
+#[test]
+fn asammdf_reads_the_same_values_units_and_times_from_the_mdf4() {
+    let folder = run_folder();
+    let (out, csv) = (folder.join("run.mf4"), folder.join("for-mdf.csv"));
+    let _ = export(&folder, "mdf4", &out, &[]).expect_code(0);
+    let _ = export(&folder, "csv", &csv, &[]).expect_code(0);
+    let read: Value = serde_json::from_str(&run_script("read_mdf4.py", &[&out])).expect("JSON");
+    let table = columns(&csv);
+    let channels = read["channels"].as_object().expect("channels");
+    assert_eq!(
+        channels.keys().filter(|name| name.contains('.')).count(),
+        table.len() - 1,
+        "all but the time"
+    );
+    for (name, column) in table.iter().filter(|(name, _)| *name != "time_s") {
+        let numbers = |key: &str| -> Vec<f64> {
+            let list = channels[name][key].as_array().unwrap_or_else(|| panic!("{name} {key}"));
+            list.iter().map(|value| value.as_f64().expect("a number")).collect()
+        };
+        let (times, values) = (numbers("times"), numbers("values"));
+        let rows =
+            table["time_s"].iter().zip(column).filter_map(|(time_s, value)| Some(((*time_s)?, (*value)?)));
+        let expected: Vec<_> = rows.collect();
+        assert_eq!(values.len(), expected.len(), "{name}");
+        for (own, (time_s, value)) in times.iter().zip(&values).zip(&expected) {
+            assert!(
+                close(*own.0, *time_s) && own.1 == value,
+                "{name}: {own:?} instead of {value} at {time_s} s"
+            );
+        }
+    }
+    for (name, unit) in [("DriveSensors.position_m", "m"), ("LoadSensors.force_n", "N"), ("Tick.cycle", "")] {
+        assert_eq!(channels[name]["unit"], unit, "{name}");
+    }
+}
+
+#[test]
+fn an_mdf4_begins_when_its_log_does() {
+    let scene = Scene::new(SHORT);
+    let log = scene.write("dated.log", "(1700000000.000250) a 160#0100\n(1700000000.000500) a 160#0200\n");
+    let out = scene.path("dated.mf4");
+    let _ = export(&log, "mdf4", &out, &[]).expect_code(0);
+    let read: Value = serde_json::from_str(&run_script("read_mdf4.py", &[&out])).expect("JSON");
+    let start_s = read["start"].as_f64().expect("a number");
+    // Python's times of day have microseconds.
+    assert!((start_s - 1_700_000_000.000_25).abs() < 2e-6, "{start_s}");
+    assert_eq!(read["channels"]["RunControl.command"]["times"], serde_json::json!([0.0, 0.000_25]));
+}
+
+/// A log with a date, of two interfaces, with all kinds of frames.
+const FOREIGN: &str = "(1700000000.000250) can0 120#0011223344556677\n\
+                       (1700000000.000500) can1 1ABCDEF0#01\n\
+                       (1700000000.001000) can0 7FF#R3\n\
+                       (1700000000.001000) can0 000#\n\
+                       (1700000003.999999) can1 18FF00AA#AABBCCDD\n";
+
+/// Frames of a log as the script prints them.
+fn frames(log: &str) -> Vec<String> {
+    let microseconds = |stamp: &str| -> u64 { stamp.replace(['(', ')', '.'], "").parse().expect("a stamp") };
+    let words: Vec<Vec<&str>> = log.lines().map(|line| line.split(' ').collect()).collect();
+    let first = microseconds(words[0][0]);
+    words.iter().map(|line| format!("{} {}", microseconds(line[0]) - first, line[2])).collect()
+}
+
+#[test]
+fn python_can_reads_asc_and_blf_equal_to_the_log() {
+    let scene = Scene::new(SHORT);
+    let foreign = scene.write("foreign.log", FOREIGN);
+    for log in [run_folder().join("bus.log"), foreign] {
+        let expected = frames(&fs::read_to_string(&log).expect("the log"));
+        for format in ["asc", "blf"] {
+            let out = scene.path(&format!("log.{format}"));
+            let told = export(&log, format, &out, &[]).expect_code(0).stdout;
+            assert!(told.contains(&format!("{} frames, read back equal", expected.len())), "{told}");
+            let read = run_script("read_frames.py", &[&out]);
+            let read: Vec<_> = read.lines().map(str::to_owned).collect();
+            assert!(
+                read == expected,
+                "{format} of {}: {:?}",
+                log.display(),
+                read.iter().zip(&expected).find(|(a, b)| a != b)
+            );
+        }
+    }
+}
+
+#[test]
+fn what_is_no_log_is_refused_by_line_and_column_and_leaves_no_file() {
+    let scene = Scene::new(SHORT);
+    for (text, place, words) in [
+        ("(0.000001) a 120#00\n(0.000002) a 120#0\n\n", ":2:18:", "two digits"),
+        ("\u{1}\u{2}\n\n", ":1:1:", "begins with"),
+        ("(0.1) a 120##000\n", ":1:13:", "CAN FD"),
+        ("\n\n\n", "", "holds no frame"),
+    ] {
+        let log = scene.write("hostile.log", text);
+        let out = scene.path("out.csv");
+        let _ = export(&log, "csv", &out, &[]).expect_code(2).expect_said(&[place, words]);
+        let left: Vec<_> = fs::read_dir(scene.path("")).expect("the scene").flatten().collect();
+        assert!(left.iter().all(|file| !file.file_name().to_string_lossy().starts_with("out.")), "{left:?}");
+    }
+    let log = scene.write("cut.log", "(0.000001) a 160#0100\n(0.00");
+    let said = export(&log, "csv", &scene.path("cut.csv"), &[]).expect_code(0);
+    let _ = said.expect_said(&["cut.log:2: the last line is cut"]);
+    let log = scene.write("years.log", "(1.0) a 160#0100\n(9999999999.0) a 160#0100\n");
+    let _ = export(&log, "csv", &scene.path("out.csv"), &["--every-ms", "1"])
+        .expect_code(2)
+        .expect_said(&["cut it"]);
+}
+
+#[test]
+fn frames_that_are_no_signals_are_told_and_a_python_without_python_can_too() {
+    let scene = Scene::new(SHORT);
+    let log = scene.write("odd.log", "(0.1) a 7F0#00\n(0.2) a 110#0000000000\n(0.3) a 160#0100\n");
+    let said = export(&log, "csv", &scene.path("odd.csv"), &[]).expect_code(0);
+    let _ = said.expect_said(&[
+        "odd.log:1: 1 frames that rig.dbc does not know",
+        "odd.log:2: 1 frames that rig.dbc does not allow",
+    ]);
+    let none = scene.path("no-python");
+    let none = none.to_str().expect("UTF-8");
+    let said = export(&log, "blf", &scene.path("odd.blf"), &["--python", none]).expect_code(2);
+    let _ = said.expect_said(&["no-python", "pip install python-can"]);
+}

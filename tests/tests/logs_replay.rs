@@ -1,0 +1,175 @@
+//! A recorded log back on a bus: every frame, in order and by its time; never stale commands to a live rig.
+
+use protocol::can::CanFrame;
+use protocol::candump::read_line;
+use rustix::process::Signal;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+use system_tests::binaries::{Build, Program, executable};
+use system_tests::launch::Pace;
+use system_tests::peer::{Packet, Peer};
+use system_tests::process::Running;
+use system_tests::records::{count, json};
+use system_tests::scene::{SHORT, Scene};
+
+/// Silence after which nothing more comes.
+const SILENCE: Duration = Duration::from_millis(500);
+
+fn replay(scene: &Scene, log: &Path, options: &str) -> Running {
+    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    bench.arg("replay").arg(log).args(["--bus", &scene.url()]).args(options.split_whitespace());
+    Running::start("bench replay", bench.arg("--out").arg(scene.path("replayed")))
+}
+
+/// Frames that came until there were `least` of them, and a silence.
+fn heard(peer: &Peer, least: usize) -> Vec<CanFrame> {
+    let mut frames = Vec::new();
+    loop {
+        let patience = if frames.len() < least { system_tests::process::PATIENCE } else { SILENCE };
+        match peer.receive(patience) {
+            Some(Packet::Frame(frame)) => frames.push(frame),
+            Some(other) => panic!("{other:?}"),
+            None => return frames,
+        }
+    }
+}
+
+fn frames_of(log: &str) -> Vec<CanFrame> {
+    log.lines().map(|line| read_line(line).expect("a line").frame).collect()
+}
+
+/// A command of the drive every 10 ms, as many as said; the data are right.
+fn commands(count: u64) -> String {
+    let line = |number: u64| {
+        let frame = protocol::frames::ValveCommand { alive: (number % 16) as u8, ..Default::default() };
+        let frame = protocol::frames::Frame::DriveValveCommand(frame).encode().expect("in range");
+        format!("({}.{:06}) can0 {frame}\n", 1_700_000_000 + number / 100, number % 100 * 10_000)
+    };
+    (0..count).map(line).collect()
+}
+
+#[test]
+fn every_frame_of_a_run_is_on_the_bus_again_in_its_order() {
+    let scene = Scene::new(SHORT);
+    let emulator = scene.emulator(Pace::Lockstep).start();
+    let controller = scene.controller(Pace::Lockstep).start();
+    let _ = (emulator.wait().expect_code(0), controller.wait().expect_code(0));
+    let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the log");
+    // The first 300 ms, and frames of others.
+    let mut short: String = log.lines().take(1500).map(|line| format!("{line}\n")).collect();
+    let last = short.lines().last().and_then(read_line).expect("a line").stamp_ns;
+    let later = |ms: u64| {
+        format!("({}.{:06})", (last / 1_000_000 + ms) / 1000, (last / 1_000_000 + ms) % 1000 * 1000)
+    };
+    short += &format!("{} bus0 1ABCDEF0#01\n{} bus0 7FF#R3\n", later(20), later(30));
+    let short = scene.write("short.log", &short);
+    let _host = scene.bus_host("");
+    let peer = scene.peer();
+    let replayed = replay(&scene, &short, "");
+    let expected = frames_of(&fs::read_to_string(&short).expect("it was written"));
+    let came = heard(&peer, expected.len());
+    assert!(came == expected, "first difference: {:?}", came.iter().zip(&expected).position(|(a, b)| a != b));
+    let told = replayed.wait().expect_code(0).stdout;
+    assert!(told.contains("timing error: p50"), "{told}");
+    let report = json(&scene.path("replayed/replay.json"));
+    assert_eq!(report["ended"], "whole");
+    for pointer in ["/frames_sent", "/frames_in_log", "/timing_error_ns/count"] {
+        assert_eq!(count(&report, pointer), expected.len() as u64, "{pointer}");
+    }
+    assert!(scene.path("replayed/replay.hlog").is_file());
+}
+
+#[test]
+fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
+    let scene = Scene::new(SHORT);
+    let mixed = format!(
+        "{}(1700000001.000000) can0 120#0000000000000000\n(1700000001.001000) can0 7F0#01\n",
+        commands(3)
+    );
+    let log = scene.write("mixed.log", &mixed);
+    let emulator = scene.emulator(Pace::Real).with("--seconds 60").start();
+    scene.wait_for_rows("emulator", 50);
+    let refused = replay(&scene, &log, "").wait().expect_code(2);
+    let _ = refused.expect_said(&[
+        "a rig is live",
+        "3 commands and 1 frames of a rig",
+        "--leave-out commands,rig",
+    ]);
+    let refused = replay(&scene, &log, "--leave-out commands").wait().expect_code(2);
+    let _ = refused.expect_said(&["0 commands and 1 frames"]);
+    let _ = replay(&scene, &log, "--leave-out commands,rig").wait().expect_code(0);
+    let report = json(&scene.path("replayed/replay.json"));
+    assert_eq!((count(&report, "/frames_sent"), count(&report, "/frames_left_out")), (1, 4));
+    emulator.signal(Signal::INT);
+    let _ = emulator.wait();
+    let summary = json(&scene.path("emulator/summary.json"));
+    assert_eq!(count(&summary, "/stale_commands"), 0);
+    let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the rig's own log");
+    assert!(log.contains(" 7F0#01") && !log.contains(" 110#"), "what was left out is not on the bus");
+}
+
+#[test]
+fn a_rig_that_comes_alive_ends_a_replay_that_would_disturb_it() {
+    let scene = Scene::new(SHORT);
+    let log = scene.write("long.log", &commands(6000));
+    let _host = scene.bus_host("");
+    let peer = scene.peer();
+    let replayed = replay(&scene, &log, "");
+    let before = heard_some(&peer, 5);
+    peer.send(&CanFrame::new(0x120, &[0; 8]).to_bytes());
+    let ended = replayed.wait().expect_code(3).stdout;
+    assert!(ended.contains("a rig came alive"), "{ended}");
+    let report = json(&scene.path("replayed/replay.json"));
+    assert_eq!(report["ended"], "live-rig");
+    assert_eq!(count(&report, "/frames_sent"), (before + heard(&peer, 0).len()) as u64);
+    // Without what disturbs there is nothing to be sent, and with something else it goes on beside the rig.
+    let _ = replay(&scene, &log, "--leave-out 110").wait().expect_code(2).expect_said(&["nothing of"]);
+}
+
+/// Takes so many frames.
+fn heard_some(peer: &Peer, count: usize) -> usize {
+    for _ in 0..count {
+        let came = peer.receive(system_tests::process::PATIENCE);
+        assert!(matches!(came, Some(Packet::Frame(_))), "{came:?}");
+    }
+    count
+}
+
+#[test]
+fn an_interrupted_replay_keeps_what_was_done() {
+    let scene = Scene::new(SHORT);
+    let log = scene.write("long.log", &commands(6000));
+    let _host = scene.bus_host("");
+    let peer = scene.peer();
+    let replayed = replay(&scene, &log, "--spin-us 100");
+    let before = heard_some(&peer, 10);
+    replayed.signal(Signal::INT);
+    let _ = replayed.wait().expect_code(130);
+    let report = json(&scene.path("replayed/replay.json"));
+    assert_eq!(report["ended"], "interrupted");
+    let sent = (before + heard(&peer, 0).len()) as u64;
+    assert!(sent < 6000);
+    assert_eq!((count(&report, "/frames_sent"), count(&report, "/timing_error_ns/count")), (sent, sent));
+}
+
+#[test]
+fn nothing_is_sent_of_a_log_that_is_not_right_to_its_last_line() {
+    let scene = Scene::new(SHORT);
+    let _host = scene.bus_host("");
+    let peer = scene.peer();
+    let later = "(9999999999.000000) can0 110#0000000000\n";
+    for (more, words) in [
+        ("(1700000001.0) can0 11#00\n\n", ":4:21: an identifier has 3 digits"),
+        (later, ":4: this frame is more than 7 days"),
+        ("(1700000001.0) can1 110#00\n", "can0, can1: choose one with --interface"),
+    ] {
+        let log = scene.write("hostile.log", &format!("{}{more}", commands(3)));
+        let _ = replay(&scene, &log, "").wait().expect_code(2).expect_said(&[words]);
+    }
+    assert!(heard(&peer, 0).is_empty());
+    let log = scene.write("good.log", &commands(3));
+    let other = Scene::new(SHORT);
+    let _ = replay(&other, &log, "--wait-s 0").wait().expect_code(3).expect_said(&["needs a host"]);
+}
