@@ -258,7 +258,15 @@ impl Gateway {
 
     fn let_in(&mut self, now_ms: u64) {
         for _ in 0..CONNECTIONS_A_TURN {
-            let Ok((stream, address)) = self.listener.accept() else { return };
+            let (stream, address) = match self.listener.accept() {
+                Ok(accepted) => accepted,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                Err(_) => {
+                    // Out of descriptors, most likely: the door stays as it is, and must not be asked without a pause.
+                    std::thread::sleep(Duration::from_millis(1));
+                    break;
+                }
+            };
             if self.clients.len() >= self.most_clients {
                 self.report.connections_refused += 1;
                 // Whether it reads this is its own affair; the socket's buffer takes it at once.
@@ -365,7 +373,7 @@ impl Gateway {
     }
 
     fn close(mut self) -> Report {
-        self.clients.iter_mut().for_each(|client| client.end(Ended::GatewayEnded));
+        self.clients.iter_mut().for_each(|client| client.end(Ended::WithGateway));
         self.let_go();
         self.report.bus_counters = *self.bus.counters();
         self.report

@@ -159,7 +159,10 @@ impl Server {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
-            let request = realtime::Request { timer_slack: true, ..realtime::Request::default() };
+            // Above the loop, as the emulator's host; the loop tells what is refused.
+            let fifo_priority = Some(super::FIFO_PRIORITY + 1);
+            let request =
+                realtime::Request { fifo_priority, timer_slack: true, ..realtime::Request::default() };
             let _grants = realtime::acquire(&request);
             if let Err(error) = host.serve(&stopped) {
                 eprintln!("bench: the bus host failed: {error}");

@@ -71,7 +71,7 @@ impl StandIn {
             say(Frame::Tick(tick));
         }
         if let Some(since) = disturbance.stopped_since
-            && (cycle - since) % periods::EMERGENCY_STOP_CYCLES == 0
+            && (cycle - since).is_multiple_of(periods::EMERGENCY_STOP_CYCLES)
         {
             let stop = EmergencyStop { reason: EmergencyStopReason::Operator, release: false };
             say(Frame::ConsoleEmergencyStop(stop));

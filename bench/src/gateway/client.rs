@@ -34,7 +34,7 @@ pub(super) enum Ended {
     /// It read nothing for 30 s, or asked without reading the answers.
     ReadsNothing,
     /// The gateway ended.
-    GatewayEnded,
+    WithGateway,
     /// The session ended it.
     #[serde(untagged)]
     Parted(Parting),
