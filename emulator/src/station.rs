@@ -129,6 +129,7 @@ impl Station {
         } = parts;
         if faults.possible() {
             plant.expect_faults();
+            sensors.seed_faults(faults.seed());
         }
         let inputs = Inputs::default();
         // Replaced by the first cycle's own sample; a scratch value has no meaning, and costs a draw of noise.
