@@ -12,7 +12,7 @@ fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() 
     let script = "seed = 3\n[[fault]]\nname = \"position-sensor-noise\"\nat = \"drive\"\n\
                   [[fault]]\nname = \"bus-loss\"\nprobability = 0.1\n\
                   [[fault]]\nname = \"chamber-leak\"\nat = \"load.b\"\nleakage_nl_per_min = 50\n";
-    let run = |faults| Plan { faults, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
+    let run = |faults: &str| Plan { faults, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
     let [one, other] = [run(script), run(script)];
     for name in ["measurement.csv", "truth.csv", "bus.log", "faults.csv"] {
         let path = |left: &Left| left.scene.path("emulator").join(name);
