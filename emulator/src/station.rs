@@ -8,13 +8,14 @@
 //!
 //! A command that arrived before t_k acts over [t_k, t_k+1) (bus.md, Time). Missed cycles are computed with the command
 //! latched before, so a stall changes which inputs there are and never the physics. Nothing here allocates, locks, prints
-//! or blocks.
+//! or blocks. What breaks on purpose is in `broken.rs`.
+
+mod broken;
 
 use crate::console::Command;
 use crate::event::{Event, EventKind};
 use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
-use crate::faults::course::{Broken, FaultCourse};
-use crate::faults::mark::Mark;
+use crate::faults::course::FaultCourse;
 use crate::recording::Recorder;
 use crate::telegrams::{self, CommandState, SaturatedSensors, TickCause};
 use crossbeam_channel::Receiver;
@@ -128,6 +129,7 @@ impl Station {
         } = parts;
         if faults.possible() {
             plant.expect_faults();
+            sensors.seed_faults(faults.seed());
         }
         let inputs = Inputs::default();
         // Replaced by the first cycle's own sample; a scratch value has no meaning, and costs a draw of noise.
@@ -220,9 +222,7 @@ impl Station {
             let saturated = std::mem::take(&mut self.saturated);
             self.send(&telegrams::status(&self.plant, &saturated, commands), bus);
         }
-        if self.faults.possible() {
-            self.send_fault_marks(bus);
-        }
+        self.send_fault_marks(bus);
         if bus.is_up() != self.bus_was_up {
             self.bus_was_up = bus.is_up();
             self.tell(cycle, if self.bus_was_up { EventKind::BusBack } else { EventKind::BusLost });
@@ -334,15 +334,6 @@ impl Station {
         self.send(&telegrams::tick(cause, cycle, self.skipped, self.lockstep), bus);
     }
 
-    /// Tells the bench what began and ended, where it listens.
-    fn send_fault_marks(&mut self, bus: &mut dyn Bus) {
-        while let Some((number, begins)) = self.faults.next_to_tell() {
-            if self.bench_frames {
-                self.send(&telegrams::fault_mark(number, begins), bus);
-            }
-        }
-    }
-
     fn send(&mut self, frame: &Frame, bus: &mut dyn Bus) -> Option<u64> {
         let frame = telegrams::encode(frame);
         // What the bus did not take is counted there.
@@ -376,11 +367,7 @@ impl Station {
         let Self { people, plant, recorder, .. } = self;
         let tell = |outcome| recorder.event(Event { cycle, kind: EventKind::from(outcome) });
         self.hands[SCRIPT] = people.begin_cycle(cycle, plant, tell);
-        let Self { plant, sensors, inputs, faults, recorder, .. } = self;
-        faults.begin_cycle(cycle, Broken { plant, sensors, inputs }, |mark| {
-            recorder.event(Event { cycle, kind: EventKind::Fault(mark) });
-        });
-        self.hands[FAULTS] = self.faults.hands();
+        self.begin_faults(cycle);
         self.hold_hands();
     }
 
@@ -411,17 +398,6 @@ impl Station {
             }),
             Command::Quit => self.quit_asked = true,
         }
-    }
-
-    fn break_or_mend(
-        &mut self,
-        cycle: u64,
-        act: impl FnOnce(&mut FaultCourse, Broken<'_>, &mut dyn FnMut(Mark)),
-    ) {
-        let Self { plant, sensors, inputs, faults, recorder, .. } = self;
-        act(faults, Broken { plant, sensors, inputs }, &mut |mark| {
-            recorder.event(Event { cycle, kind: EventKind::Fault(mark) });
-        });
     }
 
     fn tell(&mut self, cycle: u64, kind: EventKind) {

@@ -51,8 +51,13 @@ pub struct AxisReadings {
 impl Sensors {
     /// Sensors of this rig whose noise is given by the seed.
     pub fn new(rig: &RigParameters, seed: u64) -> Self {
-        let faults = SensorFaults::new(!seed);
+        let faults = SensorFaults::new(0);
         Sensors { parameters: *rig.sensors(), noise: Pcg64::seed_from_u64(seed), faults }
+    }
+
+    /// Gives the seed of what is random in faults; 0 without this.
+    pub fn seed_faults(&mut self, seed: u64) {
+        self.faults = SensorFaults::new(seed);
     }
 
     /// What is broken in the sensors from the next sample on: of drive and load; position, force, pressure a, pressure b.

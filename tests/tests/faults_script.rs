@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::broken::Plan;
+use system_tests::broken::{Left, Plan};
 use system_tests::launch::Pace;
 use system_tests::scene::{SHORT, Scene};
 
@@ -12,11 +12,16 @@ fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() 
     let script = "seed = 3\n[[fault]]\nname = \"position-sensor-noise\"\nat = \"drive\"\n\
                   [[fault]]\nname = \"bus-loss\"\nprobability = 0.1\n\
                   [[fault]]\nname = \"chamber-leak\"\nat = \"load.b\"\nleakage_nl_per_min = 50\n";
-    let run = |faults| Plan { faults, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
+    let run = |faults: &str| Plan { faults, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
     let [one, other] = [run(script), run(script)];
     for name in ["measurement.csv", "truth.csv", "bus.log", "faults.csv"] {
         let path = |left: &Left| left.scene.path("emulator").join(name);
         assert!(one.scene.same(&path(&one), &path(&other)), "{name} differs");
+    }
+    let drawn_anew = run(&script.replace("seed = 3", "seed = 4"));
+    for name in ["measurement.csv", "bus.log"] {
+        let path = |left: &Left| left.scene.path("emulator").join(name);
+        assert!(!one.scene.same(&path(&one), &path(&drawn_anew)), "{name}: another seed, other draws");
     }
     let later = "[[fault]]\nname = \"valve-dead\"\nat = \"drive\"\nfrom_s = 50\n";
     let [without, waiting] = [run(""), run(later)];

@@ -101,6 +101,12 @@ impl FaultCourse {
         self.possible
     }
 
+    /// Seed of everything that is random.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// Number of active faults.
     #[must_use]
     pub fn active(&self) -> usize {

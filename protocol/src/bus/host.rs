@@ -338,16 +338,6 @@ impl Host {
         }
     }
 
-    /// Puts one frame on the wire, which may do something to it.
-    fn deliver(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
-        self.wire.note_speaker(frame, from);
-        if self.wire.is_plain() {
-            self.carry(frame, from, deaf);
-        } else {
-            self.deliver_through_faults(frame, from, deaf);
-        }
-    }
-
     /// Carries a frame to everyone but its sender and the `deaf`. What a member of the barrier gets leaves with its Go.
     fn carry(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
         self.report.frames += 1;

@@ -49,7 +49,17 @@ impl Host {
         self.carry_fates(&mut fates);
     }
 
-    pub(super) fn deliver_through_faults(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
+    /// Puts one frame on the wire, which may do something to it.
+    pub(super) fn deliver(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
+        self.wire.note_speaker(frame, from);
+        if self.wire.is_plain() {
+            self.carry(frame, from, deaf);
+        } else {
+            self.deliver_through_faults(frame, from, deaf);
+        }
+    }
+
+    fn deliver_through_faults(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
         let now_ns = match &self.barrier {
             Some(barrier) => u64::from(barrier.cycle()) * CYCLE_NS,
             None => self.began.elapsed().as_nanos() as u64,
