@@ -96,6 +96,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let out = &arguments.files.out;
     std::fs::create_dir_all(out)
         .and_then(|()| clear(out, &controller_results(&report::name(axes))))
+        .and_then(|()| clear(out, &axes.iter().map(|axis| a2l::file_name(*axis)).collect::<Vec<_>>()))
         .and_then(|()| flight_dump::clear(out, &report::name(axes)))
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     let tables = Tables::create(out, axes).map_err(RunError::output)?;

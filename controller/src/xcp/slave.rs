@@ -40,6 +40,8 @@ const CHECKSUM_BYTES: u32 = 4096;
 const DAQ_PROPERTIES: u8 = 0x13;
 /// Unit of time stamps and of the event: 1 ms.
 const UNIT_1_MS: u8 = 6;
+/// Cycles without a command after which writing wants a key again: a minute.
+const IDLE_CYCLES: u64 = 60_000;
 /// Version of the protocol layer and of the layer below it.
 const VERSION: u8 = 1;
 
@@ -102,6 +104,8 @@ pub struct Slave {
     daq: Daq,
     connected: bool,
     storing: bool,
+    /// Cycles since the last command.
+    idle: u64,
     /// Where the next transfer begins; `None` until it is set.
     address: Option<u32>,
     block: Block,
@@ -120,6 +124,7 @@ impl Slave {
             daq: Daq::new(daq_per_cycle),
             connected: false,
             storing: false,
+            idle: 0,
             address: None,
             block: Block { bytes: [0; BLOCK], had: 0, whole: 0 },
             counters: SlaveCounters::default(),
@@ -160,6 +165,10 @@ impl Slave {
     pub fn cycle(&mut self, cycle: u64, signals: &[f64; COUNT], parameters: &[f64]) {
         self.image.refresh(cycle, signals, parameters);
         self.lock.cycle();
+        self.idle += 1;
+        if self.idle >= IDLE_CYCLES {
+            self.lock.shut();
+        }
         self.daq.cycle(cycle, &self.image);
     }
 
@@ -192,6 +201,7 @@ impl Slave {
         if !self.connected {
             return None;
         }
+        self.idle = 0;
         let answer = self.answer(code, fields, cycle, desk);
         match answer {
             Ok(answer) => {
@@ -209,7 +219,7 @@ impl Slave {
         // Whoever comes finds a session without a past: shut, no lists that run.
         self.leave();
         self.daq.free();
-        self.connected = true;
+        (self.connected, self.idle) = (true, 0);
         self.counters.sessions += 1;
         // Intel, address granularity of a byte, no slave block mode, GET_COMM_MODE_INFO can be asked for.
         let basic = 0x80;

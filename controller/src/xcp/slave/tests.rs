@@ -148,6 +148,21 @@ fn a_wrong_key_ends_the_session_and_measuring_needs_none() {
 }
 
 #[test]
+fn a_session_that_falls_silent_is_shut_after_a_minute() {
+    let mut talk = Talk::unlocked();
+    let pass = |talk: &mut Talk, cycles: u64| {
+        (0..cycles).for_each(|cycle| talk.slave.cycle(cycle, &[0.0; COUNT], &[25.0, 1.0, 15.0]));
+    };
+    pass(&mut talk, IDLE_CYCLES - 1);
+    assert_eq!(talk.good(&[0xFD])[1], 0, "a command keeps it open");
+    pass(&mut talk, IDLE_CYCLES - 1);
+    assert!(talk.slave.is_unlocked());
+    pass(&mut talk, 1);
+    assert_eq!(talk.good(&[0xFD])[1], CALIBRATION);
+    assert_eq!(talk.good(&[0xF8, 0, 1])[0], 8, "and a key opens it again");
+}
+
+#[test]
 fn a_block_is_answered_at_its_end_and_taken_whole() {
     let mut talk = Talk::unlocked();
     let bytes = [30.5_f64, 4.0, 15.0].map(f64::to_le_bytes).concat();
