@@ -26,8 +26,7 @@ class AirbenchBus(can.BusABC):
 
     def __init__(self, channel, can_filters=None, member=None, **kwargs):
         self.channel_info = f"airbench {channel}"
-        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self.socket.connect(channel)
+        self.socket = self._connected(channel)
         self.poll = select.poll()
         self.poll.register(self.socket, select.POLLIN)
         self.wanted = None
@@ -35,6 +34,21 @@ class AirbenchBus(can.BusABC):
         if member:
             self.socket.send(CONTROL.pack(MAGIC, JOIN_AS_MEMBER, 0, 0, member.encode()))
         super().__init__(channel=channel, can_filters=can_filters, **kwargs)
+
+    @staticmethod
+    def _connected(channel):
+        """A host that is only just starting is waited for."""
+        until = time.monotonic() + 10
+        while True:
+            peer = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            try:
+                peer.connect(channel)
+                return peer
+            except (FileNotFoundError, ConnectionRefusedError) as refused:
+                peer.close()
+                if time.monotonic() > until:
+                    raise can.CanInitializationError(f"no host at {channel}: {refused}") from refused
+                time.sleep(0.05)
 
     def _apply_filters(self, filters):
         plain = filters and all(each.get("can_mask") == 0x7FF for each in filters)
