@@ -58,8 +58,8 @@ pub enum ReplayError {
     Nothing(PathBuf),
     /// A rig is live, and the log would disturb it.
     #[error(
-        "a rig is live on {bus} ({heard} of its frames in {listened_ms} ms), and the log holds {commands} commands and {of_the_rig} \
-         frames of a rig, all of the past: leave them out with --leave-out commands,rig, or take another bus"
+        "a rig is live on {bus} ({heard} of its frames in {listened_ms} ms), and the log holds {commands} commands and \
+         {of_the_rig} frames of a rig, all of the past: leave them out with --leave-out commands,rig, or take another bus"
     )]
     LiveRig {
         /// The bus.

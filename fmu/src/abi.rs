@@ -12,6 +12,8 @@
 #![allow(unsafe_code)] // foreign pointers and exported names; nothing else in the crate is
 #![allow(missing_docs, non_snake_case)] // the names and their meaning are the standard's
 
+mod optional;
+
 use crate::description;
 use crate::simulation::{Refusal, Simulation};
 use plant::RigParameters;
@@ -45,9 +47,6 @@ pub(crate) struct Callbacks {
 
 /// `fmi2CoSimulation` of `fmi2Type`.
 const CO_SIMULATION: c_int = 1;
-/// `fmi2LastSuccessfulTime` and `fmi2Terminated` of `fmi2StatusKind`.
-const LAST_SUCCESSFUL_TIME: c_int = 2;
-const TERMINATED: c_int = 3;
 
 /// What an importer holds.
 struct Component {
@@ -455,126 +454,6 @@ extern "C" fn fmi2FreeFMUstate(component: *mut c_void, state: *mut *mut c_void) 
 fn null_state(own: &Component) -> Status {
     own.teller.tell(Status::Error, "a null pointer in place of an FMU state");
     Status::Error
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SerializedFMUstateSize(
-    component: *mut c_void,
-    _state: *mut c_void,
-    _size: *mut usize,
-) -> Status {
-    unsupported(component, "canSerializeFMUstate")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SerializeFMUstate(
-    component: *mut c_void,
-    _state: *mut c_void,
-    _bytes: *mut c_char,
-    _size: usize,
-) -> Status {
-    unsupported(component, "canSerializeFMUstate")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2DeSerializeFMUstate(
-    component: *mut c_void,
-    _bytes: *const c_char,
-    _size: usize,
-    _state: *mut *mut c_void,
-) -> Status {
-    unsupported(component, "canSerializeFMUstate")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetDirectionalDerivative(
-    component: *mut c_void,
-    _unknowns: *const c_uint,
-    _unknown_count: usize,
-    _knowns: *const c_uint,
-    _known_count: usize,
-    _known_differentials: *const c_double,
-    _unknown_differentials: *mut c_double,
-) -> Status {
-    unsupported(component, "providesDirectionalDerivative")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetRealInputDerivatives(
-    component: *mut c_void,
-    _references: *const c_uint,
-    _count: usize,
-    _orders: *const c_int,
-    _values: *const c_double,
-) -> Status {
-    unsupported(component, "canInterpolateInputs")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetRealOutputDerivatives(
-    component: *mut c_void,
-    _references: *const c_uint,
-    _count: usize,
-    _orders: *const c_int,
-    _values: *mut c_double,
-) -> Status {
-    unsupported(component, "maxOutputDerivativeOrder")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2CancelStep(component: *mut c_void) -> Status {
-    unsupported(component, "canRunAsynchronuously")
-}
-
-fn unsupported(component: *mut c_void, attribute: &str) -> Status {
-    on(component, |own| {
-        own.teller
-            .tell(Status::Error, &format!("not supported: modelDescription.xml does not set {attribute}"));
-        Ok(Status::Error)
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetStatus(component: *mut c_void, _kind: c_int, _value: *mut Status) -> Status {
-    on(component, |_| Ok(Status::Discard))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, value: *mut c_double) -> Status {
-    on(component, |own| {
-        // SAFETY: the importer's variable.
-        match (kind, unsafe { value.as_mut() }) {
-            (LAST_SUCCESSFUL_TIME, Some(value)) => *value = own.simulation.time_s(),
-            _ => return Ok(Status::Discard),
-        }
-        Ok(Status::Ok)
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetIntegerStatus(component: *mut c_void, _kind: c_int, _value: *mut c_int) -> Status {
-    on(component, |_| Ok(Status::Discard))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetBooleanStatus(component: *mut c_void, kind: c_int, value: *mut c_int) -> Status {
-    on(component, |_| {
-        // SAFETY: the importer's variable.
-        match (kind, unsafe { value.as_mut() }) {
-            (TERMINATED, Some(value)) => *value = 0,
-            _ => return Ok(Status::Discard),
-        }
-        Ok(Status::Ok)
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetStringStatus(
-    component: *mut c_void,
-    _kind: c_int,
-    _value: *mut *const c_char,
-) -> Status {
-    on(component, |_| Ok(Status::Discard))
 }
 
 #[cfg(test)]

@@ -9,11 +9,15 @@
 //! A step is a whole number of milliseconds, the plant's period. A valve command that is set at t_k is latched at t_k+1 and acts
 //! over [t_k+1, t_k+2), as on the bus [bus.md, Time]; hands, emergency stop and linkage act from t_k on, as people do.
 
+mod refusal;
+
 use crate::variables::{self, Causality, Kind, Role, Variable};
 use plant::parameters::table::KEYS;
-use plant::{AxisReadings, Inputs, ParameterError, Plant, RigParameters, Sensors, Setup, SetupError};
+use plant::{AxisReadings, Inputs, Plant, RigParameters, Sensors, Setup, SetupError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+pub use refusal::Refusal;
 
 /// The plant's period, s.
 const PERIOD_S: f64 = 1e-3;
@@ -21,56 +25,6 @@ const PERIOD_S: f64 = 1e-3;
 const TOLERANCE_S: f64 = 1e-6;
 /// Most periods of one step, some 11 days.
 const MOST_PERIODS: f64 = 1e9;
-
-/// Why a call is refused; nothing has changed then.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Refusal {
-    /// The call belongs into another mode.
-    #[error("{call} belongs after {after}")]
-    Mode {
-        /// The call.
-        call: &'static str,
-        /// What must have been called before.
-        after: &'static str,
-    },
-    /// No variable of this type has this reference.
-    #[error("value reference {0} is no {1} of this FMU; see its modelDescription.xml")]
-    Reference(u32, &'static str),
-    /// The variable cannot be set, or not now.
-    #[error("{0} cannot be set {1}")]
-    NotSettable(String, &'static str),
-    /// The value is out of range, or none.
-    #[error("{name} = {value}: allowed are {least} to {most}{}", spaced(unit))]
-    OutOfRange {
-        /// The variable.
-        name: String,
-        /// What was to be set, in the variable's unit.
-        value: f64,
-        /// Smallest allowed value.
-        least: f64,
-        /// Largest allowed value.
-        most: f64,
-        /// Unit.
-        unit: &'static str,
-    },
-    /// Parameters that do not fit together.
-    #[error("{0}")]
-    Parameters(#[from] ParameterError),
-    /// A rig that cannot be set up so.
-    #[error("{0}")]
-    Setup(#[from] SetupError),
-    /// Time that is not where the plant stands, or a step that is no whole number of milliseconds.
-    #[error("{0}")]
-    Time(String),
-    /// The plant's state is no longer finite: latched until a reset.
-    #[error(
-        "the plant's state is no longer finite, at {at_s} s; reset the FMU, and look at the inputs before"
-    )]
-    NotFinite {
-        /// When, s.
-        at_s: f64,
-    },
-}
 
 /// What a step has to tell although it was done.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -482,11 +436,6 @@ fn find<'v>(
         own.ok_or(Refusal::Reference(*reference, kind))
     };
     references.iter().map(one).collect()
-}
-
-/// A unit behind a number.
-fn spaced(unit: &str) -> String {
-    if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
 fn in_range(own: &Variable, value: f64) -> Result<(), Refusal> {

@@ -1,4 +1,5 @@
-//! Records of the discrepancy workflow: a measurement.csv, a log, or a foreign CSV with its mapping, told apart by the first byte.
+//! Records of the discrepancy workflow: a measurement.csv, a log, or a foreign CSV with its mapping, told apart by the first
+//! byte.
 //!
 //! `m` a measurement, `l` a log, `f` a mapping, a line `---`, and its CSV.
 #![no_main]

@@ -83,12 +83,12 @@ fn a_csv_holds_the_signals_of_the_measurement_at_its_times() {
             assert!(exported[signal][row].is_some_and(|own| close(own, value)), "{signal} in cycle {cycle}");
         }
     }
-    // In lockstep a command is delivered at the begin of the cycle in which it acts.
+    // The command that acts in a cycle was on the bus in the one before.
     let valves = measured.column("drive_valve");
     assert!(valves.iter().any(|valve| *valve != 0.0));
     for (cycle, valve) in valves.into_iter().enumerate().skip(5) {
-        let sent = exported["DriveValveCommand.opening"][first + cycle].expect("after the first cycles");
-        let enabled = exported["DriveValveCommand.enable"][first + cycle] == Some(1.0);
+        let sent = exported["DriveValveCommand.opening"][first + cycle - 1].expect("after the first cycles");
+        let enabled = exported["DriveValveCommand.enable"][first + cycle - 1] == Some(1.0);
         assert!(close(if enabled { sent } else { 0.0 }, valve), "cycle {cycle}: {sent} and {valve}");
     }
 }

@@ -1,6 +1,7 @@
 //! The frames of a log as signals, by `rig.dbc`: for each message its stamps and data.
 //!
-//! What `rig.dbc` does not know or does not allow (length, checksum, range) is no signal; it is counted, with the line of the first.
+//! What `rig.dbc` does not know or does not allow (length, checksum, range) is no signal; it is counted, with the line of the
+//! first.
 
 use crate::recorded_log::RecordedLog;
 use protocol::frames::{DecodeError, Frame, MESSAGES, MessageSpec, SignalKind, SignalSpec};

@@ -14,8 +14,8 @@ pub struct ReplayArguments {
     /// The bus: can://IFACE, or unix:///PATH that somebody hosts ('emulator bus').
     #[arg(long)]
     pub bus: BusUrl,
-    /// Leave out what controllers, console and bench sent (commands), what the rig sent (rig), or identifiers in hexadecimal (120,
-    /// or 8 digits); several, with commas between.
+    /// Leave out what controllers, console and bench sent (commands), what the rig sent (rig), or identifiers in hexadecimal
+    /// (120, or 8 digits); several, with commas between.
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
     pub leave_out: Vec<LeftOut>,
     /// Take what was seen at this interface alone.
