@@ -1,0 +1,30 @@
+//! The gateway's clients: any bytes in any pieces end in answers, frames or a parting, the same ones however they are cut up.
+#![no_main]
+
+use bench::gateway::session::{Action, Session};
+use libfuzzer_sys::fuzz_target;
+
+/// What the bus is called.
+const BUS: &str = "can0";
+/// Longest answer: those of the protocol are short, and none repeats what a client said.
+const LONGEST_REPLY: usize = 40;
+
+fuzz_target!(|input: (u8, &[u8])| {
+    let (piece, bytes) = input;
+    let whole = said(bytes.chunks(bytes.len().max(1)));
+    assert_eq!(whole, said(bytes.chunks(usize::from(piece).max(1))), "in pieces of {piece}");
+    for (at, action) in whole.iter().enumerate() {
+        match action {
+            Action::Reply(text) => assert!(text.len() <= LONGEST_REPLY, "{text}"),
+            Action::Send(frame) => assert!(frame.data().len() <= 8),
+            Action::Part(_) => assert_eq!(at + 1, whole.len(), "something after the parting"),
+        }
+    }
+});
+
+fn said<'a>(pieces: impl Iterator<Item = &'a [u8]>) -> Vec<Action> {
+    let mut session = Session::new(0, false);
+    let mut actions = Vec::new();
+    pieces.for_each(|piece| session.take(piece, BUS, 0, &mut actions));
+    actions
+}
