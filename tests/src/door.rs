@@ -99,7 +99,7 @@ impl DoorClient {
     pub fn on_the_bus(door: &Door) -> Self {
         let mut client = Self::connect(door);
         wait_until("a place at the gateway", || {
-            let let_in = client.next().as_deref() == Some("< hi >");
+            let let_in = client.hear().as_deref() == Some("< hi >");
             if !let_in {
                 client = Self::connect(door);
             }
@@ -124,7 +124,7 @@ impl DoorClient {
     ///
     /// # Panics
     /// When nothing comes.
-    pub fn next(&mut self) -> Option<String> {
+    pub fn hear(&mut self) -> Option<String> {
         loop {
             if let Some(end) = self.text.find('>') {
                 let rest = self.text.split_off(end + 1);
@@ -146,7 +146,7 @@ impl DoorClient {
     /// When it is another.
     #[track_caller]
     pub fn expect(&mut self, text: &str) {
-        assert_eq!(self.next().as_deref(), Some(text));
+        assert_eq!(self.hear().as_deref(), Some(text));
     }
 
     /// The next frame: identifier and data, without its time.
@@ -154,7 +154,7 @@ impl DoorClient {
     /// # Panics
     /// When something else comes.
     pub fn frame(&mut self) -> (String, String) {
-        let text = self.next().expect("a frame");
+        let text = self.hear().expect("a frame");
         let words: Vec<_> = text.split(' ').collect();
         assert!(words[..2] == ["<", "frame"] && words[words.len() - 1] == ">", "{text}");
         (words[2].into(), words[4].into())

@@ -182,7 +182,7 @@ impl Breaking {
         if self.fault == Fault::AnswersTwice && cycle % 100 == 50 {
             self.answer(peer, cycle);
         }
-        if self.fault == Fault::OthersFrame && cycle % 100 == 0 {
+        if self.fault == Fault::OthersFrame && cycle.is_multiple_of(100) {
             peer.send(&CanFrame::new(0x160, &[1, 0]).to_bytes());
         }
     }
@@ -196,13 +196,13 @@ impl Breaking {
         };
         let shut = shut || (self.silent_cycles >= 50 && self.fault != Fault::IgnoresLoss);
         let echo = if self.fault == Fault::OldEcho { self.last.unwrap_or(0) } else { self.answered };
-        if self.fault == Fault::OldEcho && cycle % 3 == 0 {
+        if self.fault == Fault::OldEcho && cycle.is_multiple_of(3) {
             self.last = Some(self.answered);
         }
         let command = ValveCommand { opening: 0.1, alive: self.alive, echo, enable: !shut };
         let step = match self.fault {
             Fault::Counter => 3,
-            Fault::CounterOfSensors if cycle % 64 == 0 => 0,
+            Fault::CounterOfSensors if cycle.is_multiple_of(64) => 0,
             _ => 1,
         };
         self.alive = (self.alive + step) % 16;

@@ -59,7 +59,7 @@ fn a_thousand_connections_leave_the_memory_and_the_clients_as_they_were() {
     // There is room again.
     wait_until("a client after the thousand", || {
         let mut client = DoorClient::connect(&door);
-        client.next().as_deref() == Some("< hi >")
+        client.hear().as_deref() == Some("< hi >")
     });
     let report = door.close();
     assert_eq!(count(&report, "/clients_at_a_time_max"), 32);

@@ -158,7 +158,7 @@ mod tests {
     use protocol::frames::{EmergencyStopReason, ValveCommand};
 
     fn command(alive: u8, echo: u16) -> CanFrame {
-        let command = ValveCommand { opening: 0.5, alive, echo, enable: true };
+        let command = ValveCommand { opening: 1.0, alive, echo, enable: true };
         Frame::DriveValveCommand(command).encode().unwrap()
     }
 
@@ -175,7 +175,7 @@ mod tests {
         let echo = |cycle: u16| cycle % 4096;
         let frames =
             [command(15, echo(4999)), command(0, echo(4998)), command(2, echo(4990)), command(2, echo(4995))];
-        let of = |age, step| What::Command { opening: 0.5, age, step };
+        let of = |age, step| What::Command { opening: 1.0, age, step };
         let expected = [of(Some(0), None), of(Some(1), Some(1)), of(None, Some(2)), of(None, Some(0))];
         assert_eq!(judged(&frames), expected);
         // Of a cycle to come: the 12 bits are those of one long ago, which was sent.
