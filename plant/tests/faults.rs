@@ -15,7 +15,7 @@ fn of_drive(axis: AxisFaults) -> Faults {
 }
 
 fn inputs(k: u32) -> Inputs {
-    let u = if k / 150 % 2 == 0 { 0.5 } else { -0.4 };
+    let u = if (k / 150).is_multiple_of(2) { 0.5 } else { -0.4 };
     Inputs { valve: [u, -0.3 * u], ..Inputs::default() }
 }
 
@@ -33,7 +33,7 @@ fn motion(mut plant: Plant, mut each: impl FnMut(u32, &mut Plant)) -> Vec<State>
 fn a_plant_without_a_fault_is_the_baseline_to_the_bit_before_during_and_after() {
     let baseline = motion(plant(), |_, _| ());
     let expected = motion(plant(), |k, plant| {
-        if k % 100 == 0 {
+        if k.is_multiple_of(100) {
             plant.expect_faults();
             plant.set_faults(&Faults::default());
         }

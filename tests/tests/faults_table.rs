@@ -179,8 +179,8 @@ fn sensors_are_off_by_an_offset_a_gain_and_a_drift() {
         |unit, size| format!("drift_{unit}_per_s = -{size}"),
         |channel, _, _, errors| {
             let (_, size) = unit_and_size(channel.quantity);
-            for k in BEGINS..ENDS {
-                let off = errors[k] + size * (k - BEGINS) as f64 * 1e-3;
+            for (k, error) in errors.iter().enumerate().take(ENDS).skip(BEGINS) {
+                let off = error + size * (k - BEGINS) as f64 * 1e-3;
                 assert!(off.abs() < 6.0 * channel.noise + channel.step, "{} {k}: {off}", channel.shown);
             }
         },
@@ -205,9 +205,9 @@ fn sensors_are_noisy_spiky_and_coarse() {
         |unit, size| format!("spike_{unit} = -{size}\nevery_ms = 25"),
         |channel, _, _, errors| {
             let (_, size) = unit_and_size(channel.quantity);
-            for k in BEGINS..ENDS {
+            for (k, error) in errors.iter().enumerate().take(ENDS).skip(BEGINS) {
                 let spike = if (k - BEGINS).is_multiple_of(25) { -size } else { 0.0 };
-                let off = errors[k] - spike;
+                let off = error - spike;
                 assert!(off.abs() < 6.0 * channel.noise + channel.step, "{} {k}: {off}", channel.shown);
             }
         },
@@ -347,10 +347,10 @@ fn a_leaking_chamber_empties_as_the_law_of_the_gap_says() {
     let (a, p) = (ATMOSPHERE_PA, pressure[BEGINS]);
     let c = ATMOSPHERE_PA / VOLUME_M3 * (400.0 / 60_000.0) / 35e10;
     let r = (p - a) / (p + a);
-    for k in BEGINS..ENDS {
+    for (k, shown) in pressure.iter().enumerate().take(ENDS).skip(BEGINS) {
         let decay = r * (-2.0 * a * c * (k - BEGINS) as f64 * 1e-3).exp();
         let computed = a * (1.0 + decay) / (1.0 - decay);
-        assert!((pressure[k] / computed - 1.0).abs() < 1e-5, "cycle {k}: {} for {computed}", pressure[k]);
+        assert!((shown / computed - 1.0).abs() < 1e-5, "cycle {k}: {shown} for {computed}");
     }
     assert!(pressure[ENDS - 1] < 0.95 * p, "it leaks");
 }

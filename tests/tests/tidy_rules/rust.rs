@@ -228,6 +228,13 @@ const DIMENSIONLESS: &[&str] = &[
     "factor",                // of a DBC signal, whose unit is a field beside it
     "offset",                // the same
     "range",                 // of a variable, whose unit is a field beside it
+    "friction_factor",       // on the friction of an axis
+    "limit",                 // of an opening
+    "dropout",               // probability
+    "gain",                  // of a faulty sensor
+    "spike",                 // of a faulty sensor, in its own unit
+    "step",                  // the same
+    "act",                   // openings that a test commands
     "min",                   // the same, and of a key of the parameter table
     "max",                   // the same
     "value",                 // of a reading, whose unit its sensor has
