@@ -7,9 +7,9 @@
 //!
 //! What the bus's URL says (`?loss=P&seed=N`) lasts for ever; everything else begins and ends by [`WireOrder`]s, which whoever
 //! has the host's [`WireOrders`] gives without waiting. Draws come from a seeded generator for each fault, so that the same
-//! frames in the same order meet the same; a lost frame is lost for every receiver, as on a real wire where all nodes see one
-//! error frame. A frame that is changed here is one that its sender sent wrongly: what the wire itself garbles is found by CAN's own
-//! checksum and sent again, which the wire that keeps time models (`error_rate`).
+//! frames in the same order meet the same; a lost frame is lost for every receiver, as on a real wire where all nodes see
+//! one error frame. A frame that is changed here is one that its sender sent wrongly: what the wire itself garbles is found
+//! by CAN's own checksum and sent again, which the wire that keeps time models (`error_rate`).
 //!
 //! Names and ranges are the emulator's table of faults; `kinds.rs` has the numbers of each.
 
