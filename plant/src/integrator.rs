@@ -129,7 +129,23 @@ impl Forces {
 
 impl Integrator {
     pub(crate) fn new(rig: &RigParameters, added_mass_kg: f64, substeps: u32, faults: &Faults) -> Self {
-        let chambers = Chambers::of(rig);
+        Self::assemble(Chambers::of(rig), Linkage::of(rig), rig, added_mass_kg, substeps, faults)
+    }
+
+    /// The same rig with other masses on it, or otherwise broken; allocates nothing, whatever effects replace.
+    pub(crate) fn rebuilt(&self, rig: &RigParameters, added_mass_kg: f64, faults: &Faults) -> Self {
+        let (chambers, linkage) = (self.chambers.clone(), self.linkage.clone());
+        Self::assemble(chambers, linkage, rig, added_mass_kg, self.substeps, faults)
+    }
+
+    fn assemble(
+        chambers: Chambers,
+        linkage: Linkage,
+        rig: &RigParameters,
+        added_mass_kg: f64,
+        substeps: u32,
+        faults: &Faults,
+    ) -> Self {
         let [on_drive_kg, on_load_kg] = faults.added_masses_kg();
         let motion = Motion::new(rig, [added_mass_kg + on_drive_kg, on_load_kg]);
         let supply = Supply::new(rig.supply(), faults.supply);
@@ -148,7 +164,7 @@ impl Integrator {
             coarse: span(coarse_s),
             fine: span(coarse_s / f64::from(PARTS)),
             valve: Valve::new(rig.valve()),
-            linkage: Linkage::of(rig),
+            linkage,
             file_dead_volume_m3: rig.cylinder().dead_volume_m3,
             atmospheric_pa: rig.supply().atmospheric_pressure_pa,
             chambers,

@@ -22,7 +22,6 @@ pub struct Plant {
     integrator: Integrator,
     /// `None` for a rig that has none switched on.
     effects: Option<Box<Effects>>,
-    substeps: u32,
     state: State,
     faults: Faults,
     valves: ValvesAtWork,
@@ -95,7 +94,7 @@ impl Plant {
         let integrator = Integrator::new(rig, state.added_mass_kg, substeps, &faults);
         let effects = Effects::of(rig, &integrator, &state);
         let (valves, spare) = (ValvesAtWork::default(), None);
-        Plant { rig: Arc::new(rig.clone()), integrator, effects, substeps, state, faults, valves, spare }
+        Plant { rig: Arc::new(rig.clone()), integrator, effects, state, faults, valves, spare }
     }
 
     /// Advances by exactly 1 ms with the inputs held.
@@ -265,7 +264,7 @@ impl Plant {
         self.expect_faults();
         self.faults = *faults;
         self.valves.set(faults, self.state.axes.map(|axis| axis.spool));
-        self.integrator = Integrator::new(&self.rig, self.state.added_mass_kg, self.substeps, faults);
+        self.integrator = self.integrator.rebuilt(&self.rig, self.state.added_mass_kg, faults);
         if !self.has_effects() {
             if !faults.change_laws() {
                 // The baseline's own step goes on.
@@ -292,7 +291,7 @@ impl Plant {
     /// [`SetupError::AddedMass`] if they are negative or more than the rig takes.
     pub fn set_added_mass_kg(&mut self, kg: f64) -> Result<(), SetupError> {
         self.state.added_mass_kg = check_added_mass(&self.rig, kg)?;
-        self.integrator = Integrator::new(&self.rig, kg, self.substeps, &self.faults);
+        self.integrator = self.integrator.rebuilt(&self.rig, kg, &self.faults);
         if let Some(effects) = &mut self.effects {
             effects.move_with(&self.integrator);
         }
