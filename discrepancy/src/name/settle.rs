@@ -38,7 +38,8 @@ struct Point {
     loss: f64,
 }
 
-/// Fits a model in the simulator, parameters that are not `needed` held at what the file says; `None` where the rig cannot have it.
+/// Fits a model in the simulator, parameters that are not `needed` held at what the file says; `None` where the rig cannot
+/// have it.
 pub(super) fn settled(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
     let mut factors = model.factors;
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
@@ -129,8 +130,8 @@ fn around(engine: &Engine<'_>, point: &Point) -> Option<Lines> {
     Some(Lines { columns, ridges, from })
 }
 
-/// The best point along the lines that is better than this one: with all windows, and without those that are far off, whose lines may
-/// lead anywhere.
+/// The best point along the lines that is better than this one: with all windows, and without those that are far off, whose
+/// lines may lead anywhere.
 fn stepped(engine: &Engine<'_>, point: &Point, lines: &Lines, chosen: &[usize]) -> Option<Point> {
     let far: Vec<usize> = (0..engine.freedom().len())
         .filter(|window| point.squares[*window] > FAR_OFF * engine.freedom()[*window])
@@ -140,8 +141,8 @@ fn stepped(engine: &Engine<'_>, point: &Point, lines: &Lines, chosen: &[usize]) 
     [with_all, without].into_iter().flatten().min_by(|left, right| left.loss.total_cmp(&right.loss))
 }
 
-/// A better point along the lines, those of some windows left out. Where the simulator does not do what a window's lines promise, they
-/// are left out as well: around a break-away, what a small change does says nothing of a smaller one.
+/// A better point along the lines, those of some windows left out. Where the simulator does not do what a window's lines
+/// promise, they are left out as well: around a break-away, what a small change does says nothing of a smaller one.
 fn along(
     engine: &Engine<'_>,
     point: &Point,
@@ -194,7 +195,8 @@ fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share:
     point(engine, placed, factors)
 }
 
-/// Standard errors beside all parameters, in the order of [`Refit::errors`]: which parameters are needed was told by the same records.
+/// Standard errors beside all parameters, in the order of [`Refit::errors`]: which parameters are needed was told by the same
+/// records.
 fn errors(engine: &Engine<'_>, lines: &Lines, point: &Point) -> Vec<f64> {
     let products = lines.products(engine, point, &[]);
     let all: Vec<usize> = (0..products.columns()).collect();
