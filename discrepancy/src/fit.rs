@@ -267,10 +267,10 @@ impl Products {
         Some(&inverse * middle * &inverse)
     }
 
-    /// Standard errors by leaving out one window after the other: where few windows tell a number, they follow it, and what is
-    /// left in them is no measure of its error. Two of them hold the truth as often as two of a normal distribution do, however few
-    /// windows tell. Source: Bell, McCaffrey 2002, Survey Methodology 28(2): the jackknife's variance, and Student's distribution
-    /// with as many degrees of freedom as windows tell.
+    /// Standard errors by leaving out one window after the other: where few windows tell a number, they follow it, and what
+    /// is left in them is no measure of its error. Two of them hold the truth as often as two of a normal distribution do,
+    /// however few windows tell. Source: Bell, McCaffrey 2002, Survey Methodology 28(2): the jackknife's variance, and
+    /// Student's distribution with as many degrees of freedom as windows tell.
     #[must_use]
     pub fn jackknife(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<Vec<f64>> {
         let (matrix, _) = self.normal(chosen, &fit.weights, ridges);
