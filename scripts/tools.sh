@@ -14,7 +14,7 @@ gungraun_version=0.20.0
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_compiler && install_valgrind && install_python && install_gungraun
+    install_compiler && install_strace && install_valgrind && install_python && install_gungraun
 }
 
 apt_updated=no
@@ -72,6 +72,9 @@ install_cargo_fuzz() {
 install_compiler() {
     { command -v gcc >/dev/null || need_packages gcc libc6-dev; } && need_program make make
 }
+
+# Tells which files a program touches.
+install_strace() { need_program strace strace libunwind8; }
 
 install_valgrind() {
     if command -v valgrind >/dev/null; then return; fi

@@ -14,6 +14,7 @@
 //! | [`drawing`] | panels on one time axis, as SVG |
 //! | [`picture`] | the pictures of a run: all of it, and around its step or its emergency stop |
 //! | [`runs`] | several runs: whether they are of one experiment, their figures |
+//! | [`median`] | a median with its interval |
 //! | [`grid`] | a table of words in Markdown and HTML |
 //! | [`page_style`] | what all pages share: stylesheet, frame, text made safe |
 //! | [`compare`] | runs side by side: figures with their change, curves over each other |
@@ -43,6 +44,7 @@ pub mod grid;
 pub mod join;
 mod junit;
 pub mod latency_table;
+pub mod median;
 pub mod page_style;
 pub mod picture;
 pub mod ping_pong;

@@ -15,6 +15,7 @@
 //!   firmware  a controller in C, and how well it positions
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
+//!   noise ── a node that babbles, and whether it was ever obeyed
 //!   record_maker  blind records for the study of the workflow, from a simulation of its own
 //!   study ─── the judge of the discrepancy workflow, for scripts/study
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
@@ -38,6 +39,7 @@ pub mod guest;
 pub mod hidden;
 pub mod launch;
 pub mod load;
+pub mod noise;
 pub mod own;
 pub mod peer;
 pub mod process;

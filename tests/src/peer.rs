@@ -61,6 +61,12 @@ impl Peer {
         send(&self.socket, packet, SendFlags::NOSIGNAL).expect("the host takes the packet");
     }
 
+    /// Sends a packet as it is; `false` when there is no host any more.
+    #[must_use]
+    pub fn try_send(&self, packet: &[u8]) -> bool {
+        send(&self.socket, packet, SendFlags::NOSIGNAL).is_ok()
+    }
+
     /// The next packet; `None` when none comes within `patience`.
     ///
     /// # Panics

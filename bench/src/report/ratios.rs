@@ -1,24 +1,12 @@
 //! Ours against the reference, pair by pair: the median ratio with an interval that needs no distribution.
 //!
-//! A pair is a run with the reference measured right beside it, so that what the machine did in those minutes is in both. The
-//! ratios of n pairs in rising order are x_1 … x_n. Each lies below the true median with probability ½, so the median
-//! is between x_j and x_(n+1−j) with
-//!
-//! ```text
-//!   confidence = 1 − 2 · Σ_{i<j} C(n, i) / 2^n          n = 10, j = 2: 1 − 2 · 11/1024 = 97.9 %
-//! ```
-//!
-//! The narrowest interval of at least 95 % is told; five pairs and fewer have none.
-//!
-//! # Source
-//! H. A. David, H. N. Nagaraja, Order Statistics, 3rd ed. 2003, section 7.1.
+//! A pair is a run with the reference measured right beside it, so that what the machine did in those minutes is in both. What is
+//! told of the ratios is their [`median`].
 
 use super::model::{Ratio, RunPart};
 use super::reference;
 use super::samples::Pick;
-
-/// Least confidence of an interval.
-const CONFIDENCE: f64 = 0.95;
+use crate::median::{Median, median};
 
 /// What is set against what: our distribution, percentile, the reference's distribution.
 const COMPARED: [(&str, &str, Pick, &str); 6] = [
@@ -64,37 +52,9 @@ pub fn short_name(name: &str) -> String {
 /// The ratio of these pairs, ours first; nothing without a pair.
 #[must_use]
 pub fn ratio(name: String, pairs_ns: Vec<(u64, u64)>) -> Option<Ratio> {
-    let mut ratios: Vec<_> = pairs_ns.iter().map(|(ours, theirs)| *ours as f64 / *theirs as f64).collect();
-    ratios.sort_by(f64::total_cmp);
-    let count = ratios.len();
-    let median = match count {
-        0 => return None,
-        count if count % 2 == 1 => ratios[count / 2],
-        count => f64::midpoint(ratios[count / 2 - 1], ratios[count / 2]),
-    };
-    let (interval, confidence) = match order(count) {
-        Some((j, confidence)) => (Some((ratios[j - 1], ratios[count - j])), Some(confidence)),
-        None => (None, None),
-    };
-    Some(Ratio { name, pairs_ns, median, interval, confidence })
-}
-
-/// Rank from each end, from 1, and the confidence of the interval between: the narrowest of enough confidence.
-fn order(count: usize) -> Option<(usize, f64)> {
-    let mut best = None;
-    // C(n, i) / 2^n, which stays a plain number for any count of runs.
-    let mut probability = 0.5f64.powi(i32::try_from(count).ok()?);
-    let mut below = 0.0;
-    for j in 1..=count.div_ceil(2) {
-        below += probability;
-        probability *= (count - j + 1) as f64 / j as f64;
-        let confidence = 1.0 - 2.0 * below;
-        if confidence < CONFIDENCE {
-            break;
-        }
-        best = Some((j, confidence));
-    }
-    best
+    let ratios = pairs_ns.iter().map(|(ours, theirs)| *ours as f64 / *theirs as f64).collect();
+    let Median { value, interval, confidence } = median(ratios)?;
+    Some(Ratio { name, pairs_ns, median: value, interval, confidence })
 }
 
 #[cfg(test)]
@@ -112,15 +72,6 @@ mod tests {
         assert!((told.confidence.unwrap() - 0.978_515_625).abs() < 1e-12);
         assert_eq!(short_name("a p50 / cyclictest p50"), "a.p50");
         assert_eq!(short_name("a p50 / ping-pong-bus p50"), "a.p50/ping-pong-bus");
-    }
-
-    #[test]
-    fn confidences_are_those_of_the_table() {
-        assert_eq!(order(5), None);
-        for (count, j, confidence) in [(6, 1, 0.968_75), (9, 2, 0.960_937_5), (12, 3, 0.961_425_781_25)] {
-            assert_eq!(order(count), Some((j, confidence)), "{count}");
-        }
-        assert_eq!(order(20).unwrap().0, 6);
     }
 
     #[test]

@@ -76,6 +76,7 @@ enum Made {
 }
 
 /// All lists, and the packets that wait to leave.
+#[derive(Clone)]
 pub struct Daq {
     /// Packets that may leave in a cycle.
     per_cycle: u32,

@@ -74,6 +74,7 @@ struct Begun {
 }
 
 /// The memory.
+#[derive(Clone)]
 pub struct Image {
     description: Vec<u8>,
     variables: Vec<Variable>,

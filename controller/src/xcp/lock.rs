@@ -22,6 +22,7 @@ pub const IN_PACKET: usize = 6;
 pub const PAUSE: u64 = 1000;
 
 /// The lock in front of all writing.
+#[derive(Clone)]
 pub struct Lock {
     secret: Option<Vec<u8>>,
     start: [u8; 16],

@@ -90,6 +90,7 @@ pub struct SlaveCounters {
 }
 
 /// A block that is being written.
+#[derive(Clone)]
 struct Block {
     bytes: [u8; BLOCK],
     had: usize,
@@ -97,6 +98,7 @@ struct Block {
 }
 
 /// The slave of one axis.
+#[derive(Clone)]
 pub struct Slave {
     image: Image,
     texts: Texts,

@@ -123,6 +123,7 @@ struct Settings {
 }
 
 /// The trigger buffer.
+#[derive(Clone)]
 pub struct Trace {
     settings: Settings,
     state: State,

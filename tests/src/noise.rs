@@ -1,0 +1,242 @@
+//! Noise on the bus while the loop runs, and whether any of it was ever obeyed.
+//!
+//! Frames are drawn over all identifiers, lengths and data, a quarter of them on the two identifiers of valve commands. Those
+//! that happen to be as `rig.dbc` says are drawn again: a sensor frame or an emergency stop of a stranger is one, since CAN
+//! knows no sender, and what it does is its meaning and not a fault.
+//!
+//! What was obeyed is judged by what the controllers themselves recorded of their commands, not by what the rig made of the bus.
+
+use crate::axis_table::AxisTable;
+use crate::launch::Pace;
+use crate::peer::Peer;
+use crate::records::{self, Table, count};
+use crate::scene::{RESTLESS, Scene};
+use protocol::can::{CanFrame, EXTENDED_FLAG, REMOTE_FLAG};
+use protocol::frames::{DecodeError, Frame};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Identifiers of valve commands.
+const COMMANDS: [u32; 2] = [0x110, 0x111];
+/// Bytes of a valve command.
+const COMMAND_BYTES: usize = 5;
+/// Frames are sent in bursts, as far apart.
+const BURST: Duration = Duration::from_millis(1);
+/// A command is stale when it answers a cycle that is so many cycles ago.
+const STALE_CYCLES: usize = 20;
+/// Steps of the opening on the wire, from shut to open.
+const OPENING_STEPS: f64 = 2047.0;
+/// An opening is rounded to a step of the wire.
+const ROUNDING_STEPS: f64 = 0.51;
+const AXES: [&str; 2] = ["drive", "load"];
+
+/// What was sent.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sent {
+    /// Frames in all.
+    pub frames: u64,
+    /// Those on an identifier of `rig.dbc`, wrong in length, value or checksum.
+    pub malformed: u64,
+    /// How long it took, s.
+    pub duration_s: f64,
+}
+
+/// A node that babbles until it is told to end.
+pub struct Noise {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<Sent>,
+}
+
+impl Noise {
+    /// Sends so many frames a second to the embedded bus at `socket`; the same ones for the same seed.
+    #[must_use]
+    pub fn start(socket: &Path, per_second: u32, seed: u64) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let peer = Peer::connect(socket);
+        let until = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || babble(&peer, per_second, seed, &until));
+        Self { stop, thread }
+    }
+
+    /// Ends it.
+    ///
+    /// # Panics
+    /// When the thread did.
+    #[must_use]
+    pub fn end(self) -> Sent {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.join().expect("the noise does not panic")
+    }
+}
+
+fn babble(peer: &Peer, per_second: u32, seed: u64, stop: &AtomicBool) -> Sent {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut sent = Sent::default();
+    let began = Instant::now();
+    while !stop.load(Ordering::Relaxed) {
+        let due = (began.elapsed().as_secs_f64() * f64::from(per_second)) as u64;
+        while sent.frames < due {
+            let (frame, malformed) = wrong_frame(&mut random);
+            if !peer.try_send(&frame.to_bytes()) {
+                stop.store(true, Ordering::Relaxed); // the bus has gone
+                break;
+            }
+            sent.frames += 1;
+            sent.malformed += u64::from(malformed);
+        }
+        // A node takes what passes; one that does not would be a second disturbance.
+        while peer.receive(Duration::ZERO).is_some_and(|packet| packet != crate::peer::Packet::Closed) {}
+        std::thread::sleep(BURST);
+    }
+    sent.duration_s = began.elapsed().as_secs_f64();
+    sent
+}
+
+/// A frame that is not as `rig.dbc` says, and whether its identifier is one of it.
+fn wrong_frame(random: &mut Pcg64) -> (CanFrame, bool) {
+    loop {
+        let word = random.next_u64();
+        let data = random.next_u64().to_le_bytes();
+        let (kind, id) = (word % 32, (word >> 8) as u32);
+        let length = (word >> 40) as usize % 9;
+        let frame = match kind {
+            // A checksum of eight bits lets one in 256 of these pass for a command: those are not sent.
+            0..4 => CanFrame::from_raw(COMMANDS[id as usize % 2], &data[..COMMAND_BYTES]),
+            4..8 => CanFrame::from_raw(COMMANDS[id as usize % 2], &data[..length]),
+            8 => CanFrame::from_raw(EXTENDED_FLAG | (id % (1 << 29)), &data[..length]),
+            9 => CanFrame::from_raw(REMOTE_FLAG | (id % 0x800), &[]),
+            _ => CanFrame::from_raw(id % 0x800, &data[..length]),
+        };
+        match Frame::decode(&frame) {
+            Ok(_) => {}
+            Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
+                return (frame, false);
+            }
+            Err(_) => return (frame, true),
+        }
+    }
+}
+
+/// What became of a run in real time, with noise or without.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// What was sent.
+    pub sent: Sent,
+    /// Cycles that the rig missed.
+    pub missed: u64,
+    /// Its wake-ups that came late enough to be counted.
+    pub overruns: u64,
+    /// 99th percentile of its wake-up, ns.
+    pub wakeup_p99_ns: u64,
+    /// 99th percentile of the drive's round trip, ns.
+    pub round_trip_p99_ns: u64,
+    /// Commands of the controllers that never reached the rig.
+    pub commands_lost: u64,
+    /// Sensor frames of the drive that never reached its controller.
+    pub sensors_lost: u64,
+    /// Frames that the rig counted as malformed.
+    pub malformed: u64,
+    /// Frames that the rig counted as none of its own.
+    pub unknown: u64,
+    /// Commands that were refused as stale, or grew stale while acting.
+    pub stale: u64,
+    /// Openings that acted.
+    pub openings: usize,
+    /// Those that no controller had sent.
+    pub wrong: usize,
+    /// Cycles in which a valve was shut though its controller wanted it open.
+    pub shut: usize,
+}
+
+/// Runs rig and controllers in real time for so long, with so many frames of noise each second.
+///
+/// # Panics
+/// When a program fails.
+#[must_use]
+pub fn run(seconds: u32, per_second: u32, seed: u64) -> Outcome {
+    let scene = Scene::new(RESTLESS);
+    let emulator = scene.emulator(Pace::Real).with(&format!("--seconds {seconds}")).start();
+    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    scene.wait_for_rows("emulator", 200);
+    let noise = (per_second > 0).then(|| Noise::start(&scene.socket(), per_second, seed));
+    let limit = Duration::from_secs(u64::from(seconds)) + crate::process::PATIENCE;
+    let _ = emulator.wait_within(limit).expect_code(0);
+    let sent = noise.map(Noise::end).unwrap_or_default();
+    let _ = controller.wait();
+    outcome(&scene, sent)
+}
+
+fn outcome(scene: &Scene, sent: Sent) -> Outcome {
+    let summary = records::json(&scene.path("emulator/summary.json"));
+    let told = records::json(&scene.path("controller/controller.json"));
+    let of = |pointer: &str| count(&summary, pointer);
+    let mut obeyed = Obeyed::default();
+    AXES.iter().for_each(|axis| obeyed.add(scene, axis));
+    Outcome {
+        sent,
+        missed: of("/skipped"),
+        overruns: of("/overruns"),
+        wakeup_p99_ns: of("/wakeup_ns/p99"),
+        round_trip_p99_ns: of("/round_trip_ns/p99"),
+        commands_lost: of("/frames_lost_at_rig"),
+        sensors_lost: count(&told, "/axes/drive/sensors_lost"),
+        malformed: of("/frames_ignored/malformed"),
+        unknown: of("/frames_ignored/unknown"),
+        stale: of("/stale_commands"),
+        openings: obeyed.openings,
+        wrong: obeyed.wrong,
+        shut: obeyed.shut,
+    }
+}
+
+/// Openings that acted against those that a controller recorded as sent.
+#[derive(Default)]
+struct Obeyed {
+    openings: usize,
+    wrong: usize,
+    shut: usize,
+}
+
+impl Obeyed {
+    /// Adds those of an axis. The load's controller holds its valve shut throughout, so whatever acts there is wrong.
+    fn add(&mut self, scene: &Scene, axis: &str) {
+        let acted = Table::read(&scene.path("emulator/measurement.csv")).column(&format!("{axis}_valve"));
+        let told = AxisTable::read(&scene.path(&format!("controller/controller-{axis}.csv")));
+        let (cycles, openings, enabled) = (told.cycles(), told.numbers("opening"), told.numbers("enabled"));
+        let mut answered = 0;
+        for (cycle, acted) in acted.into_iter().enumerate() {
+            answered += cycles[answered..].iter().take_while(|answers| **answers < cycle).count();
+            let live = answered.saturating_sub(STALE_CYCLES)..answered;
+            let sent = |row| if enabled[row] > 0.0 { openings[row] } else { 0.0 };
+            let known = live.clone().any(|row| (sent(row) - acted).abs() * OPENING_STEPS < ROUNDING_STEPS);
+            self.openings += 1;
+            match acted {
+                _ if known || live.is_empty() => {}
+                0.0 => self.shut += 1,
+                _ => self.wrong += 1,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_frame_of_the_noise_is_as_the_contract_says_and_many_look_like_commands() {
+        let mut random = Pcg64::seed_from_u64(1);
+        let frames: Vec<_> = (0..20_000).map(|_| wrong_frame(&mut random)).collect();
+        assert!(frames.iter().all(|(frame, _)| Frame::decode(frame).is_err()));
+        let like = |(frame, _): &&(CanFrame, bool)| {
+            COMMANDS.contains(&frame.raw_id()) && frame.data().len() == COMMAND_BYTES
+        };
+        assert!(frames.iter().filter(like).count() > 2000);
+        assert!(frames.iter().any(|(frame, malformed)| !malformed && frame.standard_id().is_none()));
+    }
+}
