@@ -14,7 +14,7 @@ gungraun_version=0.20.0
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_compiler && install_strace && install_valgrind && install_python && install_gungraun
+    install_strace && install_valgrind && install_python && install_gungraun
 }
 
 apt_updated=no
@@ -61,16 +61,17 @@ install_stress_ng() {
     need_program stress-ng stress-ng $(apt-cache depends stress-ng 2>/dev/null | sed -n 's/^ *Depends: \(lib[a-z0-9.+-]*\)$/\1/p')
 }
 
-# Builds the targets of fuzz/, with libFuzzer, which is C++.
+# Builds the targets of fuzz/.
 install_cargo_fuzz() {
-    command -v g++ >/dev/null || need_packages g++ || return 1
+    install_compiler || return 1
     [ -x "$tools/bin/cargo-fuzz" ] && "$tools/bin/cargo-fuzz" --version | grep -q "$cargo_fuzz_version" && return
     cargo install --quiet --locked cargo-fuzz --version "$cargo_fuzz_version" --root "$tools"
 }
 
-# The benchmark's floor is C; a Rust toolchain links with a C compiler anyway.
+# The benchmark's floor is C, libFuzzer is C++; a Rust toolchain links with a C compiler anyway.
 install_compiler() {
-    { command -v gcc >/dev/null || need_packages gcc libc6-dev; } && need_program make make
+    { command -v gcc >/dev/null || need_packages gcc libc6-dev; } &&
+        { command -v g++ >/dev/null || need_packages g++; } && need_program make make
 }
 
 # Tells which files a program touches.

@@ -68,13 +68,13 @@ fn run_all(kernel: &str, pairs: &Pairs) -> Guest {
 }
 
 #[test]
-fn stock_kernel_with_cards_accounts_for_every_frame_and_survives_what_cards_do() {
+fn vm_stock_kernel_with_cards_accounts_for_every_frame_and_survives_what_cards_do() {
     let guest = run_all("stock", &Pairs { vcan0: 1, cards: 1 });
     assert_eq!(json(&guest.file("guest.json"))["sys_kernel_realtime"], false);
 }
 
 #[test]
-fn preempt_rt_kernel_with_cards_accounts_for_every_frame_and_survives_what_cards_do() {
+fn vm_preempt_rt_kernel_with_cards_accounts_for_every_frame_and_survives_what_cards_do() {
     let guest = run_all("rt", &Pairs { vcan0: 2, cards: 1 });
     let facts = json(&guest.file("guest.json"));
     assert_eq!(facts["sys_kernel_realtime"], true);
