@@ -86,17 +86,19 @@ the_only() {
     found_file=${found[0]}
 }
 
-# Static binaries, because the guest has none of their libraries; a target folder of their own, because other RUSTFLAGS
-# in the usual one would make cargo rebuild everything at each change of sides.
-build_binaries() {
-    local target=x86_64-unknown-linux-gnu
-    type -P cargo >/dev/null || fail "$exit_usage" "no cargo to build emulator, controller and bench with"
-    say "building emulator, controller and bench, static"
-    (cd "$root" && RUSTFLAGS="-C target-feature=+crt-static" cargo build --release --quiet --target "$target" \
-        --target-dir target/vm -p emulator -p controller -p bench) 8>&- ||
-        fail "$exit_usage" "emulator, controller or bench cannot be built"
-    static_bench=$root/target/vm/$target/release/bench
-    install -D -t "$1" "$root/target/vm/$target/release/"{emulator,controller} "$static_bench"
+# add_binaries TREE: the programs as they ship, from where AIRBENCH_BIN_DIR says or built, with their libraries.
+add_binaries() {
+    local folder=${AIRBENCH_BIN_DIR:-} program
+    if [[ -z $folder ]]; then
+        type -P cargo >/dev/null || fail "$exit_usage" "no cargo to build emulator, controller and bench with"
+        say "building emulator, controller and bench"
+        folder=${CARGO_TARGET_DIR:-$root/target}/release
+        build_programs emulator controller bench 8>&- || fail "$exit_usage" "emulator, controller or bench cannot be built"
+    fi
+    shipped_bench=$folder/bench
+    for program in emulator controller bench; do
+        add_program "$1" "$folder/$program" "$program"
+    done
 }
 
 # Adds what belongs to this call to $out/vm/initramfs.cpio.
@@ -116,7 +118,7 @@ add_payload() {
         programs=$(dirname "$experiment")/../programs
         if [[ -d $programs ]]; then cp "$programs"/*.toml "$tree/programs/"; fi
         cp "$root"/controller/programs/*.toml "$tree/airbench/programs/"
-        build_binaries "$tree/airbench"
+        add_binaries "$tree"
     fi
     cp "$scripts"/vm/job-* "$tree/airbench/"
     if [[ -n $payload ]]; then cp -rL "$payload/." "$tree/airbench/"; fi

@@ -5,7 +5,7 @@
 # Made here rather than in the guest, which is slow. They show the way from the loop to the page on this kernel and this
 # bus; being of an emulated machine, they say themselves that they support no latency claim.
 #
-# Expects $root, $out, $kernel, $kernel_version, $static_bench and say.
+# Expects $root, $out, $kernel, $kernel_version, $shipped_bench and say.
 
 # Of each run/latency/BUS/ that the job left: target/vm-reports/KERNEL-BUS with report.html, report.json, report.md and
 # what the guest was. A report that cannot be made is told and fails nothing: the runs are the result, and they are there.
@@ -17,7 +17,7 @@ make_reports() {
         rm -rf "$folder"
         mkdir -p "$folder"
         cp "$out/guest.json" "$folder/"
-        if "$static_bench" report "$bus" --out "$folder" --title "$(basename "$bus") in QEMU, kernel $kernel_version: function, not latency" >"$folder/bench.txt" 2>&1; then
+        if "$shipped_bench" report "$bus" --out "$folder" --title "$(basename "$bus") in QEMU, kernel $kernel_version: function, not latency" >"$folder/bench.txt" 2>&1; then
             say "latency report in ${folder#"$root"/}"
         else
             say "no latency report: $(tail -n 1 "$folder/bench.txt")"

@@ -1,6 +1,6 @@
 //! A virtual machine with real SocketCAN, as `scripts/vcan-vm` makes it, and what came back from it.
 //!
-//! The script builds static binaries, boots the guest, runs a job in it and brings the files back. The guest is emulated and
+//! The script packs the programs, boots the guest, runs a job in it and brings the files back. The guest is emulated and
 //! uneven: cycles are skipped in it, and what is tested is that each of them, and every frame, is accounted for, never how fast
 //! anything was.
 
@@ -16,7 +16,7 @@ use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// Limit for one machine, static build and first download of QEMU and kernel included.
+/// Limit for one machine, packing and first download of QEMU and kernel included.
 const LIMIT: Duration = Duration::from_secs(20 * 60);
 
 /// Lines of what a machine said that a failing test shows: what failed must not drown in them.

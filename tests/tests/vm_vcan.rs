@@ -15,7 +15,7 @@ use system_tests::guest::{Guest, compare_candump, data_frames, python};
 use system_tests::records::{count, json};
 
 #[test]
-fn vm_candump_recorded_what_the_runs_files_say() {
+fn candump_recorded_what_the_runs_files_say() {
     python(); // tells at once what is missing
     let guest = Guest::run(&[]);
 
@@ -117,7 +117,7 @@ fn known_frames(log: &Path) -> Vec<Frame> {
 const REPLAYED: u16 = 50;
 
 #[test]
-fn vm_the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
+fn the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
     let folder = tempfile::tempdir().unwrap();
     let payload = folder.path().join("payload");
     fs::create_dir(&payload).unwrap();
@@ -156,7 +156,7 @@ fn vm_the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
 }
 
 #[test]
-fn vm_foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
+fn foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
     let guest = Guest::run(&["--", "sh /airbench/job-foreign"]);
     let run = guest.out();
 
