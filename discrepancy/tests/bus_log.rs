@@ -133,6 +133,12 @@ fn what_is_no_log_is_told_with_its_line() {
         ("(0000000000.000000) bus0 110#0010000090\n", "no frame of sensors (0x120, 0x121) in 1 frames"),
         ("time_s,drive_valve\n0,1\n", "a.log:1: 'time_s,drive_valve' is no line of candump -L"),
         ("", "no frame of sensors"),
+        // A stamp that went wrong: 8000 s would be 8 million rows.
+        (
+            "(0000000000.000000) bus0 120#CA4CFFFFE4539605\n(0000000000.000000) bus0 130#00000000000002\n\
+             (0000008000.001000) bus0 120#CC4CF9FFD5139615\n",
+            "a.log:3: 8000 s without a frame of sensors before this line, 10 s at most: split the log there",
+        ),
     ] {
         std::fs::write(&path, text).unwrap();
         let message = records::read(&path, &ReadOptions::default()).unwrap_err().to_string();

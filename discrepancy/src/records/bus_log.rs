@@ -25,6 +25,8 @@ const CYCLE_NS: u64 = 1_000_000;
 const BLOCK: u64 = 1000;
 /// Commands that arrive so shortly before an estimated begin may have come after the true one: the rig samples meanwhile.
 const MARGIN_NS: u64 = 100_000;
+/// A longer hole is no hole in a record but two records; and a wrong stamp would make rows out of years.
+const LONGEST_HOLE_S: u64 = 10;
 
 pub(super) fn read(file: &Path, logged_by: LoggedBy) -> Result<Record, ReadError> {
     let text = std::fs::read_to_string(file)
@@ -36,6 +38,7 @@ pub(super) fn read(file: &Path, logged_by: LoggedBy) -> Result<Record, ReadError
     let Some(first) = cycles.of.iter().flatten().min().copied() else {
         return Err(ReadError::NoSensors { file: file.into(), frames: log.len() });
     };
+    expect_no_long_hole(file, &log, &cycles)?;
     if cycles.guessed {
         record.warn(None, "no tick in the log: the time of the first row is a guess within 16 ms");
     }
@@ -127,6 +130,24 @@ fn told_zero_ns(file: &Path) -> Option<u64> {
     let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
     let zero_s = summary.get("bus_log_cycle_zero_s")?.as_f64()?;
     Some((zero_s * 1e9).round() as u64)
+}
+
+fn expect_no_long_hole(file: &Path, log: &[Logged], cycles: &Cycles) -> Result<(), ReadError> {
+    let lines: BTreeMap<u64, u64> =
+        log.iter().zip(&cycles.of).filter_map(|(logged, cycle)| Some(((*cycle)?, logged.line))).collect();
+    for ((before, _), (after, line)) in lines.iter().zip(lines.iter().skip(1)) {
+        let hole_s = (after - before) as f64 * PERIOD_S;
+        if hole_s > LONGEST_HOLE_S as f64 {
+            let file = file.into();
+            return Err(ReadError::LongHole {
+                file,
+                line: *line,
+                seconds: hole_s,
+                at_most_s: LONGEST_HOLE_S,
+            });
+        }
+    }
+    Ok(())
 }
 
 fn rows(

@@ -98,6 +98,18 @@ pub enum ReadError {
         /// Frames that are there.
         frames: usize,
     },
+    /// A log that lacks seconds in its midst.
+    #[error("{}:{line}: {seconds:.0} s without a frame of sensors before this line, {at_most_s} s at most: split the log there", file.display())]
+    LongHole {
+        /// The file.
+        file: PathBuf,
+        /// Line of the first frame after it, from 1.
+        line: u64,
+        /// How long, s.
+        seconds: f64,
+        /// What is read as one record, s.
+        at_most_s: u64,
+    },
     /// A log over two runs of the rig.
     #[error("{}:{line}: the rig starts anew (cycle {cycle} after {before}): split the log there", file.display())]
     Restarted {
