@@ -99,7 +99,10 @@ pub enum ReadError {
         frames: usize,
     },
     /// A log that lacks seconds in its midst.
-    #[error("{}:{line}: {seconds:.0} s without a frame of sensors before this line, {at_most_s} s at most: split the log there", file.display())]
+    #[error(
+        "{}:{line}: {seconds:.0} s without a frame of sensors before this line, {at_most_s} s at most: split the log there",
+        file.display()
+    )]
     LongHole {
         /// The file.
         file: PathBuf,
