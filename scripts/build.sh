@@ -10,6 +10,7 @@ build_programs() {
         shift
     done
     # shellcheck disable=SC2154 # root is the sourcing script's
-    (cd "$root" && cargo build --release --locked --quiet -p emulator -p controller -p bench -p discrepancy -p plant-fmu \
+    (cd "$root" && cargo build --release --locked --quiet -p emulator -p controller -p bench -p discrepancy -p campaign \
+        -p plant-fmu \
         "${chosen[@]}" "${@:2}")
 }

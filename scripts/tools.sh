@@ -9,12 +9,13 @@ python_packages=(
     cantools==45.1.0 crccheck==1.3.1 hdrhistogram==0.10.3
     asammdf==8.8.28 fmpy==0.3.32 numpy==2.4.6 pandas==3.1.1 python-can==4.6.1
     pyxcp==0.29.20 pya2ldb==1.0.355 # clients of XCP
+    prometheus-client==0.26.0 # reads /metrics
 )
 gungraun_version=0.20.0
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_valgrind && install_python && install_gungraun
+    install_strace && install_valgrind && install_python && install_dask && install_gungraun && install_browser
 }
 
 apt_updated=no
@@ -126,7 +127,41 @@ install_competitors() { install_requirements competitors "$(dirname "${BASH_SOUR
 # asammdf, which scripts/mdf4-to-csv reads MDF4 with.
 install_mdf4() { install_requirements mdf4 "$(dirname "${BASH_SOURCE[0]}")/../discrepancy/python/requirements.txt"; }
 
+# The client of a Dask cluster, which scripts/campaign hands parts out with.
+install_dask() { install_requirements dask "$(dirname "${BASH_SOURCE[0]}")/../campaign/dask/requirements.txt"; }
+
 install_gungraun() {
     [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return
     cargo install --quiet --locked gungraun-runner --version "$gungraun_version" --root "$tools"
+}
+
+# The browser of the live page's tests: Debian's chromium, Node, and what drives the one from the other, as its lock file pins it.
+install_browser() {
+    local pinned modules="$tools/browser"
+    pinned="$(dirname "${BASH_SOURCE[0]}")/../tests/browser"
+    # shellcheck disable=SC2046 # a list of names
+    install_chromium && need_program node nodejs $([ "$(id -u)" = 0 ] || libraries_of nodejs) || return 1
+    cmp -s "$pinned/package-lock.json" "$modules/package-lock.json" && [ -f "$modules/node_modules/.package-lock.json" ] && return
+    # Debian's npm needs hundreds of packages, too many to unpack; Node from elsewhere brings its own.
+    command -v npm >/dev/null || { [ "$(id -u)" = 0 ] && need_packages npm; } || return 1
+    rm -rf "$modules" && mkdir -p "$modules" && cp "$pinned/package.json" "$pinned/package-lock.json" "$modules" &&
+        npm ci --prefix "$modules" --silent --no-audit --no-fund --ignore-scripts
+}
+
+install_chromium() {
+    command -v chromium >/dev/null || [ -x "$tools/bin/chromium" ] && return
+    # shellcheck disable=SC2046 # a list of names
+    need_packages chromium $([ "$(id -u)" = 0 ] || { echo chromium-common && libraries_of chromium; }) || return 1
+    [ "$(id -u)" = 0 ] && return
+    mkdir -p "$tools/bin"
+    # Debian's own start script looks for the program where it would be installed.
+    printf '#!/bin/sh\nLD_LIBRARY_PATH=%s exec %s/debian/usr/lib/chromium/chromium "$@"\n' \
+        "$tools/debian/usr/lib/$(uname -m)-linux-gnu" "$tools" >"$tools/bin/chromium"
+    chmod +x "$tools/bin/chromium"
+}
+
+# libraries_of PACKAGE: all libraries that it needs but the C library's, which are there.
+libraries_of() {
+    apt-cache depends --recurse --no-recommends --no-suggests --no-conflicts --no-breaks --no-replaces --no-enhances "$1" |
+        sed -n 's/^\(lib[a-z0-9.+-]*\)$/\1/p' | grep -v -e '^libc6' -e '^libc-' | sort -u
 }

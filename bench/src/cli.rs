@@ -9,6 +9,7 @@ use crate::ping_pong::cli::{PingPongArguments, PongArguments};
 use crate::probe::cli::ProbeArguments;
 use crate::replay::cli::ReplayArguments;
 use crate::soak::cli::{ChildArguments, SoakArguments};
+use crate::watch::cli::WatchArguments;
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
@@ -50,6 +51,8 @@ pub enum Command {
     PingPong(PingPongArguments),
     /// Open a bus to programs that know no SocketCAN: the socketcand protocol, which python-can, cantools and SavvyCAN speak.
     Gateway(GatewayArguments),
+    /// Show a run while it goes on, as a page for browsers, as JSON and for Prometheus; and act on it, if it is allowed.
+    Watch(WatchArguments),
     /// Check whether a foreign controller keeps the contract of the bus: timing, counters, checksums, reaction to faults.
     CheckController(Box<ConformanceArguments>),
     /// Print the table of ratios of a latency report, in Markdown.

@@ -396,7 +396,7 @@ fn tell_loss(client: &Client) {
 }
 
 /// The name of a bus as clients open it: the interface, or the file name of the socket.
-fn name_of(bus: &BusUrl) -> Option<String> {
+pub(crate) fn name_of(bus: &BusUrl) -> Option<String> {
     let name = match bus {
         BusUrl::Can { interface } => interface.clone(),
         BusUrl::Unix { path, .. } => path.file_name()?.to_str()?.to_owned(),
@@ -406,7 +406,7 @@ fn name_of(bus: &BusUrl) -> Option<String> {
 }
 
 /// The time of day `age_ns` ago, ns since the Unix epoch: what clients expect of a time stamp.
-fn wall_clock_ns(age_ns: u64) -> u64 {
+pub(crate) fn wall_clock_ns(age_ns: u64) -> u64 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     (now.as_nanos() as u64).saturating_sub(age_ns)
 }

@@ -25,6 +25,7 @@
 //! | [`report`] | the latency report |
 //! | [`conformance`] | whether a foreign controller keeps the contract of the bus |
 //! | [`gateway`] | a door to a bus for clients of the socketcand protocol |
+//! | [`watch`] | a run shown while it goes on |
 //! | [`soak`] | emulator and controllers over hours, every frame accounted for |
 //! | [`recorded_log`] | a log of the bus, checked to its last line |
 //! | [`export`] | a log as CSV, MDF4, ASC, BLF |
@@ -61,6 +62,7 @@ pub mod spread;
 pub mod table;
 pub mod tables_read;
 pub mod thresholds;
+pub mod watch;
 
 use std::path::{Path, PathBuf};
 

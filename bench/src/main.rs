@@ -11,9 +11,10 @@ use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
 use bench::soak::SoakError;
 use bench::soak::processes::become_child;
+use bench::watch::WatchError;
 use bench::{
     SummaryError, compare, export, export_fmu, figures, join, latency_table, picture, probe, replay, soak,
-    spread, table, thresholds,
+    spread, table, thresholds, watch,
 };
 use clap::Parser;
 use protocol::exit::Exit;
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
             return told(conformance::run(&arguments), ConformanceError::exit);
         }
         Command::Gateway(arguments) => return told(gateway::run(&arguments), GatewayError::exit),
+        Command::Watch(arguments) => return told(watch::run(&arguments), WatchError::exit),
         Command::Soak(arguments) => return told(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
         Command::SoakChild(arguments) => {
             eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));

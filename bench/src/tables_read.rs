@@ -104,8 +104,9 @@ pub fn read(path: &Path, numbers: &[&'static str], states: &[&'static str]) -> R
     Ok(Table { numbers, states })
 }
 
-/// A state lasts until the row of the next one; the last one until its last row.
-fn enter(column: &mut Vec<StateSpan>, state: &str, time_s: f64) {
+/// Puts the state of a row into a column: a state lasts until the row of the next one, the last one until its last row; an empty
+/// state is none.
+pub fn enter(column: &mut Vec<StateSpan>, state: &str, time_s: f64) {
     if let Some(last) = column.last_mut() {
         last.span.to_s = time_s;
         if last.state == state {

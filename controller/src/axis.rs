@@ -9,6 +9,7 @@
 //! know each other through what was heard alone. Nothing here allocates, locks, prints or blocks.
 
 mod average;
+mod by_hand;
 mod changes;
 mod heard;
 mod range;
@@ -18,7 +19,7 @@ mod work;
 
 pub use changes::PlannedChange;
 pub use record::{Answer, AxisRecord};
-pub use work::{ForcePlan, Plan, PrepareStep};
+pub use work::{ForcePlan, Plan, PositionPlan, PrepareStep};
 
 use crate::chains::leading::{Leading, LeadingInputs};
 use crate::chains::main::{MainCause, MainConfig, MainOutput, OwnAxis};
@@ -127,7 +128,8 @@ impl AxisController {
         self.heard.listen(cycle);
         let output = self.advance(cycle, rig, self.rig.map(|_| self.own_axis(sensors)));
         let partner = &self.heard.partner;
-        let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.still() };
+        let hand = self.heard.hand.take();
+        let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.still(), hand };
         self.asked = self.work.ask(&output, &seen, &mut self.program);
         let beyond = self.range.take(self.axis, rig, output.phase);
         self.fault = self.work.fault().or(beyond);

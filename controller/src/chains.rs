@@ -84,7 +84,9 @@ impl Console {
 }
 
 /// What follows when the rig has recovered from an emergency stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum AfterStop {
     /// Nothing: the run is over.

@@ -1,5 +1,6 @@
 //! The controller's command line.
 
+use crate::chains::AfterStop;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use plant::Axis;
 use protocol::bus::BusUrl;
@@ -125,6 +126,9 @@ pub struct FileArguments {
     /// Repeat the experiment until the rig ends, instead of saying Done.
     #[arg(long)]
     pub repeat: bool,
+    /// What follows an emergency stop that was released, in place of the experiment's.
+    #[arg(long, value_enum)]
+    pub after_emergency_stop: Option<AfterStop>,
 }
 
 /// How to run with a rig on a bus.

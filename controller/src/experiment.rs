@@ -37,7 +37,7 @@
 pub mod axis;
 pub mod section;
 
-pub use axis::{AxisExperiment, Change, During, Prepare, ProgramReference, SetPoints};
+pub use axis::{AxisExperiment, ByHandLimits, Change, During, Prepare, ProgramReference, SetPoints};
 pub use section::ExperimentError;
 
 use crate::chains::AfterStop;

@@ -68,6 +68,7 @@ pub fn run_real(ride: Ride<'_>, mut stopwatch: Stopwatch<impl Clock + Send>, con
     // Not being connected yet is no loss; only what was up can be lost.
     let mut was_up = true;
     let mut ever_up = false;
+    let mut disconnects = 0;
     let mut watch = None;
     stopwatch.begin();
     let end = loop {
@@ -90,6 +91,13 @@ pub fn run_real(ride: Ride<'_>, mut stopwatch: Stopwatch<impl Clock + Send>, con
             break End::RigEnded;
         }
         ever_up |= bus.is_up();
+        // Both at once after a stall in which it went and came back.
+        let times_gone = bus.counters().disconnects;
+        let went = times_gone != std::mem::replace(&mut disconnects, times_gone);
+        if went && ever_up && was_up {
+            was_up = false;
+            station.tell(News::BusLost);
+        }
         if ever_up && bus.is_up() != was_up {
             was_up = bus.is_up();
             station.tell(if was_up { News::BusBack } else { News::BusLost });

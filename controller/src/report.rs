@@ -2,7 +2,6 @@
 //! they counted.
 
 use crate::axis::AxisController;
-use crate::rig_view::RigView;
 use crate::setup::Inputs;
 use crate::station::{IgnoredFrames, News, Station};
 use crate::timing::ledger::TimingFigures;
@@ -30,7 +29,7 @@ pub struct Report {
     pub ended_well: bool,
     /// Why it ended.
     pub ended_because: String,
-    /// Cycles answered.
+    /// Cycles answered by the axis that answered most.
     pub cycles_answered: u64,
     /// Cycles that the rig says it skipped.
     pub rig_cycles_skipped: u64,
@@ -81,6 +80,8 @@ pub struct AxisReport {
     pub position_error_dynamic_m: Option<f64>,
     /// Largest mean |error| over the last 0.2 s of each rest; null without a position.
     pub position_error_static_m: Option<f64>,
+    /// Cycles that the axis answered: its commands on the bus.
+    pub cycles_answered: u64,
     /// Sensor frames of the axis that came.
     pub sensors_received: u64,
     /// Sensor frames of the axis that never came.
@@ -105,9 +106,8 @@ pub struct AxisReport {
 }
 
 impl AxisReport {
-    /// Of a controller, as its rig was seen.
-    #[must_use]
-    pub fn new(controller: &AxisController, view: &RigView, inputs: &Inputs) -> Self {
+    fn new(controller: &AxisController, station: &Station, inputs: &Inputs) -> Self {
+        let view = station.view();
         let program = controller.program();
         let source = inputs.programs[controller.axis().index()].as_ref();
         let values = program.values().iter();
@@ -119,6 +119,7 @@ impl AxisReport {
             algorithm_fault: controller.algorithm_fault().map(|fault| fault.to_string()),
             position_error_dynamic_m: controller.figures().dynamic_m(),
             position_error_static_m: controller.figures().static_m(),
+            cycles_answered: station.answered_by(controller.axis()),
             sensors_received: view.received().get(controller.axis()),
             sensors_lost: view.lost().get(controller.axis()),
             sensors_late: view.late().get(controller.axis()),
@@ -133,17 +134,15 @@ impl AxisReport {
                 .map(|variable| variable.name.clone())
                 .zip(values.copied())
                 .collect(),
-            xcp: None,
+            xcp: station.xcp(controller.axis()),
         }
     }
 
     /// Of every controller of a station.
     #[must_use]
     pub fn of_station(station: &Station, inputs: &Inputs) -> BTreeMap<&'static str, Self> {
-        let of = |controller: &AxisController| {
-            let report = Self::new(controller, station.view(), inputs);
-            (controller.axis().name(), Self { xcp: station.xcp(controller.axis()), ..report })
-        };
+        let of =
+            |controller: &AxisController| (controller.axis().name(), Self::new(controller, station, inputs));
         station.controllers().map(of).collect()
     }
 

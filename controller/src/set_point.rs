@@ -58,6 +58,13 @@ impl From<Moment> for SetPoint {
     }
 }
 
+impl From<SetPoint> for Moment {
+    fn from(point: SetPoint) -> Self {
+        let SetPoint { position_m, velocity_m_per_s, acceleration_m_per_s2, moving } = point;
+        Self { value: position_m, rate: velocity_m_per_s, acceleration: acceleration_m_per_s2, moving }
+    }
+}
+
 /// A force set-point with its rate, compression positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceSetPoint {
@@ -80,6 +87,12 @@ impl ForceSetPoint {
 impl From<Moment> for ForceSetPoint {
     fn from(moment: Moment) -> Self {
         Self { force_n: moment.value, rate_n_per_s: moment.rate, moving: moment.moving }
+    }
+}
+
+impl From<ForceSetPoint> for Moment {
+    fn from(point: ForceSetPoint) -> Self {
+        Self { value: point.force_n, rate: point.rate_n_per_s, acceleration: 0.0, moving: point.moving }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a run reads before it starts: rig, experiment and programs, checked; and the controllers made of them.
 
 use crate::algorithm::Quantity;
-use crate::axis::{AxisController, AxisParts, ForcePlan, Plan, PlannedChange, PrepareStep};
+use crate::axis::{AxisController, AxisParts, ForcePlan, Plan, PlannedChange, PositionPlan, PrepareStep};
 use crate::chains::main::{Lengths, MainConfig, approach_s};
 use crate::chains::matching;
 use crate::chains::settled::Bounds;
@@ -62,8 +62,10 @@ impl Inputs {
             )));
         }
         let experiment_toml = read(&files.experiment)?;
-        let experiment =
+        let mut experiment =
             Experiment::from_toml(&experiment_toml, &files.experiment, stroke_m).map_err(RunError::input)?;
+        let run = &mut experiment.run;
+        run.after_emergency_stop = files.after_emergency_stop.unwrap_or(run.after_emergency_stop);
         let given = [&files.drive_program, &files.load_program];
         let mut programs = [None, None];
         for (axis, section) in sections(&experiment) {
@@ -109,19 +111,38 @@ impl Inputs {
         text_of: impl Fn(&str) -> Option<String>,
         set: &[&str],
     ) -> Result<Self, RunError> {
-        let experiment_file = PathBuf::from(name);
-        let experiment = Experiment::from_toml(experiment_toml, &experiment_file, rig.cylinder().stroke_m)
-            .map_err(RunError::input)?;
+        let source_of = |_, written: &str| {
+            text_of(written).map(|text| Source { path: written.into(), title: written.to_owned(), text })
+        };
+        Self::of_sources(rig, (Path::new(name), experiment_toml), source_of, set)
+    }
+
+    /// The same for an experiment whose text is not that of its file, which tables are read beside, and for programs by axis and
+    /// by what the experiment names.
+    ///
+    /// # Errors
+    /// [`RunError::Input`] as for files, and for a program that `source_of` does not know.
+    pub fn of_sources(
+        rig: &RigParameters,
+        (file, experiment_toml): (&Path, &str),
+        source_of: impl Fn(Axis, &str) -> Option<Source>,
+        set: &[impl AsRef<str>],
+    ) -> Result<Self, RunError> {
+        let experiment =
+            Experiment::from_toml(experiment_toml, file, rig.cylinder().stroke_m).map_err(RunError::input)?;
         let mut programs = [None, None];
         for (axis, section) in sections(&experiment) {
             let written = &section.program.written;
-            let text = text_of(written)
-                .ok_or_else(|| RunError::Input(format!("{name}: no program {written} is known here")))?;
-            programs[axis.index()] = Some(Source { path: written.into(), title: written.clone(), text });
+            let source = source_of(axis, written).ok_or_else(|| {
+                RunError::Input(format!("{}: no program {written} is known here", file.display()))
+            })?;
+            programs[axis.index()] = Some(source);
         }
-        let overrides = set.iter().map(|text| parse_override(text)).collect::<Result<Vec<_>, _>>()?;
+        let overrides =
+            set.iter().map(|text| parse_override(text.as_ref())).collect::<Result<Vec<_>, _>>()?;
         let (rig, experiment_toml) = (rig.clone(), experiment_toml.to_owned());
         let rig_toml = String::new();
+        let experiment_file = file.to_owned();
         Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
     }
 
@@ -294,7 +315,9 @@ fn timeout_s(table: &[crate::parameters::Parameter], values: &[f64], name: &str)
 
 fn plan(section: &AxisExperiment) -> Plan {
     match &section.set_points {
-        SetPoints::Positions(motion) => Plan::Position(motion.clone()),
+        SetPoints::Positions(motion) => {
+            Plan::Position(PositionPlan { motion: motion.clone(), by_hand: section.by_hand })
+        }
         SetPoints::Forces(profile) => Plan::Force(ForcePlan {
             source: ForceSource::new(profile.clone()),
             initial_ramp_s: section.initial_ramp_s,
@@ -307,6 +330,7 @@ fn plan(section: &AxisExperiment) -> Plan {
                 })
                 .collect(),
             manual: section.during == During::Manual,
+            by_hand: section.by_hand,
         }),
     }
 }

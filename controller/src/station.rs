@@ -329,8 +329,11 @@ impl Station {
     /// What the port of `axis` counted; `None` without XCP.
     #[must_use]
     pub fn xcp(&self, axis: Axis) -> Option<PortCounters> {
-        let seat = self.seats.iter().find(|seat| seat.controller.axis() == axis)?;
-        seat.xcp.as_ref().map(Port::counters)
+        self.seat(axis)?.xcp.as_ref().map(Port::counters)
+    }
+
+    fn seat(&self, axis: Axis) -> Option<&Seat> {
+        self.seats.iter().find(|seat| seat.controller.axis() == axis)
     }
 
     /// Whether `axis` is one of ours.
@@ -361,6 +364,12 @@ impl Station {
     #[must_use]
     pub fn answered(&self) -> u64 {
         self.seats.iter().map(|seat| seat.answered).max().unwrap_or(0)
+    }
+
+    /// Cycles answered by `axis`; 0 where it is none of ours.
+    #[must_use]
+    pub fn answered_by(&self, axis: Axis) -> u64 {
+        self.seat(axis).map_or(0, |seat| seat.answered)
     }
 
     /// Cycles answered since an axis was stopped for good, by an abort or a fault; 0 while none is.

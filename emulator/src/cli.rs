@@ -123,6 +123,10 @@ pub struct RunArguments {
     /// What is typed is not reproducible, in lockstep neither.
     #[arg(long)]
     pub console: bool,
+    /// Let viewers look on at a Unix socket of this path: cycles, events, histograms, and with --console its commands;
+    /// 'bench watch' shows them.
+    #[arg(long, value_name = "PATH")]
+    pub telemetry: Option<PathBuf>,
     /// How long the bus may be gone before the run ends, in s.
     #[arg(long, default_value = "5", value_parser = seconds)]
     pub bus_grace: f64,

@@ -1,7 +1,9 @@
-//! The rig's console: commands of a person at standard input, one a line, for a run with `--console`.
+//! The rig's console: commands of a person, one a line, for a run with `--console`: at standard input, and from whoever is
+//! connected to the telemetry.
 //!
 //! ```text
-//!   standard input ── thread: read, check, answer ── bounded queue ──► rig loop, one command a cycle, try_recv
+//!   standard input ── thread: read, check, answer ──┬── bounded queue ──► rig loop, one command a cycle, try_recv
+//!   telemetry ─────── the same, never waiting ──────┘
 //! ```
 //!
 //! A command acts at the start of the cycle that takes it: what is typed is not reproducible, not even in lockstep, and stands
@@ -10,15 +12,14 @@
 
 use crate::faults::overlay::on_wire;
 use crate::faults::{Fault, NEEDS_HOST};
-use crossbeam_channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use plant::scene::{Action, Part};
 use protocol::frames::{HAND_FORCE, SignalSpec};
+use protocol::telemetry::LONGEST_LINE;
 use std::io::{self, BufRead, Read};
 
 /// Commands that may wait; a person is slower than the loop, and a file that is piped in waits for it.
 const QUEUE: usize = 16;
-/// Longest line that is read as a command, in bytes.
-const LONGEST_LINE: u64 = 200;
 
 /// What a person may type.
 pub const HELP: &str = "stop | release        the rig's own emergency stop; others release theirs
@@ -60,28 +61,57 @@ pub struct Limits {
     pub hosts_bus: bool,
 }
 
-/// Opens the console on standard input.
-#[must_use]
-pub fn open(limits: Limits) -> Receiver<Command> {
-    let (sender, receiver) = bounded(QUEUE);
-    let answer = |text: &str| text.lines().for_each(|line| eprintln!("emulator: console: {line}"));
-    // It ends with its input, with the loop, or with the process: nobody can wait for a thread that reads a terminal.
-    std::thread::spawn(move || {
-        answer("open; 'help' lists the commands");
-        read(&mut io::stdin().lock(), limits, &sender, answer);
-    });
-    receiver
+/// The way to the rig loop.
+#[derive(Clone)]
+pub struct Console {
+    limits: Limits,
+    queue: Sender<Command>,
 }
 
-/// Reads commands until the input ends or nobody takes them any more.
-fn read(input: &mut impl BufRead, limits: Limits, queue: &Sender<Command>, mut answer: impl FnMut(&str)) {
-    while let Ok(Some(line)) = next_line(input) {
-        match line.and_then(|line| parse(&line, limits)) {
-            Ok(None) => {}
-            Ok(Some(Line::Help)) => answer(HELP),
-            Ok(Some(Line::Command(command))) if queue.send(command).is_err() => return,
-            Ok(Some(Line::Command(_))) => {}
-            Err(message) => answer(&message),
+/// Opens the console; the rig loop takes its commands.
+#[must_use]
+pub fn open(limits: Limits) -> (Console, Receiver<Command>) {
+    let (queue, receiver) = bounded(QUEUE);
+    (Console { limits, queue }, receiver)
+}
+
+impl Console {
+    /// Obeys what is typed at standard input, and says there what there is to say.
+    pub fn listen(self) {
+        let answer = |text: &str| text.lines().for_each(|line| eprintln!("emulator: console: {line}"));
+        // It ends with its input, with the loop, or with the process: nobody can wait for a thread that reads a terminal.
+        std::thread::spawn(move || {
+            answer("open; 'help' lists the commands");
+            self.read(&mut io::stdin().lock(), answer);
+        });
+    }
+
+    /// Obeys a line without waiting for the loop, and gives what there is to say.
+    ///
+    /// # Errors
+    /// Why it is not obeyed, in words.
+    pub fn obey(&self, line: &str) -> Result<&'static str, String> {
+        match parse(line, self.limits)? {
+            None => Ok(""),
+            Some(Line::Help) => Ok(HELP),
+            Some(Line::Command(command)) => match self.queue.try_send(command) {
+                Ok(()) => Ok(""),
+                Err(TrySendError::Full(_)) => Err("too many commands at once; try again".into()),
+                Err(TrySendError::Disconnected(_)) => Err("the run is over".into()),
+            },
+        }
+    }
+
+    /// Reads commands until the input ends or nobody takes them any more.
+    fn read(&self, input: &mut impl BufRead, mut answer: impl FnMut(&str)) {
+        while let Ok(Some(line)) = next_line(input) {
+            match line.and_then(|line| parse(&line, self.limits)) {
+                Ok(None) => {}
+                Ok(Some(Line::Help)) => answer(HELP),
+                Ok(Some(Line::Command(command))) if self.queue.send(command).is_err() => return,
+                Ok(Some(Line::Command(_))) => {}
+                Err(message) => answer(&message),
+            }
         }
     }
 }
@@ -89,15 +119,21 @@ fn read(input: &mut impl BufRead, limits: Limits, queue: &Sender<Command>, mut a
 /// The next line, or why it is none; `None` at the end of the input.
 fn next_line(input: &mut impl BufRead) -> io::Result<Option<Result<String, String>>> {
     let mut bytes = Vec::new();
-    if input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes)? == 0 {
+    if input.by_ref().take(LONGEST_LINE as u64).read_until(b'\n', &mut bytes)? == 0 {
         return Ok(None);
     }
-    let whole = bytes.ends_with(b"\n") || (bytes.len() as u64) < LONGEST_LINE;
+    let whole = bytes.ends_with(b"\n") || bytes.len() < LONGEST_LINE;
     if !whole {
         input.skip_until(b'\n')?;
-        return Ok(Some(Err(format!("a line of more than {LONGEST_LINE} bytes is no command"))));
+        return Ok(Some(Err(too_long())));
     }
     Ok(Some(Ok(String::from_utf8_lossy(&bytes).into_owned())))
+}
+
+/// What is said to a line that is longer than any command.
+#[must_use]
+pub fn too_long() -> String {
+    format!("a line of more than {LONGEST_LINE} bytes is no command")
 }
 
 #[derive(Debug, PartialEq)]
@@ -187,9 +223,9 @@ mod tests {
 
     /// Commands and answers of a whole input.
     fn said(input: &str) -> (Vec<Command>, Vec<String>) {
-        let (sender, receiver) = bounded(QUEUE);
+        let (console, receiver) = open(LIMITS);
         let mut answers = Vec::new();
-        read(&mut input.as_bytes(), LIMITS, &sender, |text| answers.push(text.to_owned()));
+        console.read(&mut input.as_bytes(), |text| answers.push(text.to_owned()));
         (receiver.try_iter().collect(), answers)
     }
 
@@ -278,10 +314,23 @@ mod tests {
 
     #[test]
     fn a_loop_that_is_gone_ends_the_reading() {
-        let (sender, receiver) = bounded(QUEUE);
+        let (console, receiver) = open(LIMITS);
         drop(receiver);
         let mut input = "stop\nstop\n".as_bytes();
-        read(&mut input, LIMITS, &sender, |_| {});
+        console.read(&mut input, |_| {});
         assert_eq!(input, b"stop\n");
+        assert_eq!(console.obey("stop"), Err("the run is over".into()));
+    }
+
+    #[test]
+    fn a_viewer_never_waits() {
+        let (console, receiver) = open(LIMITS);
+        assert_eq!(console.obey("help"), Ok(HELP));
+        assert!(console.obey("dance").unwrap_err().contains("is none of"));
+        for _ in 0..QUEUE {
+            assert_eq!(console.obey("stop"), Ok(""));
+        }
+        assert!(console.obey("stop").unwrap_err().contains("try again"));
+        assert_eq!(receiver.try_iter().count(), QUEUE);
     }
 }

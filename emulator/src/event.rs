@@ -123,57 +123,62 @@ fn axis_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, 
 
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "cycle {}: ", self.cycle)?;
-        match self.kind {
-            EventKind::Skipped { cycles } => write!(f, "woke late, {cycles} cycle(s) computed but not sent"),
-            EventKind::CommandStale(axis) => write!(
+        write!(f, "cycle {}: {}", self.cycle, self.kind)
+    }
+}
+
+impl fmt::Display for EventKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Skipped { cycles } => write!(f, "woke late, {cycles} cycle(s) computed but not sent"),
+            Self::CommandStale(axis) => write!(
                 f,
                 "no fresh {} command for 20 cycles, valve shut; is its controller running?",
                 axis.name()
             ),
-            EventKind::CommandFresh(axis) => write!(f, "fresh {} commands again, valve follows", axis.name()),
-            EventKind::TwoSources(axis) => write!(
+            Self::CommandFresh(axis) => write!(f, "fresh {} commands again, valve follows", axis.name()),
+            Self::TwoSources(axis) => write!(
                 f,
                 "fault two-sources: two senders on the {} command, valve shut; stop one of them",
                 axis.name()
             ),
-            EventKind::OneSource(axis) => {
+            Self::OneSource(axis) => {
                 write!(f, "one sender left on the {} command, valve follows", axis.name())
             }
-            EventKind::EmergencyStop => write!(f, "emergency stop"),
-            EventKind::EmergencyStopReleased => write!(f, "emergency stop released"),
-            EventKind::EmergencyStopStillHeld => {
+            Self::EmergencyStop => write!(f, "emergency stop"),
+            Self::EmergencyStopReleased => write!(f, "emergency stop released"),
+            Self::EmergencyStopStillHeld => {
                 write!(f, "the rig released its emergency stop; another still holds it")
             }
-            EventKind::Linked => write!(f, "rods linked"),
-            EventKind::Unlinked => write!(f, "rods parted"),
-            EventKind::LinkRefused => {
+            Self::Linked => write!(f, "rods linked"),
+            Self::Unlinked => write!(f, "rods parted"),
+            Self::LinkRefused => {
                 write!(f, "link refused: the load eye is not within the gap of the carriage")
             }
-            EventKind::LinkGivenUp => {
+            Self::LinkGivenUp => {
                 write!(f, "link given up: the load eye never came within the gap of the carriage")
             }
-            EventKind::Weights { added_mass_kg } => write!(f, "weights on the carriage: {added_mass_kg} kg"),
-            EventKind::WeightsRefused => {
+            Self::Weights { added_mass_kg } => write!(f, "weights on the carriage: {added_mass_kg} kg"),
+            Self::WeightsRefused => {
                 write!(f, "weights refused: more than mass.added_limit_kg of the rig file")
             }
-            EventKind::ConsoleHand { carriage_n, load_eye_n } => {
+            Self::ConsoleHand { carriage_n, load_eye_n } => {
                 write!(
                     f,
                     "the console's hand pushes the carriage with {carriage_n} N, the load eye with {load_eye_n} N"
                 )
             }
-            EventKind::Malformed { raw_id } => write!(
+            Self::Malformed { raw_id } => write!(
                 f,
                 "a frame with identifier {raw_id:#05x} is not as rig.dbc says and was ignored; more are counted silently"
             ),
-            EventKind::SecondRig { id } => {
+            Self::SecondRig { id } => {
                 write!(f, "frame {id:#05x} came from elsewhere: another rig is on this bus; stop one of them")
             }
-            EventKind::Fault(mark) => write!(f, "{mark}"),
-            EventKind::NotFinite => write!(f, "fault not-finite: the plant's state is no longer finite"),
-            EventKind::BusLost => write!(f, "the bus is gone; trying to come back"),
-            EventKind::BusBack => write!(f, "the bus is back"),
+            Self::Fault(mark) => write!(f, "{mark}"),
+            Self::NotFinite => write!(f, "fault not-finite: the plant's state is no longer finite"),
+            Self::BusLost => write!(f, "the bus is gone; trying to come back"),
+            Self::BusBack => write!(f, "the bus is back"),
         }
     }
 }

@@ -13,6 +13,7 @@
 //! | `finish` | histograms, summary, exit code |
 //! | [`faults`] | what is broken on purpose, when, and how it is told |
 //! | [`console`] | what a person types |
+//! | [`telemetry`] | who looks on |
 //! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
 //! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
 
@@ -33,4 +34,5 @@ pub mod seal;
 pub mod station;
 pub mod summary;
 pub mod telegrams;
+pub mod telemetry;
 pub mod wire_limits;

@@ -48,7 +48,7 @@ pub struct Recorder {
 pub struct Records {
     pub(crate) cycles: Receiver<CycleRecord>,
     frames: Receiver<FrameRecord>,
-    events: Receiver<Event>,
+    pub(crate) events: Receiver<Event>,
     timings: Receiver<TimingRecord>,
     round_trips: Receiver<RoundTrip>,
     sender_alive: Weak<()>,

@@ -3,13 +3,13 @@
 //! ```text
 //!   main ─ waits, tells progress, sees signals
 //!    ├─ bus host    serves the embedded bus (FIFO, one above the rig loop)
-//!    ├─ writer      empties the queues into the run's folder
+//!    ├─ writer      empties the queues into the run's folder, and tells viewers
 //!    ├─ console     reads standard input, if asked to
 //!    └─ rig loop    the 1 ms path
 //! ```
 
 use crate::cli::RunArguments;
-use crate::console::{self, Command};
+use crate::console::{self, Command, Console};
 use crate::faults::course::FaultCourse;
 use crate::finish::finish;
 use crate::host_thread::HostThread;
@@ -20,6 +20,7 @@ use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::station::{Station, StationFigures, StationParts};
 use crate::summary::RunDescription;
+use crate::telemetry::{Described, Telemetry};
 use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
@@ -105,7 +106,10 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         return Err(error);
     }
     let started = RunStart::now(lockstep);
-    let writer = match open_folder(arguments, &inputs, &started) {
+    let limits =
+        console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg, hosts_bus: orders.is_some() };
+    let (console, typed) = arguments.console.then(|| console::open(limits)).unzip();
+    let writer = match open_folder(arguments, &inputs, &started, console.clone()) {
         Ok(writer) => writer,
         Err(error) => {
             host.map(HostThread::stop);
@@ -114,9 +118,9 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     };
     let (recorder, records) = recording::queues(lockstep);
     // From this thread: one of the rig loop's would inherit its priority.
-    let limits =
-        console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg, hosts_bus: orders.is_some() };
-    let console = arguments.console.then(|| console::open(limits));
+    if let Some(console) = console {
+        console.listen();
+    }
     let by_script = script.as_ref().map(|script| &script.script);
     let faults = FaultCourse::new(by_script, arguments.console, orders);
 
@@ -131,7 +135,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
             started: &started,
             simulated_ns: &simulated_ns,
             periodic,
-            console,
+            console: typed,
             script: script.as_ref(),
             faults,
         };
@@ -301,7 +305,14 @@ fn stamp_clock(lockstep: bool, simulated_ns: &Arc<AtomicU64>) -> StampClock {
     }
 }
 
-fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) -> Result<Writer, RunError> {
+fn open_folder(
+    arguments: &RunArguments,
+    inputs: &Inputs,
+    started: &RunStart,
+    console: Option<Console>,
+) -> Result<Writer, RunError> {
+    let terms = truth_columns(arguments, inputs);
+    let telemetry = open_telemetry(arguments, inputs, started, &terms, console)?;
     let folder = arguments.out.as_path();
     std::fs::create_dir_all(folder)
         .and_then(|()| clear_results(folder))
@@ -317,16 +328,36 @@ fn open_folder(arguments: &RunArguments, inputs: &Inputs, started: &RunStart) ->
         epoch_offset_ns: started.epoch_offset_ns,
         linked: inputs.scene.linked,
         added_mass_kg: inputs.scene.added_mass_kg,
-        terms: truth_columns(arguments, inputs),
+        terms,
         faults: can_break(arguments),
         evidence: started.unix_s.map(|started_unix_s| EvidenceSetup {
             full_timing: arguments.full_timing,
             flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
             started_unix_s,
             base: started.monotonic,
+            told: telemetry.is_some(),
         }),
+        telemetry,
     })
     .map_err(|error| RunError::output(folder, &error))
+}
+
+fn open_telemetry(
+    arguments: &RunArguments,
+    inputs: &Inputs,
+    started: &RunStart,
+    terms: &[String],
+    console: Option<Console>,
+) -> Result<Option<Telemetry>, RunError> {
+    let Some(path) = &arguments.telemetry else { return Ok(None) };
+    let described = Described { arguments, inputs, terms, started_unix_s: started.unix_s };
+    let refused = |error| {
+        let path = path.display();
+        RunError::Input(format!(
+            "cannot open telemetry {path}: {error}; choose another path with --telemetry"
+        ))
+    };
+    Telemetry::open(path, &described, console).map(Some).map_err(refused)
 }
 
 /// Whether there can be faults in the run.

@@ -106,6 +106,7 @@ pub struct Station {
     readings: [AxisReadings; 2],
     skipped: u64,
     bus_was_up: bool,
+    bus_disconnects: u64,
     frames: FrameCounters,
     /// Sensors that saturated since the last status.
     saturated: [SaturatedSensors; 2],
@@ -151,6 +152,7 @@ impl Station {
             readings,
             skipped: 0,
             bus_was_up: true,
+            bus_disconnects: 0,
             frames: FrameCounters::default(),
             saturated: [SaturatedSensors::default(); 2],
             exchange: Default::default(),
@@ -223,6 +225,17 @@ impl Station {
             self.send(&telegrams::status(&self.plant, &saturated, commands), bus);
         }
         self.send_fault_marks(bus);
+        self.look_at_the_bus(cycle, bus);
+    }
+
+    /// Tells when the bus goes and comes, also when it did both since the last look, as after a stall.
+    fn look_at_the_bus(&mut self, cycle: u64, bus: &dyn Bus) {
+        let disconnects = bus.counters().disconnects;
+        let went = disconnects != std::mem::replace(&mut self.bus_disconnects, disconnects);
+        if went && self.bus_was_up {
+            self.bus_was_up = false;
+            self.tell(cycle, EventKind::BusLost);
+        }
         if bus.is_up() != self.bus_was_up {
             self.bus_was_up = bus.is_up();
             self.tell(cycle, if self.bus_was_up { EventKind::BusBack } else { EventKind::BusLost });

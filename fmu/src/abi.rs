@@ -119,13 +119,39 @@ fn slice_mut<'a, T>(start: *mut T, count: usize) -> &'a mut [T] {
     unsafe { std::slice::from_raw_parts_mut(start, count) }
 }
 
-/// References and values of a get or set, when both are there.
-fn both<R, V>(component: &Component, references: &[R], values: &[V], count: usize) -> bool {
-    let there = references.len() == count && values.len() == count;
-    if !there {
-        component.teller.tell(Status::Error, "a null pointer in place of value references or values");
-    }
-    there
+/// Hands the references and the places for their values of a `fmi2Get…` to `work`, when both are there.
+fn get<V>(
+    component: *mut c_void,
+    (references, values, count): (*const c_uint, *mut V, usize),
+    work: impl FnOnce(&mut Simulation, &[c_uint], &mut [V]) -> Result<(), Refusal>,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice_mut(values, count));
+        if references.len() != count || values.len() != count {
+            return Ok(null_array(own));
+        }
+        work(&mut own.simulation, references, values).map(|()| Status::Ok)
+    })
+}
+
+/// The same for a `fmi2Set…`, which only reads the values.
+fn set<V>(
+    component: *mut c_void,
+    (references, values, count): (*const c_uint, *const V, usize),
+    work: impl FnOnce(&mut Simulation, &[c_uint], &[V]) -> Result<(), Refusal>,
+) -> Status {
+    on(component, |own| {
+        let (references, values) = (slice(references, count), slice(values, count));
+        if references.len() != count || values.len() != count {
+            return Ok(null_array(own));
+        }
+        work(&mut own.simulation, references, values).map(|()| Status::Ok)
+    })
+}
+
+fn null_array(component: &Component) -> Status {
+    component.teller.tell(Status::Error, "a null pointer in place of value references or values");
+    Status::Error
 }
 
 fn text(pointer: *const c_char) -> Option<String> {
@@ -279,13 +305,7 @@ extern "C" fn fmi2GetReal(
     count: usize,
     values: *mut c_double,
 ) -> Status {
-    on(component, |own| {
-        let (references, values) = (slice(references, count), slice_mut(values, count));
-        if !both(own, references, values, count) {
-            return Ok(Status::Error);
-        }
-        own.simulation.reals(references, values).map(|()| Status::Ok)
-    })
+    get(component, (references, values, count), |own, references, values| own.reals(references, values))
 }
 
 #[unsafe(no_mangle)]
@@ -295,13 +315,7 @@ extern "C" fn fmi2GetInteger(
     count: usize,
     values: *mut c_int,
 ) -> Status {
-    on(component, |own| {
-        let (references, values) = (slice(references, count), slice_mut(values, count));
-        if !both(own, references, values, count) {
-            return Ok(Status::Error);
-        }
-        own.simulation.integers(references, values).map(|()| Status::Ok)
-    })
+    get(component, (references, values, count), |own, references, values| own.integers(references, values))
 }
 
 #[unsafe(no_mangle)]
@@ -311,15 +325,11 @@ extern "C" fn fmi2GetBoolean(
     count: usize,
     values: *mut c_int,
 ) -> Status {
-    on(component, |own| {
-        let (references, values) = (slice(references, count), slice_mut(values, count));
-        if !both(own, references, values, count) {
-            return Ok(Status::Error);
-        }
+    get(component, (references, values, count), |own, references, values| {
         let mut flags = vec![false; count];
-        own.simulation.booleans(references, &mut flags)?;
+        own.booleans(references, &mut flags)?;
         values.iter_mut().zip(flags).for_each(|(value, flag)| *value = c_int::from(flag));
-        Ok(Status::Ok)
+        Ok(())
     })
 }
 
@@ -340,13 +350,7 @@ extern "C" fn fmi2SetReal(
     count: usize,
     values: *const c_double,
 ) -> Status {
-    on(component, |own| {
-        let (references, values) = (slice(references, count), slice(values, count));
-        if !both(own, references, values, count) {
-            return Ok(Status::Error);
-        }
-        own.simulation.set_reals(references, values).map(|()| Status::Ok)
-    })
+    set(component, (references, values, count), |own, references, values| own.set_reals(references, values))
 }
 
 #[unsafe(no_mangle)]
@@ -356,12 +360,8 @@ extern "C" fn fmi2SetInteger(
     count: usize,
     values: *const c_int,
 ) -> Status {
-    on(component, |own| {
-        let (references, values) = (slice(references, count), slice(values, count));
-        if !both(own, references, values, count) {
-            return Ok(Status::Error);
-        }
-        own.simulation.set_integers(references, values).map(|()| Status::Ok)
+    set(component, (references, values, count), |own, references, values| {
+        own.set_integers(references, values)
     })
 }
 
@@ -372,13 +372,9 @@ extern "C" fn fmi2SetBoolean(
     count: usize,
     values: *const c_int,
 ) -> Status {
-    on(component, |own| {
-        let (references, values) = (slice(references, count), slice(values, count));
-        if !both(own, references, values, count) {
-            return Ok(Status::Error);
-        }
+    set(component, (references, values, count), |own, references, values| {
         let flags: Vec<_> = values.iter().map(|value| *value != 0).collect();
-        own.simulation.set_booleans(references, &flags).map(|()| Status::Ok)
+        own.set_booleans(references, &flags)
     })
 }
 

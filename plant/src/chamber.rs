@@ -18,7 +18,7 @@
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6.
 
 use crate::effects;
-use crate::lanes::{Mask, Pair};
+use crate::lanes::{Axes, Form, Pair};
 use crate::parameters::RigParameters;
 
 /// How much of its air a chamber may carry beyond a bound before the instant of crossing matters: below 1 Pa.
@@ -29,30 +29,30 @@ const NEGLIGIBLE_SHARE: f64 = 1e-6;
 
 /// Geometry and pressures that do not change.
 #[derive(Debug, Clone)]
-pub(crate) struct Chambers {
-    dead_volume: Pair,
-    full_volume_b: Pair,
-    area_a: Pair,
-    area_b: Pair,
-    atmospheric_force: Pair,
-    exhaust_pa: Pair,
+pub(crate) struct Chambers<P = Pair> {
+    dead_volume: P,
+    full_volume_b: P,
+    area_a: P,
+    area_b: P,
+    atmospheric_force: P,
+    exhaust_pa: P,
     normal_pa: f64,
 }
 
 /// How the lagged flow goes through one span with the edge flow held.
 #[derive(Debug, Clone)]
-pub(crate) struct FlowLag {
-    keep: Pair,
-    carried_air: Pair,
-    fed_air: Pair,
-    half_span_air: Pair,
+pub(crate) struct FlowLag<P = Pair> {
+    keep: P,
+    carried_air: P,
+    fed_air: P,
+    half_span_air: P,
 }
 
 /// Stored air in joule and lagged flow in m^3/s of one chamber of both axes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Air {
-    pub(crate) stored: Pair,
-    pub(crate) flow: Pair,
+pub(crate) struct Air<P = Pair> {
+    pub(crate) stored: P,
+    pub(crate) flow: P,
 }
 
 impl Chambers {
@@ -93,30 +93,17 @@ impl Chambers {
         self.normal_pa
     }
 
-    /// Volume of chamber a, m^3, at extensions in [0, L], m.
     #[inline(always)]
-    pub(crate) fn volume_a(&self, extension: Pair) -> Pair {
-        self.dead_volume + self.area_a * extension
-    }
-
-    /// Volume of chamber b, m^3, at extensions in [0, L], m.
-    #[inline(always)]
-    pub(crate) fn volume_b(&self, extension: Pair) -> Pair {
-        self.full_volume_b - self.area_b * extension
-    }
-
-    /// Force of the air on the piston, N, positive extends the rod; pressures absolute, Pa.
-    #[inline(always)]
-    pub(crate) fn pneumatic_force(&self, pressure_a: Pair, pressure_b: Pair) -> Pair {
-        pressure_a * self.area_a - pressure_b * self.area_b - self.atmospheric_force
-    }
-
-    /// By how much the pneumatic force grows in half a span by the lagged flows alone, N.
-    #[inline(always)]
-    pub(crate) fn force_growth(&self, lag: &FlowLag, per_volume: [Pair; 2], flow: [Pair; 2]) -> Pair {
-        let a = self.area_a * per_volume[0] * flow[0];
-        let b = self.area_b * per_volume[1] * flow[1];
-        (a - b) * lag.half_span_air
+    pub(crate) fn formed<P, F: Form<P>>(&self, form: &mut F) -> Chambers<P> {
+        Chambers {
+            dead_volume: form.pair(self.dead_volume),
+            full_volume_b: form.pair(self.full_volume_b),
+            area_a: form.pair(self.area_a),
+            area_b: form.pair(self.area_b),
+            atmospheric_force: form.pair(self.atmospheric_force),
+            exhaust_pa: form.pair(self.exhaust_pa),
+            normal_pa: form.one(self.normal_pa),
+        }
     }
 
     /// The pressure at which a chamber of this cross-section's force balance stands still, Pa absolute:
@@ -126,16 +113,56 @@ impl Chambers {
     }
 }
 
+impl<P: Axes> Chambers<P> {
+    /// Volume of chamber a, m^3, at extensions in [0, L], m.
+    #[inline(always)]
+    pub(crate) fn volume_a(&self, extension: P) -> P {
+        self.dead_volume + self.area_a * extension
+    }
+
+    /// Volume of chamber b, m^3, at extensions in [0, L], m.
+    #[inline(always)]
+    pub(crate) fn volume_b(&self, extension: P) -> P {
+        self.full_volume_b - self.area_b * extension
+    }
+
+    /// Force of the air on the piston, N, positive extends the rod; pressures absolute, Pa.
+    #[inline(always)]
+    pub(crate) fn pneumatic_force(&self, pressure_a: P, pressure_b: P) -> P {
+        pressure_a * self.area_a - pressure_b * self.area_b - self.atmospheric_force
+    }
+
+    /// By how much the pneumatic force grows in half a span by the lagged flows alone, N.
+    #[inline(always)]
+    pub(crate) fn force_growth(&self, lag: &FlowLag<P>, per_volume: [P; 2], flow: [P; 2]) -> P {
+        let a = self.area_a * per_volume[0] * flow[0];
+        let b = self.area_b * per_volume[1] * flow[1];
+        (a - b) * lag.half_span_air
+    }
+}
+
 impl FlowLag {
+    #[inline(always)]
+    pub(crate) fn formed<P, F: Form<P>>(&self, form: &mut F) -> FlowLag<P> {
+        FlowLag {
+            keep: form.pair(self.keep),
+            carried_air: form.pair(self.carried_air),
+            fed_air: form.pair(self.fed_air),
+            half_span_air: form.pair(self.half_span_air),
+        }
+    }
+}
+
+impl<P: Axes> FlowLag<P> {
     /// The stored air half a span on, J, to the order the midpoint rule needs.
     #[inline(always)]
-    pub(crate) fn midpoint_air(&self, air: Air) -> Pair {
+    pub(crate) fn midpoint_air(&self, air: Air<P>) -> P {
         air.stored + air.flow * self.half_span_air
     }
 
     /// Stored air and flow a span on, with the edge flow held and no bounds.
     #[inline(always)]
-    pub(crate) fn advance(&self, air: Air, edge_flow: Pair) -> Air {
+    pub(crate) fn advance(&self, air: Air<P>, edge_flow: P) -> Air<P> {
         Air {
             stored: air.stored + air.flow * self.carried_air + edge_flow * self.fed_air,
             flow: edge_flow + (air.flow - edge_flow) * self.keep,
@@ -150,7 +177,7 @@ pub(crate) struct Limits {
     exhaust_pa: f64,
 }
 
-impl Chambers {
+impl<P: Axes> Chambers<P> {
     #[inline(always)]
     pub(crate) fn limits(&self, supply_pa: f64) -> Limits {
         Limits { supply_pa, exhaust_pa: self.exhaust_pa.drive() }
@@ -164,14 +191,14 @@ impl Chambers {
 impl Limits {
     /// The air after a step, stopped at the bounds at the step's end, and where the instant of crossing would matter.
     #[inline(always)]
-    pub(crate) fn stop(&self, from: Air, to: Air, volume: Pair) -> (Air, Mask) {
-        let most = (volume * Pair::both(self.supply_pa)).max(from.stored);
-        let least = (volume * Pair::both(self.exhaust_pa)).min(from.stored);
+    pub(crate) fn stop<P: Axes>(&self, from: Air<P>, to: Air<P>, volume: P) -> (Air<P>, P::Mask) {
+        let most = (volume * P::both(self.supply_pa)).max(from.stored);
+        let least = (volume * P::both(self.exhaust_pa)).min(from.stored);
         let stored = to.stored.min(most).max(least);
         let beyond = (to.stored - stored).abs();
-        let within = beyond.at_most(Pair::both(0.0));
+        let within = beyond.at_most(P::both(0.0));
         let air = Air { stored, flow: to.flow.where_true(within) };
-        (air, (stored * Pair::both(NEGLIGIBLE_SHARE)).less(beyond))
+        (air, (stored * P::both(NEGLIGIBLE_SHARE)).less(beyond))
     }
 
     /// The air after a step, with the flow stopped at the instant at which a bound was crossed.

@@ -18,11 +18,13 @@
 //! Why this scheme and this step: `docs/integration.md` has the measured table of error and cost for this and
 //! other schemes; `cargo run --release -p plant --example accuracy` makes it.
 
+mod form;
 pub(crate) mod laws;
+mod smooth;
 
 use crate::chamber::{Air, Chambers, FlowLag};
 use crate::faults::Faults;
-use crate::lanes::{Mask, Pair};
+use crate::lanes::{Axes, Choice, Mask, Pair};
 use crate::linkage::{Approach, Linkage};
 use crate::motion::{Motion, MotionSpan, Place};
 use crate::parameters::RigParameters;
@@ -40,55 +42,51 @@ pub(crate) const SUBSTEPS: u32 = 10;
 /// Parts of a substep that has a corner in it.
 const PARTS: u32 = 8;
 
-/// A resting axis linked to a moving one is looked at closely from this far below its break-away force on, N: more than
-/// the contact force changes within half a substep while the other axis creeps.
-const BREAK_AWAY_MARGIN_N: f64 = 0.5;
-
 /// The laws, and their constants for both lengths of step.
 #[derive(Debug, Clone)]
-pub(crate) struct Integrator {
-    pub(crate) valve: Valve,
-    pub(crate) chambers: Chambers,
+pub(crate) struct Integrator<P = Pair> {
+    pub(crate) valve: Valve<P>,
+    pub(crate) chambers: Chambers<P>,
     pub(crate) motion: Motion,
     pub(crate) linkage: Linkage,
     pub(crate) supply: Supply,
     atmospheric_pa: f64,
     file_dead_volume_m3: f64,
     substeps: u32,
-    coarse: Span,
-    fine: Span,
+    coarse: Span<P>,
+    fine: Span<P>,
 }
 
 /// Everything that depends on the length of a step and on the parameters.
 #[derive(Debug, Clone)]
-pub(crate) struct Span {
+pub(crate) struct Span<P = Pair> {
     pub(crate) span_s: f64,
-    pub(crate) spool_to_middle: Pair,
-    pub(crate) spool_to_end: Pair,
-    pub(crate) lag: FlowLag,
-    pub(crate) motion_to_middle: MotionSpan,
-    pub(crate) motion_to_end: MotionSpan,
+    pub(crate) spool_to_middle: P,
+    pub(crate) spool_to_end: P,
+    pub(crate) lag: FlowLag<P>,
+    pub(crate) motion_to_middle: MotionSpan<P>,
+    pub(crate) motion_to_end: MotionSpan<P>,
     supply_to_middle: SupplyDecay,
     supply_to_end: SupplyDecay,
 }
 
 /// The state of both axes, lane by lane.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Lanes {
-    pub(crate) extension: Pair,
-    pub(crate) velocity: Pair,
-    pub(crate) spool: Pair,
-    pub(crate) air_a: Air,
-    pub(crate) air_b: Air,
+pub(crate) struct Lanes<P = Pair> {
+    pub(crate) extension: P,
+    pub(crate) velocity: P,
+    pub(crate) spool: P,
+    pub(crate) air_a: Air<P>,
+    pub(crate) air_b: Air<P>,
 }
 
 /// What is held over a period.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Held {
+pub(crate) struct Held<P = Pair> {
     /// Valve commands as they act.
-    pub(crate) command: Pair,
+    pub(crate) command: P,
     /// Hand forces in each axis' own extension, N.
-    pub(crate) hand: Pair,
+    pub(crate) hand: P,
     pub(crate) stopped: bool,
     pub(crate) linked: bool,
     /// Spools that do not move.
@@ -104,25 +102,25 @@ pub(crate) struct Node {
 }
 
 /// What the air does at the midpoint of a step; two values are those of chambers a and b.
-pub(crate) struct Middle {
-    pub(crate) extension: Pair,
-    pub(crate) pneumatic: Pair,
-    pub(crate) edge_flow: [Pair; 2],
-    pub(crate) pressure: [Pair; 2],
-    pub(crate) per_volume: [Pair; 2],
+pub(crate) struct Middle<P = Pair> {
+    pub(crate) extension: P,
+    pub(crate) pneumatic: P,
+    pub(crate) edge_flow: [P; 2],
+    pub(crate) pressure: [P; 2],
+    pub(crate) per_volume: [P; 2],
 }
 
 /// The forces on each piston, N, along its own extension; viscous friction is in the motion's exponentials.
-struct Forces {
-    pneumatic: Pair,
-    hand: Pair,
-    sliding_friction: Pair,
-    contact: Pair,
+struct Forces<P> {
+    pneumatic: P,
+    hand: P,
+    sliding_friction: P,
+    contact: P,
 }
 
-impl Forces {
+impl<P: Axes> Forces<P> {
     #[inline(always)]
-    fn sum(&self) -> Pair {
+    fn sum(&self) -> P {
         self.pneumatic + self.hand + self.sliding_friction + self.contact
     }
 }
@@ -180,28 +178,43 @@ impl Integrator {
         let mut supply_pa = state.supply_pressure_pa;
         for substep in 0..self.substeps {
             let carried = laws.carried();
-            let node = self.node(&self.coarse, supply_pa, held.stopped);
-            let at = At { of: self, span: &self.coarse, from: &lanes, node, held, substep, part: 0 };
-            let (next, handed_on, corner) = self.smooth(laws, at, carried);
-            let valves_move =
-                self.supply.check_valves_shut(supply_pa) != self.supply.check_valves_shut(node.end_pa);
-            if corner || valves_move {
-                let mut carried = carried;
-                for part in 0..PARTS {
-                    let node = self.node(&self.fine, supply_pa, held.stopped);
-                    let at = At { of: self, span: &self.fine, from: &lanes, node, held, substep, part };
-                    (lanes, carried) = self.careful(laws, at, carried);
-                    supply_pa = node.end_pa;
-                }
-                laws.keep(self, held, &lanes, carried);
+            let (next, handed_on, corner) = self.substep(laws, (&lanes, supply_pa), held, substep, carried);
+            if corner {
+                let handed_on;
+                ((lanes, supply_pa), handed_on) =
+                    self.in_parts(laws, (lanes, supply_pa), held, substep, carried);
+                laws.keep(self, held, &lanes, handed_on);
             } else {
-                lanes = next;
-                supply_pa = node.end_pa;
+                (lanes, supply_pa) = next;
                 laws.keep(self, held, &lanes, handed_on);
             }
         }
         lanes.store(state);
         state.supply_pressure_pa = supply_pa;
+    }
+
+    /// A substep from these lanes and this supply pressure made again, in parts that locate its corners.
+    #[cold]
+    pub(crate) fn in_parts<L: Laws>(
+        &self,
+        laws: &L,
+        (mut lanes, mut supply_pa): (Lanes, f64),
+        held: Held,
+        substep: u32,
+        mut carried: L::Carried,
+    ) -> ((Lanes, f64), L::Carried) {
+        for part in 0..PARTS {
+            let node = self.node(&self.fine, supply_pa, held.stopped);
+            let at = At { of: self, span: &self.fine, from: &lanes, node, held, substep, part };
+            (lanes, carried) = self.careful(laws, at, carried);
+            supply_pa = node.end_pa;
+        }
+        ((lanes, supply_pa), carried)
+    }
+
+    /// Substeps in a period.
+    pub(crate) fn substeps(&self) -> u32 {
+        self.substeps
     }
 
     /// Length of a substep, s.
@@ -222,84 +235,6 @@ impl Integrator {
     /// Pressure around the rods, Pa.
     pub(crate) fn atmospheric_pa(&self) -> f64 {
         self.atmospheric_pa
-    }
-
-    /// d of the linkage, m, from both extensions.
-    pub(crate) fn distance(&self, extension: Pair) -> f64 {
-        self.motion.stroke_m() - extension.sum()
-    }
-
-    #[inline(always)]
-    fn node(&self, span: &Span, supply_pa: f64, stopped: bool) -> Node {
-        let middle_pa = self.supply.after(supply_pa, stopped, span.supply_to_middle);
-        let end_pa = self.supply.after(supply_pa, stopped, span.supply_to_end);
-        Node { middle_pa, end_pa, shut: self.supply.check_valves_shut(middle_pa) }
-    }
-
-    /// A step that assumes no corner; the flag says that there may be one, and then the step counts for nothing.
-    #[inline(always)]
-    fn smooth<L: Laws>(&self, laws: &L, at: At<'_>, mut carried: L::Carried) -> (Lanes, L::Carried, bool) {
-        let (span, node, held) = (at.span, at.node, at.held);
-        let from = at.from.with_check_valves(node.shut);
-        let at = At { from: &from, ..at };
-        let zero = Pair::both(0.0);
-        let middle = laws.middle(at, &mut carried);
-
-        let moving = laws.moving(at);
-        let hand = laws.outside(at, &middle);
-        let mut forces = Forces {
-            pneumatic: middle.pneumatic,
-            hand,
-            sliding_friction: laws.sliding(at, &middle, &carried, middle.pneumatic + hand, moving),
-            contact: zero,
-        };
-        let [to_middle, way] = laws.ways(at);
-        if held.linked {
-            let approach = self.approach(span, to_middle, &from, moving, &forces);
-            forces.contact = Pair::both(self.linkage.midpoint_force(approach));
-        }
-        let force = forces.sum();
-        let mut velocity = (way.keep * from.velocity + way.gain * force).where_true(moving);
-        let mut extension =
-            from.extension + (way.drift * from.velocity + way.push * force).where_true(moving);
-        let mut sticks = None;
-        if laws.on_bristles() != [false; 2] {
-            let unresisted = forces.pneumatic + forces.hand + forces.contact;
-            let place = |axis: usize, carried: &mut L::Carried| {
-                if !laws.on_bristles()[axis] {
-                    return Place {
-                        extension: extension.to_array()[axis],
-                        velocity: velocity.to_array()[axis],
-                    };
-                }
-                laws.advance(at, &middle, carried, axis, unresisted.to_array()[axis])
-            };
-            let (drive, load) = (place(0, &mut carried), place(1, &mut carried));
-            extension = Pair::new(drive.extension, load.extension);
-            velocity = Pair::new(drive.velocity, load.velocity);
-            sticks = Some(Mask::new(laws.on_bristles().map(|on| !on)));
-        }
-
-        let growth =
-            self.chambers.force_growth(&span.lag, middle.per_volume, [from.air_a.flow, from.air_b.flow]);
-        let nudged_n = if held.linked && moving.any() { BREAK_AWAY_MARGIN_N } else { 0.0 };
-        let margin = growth.abs() + Pair::both(nudged_n);
-        let break_away = laws.break_away(at, &middle, force);
-        let leaves = !moving & self.motion.might_leave(from.extension, force, margin, break_away);
-        let turns = moving & (velocity * from.velocity).at_most(zero);
-        let turns = sticks.map_or(turns, |sticks| turns & sticks);
-        let overruns = extension.less(zero) | Pair::both(self.motion.stroke_m()).less(extension);
-        let touches =
-            held.linked && self.linkage.made_contact(self.distance(from.extension), self.distance(extension));
-        let limits = self.chambers.limits(node.end_pa);
-        let stop = |air: Air, edge_flow: Pair, volume: Pair| {
-            limits.stop(air, span.lag.advance(air, edge_flow), volume)
-        };
-        let (air_a, fills_a) = stop(from.air_a, middle.edge_flow[0], self.chambers.volume_a(extension));
-        let (air_b, fills_b) = stop(from.air_b, middle.edge_flow[1], self.chambers.volume_b(extension));
-        let mut next = Lanes { extension, velocity, spool: laws.spool(at, &carried), air_a, air_b };
-        laws.air(at, &mut next, &middle, &mut carried);
-        (next, carried, (leaves | turns | overruns | fills_a | fills_b).any() | touches)
     }
 
     /// A short step that may meet any corner.
@@ -367,32 +302,6 @@ impl Integrator {
         let leaves = |axis: usize| !laws.holds(at, middle, axis, force.to_array()[axis]);
         Mask::new([leaves(0), leaves(1)]) & !moving
     }
-
-    /// The extensions at a step's midpoint, kept within the stroke: a step that overruns the end is discarded, but must not
-    /// meet a negative volume.
-    #[inline(always)]
-    pub(crate) fn ahead(&self, span: &Span, from: &Lanes) -> Pair {
-        let ahead = from.extension + from.velocity * Pair::both(span.span_s / 2.0);
-        ahead.max(Pair::both(0.0)).min(Pair::both(self.motion.stroke_m()))
-    }
-
-    #[inline(always)]
-    fn approach(
-        &self,
-        span: &Span,
-        to_middle: &MotionSpan,
-        from: &Lanes,
-        moving: Mask,
-        forces: &Forces,
-    ) -> Approach {
-        let free = (to_middle.keep * from.velocity + to_middle.gain * forces.sum()).where_true(moving);
-        Approach {
-            distance_m: self.distance(from.extension),
-            free_speed_m_per_s: -free.sum(),
-            mobility: to_middle.gain.where_true(moving).sum(),
-            half_span_s: span.span_s / 2.0,
-        }
-    }
 }
 
 impl Lanes {
@@ -407,7 +316,7 @@ impl Lanes {
         }
     }
 
-    fn store(&self, state: &mut State) {
+    pub(crate) fn store(&self, state: &mut State) {
         for (i, axis) in state.axes.iter_mut().enumerate() {
             let lane = |pair: Pair| pair.to_array()[i];
             *axis = AxisState {
@@ -421,6 +330,21 @@ impl Lanes {
             };
         }
     }
+}
+
+impl<P: Axes> Lanes<P> {
+    /// From its numbers in the order of [`Lanes::to_pairs`].
+    #[inline(always)]
+    pub(crate) fn from_pairs([extension, velocity, spool, a, flow_a, b, flow_b]: [P; 7]) -> Self {
+        let (air_a, air_b) = (Air { stored: a, flow: flow_a }, Air { stored: b, flow: flow_b });
+        Lanes { extension, velocity, spool, air_a, air_b }
+    }
+
+    #[inline(always)]
+    pub(crate) fn to_pairs(self) -> [P; 7] {
+        let Lanes { extension, velocity, spool, air_a, air_b } = self;
+        [extension, velocity, spool, air_a.stored, air_a.flow, air_b.stored, air_b.flow]
+    }
 
     /// One axis.
     #[inline(always)]
@@ -432,8 +356,8 @@ impl Lanes {
     #[inline(always)]
     fn with_check_valves(mut self, shut: bool) -> Self {
         if shut {
-            self.air_a.flow = Pair::both(0.0);
-            self.air_b.flow = Pair::both(0.0);
+            self.air_a.flow = P::both(0.0);
+            self.air_b.flow = P::both(0.0);
         }
         self
     }

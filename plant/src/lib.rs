@@ -13,7 +13,9 @@
 //! | `chamber.rs` | volumes, pressures, flow lag and its bounds, pneumatic force |
 //! | `linkage.rs` | gap and contact force |
 //! | `motion.rs` | friction, stick and slip, end stops, motion under a held force |
-//! | `integrator.rs` | the substep that puts them together |
+//! | `integrator.rs` | the substep that puts them together; without a corner: `integrator/smooth.rs` |
+//! | `lanes.rs` | numbers of both axes side by side: what all of these are written over |
+//! | `batch.rs` | many rigs at once |
 //! | `truth.rs` | the list of all terms at an instant |
 //! | `sensors.rs` | noise, rounding, saturation |
 //! | `faults.rs` | what is broken, over all of these |
@@ -40,6 +42,7 @@
 //! Source of the model: rig-model.md, after Neugebauer, Quellmalz, Schönherr, Schlegel, "Control of a servo-pneumatic
 //! experimental rig", The Archive of Mechanical Engineering LVIII (2011) no. 2, DOI 10.2478/v10180-011-0014-6.
 
+mod batch;
 mod chamber;
 pub mod effects;
 pub mod faults;
@@ -58,6 +61,7 @@ pub mod tables;
 mod truth;
 mod valve;
 
+pub use batch::{Batch, Registers};
 pub use parameters::{ParameterError, RigParameters};
 pub use plant::{LinkRefused, Plant};
 pub use scene::{People, Scene, SceneError};

@@ -17,6 +17,7 @@
 //! where w is the relative speed at the midpoint. A sticking axis adds nothing to Y.
 
 use crate::effects;
+use crate::lanes::Form;
 use crate::parameters::RigParameters;
 
 /// Gap and contact.
@@ -48,6 +49,15 @@ impl Linkage {
             half_gap_m: parameters.gap_m / 2.0,
             stiffness_n_per_m: parameters.stiffness_n_per_m,
             damping_n_s_per_m: parameters.damping_n_s_per_m,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn formed<P>(&self, form: &mut impl Form<P>) -> Self {
+        Linkage {
+            half_gap_m: form.one(self.half_gap_m),
+            stiffness_n_per_m: form.one(self.stiffness_n_per_m),
+            damping_n_s_per_m: form.one(self.damping_n_s_per_m),
         }
     }
 

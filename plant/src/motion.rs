@@ -21,7 +21,7 @@
 //!
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6.
 
-use crate::lanes::{Mask, Pair};
+use crate::lanes::{Axes, Form, Pair};
 use crate::parameters::{FrictionParameters, RigParameters};
 
 /// What moves each axis and what holds it.
@@ -52,11 +52,11 @@ pub(crate) fn side(direction: f64) -> usize {
 
 /// E, G, D and W of the module's head for one span, one lane for each axis.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct MotionSpan {
-    pub(crate) keep: Pair,
-    pub(crate) gain: Pair,
-    pub(crate) drift: Pair,
-    pub(crate) push: Pair,
+pub(crate) struct MotionSpan<P = Pair> {
+    pub(crate) keep: P,
+    pub(crate) gain: P,
+    pub(crate) drift: P,
+    pub(crate) push: P,
 }
 
 /// Where an axis is and how fast, in its own extension, m and m/s.
@@ -74,6 +74,21 @@ impl Motion {
             behind_sensor_kg: [rig.mass().carriage_kg + on_carriage_kg, 0.0],
             stroke_m: rig.cylinder().stroke_m,
             levels: Levels::of(rig.friction()),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn formed<P>(&self, form: &mut impl Form<P>) -> Self {
+        let mut both = |own: [f64; 2]| [form.one(own[0]), form.one(own[1])];
+        Motion {
+            masses_kg: both(self.masses_kg),
+            behind_sensor_kg: both(self.behind_sensor_kg),
+            levels: Levels {
+                sliding_n: both(self.levels.sliding_n),
+                break_away_n: both(self.levels.break_away_n),
+                viscous_n_s_per_m: both(self.levels.viscous_n_s_per_m),
+            },
+            stroke_m: form.one(self.stroke_m),
         }
     }
 
@@ -128,10 +143,10 @@ impl Motion {
     /// Whether resting axes might leave within the span, so that a step must look closer; `break_away` is that of the force's
     /// direction, N.
     #[inline(always)]
-    pub(crate) fn might_leave(&self, extension: Pair, force: Pair, margin: Pair, break_away: Pair) -> Mask {
-        let zero = Pair::both(0.0);
+    pub(crate) fn might_leave<P: Axes>(&self, extension: P, force: P, margin: P, break_away: P) -> P::Mask {
+        let zero = P::both(0.0);
         let pressed = extension.at_most(zero) & force.less(zero)
-            | Pair::both(self.stroke_m).at_most(extension) & zero.less(force);
+            | P::both(self.stroke_m).at_most(extension) & zero.less(force);
         break_away.less(force.abs() + margin) & !pressed
     }
 
@@ -188,6 +203,18 @@ impl Motion {
     }
 }
 
+impl MotionSpan {
+    #[inline(always)]
+    pub(crate) fn formed<P, F: Form<P>>(&self, form: &mut F) -> MotionSpan<P> {
+        MotionSpan {
+            keep: form.pair(self.keep),
+            gain: form.pair(self.gain),
+            drift: form.pair(self.drift),
+            push: form.pair(self.push),
+        }
+    }
+}
+
 impl Levels {
     pub(crate) fn of(friction: &FrictionParameters) -> Self {
         Levels {
@@ -200,7 +227,7 @@ impl Levels {
 
 /// Sliding friction on moving axes, N, against the motion, of its level; 0 at rest.
 #[inline(always)]
-pub(crate) fn against(velocity: Pair, level: Pair, moving: Mask) -> Pair {
+pub(crate) fn against<P: Axes>(velocity: P, level: P, moving: P::Mask) -> P {
     -level.with_sign_of(velocity).where_true(moving)
 }
 

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use crate::effects::{Effects, Term, Terms};
 use crate::faults::{Faults, ValvesAtWork};
 use crate::integrator::laws::Baseline;
-use crate::integrator::{Held, Integrator, SUBSTEPS};
-use crate::lanes::Pair;
+use crate::integrator::{Held, Integrator, Lanes, SUBSTEPS};
+use crate::lanes::{Axes, Pair};
 use crate::parameters::RigParameters;
 use crate::setup::{Setup, SetupError, check_added_mass, check_state, start_state};
 use crate::state::{Inputs, State};
@@ -105,6 +105,18 @@ impl Plant {
     /// # Panics
     /// In debug builds, if a command is not in [-1, 1] or a hand's force not finite: a bug of the caller.
     pub fn step(&mut self, inputs: &Inputs) {
+        let held = self.hold(inputs);
+        if let Some(effects) = &mut self.effects {
+            effects.begin_period(held.command.to_array());
+            self.integrator.advance(effects.as_mut(), &mut self.state, held);
+        } else {
+            self.integrator.advance(&mut Baseline, &mut self.state, held);
+        }
+    }
+
+    /// What is held over a period with these inputs; a slow valve goes on by that period.
+    #[inline(always)]
+    pub(crate) fn hold(&mut self, inputs: &Inputs) -> Held {
         debug_assert!(inputs.valve.iter().all(|u| (-1.0..=1.0).contains(u)), "{inputs:?}");
         debug_assert!(
             inputs.hand_force_carriage_n.is_finite() && inputs.hand_force_load_n.is_finite(),
@@ -122,19 +134,24 @@ impl Plant {
             (passed, stuck) = self.valves.pass(command.to_array(), spools);
             command = Pair::new(passed[0], passed[1]);
         }
-        let held = Held {
+        Held {
             command,
             hand: hand_forces(inputs),
             stopped: self.state.emergency_stop,
             linked: self.state.linked,
             stuck,
-        };
-        if let Some(effects) = &mut self.effects {
-            effects.begin_period(command.to_array());
-            self.integrator.advance(effects.as_mut(), &mut self.state, held);
-        } else {
-            self.integrator.advance(&mut Baseline, &mut self.state, held);
         }
+    }
+
+    /// Whether the baseline's laws move it, which many rigs can be moved by at once.
+    pub(crate) fn is_baseline(&self) -> bool {
+        self.effects.is_none()
+    }
+
+    /// Goes to where a batch has moved it.
+    pub(crate) fn go_to(&mut self, lanes: &Lanes, supply_pa: f64) {
+        lanes.store(&mut self.state);
+        self.state.supply_pressure_pa = supply_pa;
     }
 
     /// True states and terms at this instant; of the inputs only the hand forces matter, since a spool lags.
@@ -180,7 +197,6 @@ impl Plant {
         self.effects.as_deref()
     }
 
-    #[cfg(test)]
     pub(crate) fn integrator(&self) -> &Integrator {
         &self.integrator
     }

@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::chamber::Chambers;
-use crate::lanes::Pair;
+use crate::lanes::{Axes, Pair};
 use crate::parameters::RigParameters;
 use crate::state::{AxisState, State};
 

@@ -13,6 +13,7 @@
 //! Source: rig-model.md, Emergency stop.
 
 use crate::faults::SupplyFault;
+use crate::lanes::Form;
 use crate::parameters::SupplyParameters;
 
 /// The node's constants.
@@ -45,6 +46,21 @@ impl Supply {
         }
     }
 
+    #[inline(always)]
+    pub(crate) fn formed<P>(&self, form: &mut impl Form<P>) -> Self {
+        let mut one = |number| form.one(number);
+        let own = &self.parameters;
+        let parameters = SupplyParameters {
+            pressure_pa: one(own.pressure_pa),
+            exhaust_pressure_pa: one(own.exhaust_pressure_pa),
+            atmospheric_pressure_pa: one(own.atmospheric_pressure_pa),
+            discharge_time_constant_s: one(own.discharge_time_constant_s),
+            recovery_time_constant_s: one(own.recovery_time_constant_s),
+            check_valve_pressure_pa: one(own.check_valve_pressure_pa),
+        };
+        Supply { parameters }
+    }
+
     /// Node pressure, Pa absolute, a span after it was `pressure_pa`.
     #[inline(always)]
     pub(crate) fn after(&self, pressure_pa: f64, stopped: bool, decay: SupplyDecay) -> f64 {
@@ -60,6 +76,13 @@ impl Supply {
     #[inline(always)]
     pub(crate) fn check_valves_shut(&self, pressure_pa: f64) -> bool {
         pressure_pa < self.parameters.check_valve_pressure_pa
+    }
+}
+
+impl SupplyDecay {
+    #[inline(always)]
+    pub(crate) fn formed<P>(&self, form: &mut impl Form<P>) -> Self {
+        SupplyDecay { discharge: form.one(self.discharge), recovery: form.one(self.recovery) }
     }
 }
 

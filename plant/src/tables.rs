@@ -34,10 +34,25 @@ const AXIS_COLUMNS: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_P
 /// What `out` says.
 pub fn write_measurement_head(out: &mut impl Write, linked: bool, added_mass_kg: f64) -> io::Result<()> {
     write!(out, "# linked={linked} added_mass_kg={added_mass_kg}\ntime_s")?;
-    for axis in ["drive", "load"] {
-        AXIS_COLUMNS.iter().try_for_each(|column| write!(out, ",{axis}_{column}"))?;
-    }
+    measurement_columns().try_for_each(|column| write!(out, ",{column}"))?;
     writeln!(out)
+}
+
+/// Columns of `measurement.csv` after `time_s`.
+pub fn measurement_columns() -> impl Iterator<Item = String> {
+    ["drive", "load"]
+        .into_iter()
+        .flat_map(|axis| AXIS_COLUMNS.iter().map(move |column| format!("{axis}_{column}")))
+}
+
+impl CycleRecord {
+    /// The values of [`measurement_columns`].
+    pub fn measured(&self) -> impl Iterator<Item = f64> {
+        self.valve.iter().zip(&self.readings).flat_map(|(valve, axis)| {
+            let readings = [&axis.position, &axis.force, &axis.pressure_a, &axis.pressure_b];
+            std::iter::once(*valve).chain(readings.map(|reading| reading.value))
+        })
+    }
 }
 
 /// Writes one row of `measurement.csv`.
@@ -46,11 +61,7 @@ pub fn write_measurement_head(out: &mut impl Write, linked: bool, added_mass_kg:
 /// What `out` says.
 pub fn write_measurement(out: &mut impl Write, record: &CycleRecord) -> io::Result<()> {
     write_time(out, record.cycle)?;
-    for (valve, axis) in record.valve.iter().zip(&record.readings) {
-        let readings = [&axis.position, &axis.force, &axis.pressure_a, &axis.pressure_b];
-        write!(out, ",{valve}")?;
-        readings.iter().try_for_each(|reading| write!(out, ",{}", reading.value))?;
-    }
+    record.measured().try_for_each(|value| write!(out, ",{value}"))?;
     writeln!(out)
 }
 

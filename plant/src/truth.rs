@@ -16,7 +16,7 @@
 use crate::effects::Effects;
 use crate::effects::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
-use crate::lanes::Pair;
+use crate::lanes::{Axes, Pair};
 use crate::motion::side;
 use crate::state::{Inputs, State};
 use crate::valve::edge_flow;

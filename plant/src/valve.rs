@@ -15,7 +15,7 @@
 //!
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6.
 
-use crate::lanes::Pair;
+use crate::lanes::{Axes, Choice, Form, Pair};
 use crate::parameters::ValveParameters;
 use crate::parameters::table::VALVE_POINTS;
 
@@ -37,23 +37,23 @@ pub fn quantise_valve(u: f64) -> f64 {
 
 /// The valve's characteristic, ready for the step.
 #[derive(Debug, Clone)]
-pub(crate) struct Valve {
-    point: [Pair; HINGES],
-    supply_hinge: [Pair; HINGES],
-    exhaust_hinge: [Pair; HINGES],
+pub(crate) struct Valve<P = Pair> {
+    point: [P; HINGES],
+    supply_hinge: [P; HINGES],
+    exhaust_hinge: [P; HINGES],
 }
 
 /// What an edge lets through per unit of the pressure root, m^3/s per Pa, for both chambers of both axes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Edges {
+pub(crate) struct Edges<P> {
     /// Conductance of the edge that chamber a is connected to.
-    pub(crate) conductance_a: Pair,
+    pub(crate) conductance_a: P,
     /// Conductance of the edge that chamber b is connected to.
-    pub(crate) conductance_b: Pair,
+    pub(crate) conductance_b: P,
     /// Pressure on the far side of chamber a's edge: supply or exhaust.
-    pub(crate) far_pressure_a: Pair,
+    pub(crate) far_pressure_a: P,
     /// Pressure on the far side of chamber b's edge.
-    pub(crate) far_pressure_b: Pair,
+    pub(crate) far_pressure_b: P,
 }
 
 impl Valve {
@@ -79,21 +79,32 @@ impl Valve {
         [sum(&self.supply_hinge), sum(&self.exhaust_hinge)]
     }
 
+    #[inline(always)]
+    pub(crate) fn formed<P: Copy, F: Form<P>>(&self, form: &mut F) -> Valve<P> {
+        Valve {
+            point: formed_hinges(&self.point, form),
+            supply_hinge: formed_hinges(&self.supply_hinge, form),
+            exhaust_hinge: formed_hinges(&self.exhaust_hinge, form),
+        }
+    }
+}
+
+impl<P: Axes> Valve<P> {
     /// Which edge each chamber sees and how far it is open, for spools in [-1, 1].
     ///
     /// s > 0: supply to a, b to exhaust; s < 0: supply to b, a to exhaust.
     #[inline(always)]
-    pub(crate) fn edges(&self, spool: Pair, supply_pa: f64, exhaust_pa: f64) -> Edges {
+    pub(crate) fn edges(&self, spool: P, supply_pa: f64, exhaust_pa: f64) -> Edges<P> {
         let opening = spool.abs();
-        let mut supply = Pair::both(0.0);
-        let mut exhaust = Pair::both(0.0);
+        let mut supply = P::both(0.0);
+        let mut exhaust = P::both(0.0);
         for i in 0..HINGES {
-            let beyond = (opening - self.point[i]).max(Pair::both(0.0));
+            let beyond = (opening - self.point[i]).max(P::both(0.0));
             supply = supply + self.supply_hinge[i] * beyond;
             exhaust = exhaust + self.exhaust_hinge[i] * beyond;
         }
-        let extending = Pair::both(0.0).less(spool);
-        let (supply_pa, exhaust_pa) = (Pair::both(supply_pa), Pair::both(exhaust_pa));
+        let extending = P::both(0.0).less(spool);
+        let (supply_pa, exhaust_pa) = (P::both(supply_pa), P::both(exhaust_pa));
         Edges {
             conductance_a: extending.choose(supply, exhaust),
             conductance_b: extending.choose(exhaust, supply),
@@ -103,14 +114,23 @@ impl Valve {
     }
 }
 
+#[inline(always)]
+fn formed_hinges<P: Copy, F: Form<P>>(own: &[Pair; HINGES], form: &mut F) -> [P; HINGES] {
+    let mut formed = [form.pair(own[0]); HINGES];
+    for i in 1..HINGES {
+        formed[i] = form.pair(own[i]);
+    }
+    formed
+}
+
 /// Normal volume flow through an edge into the chamber, m^3/s, positive inwards [Neugebauer 2011, eq. 4].
 ///
 /// `conductance` is in m^3/s per Pa and not negative, pressures are absolute, Pa, and positive.
 #[inline(always)]
-pub(crate) fn edge_flow(conductance: Pair, far_pa: Pair, chamber_pa: Pair) -> Pair {
+pub(crate) fn edge_flow<P: Axes>(conductance: P, far_pa: P, chamber_pa: P) -> P {
     let upstream = far_pa.max(chamber_pa);
     let downstream = far_pa.min(chamber_pa);
-    let throat = downstream.max(upstream * Pair::both(0.5));
+    let throat = downstream.max(upstream * P::both(0.5));
     let root = ((upstream - throat) * throat).sqrt();
     (conductance * root).with_sign_of(far_pa - chamber_pa)
 }

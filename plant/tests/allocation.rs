@@ -7,7 +7,7 @@ use std::cell::Cell;
 
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::faults::{AxisFaults, Faults, SensorFault, SupplyFault, ValveFault};
-use plant::{Axis, Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
+use plant::{Axis, Batch, Inputs, People, Plant, RigParameters, Scene, Sensors, Setup};
 
 thread_local! {
     /// Allocations of this thread; the test harness has threads of its own.
@@ -103,6 +103,31 @@ fn a_period_with_all_effects_allocates_nothing() {
         value: vec![1.0, 0.0, -1.0],
     });
     periods_allocate_nothing(&rig.with_tabulated(&tables).expect("allowed"));
+}
+
+#[test]
+fn a_batch_allocates_nothing_in_a_step() {
+    let rig = RigParameters::baseline();
+    let mut plants = vec![Plant::new(&rig, &Setup { linked: true, ..Setup::default() }).expect("good"); 11];
+    plants[4].expect_faults();
+    let mut batch = Batch::new(plants);
+    let (faults, _) = broken();
+    let counted = ALLOCATIONS.with(Cell::get);
+    let mut inputs = [Inputs::default(); 11];
+    for k in 0..2000 {
+        match k {
+            300 => batch.plant_mut(3).trip_emergency_stop(),
+            700 => batch.plant_mut(4).set_faults(&faults),
+            900 => batch.plant_mut(5).unlink(),
+            _ => (),
+        }
+        for (i, inputs) in inputs.iter_mut().enumerate() {
+            inputs.valve = if (k + 50 * i) / 300 % 2 == 0 { [1.0, -0.5] } else { [-1.0, 0.5] };
+        }
+        batch.step(&inputs);
+    }
+    assert_eq!(ALLOCATIONS.with(Cell::get), counted);
+    assert!(batch.plants()[3].check_valves_shut());
 }
 
 #[test]

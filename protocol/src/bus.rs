@@ -20,7 +20,6 @@ mod host_report;
 mod hosted_rig;
 pub mod lockstep;
 mod packets;
-mod socket_file;
 mod socket_peer;
 mod tally;
 mod timed;

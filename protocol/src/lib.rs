@@ -13,6 +13,8 @@ pub mod live_cycles;
 pub mod periods;
 pub mod response_time;
 pub mod run_folder;
+pub mod socket_file;
 pub mod sources;
+pub mod telemetry;
 pub mod timing;
 pub mod wire_time;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use protocol::frames::{ALIVE_RANGE, BIT_RATE_PER_S, ECHO_RANGE, MESSAGES};
 
 /// Identifier, name, sender, period in ms (0: event) and bytes.
-const CONTRACT: [(u16, &str, &str, u32, u8); 23] = [
+const CONTRACT: [(u16, &str, &str, u32, u8); 24] = [
     (0x108, "ConsoleEmergencyStop", "Console", 100, 2),
     (0x109, "RigEmergencyStop", "Rig", 100, 2),
     (0x10A, "DriveEmergencyStop", "DriveController", 100, 2),
@@ -25,6 +25,7 @@ const CONTRACT: [(u16, &str, &str, u32, u8); 23] = [
     (0x181, "Link", "Bench", 0, 1),
     (0x182, "Weights", "Bench", 0, 2),
     (0x183, "FaultMark", "Bench", 0, 3),
+    (0x184, "HandSetPoint", "Bench", 0, 5),
     (0x1E0, "DriveXcpCommand", "Console", 0, 8),
     (0x1E1, "DriveXcpResponse", "DriveController", 0, 8),
     (0x1E2, "LoadXcpCommand", "Console", 0, 8),

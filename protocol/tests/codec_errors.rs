@@ -46,7 +46,7 @@ fn each_physical_signal_refuses_what_is_out_of_range_or_not_finite() {
             }
         }
     }
-    assert_eq!(refused, 9 * (2 + 2 * 4 + 1 + 2 * 4 + 2 + 1), "physical signals of all messages");
+    assert_eq!(refused, 9 * (2 + 2 * 4 + 1 + 2 * 4 + 2 + 1 + 2), "physical signals of all messages");
 }
 
 #[test]

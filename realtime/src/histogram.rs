@@ -21,9 +21,10 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
-use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, IntervalLogWriterError, Tag};
 use serde::{Serialize, Serializer};
+
+use crate::deflate::DeflateSerializer;
 
 pub use hdrhistogram::Histogram;
 
@@ -180,7 +181,7 @@ pub fn write_hlog(
     let tagged = tagged.collect::<io::Result<Vec<_>>>()?;
 
     let mut file = BufWriter::new(File::create(path)?);
-    let mut serializer = V2DeflateSerializer::new();
+    let mut serializer = DeflateSerializer::new();
     write_head(&mut file, started)?;
     for (tag, histogram) in tagged {
         write_interval(&mut file, &mut serializer, tag, histogram, (Duration::ZERO, duration))?;
@@ -196,7 +197,7 @@ pub(crate) fn start_of_log(started_unix_s: f64) -> io::Result<Duration> {
 
 /// The comments, the start and the base time of a log.
 pub(crate) fn write_head(out: &mut impl Write, started: Duration) -> io::Result<()> {
-    let mut serializer = V2DeflateSerializer::new();
+    let mut serializer = DeflateSerializer::new();
     let started = SystemTime::UNIX_EPOCH + started;
     IntervalLogWriterBuilder::new()
         .add_comment("[Histogram log format version 1.3]")
@@ -210,7 +211,7 @@ pub(crate) fn write_head(out: &mut impl Write, started: Duration) -> io::Result<
 /// One line: a histogram of the interval that begins `from` after the base time and lasts `length`.
 pub(crate) fn write_interval(
     out: &mut impl Write,
-    serializer: &mut V2DeflateSerializer,
+    serializer: &mut DeflateSerializer,
     tag: Tag<'_>,
     histogram: &Histogram<u64>,
     (from, length): (Duration, Duration),

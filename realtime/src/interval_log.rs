@@ -20,9 +20,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use hdrhistogram::serialization::V2DeflateSerializer;
-
 use crate::clock::Instant;
+use crate::deflate::DeflateSerializer;
 use crate::histogram::{Percentiles, Recorder, start_of_log, tag, write_head, write_interval};
 
 /// Length of an interval.
@@ -73,13 +72,15 @@ impl TaggedRecorder {
 pub struct IntervalLog {
     path: PathBuf,
     file: File,
-    serializer: V2DeflateSerializer,
+    serializer: DeflateSerializer,
     base: Instant,
     /// Start of the second that is going on, in ns after the base.
     from_ns: u64,
     lines: Vec<u8>,
     /// Bytes of whole lines in the file.
     length: u64,
+    /// Lines written since they were taken, where somebody takes them.
+    copy: Option<Vec<u8>>,
 }
 
 impl IntervalLog {
@@ -96,15 +97,28 @@ impl IntervalLog {
         let mut log = Self {
             path: path.into(),
             file,
-            serializer: V2DeflateSerializer::new(),
+            serializer: DeflateSerializer::new(),
             base,
             from_ns: 0,
             lines: Vec::new(),
             length: 0,
+            copy: None,
         };
         write_head(&mut log.lines, started)?;
         log.write_out()?;
         Ok(log)
+    }
+
+    /// Keeps a copy of the lines written from now on, for whoever looks on.
+    #[must_use]
+    pub fn with_copy(mut self) -> Self {
+        self.copy = Some(Vec::new());
+        self
+    }
+
+    /// The lines since they were taken the last time.
+    pub(crate) fn take_copy(&mut self) -> Vec<u8> {
+        self.copy.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Whether `at` lies in a later second than the one that is going on.
@@ -142,6 +156,9 @@ impl IntervalLog {
             recorder.reset();
         }
         self.from_ns = at_ns - at_ns % INTERVAL_NS;
+        if let Some(copy) = &mut self.copy {
+            copy.extend(&self.lines);
+        }
         self.write_out()
     }
 

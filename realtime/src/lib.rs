@@ -48,6 +48,7 @@
 pub mod allocations;
 pub mod arrivals;
 pub mod clock;
+mod deflate;
 pub mod flight;
 pub mod histogram;
 pub mod interval_log;

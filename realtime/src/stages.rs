@@ -149,6 +149,11 @@ impl StageAccount {
         self.log = Some(log);
     }
 
+    /// Lines that the log got since they were taken the last time, if it keeps copies ([`IntervalLog::with_copy`]).
+    pub fn take_copy(&mut self) -> Vec<u8> {
+        self.log.as_mut().map(IntervalLog::take_copy).unwrap_or_default()
+    }
+
     /// Records a cycle; first writes the second that is over, when this cycle was done in a later one.
     ///
     /// # Errors

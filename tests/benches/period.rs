@@ -5,8 +5,12 @@
 //! The motion is the recorded one of plant's tests of accuracy: set-points under load steps, with rests, sticking and
 //! contact. Before anything is timed, both codes run the whole record and must stay together to 1e-9: only then is it
 //! the same scheme. Divan gives the distribution over
-//! samples of 50 periods; the two last lines compare the best of alternating passes, which is what
+//! samples of 50 periods; the lines after it compare the best of alternating passes, which is what
 //! noise from the machine touches least. The code is that which ships: plain x86-64, the release profile.
+//!
+//! A batch of n rigs shares the record out: each begins at another place of it and makes an n-th, so that a pass of a batch is
+//! the same 6 s as a pass of one plant, corners and all, but no two corners coincide. That each ends where its neighbour began,
+//! to the bit, is checked before anything is timed.
 
 #![allow(unsafe_code, clippy::print_stdout)] // the floor is C, and a benchmark prints
 
@@ -15,7 +19,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use divan::Bencher;
-use plant::{AxisState, Inputs, Plant, RigParameters};
+use plant::{AxisState, Batch, Inputs, Plant, Registers, RigParameters};
 
 #[path = "../../plant/tests/scenario/mod.rs"]
 mod scenario;
@@ -170,9 +174,56 @@ fn check_the_same_scheme(rig: &RigParameters, scenario: &Scenario) {
     println!("same trajectory over {} ms to {worst:.1e}", scenario.inputs.len());
 }
 
+/// Rigs of the batches that are timed; the floor's ratios are told for all of them.
+const BATCHES: [usize; 4] = [3, 8, 64, 256];
+
+/// A batch that shares a record out among its rigs, and the inputs of each of its periods.
+struct Shared {
+    rigs: usize,
+    registers: Registers,
+    fresh: Batch,
+    inputs: Vec<Vec<Inputs>>,
+    ns: f64,
+}
+
+impl Shared {
+    fn new(rig: &RigParameters, scenario: &Scenario, rigs: usize, registers: Registers) -> Self {
+        let each = scenario.inputs.len() / rigs;
+        let plant = |i: usize| Plant::in_state(rig, &scenario.states[i * each]).expect("a recorded state");
+        let fresh = Batch::new((0..rigs).map(plant).collect()).with_registers(registers);
+        let inputs = (0..each).map(|k| (0..rigs).map(|i| scenario.inputs[i * each + k]).collect()).collect();
+        let own = Shared { rigs, registers, fresh, inputs, ns: f64::INFINITY };
+        for (i, plant) in own.passed().plants()[..rigs - 1].iter().enumerate() {
+            assert_eq!(*plant.state(), scenario.states[(i + 1) * each], "rig {i} of {rigs} in {registers:?}");
+        }
+        own
+    }
+
+    fn passed(&self) -> Batch {
+        let mut batch = self.fresh.clone();
+        self.inputs.iter().for_each(|inputs| batch.step(black_box(inputs)));
+        batch
+    }
+
+    /// One more pass; keeps the best.
+    fn time(&mut self) {
+        let mut batch = self.fresh.clone();
+        let before = Instant::now();
+        self.inputs.iter().for_each(|inputs| batch.step(black_box(inputs)));
+        let periods = (self.inputs.len() * self.rigs) as f64;
+        self.ns = self.ns.min(before.elapsed().as_nanos() as f64 / periods);
+        black_box(&batch);
+    }
+}
+
 fn main() {
     let (rig, scenario) = motion();
     check_the_same_scheme(&rig, &scenario);
+    let there = || Registers::ALL.into_iter().filter(|registers| registers.are_there());
+    let mut batches: Vec<Shared> = there()
+        .flat_map(|registers| BATCHES.map(|rigs| (rigs, registers)))
+        .map(|(rigs, registers)| Shared::new(&rig, &scenario, rigs, registers))
+        .collect();
     divan::main();
 
     let periods = scenario.inputs.len() as f64;
@@ -186,7 +237,22 @@ fn main() {
         scenario.inputs.iter().for_each(|inputs| floor.step(black_box(inputs)));
         floor_ns = floor_ns.min(before.elapsed().as_nanos() as f64 / periods);
         black_box((&plant, &floor.axes));
+        batches.iter_mut().for_each(Shared::time);
     }
     println!("plant {plant_ns:.0} ns per period of 1 ms: {:.0} times faster than real time", 1e6 / plant_ns);
     println!("floor {floor_ns:.0} ns per period: the plant takes {:.2} of it", plant_ns / floor_ns);
+    for Shared { rigs, registers, ns, .. } in &batches {
+        println!(
+            "batch of {rigs:3} in {registers:?}: {ns:.0} ns per rig and period, {:.2} of the floor and {:.2} of the plant, \
+             {:.0} s simulated in a second of a core",
+            ns / floor_ns,
+            ns / plant_ns,
+            1e6 / ns
+        );
+    }
+    let widest = Registers::widest();
+    if let Some(batch) = batches.iter().find(|batch| batch.rigs == 64 && batch.registers == widest) {
+        let of_floor = batch.ns / floor_ns;
+        println!("batch {:.0} ns per rig and period: {of_floor:.2} of the floor", batch.ns);
+    }
 }

@@ -1,8 +1,8 @@
 //! Where the programs under test are: given by the environment, else built once as they ship.
 //!
 //! `AIRBENCH_BIN_DIR` and `AIRBENCH_COUNTING_BIN_DIR` name folders that hold `emulator`, `controller` and, as shipped,
-//! `bench` and `discrepancy`; a script that has built them sets these. Without them cargo builds the release profile, and
-//! says itself where the results are.
+//! `bench`, `discrepancy` and `campaign`; a script that has built them sets these. Without them cargo builds the release
+//! profile, and says itself where the results are.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -19,6 +19,8 @@ pub enum Program {
     Bench,
     /// The workflow that names what a model is missing.
     Discrepancy,
+    /// Thousands of runs from a file.
+    Campaign,
 }
 
 impl Program {
@@ -30,6 +32,7 @@ impl Program {
             Self::Controller => "controller",
             Self::Bench => "bench",
             Self::Discrepancy => "discrepancy",
+            Self::Campaign => "campaign",
         }
     }
 }
@@ -82,7 +85,7 @@ fn build(features: &[&str]) -> PathBuf {
     cargo.current_dir(workspace()).args(["build", "--release", "--message-format=json-render-diagnostics"]);
     // Only these two count their allocations.
     let counting = [Program::Emulator, Program::Controller];
-    let all = [counting[0], counting[1], Program::Bench, Program::Discrepancy];
+    let all = [counting[0], counting[1], Program::Bench, Program::Discrepancy, Program::Campaign];
     for program in if features.is_empty() { &all[..] } else { &counting[..] } {
         cargo.args(["--package", program.name(), "--bin", program.name()]);
     }

@@ -18,6 +18,19 @@ pub fn python() -> PathBuf {
     python
 }
 
+/// The python of another environment beside it, as `scripts/tools.sh` names it.
+///
+/// # Panics
+/// When there is none.
+#[must_use]
+pub fn of(environment: &str) -> PathBuf {
+    let python = python();
+    let tools = python.ancestors().nth(3).expect("an environment lies in the folder of tools");
+    let other = tools.join(environment).join("bin/python");
+    assert!(other.exists(), "{} is missing: run scripts/test, which makes it", other.display());
+    other
+}
+
 /// Runs a script of `tests/python` and gives what it printed.
 ///
 /// # Panics

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -41,6 +42,9 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate stands in the workspace")
 }
 
+/// Machines that this process started.
+static STARTED: AtomicU32 = AtomicU32::new(0);
+
 /// A machine that has run its job and is gone.
 #[derive(Debug)]
 pub struct Guest {
@@ -65,7 +69,8 @@ impl Guest {
         let ended = Running::start("scripts/vcan-vm", &mut command).wait_within(LIMIT);
         let lines: Vec<&str> = ended.stderr.lines().collect();
         let last = lines[lines.len().saturating_sub(LAST_LINES)..].join("\n");
-        let log = root().join(format!("target/vm-said-{}.txt", std::process::id()));
+        let nth = STARTED.fetch_add(1, Ordering::Relaxed);
+        let log = root().join(format!("target/vm-said-{}-{nth}.txt", std::process::id()));
         fs::write(&log, &ended.stderr).expect("a log in target");
         eprintln!("the last lines of {}:\n{last}", log.display());
         Self { folder, said: ended.expect_code(0).stderr }

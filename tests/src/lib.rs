@@ -11,11 +11,14 @@
 //!   foreign_python  scripts with the packages that the product is held against
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   door ──── the gateway, and a client that does what it is told
+//!   onlooker  a viewer of the telemetry, and the live page as programs see it
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   firmware  a controller in C, and how well it positions
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
 //!   noise ── a node that babbles, and whether it was ever obeyed
+//!   pairs ─── runs with something and without, in turns, and the table of what it costs
+//!   viewers ─ ten of the live page, for scripts/viewers
 //!   record_maker  blind records for the study of the workflow, from a simulation of its own
 //!   study ─── the judge of the discrepancy workflow, for scripts/study
 //!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
@@ -40,14 +43,18 @@ pub mod hidden;
 pub mod launch;
 pub mod load;
 pub mod noise;
+pub mod onlooker;
 pub mod own;
+pub mod pairs;
 pub mod peer;
 pub mod process;
 pub mod record_maker;
 pub mod records;
 pub mod scene;
 pub mod skip;
+pub mod small_disk;
 pub mod study;
 pub mod tune;
 pub mod turn;
+pub mod viewers;
 pub mod xcp;

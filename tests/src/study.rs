@@ -12,7 +12,8 @@
 //! | [`draws`] | which effects, how strong, where, under which difficulties: a pure function of seed and shape |
 //! | [`folder`] | the files of a study's folder; each is whole or absent |
 //! | [`program`] | one start of the program under study: time limit, wall time, memory |
-//! | [`campaign`] | all draws that are not done yet, several at once |
+//! | [`step`] | one draw: records, program, what it wrote |
+//! | [`answer`] | what a campaign is told of it |
 //! | [`report`] | `report.json`, read as strictly as it is promised |
 //! | [`judge`] | one case: what was hidden against what was named |
 //! | [`leave_out`] | one case whose effect is left out of the program's catalogue |
@@ -30,7 +31,7 @@
 //!
 //! The commands: `scripts/study --help`; what they found: `tests/docs/study.md`.
 
-pub mod campaign;
+pub mod answer;
 pub mod classes;
 pub mod compare;
 pub mod compute;
@@ -49,6 +50,7 @@ pub mod report;
 pub mod resolve;
 pub mod score;
 pub mod signature;
+pub mod step;
 
 /// Version of every JSON file of the study.
 pub const SCHEMA_VERSION: u32 = 1;

@@ -1,10 +1,24 @@
-//! Real-time runs of one test file take turns: two of them on two processors would disturb each other.
+//! Real-time runs take turns: two of them on two processors would disturb each other, in one test file or in two.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use crate::binaries::workspace;
+use rustix::fs::{FlockOperation, flock};
+use std::fs::File;
 
-/// Waits for the machine; it is this test's until the guard goes.
-pub fn take() -> MutexGuard<'static, ()> {
-    static TURN: Mutex<()> = Mutex::new(());
-    // A test that failed while it held the machine has left it.
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+/// The machine, as long as it is held.
+pub struct Turn {
+    _lock: File,
+}
+
+/// Waits for the machine; it is this test's until the turn goes, or its process.
+///
+/// # Panics
+/// When the file that stands for the machine cannot be made.
+#[must_use]
+pub fn take() -> Turn {
+    let folder = workspace().join("target");
+    let made = std::fs::create_dir_all(&folder).and_then(|()| File::create(folder.join("turn.lock")));
+    let lock = made.unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    // Each opening of the file has a lock of its own, so that threads of one process wait for each other too.
+    flock(&lock, FlockOperation::LockExclusive).unwrap_or_else(|error| panic!("turn.lock: {error}"));
+    Turn { _lock: lock }
 }

@@ -9,6 +9,7 @@ use protocol::can::CanFrame;
 use system_tests::axis_table::AxisTable;
 use system_tests::binaries::Build;
 use system_tests::launch::Pace;
+use system_tests::onlooker::Viewer;
 use system_tests::peer::Peer;
 use system_tests::records::{count, json};
 use system_tests::scene::{LINKED, RESTLESS, Scene};
@@ -57,7 +58,12 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
         .emulator(Pace::Real)
         .build(Build::CountingAllocations)
         .with(&format!("--seconds 11.5 --full-timing --faults {}", faults.display()))
+        .with(&format!("--telemetry {}", scene.path("telemetry").display()))
         .start();
+    // One that looks on and one that stands still: both are served outside of the 1 ms path.
+    let viewer = Viewer::connect(&scene.path("telemetry"));
+    let _still = Viewer::connect(&scene.path("telemetry"));
+    let reading = std::thread::spawn(move || viewer.to_the_end());
     let stranger = scene.peer();
     let options = format!("--repeat --full-timing --xcp {}", xcp::config(&scene).display());
     let controller = scene.controller(Pace::Real).build(Build::CountingAllocations).with(&options).start();
@@ -71,6 +77,8 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
     }
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait().expect_code(0);
+    let told = reading.join().expect("the viewer does not panic");
+    assert!(told.cycles.len() > 11_000, "the viewer saw {} cycles", told.cycles.len());
     assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], true);
     let summary = json(&scene.path("emulator/summary.json"));
     let controller = json(&scene.path("controller/controller.json"));

@@ -1,12 +1,12 @@
 //! Faults of the output: a file that may not grow, a disk that is full, a process that is killed while it writes.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 use system_tests::launch::Pace;
 use system_tests::process::Ended;
 use system_tests::records::{Table, bus_log_to_last_whole_line, count, expect_whole_lines, json};
 use system_tests::scene::{RESTLESS, Scene};
 use system_tests::skip;
+use system_tests::small_disk::SmallDisk;
 use system_tests::turn;
 
 const BAD_INPUT: i32 = 2;
@@ -55,7 +55,7 @@ fn a_controller_whose_file_cannot_grow_ends_and_the_rig_shuts_its_valve() {
 fn a_full_disk_ends_the_run_and_keeps_whole_lines() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let Some(disk) = SmallDisk::mount(scene.path("disk")) else {
+    let Some(disk) = SmallDisk::mount(scene.path("disk"), 512) else {
         skip::tell("a_full_disk_ends_the_run_and_keeps_whole_lines", "mounting a tmpfs needs root");
         return;
     };
@@ -69,27 +69,6 @@ fn a_full_disk_ends_the_run_and_keeps_whole_lines() {
     let _ = expect_whole_lines(&folder.join("bus.log"));
     let summary = folder.join("summary.json");
     assert!(!summary.exists() || json(&summary).is_object(), "there is no half summary");
-}
-
-/// A disk of 512 KiB.
-struct SmallDisk {
-    path: PathBuf,
-}
-
-impl SmallDisk {
-    fn mount(path: PathBuf) -> Option<Self> {
-        std::fs::create_dir(&path).expect("the folder can be written");
-        let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", "size=512k", "tmpfs"]).arg(&path);
-        mount.output().is_ok_and(|done| done.status.success()).then_some(Self { path })
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        // What cannot be unmounted now goes when its last user does.
-        let _ = Command::new("umount").arg("-l").arg(&self.path).status();
-    }
 }
 
 /// Lines wait in memory for 0.2 s at most; what a kill may cost is that, and what the machine was busy with otherwise.

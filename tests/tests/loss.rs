@@ -89,14 +89,13 @@ impl Counted {
             "{axis} commands: {injected} lost on the wire, {before} before the first, {lost} in between"
         );
         assert!(lost > 10, "{axis}: {lost} lost commands prove nothing");
-        if axis == "drive" {
-            let answered = count(&self.controller, "/cycles_answered");
-            assert_eq!(
-                answered,
-                self.heard(id) + injected,
-                "each command sent was heard or lost on the wire"
-            );
-        }
+        // Each axis answers its own sensors, of which the wire and a stall took others than from its partner.
+        let answered = count(&self.controller, &format!("/axes/{axis}/cycles_answered"));
+        assert_eq!(
+            answered,
+            self.heard(id) + injected,
+            "{axis}: each command sent was heard or lost on the wire"
+        );
     }
 
     fn check(&self) {

@@ -38,7 +38,28 @@ pub fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
     Claim { supported, sentence, reasons, not_controlled }
 }
 
+/// What is known of runs that still go on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SoFar {
+    /// What speaks against a claim, whatever comes.
+    pub against: Vec<String>,
+    /// What a claim cannot do without and is not there yet.
+    pub missing: Vec<String>,
+}
+
+/// Judges runs that still go on by the same rules.
+#[must_use]
+pub fn so_far(runs: &[RunFiles], conditions: &Conditions) -> SoFar {
+    let against = [not_granted(runs), disturbed(runs, conditions)].concat();
+    SoFar { against, missing: missing(runs, conditions) }
+}
+
 fn reasons(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+    [not_granted(runs), missing(runs, conditions), disturbed(runs, conditions)].concat()
+}
+
+/// What processes ran without.
+fn not_granted(runs: &[RunFiles]) -> Vec<String> {
     let mut reasons = Vec::new();
     for (word, lack) in [
         ("SCHED_FIFO", "real-time priority (SCHED_FIFO)"),
@@ -56,6 +77,12 @@ fn reasons(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
             reasons.push(format!("{} ran without {lack}.", who.join(" and ")));
         }
     }
+    reasons
+}
+
+/// What is not told, or too little.
+fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+    let mut reasons = Vec::new();
     let unknown = runs.iter().filter(|run| run.run.is_null() || run.controllers.is_empty()).count();
     if unknown > 0 {
         reasons.push(format!("What was granted is not told by all processes of {unknown} run(s)."));
@@ -74,6 +101,12 @@ fn reasons(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
         reasons
             .push(format!("{cycles} cycles are too few for p99.9 and beyond: {CYCLES_FOR_P999} at least."));
     }
+    reasons
+}
+
+/// What was not as it should have been.
+fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+    let mut reasons = Vec::new();
     if conditions.probe {
         reasons.push(
             "The probe kept the CPUs busy: it keeps them awake, and takes caches from the loops.".into(),

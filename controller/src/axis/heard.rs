@@ -1,8 +1,8 @@
-//! What an axis heard since its last answer: partner, emergency stops, console.
+//! What an axis heard since its last answer: partner, emergency stops, console, set-points by hand.
 
 use crate::chains::{Console, Partner};
 use plant::Axis;
-use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
+use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis};
 
 /// What was heard.
 pub(super) struct Heard {
@@ -12,6 +12,8 @@ pub(super) struct Heard {
     partner_spoke: bool,
     pub(super) console: Console,
     pub(super) stop: Option<EmergencyStopReason>,
+    /// The newest set-point by hand for this axis.
+    pub(super) hand: Option<HandSetPoint>,
     /// Cycle answered last.
     answered: Option<u64>,
 }
@@ -26,6 +28,7 @@ impl Heard {
             partner_spoke: false,
             console: Console::default(),
             stop: None,
+            hand: None,
             answered: None,
         }
     }
@@ -48,6 +51,7 @@ impl Heard {
                 self.take_stop(stop);
             }
             (_, Frame::RunControl(control)) => self.console.take_run_control(control, self.experiment),
+            (own, Frame::HandSetPoint(hand)) if own == axis_of(hand) => self.hand = Some(*hand),
             _ => {}
         }
     }
@@ -68,5 +72,12 @@ impl Heard {
         if std::mem::take(&mut self.partner_spoke) {
             *heard = Some(cycle);
         }
+    }
+}
+
+fn axis_of(hand: &HandSetPoint) -> Axis {
+    match hand.axis {
+        HandSetPointAxis::Drive => Axis::Drive,
+        HandSetPointAxis::Load => Axis::Load,
     }
 }

@@ -6,7 +6,7 @@
 //!   prepare             hold the start        relieve, match, in the order of the experiment
 //!   ramp to the force   hold the start        sinoid from 0 to the initial force
 //!   hold the start      hold the start        hold the initial force
-//!   experiment          set-points            set-points, or give way to a hand
+//!   experiment          set-points            set-points, or give way to a hand; both by hand too, if that is allowed
 //!   hold the end        hold the end          hold the last force, or give way
 //! ```
 //!
@@ -15,15 +15,17 @@
 //! the ramp to the force, until it is done that is a fault, also with a force of zero: nothing was pressed, and nobody shall
 //! take it for an experiment.
 
+use super::by_hand::ByHand;
 use crate::algorithm::Ready;
 use crate::chains::force::{ForceAsked, ForceChain, ForceInputs};
 use crate::chains::main::{MainConfig, MainOutput, Phase};
 use crate::chains::matching::{MatchingChain, MatchingInputs};
 use crate::chains::settled::ControlError;
 use crate::chains::{Fault, Partner};
+use crate::experiment::ByHandLimits;
 use crate::program::{Demand, Hand, Program, Task};
 use crate::set_point::{ForceSetPoint, ForceSource, Motion, SetPoint, SmoothWay};
-use protocol::frames::{ForceChainState, MainChainState, MatchingChainState, RigStatus};
+use protocol::frames::{ForceChainState, HandSetPoint, MainChainState, MatchingChainState, RigStatus};
 
 /// What an axis does in an experiment.
 #[derive(Clone, Debug)]
@@ -31,9 +33,18 @@ pub enum Plan {
     /// Its valve is shut.
     Shut,
     /// It is positioned.
-    Position(Motion),
+    Position(PositionPlan),
     /// It presses.
     Force(ForcePlan),
+}
+
+/// What an axis that is positioned does in an experiment.
+#[derive(Clone, Debug)]
+pub struct PositionPlan {
+    /// Its positions.
+    pub motion: Motion,
+    /// What positions given by hand keep to; `None`: none are followed.
+    pub by_hand: Option<ByHandLimits>,
 }
 
 /// What an axis that presses does in an experiment.
@@ -47,6 +58,8 @@ pub struct ForcePlan {
     pub prepare: Vec<PrepareStep>,
     /// It gives way to a hand during the experiment, instead of pressing.
     pub manual: bool,
+    /// What forces given by hand keep to; `None`: none are followed.
+    pub by_hand: Option<ByHandLimits>,
 }
 
 /// A step before the initial force.
@@ -71,18 +84,21 @@ pub(super) struct Seen<'a> {
     pub(super) rig: Option<&'a RigStatus>,
     pub(super) partner: &'a Partner,
     pub(super) still: bool,
+    /// What a person asked for since the last cycle.
+    pub(super) hand: Option<HandSetPoint>,
 }
 
 /// The work of an axis, with what it remembers.
 pub(super) enum Work {
     Shut,
-    Position { motion: Motion, start_m: f64 },
+    Position { motion: Motion, start_m: f64, by_hand: Option<ByHand> },
     Force(Box<Pressing>),
 }
 
 /// An axis that presses.
 pub(super) struct Pressing {
     plan: ForcePlan,
+    by_hand: Option<ByHand>,
     force: ForceChain,
     matching: MatchingChain,
     /// State of both, as told last.
@@ -96,11 +112,12 @@ impl Work {
     pub(super) fn new(plan: Plan, main: &MainConfig) -> Self {
         match plan {
             Plan::Shut => Self::Shut,
-            Plan::Position(motion) => {
+            Plan::Position(PositionPlan { motion, by_hand }) => {
                 let start_m = main.start_m.unwrap_or(motion.start_m());
-                Self::Position { motion, start_m }
+                Self::Position { motion, start_m, by_hand: by_hand.map(ByHand::new) }
             }
             Plan::Force(plan) => Self::Force(Box::new(Pressing {
+                by_hand: plan.by_hand.map(ByHand::new),
                 plan,
                 force: ForceChain::default(),
                 matching: MatchingChain::default(),
@@ -120,7 +137,10 @@ impl Work {
     ) -> Option<Asked> {
         match self {
             Self::Shut => None,
-            Self::Position { motion, start_m } => {
+            Self::Position { motion, start_m, by_hand } => {
+                if let Some(by_hand) = by_hand {
+                    by_hand.hear(output.phase, seen.hand.map(|hand| hand.position_m));
+                }
                 let position = match output.phase {
                     Phase::Shut => return None,
                     Phase::Approach { elapsed_s, from_m, duration_s } => {
@@ -129,8 +149,14 @@ impl Work {
                     Phase::Prepare { .. } | Phase::RampForce { .. } | Phase::HoldStart => {
                         SetPoint::at_rest(*start_m)
                     }
-                    Phase::Experiment { elapsed_s } => motion.at(elapsed_s),
-                    Phase::HoldEnd => SetPoint::at_rest(motion.end_m()),
+                    Phase::Experiment { elapsed_s } => {
+                        let planned = motion.at(elapsed_s);
+                        by_hand.as_mut().map_or(planned, |hand| hand.at(elapsed_s, planned.into()).into())
+                    }
+                    Phase::HoldEnd => {
+                        let led_to_m = by_hand.as_ref().and_then(ByHand::end);
+                        SetPoint::at_rest(led_to_m.unwrap_or(motion.end_m()))
+                    }
                 };
                 let demand = Demand { position, force: ForceSetPoint::at_rest(0.0) };
                 Some(Asked { demand, hand: Hand::User })
@@ -204,6 +230,9 @@ impl Work {
 impl Pressing {
     fn ask(&mut self, output: &MainOutput, seen: &Seen<'_>, program: &mut Program) -> Option<Asked> {
         let linked = seen.rig.is_some_and(|rig| rig.linked);
+        if let Some(by_hand) = &mut self.by_hand {
+            by_hand.hear(output.phase, seen.hand.map(|hand| hand.force_n));
+        }
         if matches!(output.phase, Phase::Approach { .. } | Phase::Shut) {
             self.step = 0;
             self.plan.source.reset();
@@ -298,8 +327,14 @@ impl Pressing {
             Phase::RampForce { elapsed_s } => {
                 SmoothWay::new(0.0, initial_n, self.plan.initial_ramp_s).force(elapsed_s)
             }
-            Phase::Experiment { elapsed_s } => self.plan.source.at(elapsed_s, &program.actual()),
-            Phase::HoldEnd => self.plan.source.end(),
+            Phase::Experiment { elapsed_s } => {
+                let planned = self.plan.source.at(elapsed_s, &program.actual());
+                self.by_hand.as_mut().map_or(planned, |hand| hand.at(elapsed_s, planned.into()).into())
+            }
+            Phase::HoldEnd => {
+                let led_to_n = self.by_hand.as_ref().and_then(ByHand::end);
+                led_to_n.map_or_else(|| self.plan.source.end(), ForceSetPoint::at_rest)
+            }
             _ => ForceSetPoint::at_rest(initial_n),
         }
     }

@@ -8,6 +8,7 @@
 //! force_limit_n = 1000.0        # the four of a row of forces
 //! initial_force_n = 100.0
 //! initial_ramp_s = 1.0
+//! by_hand_speed_m_per_s = 0.2   # of a row of forces by_hand_rate_n_per_s: set-points given by hand are followed, see below
 //! [[drive.set-point]]           # a row of positions or of forces
 //! [[drive.change]]
 //! at_s = 3.0
@@ -17,6 +18,9 @@
 //!
 //! Whether the row is of positions or of forces follows from its laws and their keys (`to_m`, `to_n`); a row that says neither is
 //! of positions for the drive and of forces for the load axis.
+//!
+//! With a largest speed (or rate) by hand, the axis follows the frame `HandSetPoint` while the experiment lasts, where its row
+//! rests.
 
 use super::section::{ExperimentError, Section};
 use crate::algorithm::Quantity;
@@ -39,6 +43,8 @@ pub struct AxisExperiment {
     pub during: During,
     /// Its set-points.
     pub set_points: SetPoints,
+    /// What set-points given by hand keep to; `None`: none are followed.
+    pub by_hand: Option<ByHandLimits>,
     /// Parameters changed while running, in the order of their times.
     pub changes: Vec<Change>,
 }
@@ -80,6 +86,15 @@ pub enum During {
     SetPoint,
     /// A hand, under force control with set-point zero.
     Manual,
+}
+
+/// What set-points given by hand keep to, in m or N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByHandLimits {
+    /// Largest rate on the way to one, per s.
+    pub rate_per_s: f64,
+    /// Least and largest one; others are taken to these.
+    pub range: [f64; 2],
 }
 
 /// Set-points of an axis.
@@ -128,6 +143,18 @@ static RAMP: Parameter =
     Parameter::new(("initial_ramp_s", "s"), [0.01, 60.0], 1.0, "how long the initial force is ramped to");
 static FORCE_LIMIT: Parameter =
     Parameter::new(("force_limit_n", "N"), [1.0, 2000.0], 1000.0, "largest force that is asked for");
+static BY_HAND_SPEED: Parameter = Parameter::new(
+    ("by_hand_speed_m_per_s", "m/s"),
+    [0.001, 1.0],
+    0.2,
+    "largest speed to a position given by hand",
+);
+static BY_HAND_RATE: Parameter = Parameter::new(
+    ("by_hand_rate_n_per_s", "N/s"),
+    [1.0, 10_000.0],
+    200.0,
+    "largest rate to a force given by hand",
+);
 static AT: Parameter =
     Parameter::new(("at_s", "s"), [0.0, 86_400.0], 0.0, "when, after the experiment began");
 // What the program's own table allows is checked there.
@@ -151,6 +178,7 @@ impl AxisExperiment {
         let segments = section.sections("set-point")?;
         let quantity = reading::quantity(&segments)?.unwrap_or(usual);
         let mut initial_ramp_s = RAMP.default;
+        let by_hand;
         let set_points = match quantity {
             Quantity::Position => {
                 if let Some(key) = FORCE_KEYS.iter().find(|key| section.has(key)) {
@@ -158,6 +186,8 @@ impl AxisExperiment {
                     return Err(section.wrong_at(key, &said));
                 }
                 let start_m = section.needed_number(&start)?;
+                let speed = section.number(&BY_HAND_SPEED)?;
+                by_hand = speed.map(|rate_per_s| ByHandLimits { rate_per_s, range: [0.0, stroke_m] });
                 SetPoints::Positions(reading::motion(start_m, segments, stroke_m)?)
             }
             Quantity::Force => {
@@ -170,14 +200,20 @@ impl AxisExperiment {
                 );
                 let initial_n = section.number_or_default(&initial)?;
                 initial_ramp_s = section.number_or_default(&RAMP)?;
+                let rate = section.number(&BY_HAND_RATE)?;
+                by_hand = rate.map(|rate_per_s| ByHandLimits { rate_per_s, range: [0.0, limit_n] });
                 SetPoints::Forces(reading::forces([initial_n, limit_n], segments, stroke_m)?)
             }
         };
+        if by_hand.is_some() && during == During::Manual {
+            let said = "during = \"manual\" leaves no set-points to be given by hand: leave one of both out";
+            return Err(section.wrong_at("during", said));
+        }
         let changes = section.sections("change")?.into_iter().map(change).collect::<Result<Vec<_>, _>>();
         let mut changes = changes?;
         changes.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
         section.finish()?;
-        Ok(Self { program, start_m, prepare, initial_ramp_s, during, set_points, changes })
+        Ok(Self { program, start_m, prepare, initial_ramp_s, during, set_points, by_hand, changes })
     }
 
     /// The force that the axis begins with, N; 0 when it is position controlled.
@@ -196,7 +232,7 @@ impl AxisExperiment {
     }
 }
 
-const FORCE_KEYS: [&str; 3] = ["force_limit_n", "initial_force_n", "initial_ramp_s"];
+const FORCE_KEYS: [&str; 4] = ["force_limit_n", "initial_force_n", "initial_ramp_s", "by_hand_rate_n_per_s"];
 
 fn program(section: &mut Section<'_>) -> Result<ProgramReference, ExperimentError> {
     let program = section.needed_text("program", "a name in programs, or a path ending in .toml")?;

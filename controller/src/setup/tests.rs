@@ -34,6 +34,7 @@ fn controllers(experiment: &str, load: &str, set: &[&str]) -> Result<Vec<AxisCon
         load_program: None,
         set: set.iter().map(|set| (*set).to_owned()).collect(),
         repeat: false,
+        after_emergency_stop: None,
     });
     let inputs = inputs.map_err(|error| error.to_string())?;
     let made = Axis::ALL.map(|axis| inputs.controller(axis, MODE).map_err(|error| error.to_string()));

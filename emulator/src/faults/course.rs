@@ -15,6 +15,7 @@ use super::table::Kind;
 use plant::scene::HandForces;
 use plant::{Axis, Inputs, Plant, Sensors};
 use protocol::bus::{WireOrder, WireOrders};
+use std::collections::VecDeque;
 
 /// Faults that people may have put in by hand and not mended, at once.
 const MOST_BY_HAND: usize = 64;
@@ -46,7 +47,7 @@ pub struct FaultCourse {
     seed: u64,
     orders: Option<WireOrders>,
     overlay: Overlay,
-    to_tell: Vec<(u16, bool)>,
+    to_tell: VecDeque<(u16, bool)>,
     /// Whether there can be any in this run.
     possible: bool,
 }
@@ -84,7 +85,7 @@ impl FaultCourse {
             seed: script.map_or(1, |script| script.seed),
             orders,
             overlay: Overlay::default(),
-            to_tell: Vec::with_capacity(if possible { MARKS } else { 0 }),
+            to_tell: VecDeque::with_capacity(if possible { MARKS } else { 0 }),
             possible,
         }
     }
@@ -124,7 +125,7 @@ impl FaultCourse {
 
     /// The next mark for the bench's frame: number of the fault, and whether it begins.
     pub fn next_to_tell(&mut self) -> Option<(u16, bool)> {
-        if self.to_tell.is_empty() { None } else { Some(self.to_tell.remove(0)) }
+        self.to_tell.pop_front()
     }
 
     /// Lets begin and end what is due in `cycle`, before the sensors are sampled.
@@ -238,7 +239,7 @@ impl FaultCourse {
         tell(Mark { number, what, fault, cause });
         let happened = matches!(what, What::Begins | What::Ends);
         if happened && self.to_tell.len() < self.to_tell.capacity() {
-            self.to_tell.push((number, what == What::Begins));
+            self.to_tell.push_back((number, what == What::Begins));
         }
     }
 

@@ -55,12 +55,17 @@ fn as_text(spec: &FaultSpec) -> String {
 }
 
 fn as_json() -> Value {
-    let faults: Vec<Value> = all().map(fault).collect();
     json!({
         "schema_version": SCHEMA_VERSION,
-        "faults": faults,
+        "faults": faults(),
         "conditions": signals().collect::<Vec<_>>(),
     })
+}
+
+/// Every fault, as programs read it.
+#[must_use]
+pub fn faults() -> Vec<Value> {
+    all().map(fault).collect()
 }
 
 fn fault(spec: &FaultSpec) -> Value {

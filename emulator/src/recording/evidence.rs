@@ -48,6 +48,8 @@ pub struct EvidenceSetup {
     pub started_unix_s: f64,
     /// The same moment on the monotonic clock.
     pub base: realtime::Instant,
+    /// Whether somebody takes the lines of the log too: [`Evidence::new_lines`].
+    pub told: bool,
 }
 
 /// What `summary.json` says of it.
@@ -136,7 +138,8 @@ impl Evidence {
         let round_trip = AXES.map(|axis| account.add(&format!("{axis}-round-trip")));
         let command_age = AXES.map(|axis| account.add(&format!("{axis}-command-age")));
         let hlog = folder.join(format!("{PROCESS}.hlog"));
-        account.log_to(IntervalLog::create(&hlog, setup.started_unix_s, setup.base)?);
+        let log_file = IntervalLog::create(&hlog, setup.started_unix_s, setup.base)?;
+        account.log_to(if setup.told { log_file.with_copy() } else { log_file });
         let mut table = None;
         if setup.full_timing {
             let mut file = LineFile::create(&folder.join(format!("{PROCESS}-timing.csv")))?;
@@ -256,6 +259,11 @@ impl Evidence {
         let mut written = Ok(());
         flight.advance(now, |dump| keep_first(&mut written, write_dump(folder, log, &dump)));
         written
+    }
+
+    /// Lines of the log that are new.
+    pub fn new_lines(&mut self) -> Vec<u8> {
+        self.account.take_copy()
     }
 
     /// Writes the table out.

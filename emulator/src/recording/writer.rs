@@ -9,6 +9,7 @@ use super::evidence::{Evidence, EvidenceReport, EvidenceSetup};
 use crate::event::{Event, EventKind};
 use crate::faults::mark;
 use crate::pace::Shared;
+use crate::telemetry::Telemetry;
 use plant::tables;
 use protocol::candump::{self, FrameRecord};
 use protocol::flight_dump::Log;
@@ -50,6 +51,8 @@ pub struct WriterSetup {
     pub faults: bool,
     /// What to keep of time; `None` in lockstep.
     pub evidence: Option<EvidenceSetup>,
+    /// Who looks on.
+    pub telemetry: Option<Telemetry>,
 }
 
 /// What the writer leaves behind.
@@ -72,6 +75,7 @@ pub struct WriterReport {
 /// The open files of a run.
 pub struct Writer {
     setup: WriterSetup,
+    telemetry: Option<Telemetry>,
     bus_log: LineFile,
     measurement: LineFile,
     truth: LineFile,
@@ -88,7 +92,7 @@ impl Writer {
     ///
     /// # Errors
     /// Names the file that cannot be made.
-    pub fn create(setup: WriterSetup) -> io::Result<Self> {
+    pub fn create(mut setup: WriterSetup) -> io::Result<Self> {
         let open = |name: &str| LineFile::create(&setup.folder.join(name));
         let (bus_log, mut measurement, mut truth) =
             (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
@@ -104,8 +108,10 @@ impl Writer {
             evidence.map(|evidence| Evidence::create(setup.folder.clone(), log, evidence)).transpose()?;
         let pending = Vec::new();
         let report = WriterReport::default();
+        let telemetry = setup.telemetry.take();
         Ok(Self {
             setup,
+            telemetry,
             bus_log,
             measurement,
             truth,
@@ -139,6 +145,7 @@ impl Writer {
             if finished || written.is_err() {
                 written = written.and(self.finish_evidence());
             }
+            self.serve();
             if let Err(error) = written {
                 self.fail(&error, shared);
                 return self.report;
@@ -152,6 +159,9 @@ impl Writer {
 
     fn drain(&mut self, records: &Records) -> io::Result<()> {
         for record in records.cycles.try_iter() {
+            if let Some(telemetry) = &mut self.telemetry {
+                telemetry.cycle(&record);
+            }
             tables::write_measurement(self.measurement.lines(), &record)?;
             tables::write_truth(self.truth.lines(), &record)?;
             self.report.rows += 1;
@@ -184,6 +194,15 @@ impl Writer {
         evidence.poll(MonotonicClock.now(), asked)
     }
 
+    /// Lets viewers have what there is for them.
+    fn serve(&mut self) {
+        let Some(telemetry) = &mut self.telemetry else { return };
+        if let Some(evidence) = &mut self.evidence {
+            telemetry.histograms(&evidence.new_lines());
+        }
+        telemetry.serve(&self.report.events);
+    }
+
     fn finish_evidence(&mut self) -> io::Result<()> {
         let Some(evidence) = self.evidence.take() else { return Ok(()) };
         let (report, written) = evidence.finish(MonotonicClock.now());
@@ -211,6 +230,9 @@ impl Writer {
     /// Tells and keeps the event. Late wake-ups have a quota of their own, so that they hide nothing else.
     fn tell(&mut self, event: Event) -> io::Result<()> {
         self.report.event_count += 1;
+        if let Some(telemetry) = &mut self.telemetry {
+            telemetry.event(&event);
+        }
         if let (Some(faults), EventKind::Fault(mark)) = (&mut self.faults, &event.kind) {
             mark.write(faults.lines(), event.cycle)?;
         }

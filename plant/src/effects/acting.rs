@@ -17,7 +17,7 @@ use super::{AxisEffects, Touched};
 use crate::faults::{Faults, Outlet};
 use crate::integrator::laws::{At, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
-use crate::lanes::{Mask, Pair};
+use crate::lanes::{Axes, Choice, Mask, Pair};
 use crate::motion::{MotionSpan, Place, side};
 use crate::parameters::{LinkageParameters, RigParameters};
 use crate::state::State;

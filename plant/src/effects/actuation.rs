@@ -5,6 +5,7 @@ use super::memory::AxisMoving;
 use super::sums::{Arriving, LimitedRate, SpoolRate, Target};
 use crate::integrator::PERIOD_S;
 use crate::integrator::laws::At;
+use crate::lanes::Axes;
 
 impl Effects {
     /// Terms of the command that arrives at the valve at a time of the period.

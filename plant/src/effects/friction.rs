@@ -5,6 +5,7 @@ use super::memory::AxisMoving;
 use super::presliding::{Bristle, Under};
 use super::sums::{BreakAwayLevel, Bristles, SlidingLevel, Viscous};
 use crate::integrator::{Integrator, Middle};
+use crate::lanes::Axes;
 use crate::motion::{Levels, Place, side};
 use crate::truth::AirAt;
 

@@ -5,7 +5,7 @@
 
 use super::AxisEffects;
 use crate::integrator::{Integrator, Lanes, PERIOD_S};
-use crate::lanes::Pair;
+use crate::lanes::{Axes, Pair};
 use crate::state::State;
 
 /// Commands that a dead time can look back to, periods; the longest allowed is 10 ms.

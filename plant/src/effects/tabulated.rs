@@ -20,6 +20,7 @@
 //! Source: discrepancy-notes.md, Pipeline 8: an unknown input over the variable that it follows.
 
 use crate::integrator::Lanes;
+use crate::lanes::Axes;
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::state::Axis;

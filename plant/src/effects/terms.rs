@@ -10,7 +10,7 @@ use super::sums::Balance;
 use super::sums::{Damping, DeadSpace, ExhaustSide, Gap, Stiffness};
 use super::tabulated::Seen;
 use crate::integrator::{Integrator, Lanes};
-use crate::lanes::Pair;
+use crate::lanes::{Axes, Pair};
 use crate::motion::side;
 use crate::state::{Inputs, State};
 use crate::truth::{AirAt, Forces, hand_forces};

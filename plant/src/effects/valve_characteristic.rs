@@ -84,7 +84,7 @@ impl ValveCharacteristic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::Pair;
+    use crate::lanes::{Axes, Pair};
     use crate::valve::{FLOW_PER_KV, Valve};
     use proptest::prelude::*;
 

@@ -6,18 +6,18 @@
 
 use super::{Held, Integrator, Lanes, Middle, Node, Span};
 use crate::chamber::Air;
-use crate::lanes::{Mask, Pair};
+use crate::lanes::{Axes, Pair};
 use crate::motion::{MotionSpan, Place, against};
 use crate::valve::edge_flow;
 
 /// A step to be made: whose, how long, from where, and what is held over it.
 #[derive(Clone, Copy)]
-pub(crate) struct At<'s> {
-    pub(crate) of: &'s Integrator,
-    pub(crate) span: &'s Span,
-    pub(crate) from: &'s Lanes,
+pub(crate) struct At<'s, P = Pair> {
+    pub(crate) of: &'s Integrator<P>,
+    pub(crate) span: &'s Span<P>,
+    pub(crate) from: &'s Lanes<P>,
     pub(crate) node: Node,
-    pub(crate) held: Held,
+    pub(crate) held: Held<P>,
     /// Which substep of the period, and which part of it; 0 for a substep that is made in one.
     pub(crate) substep: u32,
     pub(crate) part: u32,
@@ -34,20 +34,22 @@ impl At<'_> {
     pub(crate) fn since_period_s(&self) -> f64 {
         f64::from(self.substep) * self.of.substep_s() + self.since_substep_s()
     }
+}
 
+impl<P: Axes> At<'_, P> {
     /// The spools when this share of what they lack is left.
     #[inline(always)]
-    pub(crate) fn spool_after(&self, share: Pair) -> Pair {
+    pub(crate) fn spool_after(&self, share: P) -> P {
         self.held.command + (self.from.spool - self.held.command) * share
     }
 
     /// The baseline's air and flows at the midpoint, with the spools there.
     #[inline(always)]
-    pub(crate) fn middle(&self, spool: Pair) -> Middle {
+    pub(crate) fn middle(&self, spool: P) -> Middle<P> {
         let At { of, span, from, node, .. } = *self;
         let mut edges = of.valve.edges(spool, node.middle_pa, of.chambers.exhaust_pa());
         if node.shut {
-            (edges.conductance_a, edges.conductance_b) = (Pair::both(0.0), Pair::both(0.0));
+            (edges.conductance_a, edges.conductance_b) = (P::both(0.0), P::both(0.0));
         }
         let extension = of.ahead(span, from);
         let per_volume_a = of.chambers.volume_a(extension).reciprocal();
@@ -68,7 +70,7 @@ impl At<'_> {
 }
 
 /// The laws of a rig; pairs hold a value for each axis, forces are along its own extension.
-pub(crate) trait Laws {
+pub(crate) trait Laws<P: Axes = Pair> {
     /// What a step hands on beside the lanes; a step that is discarded leaves none.
     type Carried: Copy;
 
@@ -76,75 +78,81 @@ pub(crate) trait Laws {
     fn carried(&self) -> Self::Carried;
 
     /// Air and flows at the midpoint of a step.
-    fn middle(&self, at: At<'_>, carried: &mut Self::Carried) -> Middle;
+    fn middle(&self, at: At<'_, P>, carried: &mut Self::Carried) -> Middle<P>;
 
     /// Forces from outside on each piston, N: the hand's and what else there is.
-    fn outside(&self, at: At<'_>, middle: &Middle) -> Pair;
+    fn outside(&self, at: At<'_, P>, middle: &Middle<P>) -> P;
 
     /// Which axes move, for the laws of friction.
-    fn moving(&self, at: At<'_>) -> Mask;
+    fn moving(&self, at: At<'_, P>) -> P::Mask;
 
     /// Which axes rest and slide on bristles: they neither stick nor break away.
     fn on_bristles(&self) -> [bool; 2];
 
     /// Friction on moving axes but for the viscous one, N, signed; `push` is the force without it.
-    fn sliding(&self, at: At<'_>, middle: &Middle, carried: &Self::Carried, push: Pair, moving: Mask)
-    -> Pair;
+    fn sliding(
+        &self,
+        at: At<'_, P>,
+        middle: &Middle<P>,
+        carried: &Self::Carried,
+        push: P,
+        moving: P::Mask,
+    ) -> P;
 
     /// Friction on axes that this force sets in motion, N, signed.
-    fn starting(&self, at: At<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair;
+    fn starting(&self, at: At<'_, P>, middle: &Middle<P>, force: P, starts: P::Mask) -> P;
 
     /// Break-away force in the direction of a force, N.
-    fn break_away(&self, at: At<'_>, middle: &Middle, force: Pair) -> Pair;
+    fn break_away(&self, at: At<'_, P>, middle: &Middle<P>, force: P) -> P;
 
     /// Factors of the motion to the middle and to the end of a step.
-    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2];
+    fn ways<'s>(&'s self, at: At<'s, P>) -> [&'s MotionSpan<P>; 2];
 
     /// Whether a resting axis stays under this force, N without any friction.
-    fn holds(&self, at: At<'_>, middle: &Middle, axis: usize, force: f64) -> bool;
+    fn holds(&self, at: At<'_, P>, middle: &Middle<P>, axis: usize, force: f64) -> bool;
 
     /// Moves one axis through a step under a held force, N without any friction.
     fn advance(
         &self,
-        at: At<'_>,
-        middle: &Middle,
+        at: At<'_, P>,
+        middle: &Middle<P>,
         carried: &mut Self::Carried,
         axis: usize,
         force: f64,
     ) -> Place;
 
     /// The air of both chambers after a step, given what lag and bounds left of it.
-    fn air(&self, at: At<'_>, to: &mut Lanes, middle: &Middle, carried: &mut Self::Carried);
+    fn air(&self, at: At<'_, P>, to: &mut Lanes<P>, middle: &Middle<P>, carried: &mut Self::Carried);
 
     /// The spools at the step's end.
-    fn spool(&self, at: At<'_>, carried: &Self::Carried) -> Pair;
+    fn spool(&self, at: At<'_, P>, carried: &Self::Carried) -> P;
 
     /// A substep counts: what it handed on is kept.
-    fn keep(&mut self, of: &Integrator, held: Held, to: &Lanes, carried: Self::Carried);
+    fn keep(&mut self, of: &Integrator<P>, held: Held<P>, to: &Lanes<P>, carried: Self::Carried);
 }
 
 /// The laws of rig-model.md.
 pub(crate) struct Baseline;
 
-impl Laws for Baseline {
+impl<P: Axes> Laws<P> for Baseline {
     type Carried = ();
 
     #[inline(always)]
     fn carried(&self) {}
 
     #[inline(always)]
-    fn middle(&self, at: At<'_>, (): &mut ()) -> Middle {
+    fn middle(&self, at: At<'_, P>, (): &mut ()) -> Middle<P> {
         at.middle(at.spool_after(at.span.spool_to_middle))
     }
 
     #[inline(always)]
-    fn outside(&self, at: At<'_>, _: &Middle) -> Pair {
+    fn outside(&self, at: At<'_, P>, _: &Middle<P>) -> P {
         at.held.hand
     }
 
     #[inline(always)]
-    fn moving(&self, at: At<'_>) -> Mask {
-        at.from.velocity.differs(Pair::both(0.0))
+    fn moving(&self, at: At<'_, P>) -> P::Mask {
+        at.from.velocity.differs(P::both(0.0))
     }
 
     #[inline(always)]
@@ -153,52 +161,52 @@ impl Laws for Baseline {
     }
 
     #[inline(always)]
-    fn sliding(&self, at: At<'_>, _: &Middle, (): &(), _: Pair, moving: Mask) -> Pair {
-        against(at.from.velocity, Pair::both(at.of.motion.levels().sliding_n[0]), moving)
+    fn sliding(&self, at: At<'_, P>, _: &Middle<P>, (): &(), _: P, moving: P::Mask) -> P {
+        against(at.from.velocity, P::both(at.of.motion.levels().sliding_n[0]), moving)
     }
 
     #[inline(always)]
-    fn starting(&self, at: At<'_>, _: &Middle, force: Pair, starts: Mask) -> Pair {
-        against(force, Pair::both(at.of.motion.levels().sliding_n[0]), starts)
+    fn starting(&self, at: At<'_, P>, _: &Middle<P>, force: P, starts: P::Mask) -> P {
+        against(force, P::both(at.of.motion.levels().sliding_n[0]), starts)
     }
 
     #[inline(always)]
-    fn break_away(&self, at: At<'_>, _: &Middle, _: Pair) -> Pair {
-        Pair::both(at.of.motion.levels().break_away_n[0])
+    fn break_away(&self, at: At<'_, P>, _: &Middle<P>, _: P) -> P {
+        P::both(at.of.motion.levels().break_away_n[0])
     }
 
     #[inline(always)]
-    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2] {
+    fn ways<'s>(&'s self, at: At<'s, P>) -> [&'s MotionSpan<P>; 2] {
         [&at.span.motion_to_middle, &at.span.motion_to_end]
     }
 
     #[inline(always)]
-    fn holds(&self, at: At<'_>, _: &Middle, axis: usize, force: f64) -> bool {
+    fn holds(&self, at: At<'_, P>, _: &Middle<P>, axis: usize, force: f64) -> bool {
         at.of.motion.holds(at.from.place(axis).extension, force, at.of.motion.levels())
     }
 
     #[inline(always)]
-    fn advance(&self, at: At<'_>, _: &Middle, (): &mut (), axis: usize, force: f64) -> Place {
+    fn advance(&self, at: At<'_, P>, _: &Middle<P>, (): &mut (), axis: usize, force: f64) -> Place {
         let motion = &at.of.motion;
         motion.advance(axis, at.from.place(axis), force, motion.levels(), at.span.span_s)
     }
 
     #[inline(always)]
-    fn air(&self, _: At<'_>, _: &mut Lanes, _: &Middle, (): &mut ()) {}
+    fn air(&self, _: At<'_, P>, _: &mut Lanes<P>, _: &Middle<P>, (): &mut ()) {}
 
     #[inline(always)]
-    fn spool(&self, at: At<'_>, (): &()) -> Pair {
+    fn spool(&self, at: At<'_, P>, (): &()) -> P {
         at.spool_after(at.span.spool_to_end)
     }
 
     #[inline(always)]
-    fn keep(&mut self, _: &Integrator, _: Held, _: &Lanes, (): ()) {}
+    fn keep(&mut self, _: &Integrator<P>, _: Held<P>, _: &Lanes<P>, (): ()) {}
 }
 
 /// Air of both chambers in one place, for laws that treat them alike.
-impl Lanes {
+impl<P: Copy> Lanes<P> {
     #[inline(always)]
-    pub(crate) fn air(&self) -> [Air; 2] {
+    pub(crate) fn air(&self) -> [Air<P>; 2] {
         [self.air_a, self.air_b]
     }
 }

@@ -4,7 +4,7 @@
 //! and counted by peer and identifier, so that it can be held against the gaps that the peer sees. A frame that the
 //! wire loses (`wire`) is lost for all and counted by identifier; what else faults do to frames is carried out in `faulty`.
 //! In lockstep, [`super::lockstep`] decides when frames are delivered; a wire that keeps time does in `modelled`. The socket's
-//! file and its lock are in `socket_file`.
+//! file and its lock are in [`crate::socket_file`].
 
 mod closing;
 mod faulty;
@@ -14,12 +14,13 @@ use super::BusError;
 use super::control::{Control, Kind, Role};
 use super::lockstep::{Barrier, BarrierConfig, PeerId, Release};
 use super::packets::{self, Inbox, Outbox, Wait};
-use super::socket_file::SocketFile;
 use super::timed::{CYCLE_NS, Reported, TimedWire};
+use super::unix_link;
 use super::url::{BusUrl, WireOptions};
 use super::wire::{Fate, Wire};
 use crate::can::{CAN_FRAME_BYTES, CanFrame, ERROR_FLAG};
 use crate::response_time;
+use crate::socket_file::SocketFile;
 use crate::wire_time::WireEvent;
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 use rustix::net::SendFlags;
@@ -118,7 +119,7 @@ impl Host {
             response_time::rig::check(timing.bits_per_s)
                 .map_err(|arithmetic| BusError::TooSlow { url: url(), arithmetic })?;
         }
-        let socket_file = SocketFile::bind(path, wire)?;
+        let socket_file = unix_link::bind(path, wire)?;
         let timed = TimedWire::new(&wire).map_err(io::Error::from);
         let opened = timed.and_then(|timed| Ok((listening(&socket_file, timed.as_ref())?, timed)));
         let (epoll, timed) = opened.map_err(|error| BusError::Open {

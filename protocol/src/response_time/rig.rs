@@ -50,6 +50,7 @@ const ARRIVALS: &[(&str, Arrivals, &str)] = &[
         "a person: an abort right after a start, then ten a second",
     ),
     ("HandForce", Arrivals::periodic(10 * MS), "a slider that is pulled: a hundred a second"),
+    ("HandSetPoint", Arrivals::periodic(10 * MS), "a slider that is pulled: a hundred a second"),
     ("Link", Arrivals::periodic(100 * MS), "a person"),
     ("Weights", Arrivals::periodic(100 * MS), "a person"),
     ("FaultMark", Arrivals::bursts(2, MS, 100 * MS), "two faults that begin together"),

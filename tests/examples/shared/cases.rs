@@ -50,6 +50,7 @@ impl Case {
             load_program: program(made.load),
             set: made.set.to_vec(),
             repeat: false,
+            after_emergency_stop: None,
         };
         let inputs = Inputs::read(&files)?;
         let scene = Scene::from_toml(&inputs.experiment_toml, made.experiment, &inputs.rig)?;

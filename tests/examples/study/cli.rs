@@ -1,9 +1,10 @@
 //! The command line of the study.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::str::FromStr;
-use system_tests::study::draws::{Shape, Shard};
+use system_tests::study::draws::Shape;
+use system_tests::study::folder::Plan;
 
 /// The study: judges a program that names missing effects, on records whose truth it never sees.
 #[derive(Parser)]
@@ -15,30 +16,30 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// Begins a study: draws effects, amplitudes, places and difficulties from a seed.
+    /// Writes down which draws a study has: effects, amplitudes, places and difficulties, from a seed.
     Draws(DrawsArguments),
     /// Computes the detection limits of the ideal observer.
     Limits(LimitsArguments),
     /// Computes for each draw which effects leave the same signature.
     Cosines(CosinesArguments),
-    /// Makes records and runs the program on them; run again, it does only what is missing.
-    Run(RunArguments),
+    /// Takes a step with one draw, for a campaign: its number comes as a line of JSON, what came of it goes out as one.
+    One(OneArguments),
     /// Scores the results: score-LABEL.json and score-LABEL.html.
     Score(ScoreArguments),
     /// Several scores side by side, as tables in Markdown: ours beside the competitors.
     Compare(CompareArguments),
     /// How rates fall over noise and amplitude: curve-LABEL.md and curve-LABEL.svg.
     Curve(CurveArguments),
-    /// Runs the experiments that the program proposed where it could not tell effects apart: resolve-LABEL.json and .md.
+    /// What came of the experiments that the program proposed where it could not tell effects apart: resolve-LABEL.json and .md.
     Resolve(ResolveArguments),
 }
 
-/// Results under a label, of a study or of all its shards.
+/// Results under a label, in one folder or in several.
 #[derive(Debug, Clone)]
 pub(crate) struct Column {
     /// What the results are called.
     pub(crate) label: String,
-    /// Folder of the study, or of all its shards.
+    /// Folders of the study.
     pub(crate) folders: Vec<PathBuf>,
 }
 
@@ -51,16 +52,14 @@ impl FromStr for Column {
                 let folders = folders.split(',').map(PathBuf::from).collect();
                 Ok(Column { label: label.to_owned(), folders })
             }
-            _ => Err("write LABEL@FOLDER, and of several shards LABEL@FOLDER,FOLDER".to_owned()),
+            _ => Err("write LABEL@FOLDER, and of several folders LABEL@FOLDER,FOLDER".to_owned()),
         }
     }
 }
 
-#[derive(Args)]
-pub(crate) struct DrawsArguments {
-    /// Folder of the study.
-    #[arg(long)]
-    pub(crate) out: PathBuf,
+/// What defines a study; of one that was begun it must be the same, or be left out.
+#[derive(Args, Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PlanArguments {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..1 << 53))]
     pub(crate) seed: u64,
@@ -85,16 +84,24 @@ pub(crate) struct DrawsArguments {
     /// Divides all amplitudes, counted from the baseline: 100 brings most near their limits.
     #[arg(long, default_value_t = 1.0)]
     weaker: f64,
-    /// Part of the study, as 0/4: draws whose number leaves this remainder.
-    #[arg(long, default_value_t = Shard::WHOLE)]
-    pub(crate) shard: Shard,
 }
 
-impl DrawsArguments {
-    pub(crate) fn shape(&self) -> Shape {
+impl PlanArguments {
+    pub(crate) fn plan(&self) -> Plan {
         let Self { each, nulls, parameters, pairs, triples, noise, weaker, .. } = *self;
-        Shape { each, nulls, parameters, pairs, triples, noise_factor: noise, weaker_factor: weaker }
+        let shape =
+            Shape { each, nulls, parameters, pairs, triples, noise_factor: noise, weaker_factor: weaker };
+        Plan::new(self.seed, shape)
     }
+}
+
+#[derive(Args)]
+pub(crate) struct DrawsArguments {
+    /// Folder of the study.
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) plan: PlanArguments,
 }
 
 #[derive(Args)]
@@ -120,46 +127,58 @@ pub(crate) struct CosinesArguments {
     pub(crate) write: bool,
 }
 
+/// What is done with a draw.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Deed {
+    /// Its records are made.
+    Records,
+    /// The program is let loose on them.
+    Run,
+    /// The same without what is hidden in its catalogue, and its class: --without NAME for each; only draws of one effect.
+    LeaveOut,
+    /// Where the program could not tell effects apart: what it proposed is measured, and it is run on both records.
+    Resolve,
+}
+
 #[derive(Args)]
-pub(crate) struct RunArguments {
-    /// Folder of the study.
+pub(crate) struct OneArguments {
+    /// What is done.
+    #[arg(value_enum)]
+    pub(crate) deed: Deed,
+    /// Folder of the study; begun if there is none.
     #[arg(long)]
     pub(crate) out: PathBuf,
-    /// The program: PROGRAM close --rig rig.toml --train train.csv --test test.csv --out out. Without it only records are made.
+    #[command(flatten)]
+    pub(crate) plan: PlanArguments,
+    /// The program, a path or a name in PATH: PROGRAM close --rig rig.toml --train train.csv --test test.csv --out out.
     #[arg(long)]
     pub(crate) program: Option<PathBuf>,
     /// More arguments for the program, after --.
     #[arg(last = true)]
     pub(crate) arguments: Vec<String>,
-    /// What the results are called.
+    /// What the results are called; those with proposed experiments stand under LABEL-resolve.
     #[arg(long, default_value = "program")]
     pub(crate) label: String,
-    /// Leaves the hidden effect and its class out: --without NAME for each; only draws of one effect are run.
+    /// The draw, done again if it is done; without it, it comes from standard input and is done if it is missing.
     #[arg(long)]
-    pub(crate) leave_out: bool,
-    /// Longest time for one draw, s.
-    #[arg(long, default_value_t = 600.0)]
+    pub(crate) draw: Option<usize>,
+    /// Longest time for one start, s.
+    #[arg(long, default_value_t = 1200.0)]
     pub(crate) time_limit: f64,
-    /// Draws at once.
-    #[arg(long, default_value_t = 1)]
-    pub(crate) jobs: usize,
-    /// Runs these draws, again if they are done; commas between.
-    #[arg(long, value_delimiter = ',')]
-    pub(crate) only: Vec<usize>,
     /// Keeps truth.csv, 17 MB a record.
     #[arg(long)]
     pub(crate) keep_truth: bool,
     /// Deletes the records of a draw once the program has seen them.
     #[arg(long)]
     pub(crate) drop_records: bool,
-    /// Free space on the disk below which the study stops, MiB.
+    /// Free space on the disk below which nothing is begun, MiB.
     #[arg(long, default_value_t = 1024)]
     pub(crate) least_free: u64,
 }
 
 #[derive(Args)]
 pub(crate) struct ScoreArguments {
-    /// Folder of the study, or of all its shards, which are merged.
+    /// Folder of the study, or all of them where machines without a common disk filled several.
     #[arg(required = true)]
     pub(crate) folders: Vec<PathBuf>,
     /// What the results are called.
@@ -172,7 +191,7 @@ pub(crate) struct ScoreArguments {
 
 #[derive(Args)]
 pub(crate) struct CompareArguments {
-    /// LABEL@FOLDER for each program; of several shards LABEL@FOLDER,FOLDER.
+    /// LABEL@FOLDER for each program; of several folders LABEL@FOLDER,FOLDER.
     #[arg(required = true)]
     pub(crate) columns: Vec<Column>,
     /// Where the tables are written; without it they are printed.
@@ -185,7 +204,7 @@ pub(crate) struct CompareArguments {
 
 #[derive(Args)]
 pub(crate) struct CurveArguments {
-    /// LABEL@FOLDER for each noise factor; of several shards LABEL@FOLDER,FOLDER.
+    /// LABEL@FOLDER for each noise factor; of several folders LABEL@FOLDER,FOLDER.
     #[arg(required = true)]
     pub(crate) columns: Vec<Column>,
     /// Folder for curve-LABEL.md and curve-LABEL.svg.
@@ -204,24 +223,6 @@ pub(crate) struct ResolveArguments {
     /// What the results are called; those with the proposed experiments stand under LABEL-resolve.
     #[arg(long, default_value = "program")]
     pub(crate) label: String,
-    /// The program that the results are of. Without it only the table is made of what is done.
-    #[arg(long)]
-    pub(crate) program: Option<PathBuf>,
-    /// Its arguments, after --; the same as in the run.
-    #[arg(last = true)]
-    pub(crate) arguments: Vec<String>,
-    /// Longest time for one start, s.
-    #[arg(long, default_value_t = 1200.0)]
-    pub(crate) time_limit: f64,
-    /// Draws at once.
-    #[arg(long, default_value_t = 1)]
-    pub(crate) jobs: usize,
-    /// Runs these draws, again if they are done; commas between.
-    #[arg(long, value_delimiter = ',')]
-    pub(crate) only: Vec<usize>,
-    /// Free space on the disk below which the study stops, MiB.
-    #[arg(long, default_value_t = 1024)]
-    pub(crate) least_free: u64,
     /// Writes the table into tests/docs/study.md.
     #[arg(long)]
     pub(crate) write: bool,

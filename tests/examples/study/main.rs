@@ -1,24 +1,21 @@
-//! The study's commands, for `scripts/study`: draws, limits, cosines, run, score, compare, curve, resolve.
+//! The study's commands, for `scripts/study`: draws, limits, cosines, one, score, compare, curve, resolve.
 
 mod cli;
-mod resolve;
+mod one;
 mod scores;
 
 use clap::Parser;
-use cli::{Cli, Command, CosinesArguments, DrawsArguments, LimitsArguments, RunArguments};
+use cli::{Cli, Command, CosinesArguments, DrawsArguments, LimitsArguments, ResolveArguments};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-use system_tests::study::campaign::{Campaign, CampaignEnd, make_record};
-use system_tests::study::classes::{Classes, DrawClasses, read_draw};
-use system_tests::study::draws::{Draw, Kind};
-use system_tests::study::folder::{Plan, Study, read, write_whole};
-use system_tests::study::leave_out::left_out;
-use system_tests::study::program::Program;
+use system_tests::study::classes::{Classes, DrawClasses};
+use system_tests::study::draws::Draw;
+use system_tests::study::folder::{Study, read, write_whole};
+use system_tests::study::resolve::Table;
 use system_tests::study::{compute, document};
 
 /// Exit code of a study that was told to stop: everything that is done is kept.
@@ -36,14 +33,14 @@ fn main() -> ExitCode {
         }
     }
     let done = match Cli::parse().command {
+        Command::One(arguments) => return one::one(&arguments, &stop),
         Command::Draws(arguments) => draws(&arguments),
         Command::Limits(arguments) => limits(&arguments),
         Command::Cosines(arguments) => cosines(&arguments, &stop),
-        Command::Run(arguments) => run(&arguments, &stop),
         Command::Score(arguments) => scores::score(&arguments),
         Command::Compare(arguments) => scores::compare(&arguments),
         Command::Curve(arguments) => scores::curve(&arguments),
-        Command::Resolve(arguments) => resolve::resolve(&arguments, &stop),
+        Command::Resolve(arguments) => resolve(&arguments),
     };
     match done {
         Ok(()) if stop.load(Ordering::Relaxed) => ExitCode::from(INTERRUPTED),
@@ -72,8 +69,7 @@ const CLASSES: &str = "study/classes.json";
 const EXPECTED: &str = "study/outside-expected.json";
 
 fn draws(arguments: &DrawsArguments) -> Done {
-    let plan = Plan { shard: arguments.shard, ..Plan::new(arguments.seed, arguments.shape()) };
-    let study = Study::begin(&arguments.out, &plan)?;
+    let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
     say(&format!("{} draws in {}", study.draws.len(), arguments.out.display()));
     Ok(())
 }
@@ -102,62 +98,19 @@ fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
     Ok(())
 }
 
-fn run(arguments: &RunArguments, stop: &AtomicBool) -> Done {
+fn resolve(arguments: &ResolveArguments) -> Done {
     let study = Study::open(&arguments.out)?;
-    let limit = Duration::from_secs_f64(arguments.time_limit.max(0.001));
-    let program =
-        arguments.program.as_ref().map(|path| program(path, &arguments.arguments, limit)).transpose()?;
-    let classes = if arguments.leave_out { classes_for(&study)? } else { BTreeMap::new() };
-    let without = |draw: &Draw| left_out(draw, classes.get(&draw.number));
-    let campaign = Campaign {
-        study: &study,
-        program: program.as_ref(),
-        label: &arguments.label,
-        make: &make_record,
-        without: if arguments.leave_out { Some(&without) } else { None },
-        only: &arguments.only,
-        jobs: arguments.jobs,
-        keep_truth: arguments.keep_truth,
-        drop_records: arguments.drop_records,
-        least_free_mib: arguments.least_free,
-        stop,
-        say: &say,
-    };
-    told(campaign.run()?);
+    let table = Table::of(&study, &arguments.label)?;
+    let text = table.markdown();
+    let path = |extension: &str| study.root.join(format!("resolve-{}.{extension}", arguments.label));
+    write_whole(&path("json"), format!("{:#}\n", serde_json::json!(table)).as_bytes())?;
+    write_whole(&path("md"), text.as_bytes())?;
+    if arguments.write {
+        document::put(&committed(PAGE), "resolve", &text)?;
+    }
+    say(&format!("\n{text}"));
+    say(&path("json").display().to_string());
     Ok(())
-}
-
-fn program(path: &Path, arguments: &[String], limit: Duration) -> Result<Program, String> {
-    Program::new(path, arguments.to_owned(), limit)
-        .map_err(|error| format!("--program {}: {error}", path.display()))
-}
-
-fn told(end: CampaignEnd) {
-    match end {
-        CampaignEnd::Complete => say("complete"),
-        CampaignEnd::Stopped(left) => {
-            say(&format!("stopped, {left} draws are left: the same command goes on"))
-        }
-    }
-}
-
-/// All classes that are known of a study: committed, or computed for it.
-fn classes_for(study: &Study) -> Result<BTreeMap<usize, DrawClasses>, Box<dyn Error>> {
-    let mut classes = known_classes(&study.draws)?;
-    for number in study.draws.iter().map(|draw| draw.number) {
-        let path = study.class(number);
-        if !classes.contains_key(&number) && path.exists() {
-            classes.insert(number, read_draw(&path, number)?);
-        }
-    }
-    let single = || study.draws.iter().filter(|draw| draw.kind == Kind::Single);
-    let unknown = single().filter(|draw| !classes.contains_key(&draw.number)).count();
-    if unknown > 0 {
-        say(&format!(
-            "of {unknown} draws the classes are not known: there only the effect itself is left out"
-        ));
-    }
-    Ok(classes)
 }
 
 /// The committed classes of these draws, by their numbers.

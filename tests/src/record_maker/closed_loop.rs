@@ -202,6 +202,7 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
         load_program: None,
         set,
         repeat: false,
+        after_emergency_stop: None,
     };
     let mut inputs = Inputs::read(&files)?;
     inputs.rig = rig.without_effects();

@@ -5,14 +5,14 @@ use crate::study::SCHEMA_VERSION;
 use crate::study::classes::{Classes, DrawClasses, classes_of, read_draw};
 use crate::study::course::{Course, Point, WINDOW};
 use crate::study::draws::Draw;
-use crate::study::draws::Shard;
-use crate::study::folder::{FolderError, Plan, Study, write_whole};
+use crate::study::folder::{FolderError, Study, write_whole};
 use crate::study::limits::{Limits, Measured, limits_in};
 use crate::study::signature::Observer;
 use plant::{Axis, AxisState, Inputs, ParameterError, RigParameters, State};
+use rayon::prelude::*;
+use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde_json::json;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Why limits or classes cannot be computed.
 #[derive(Debug, thiserror::Error)]
@@ -31,6 +31,9 @@ pub enum ComputeError {
     /// A file of the study.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// The threads.
+    #[error("no threads: {0}")]
+    Threads(#[from] ThreadPoolBuildError),
     /// Draws have no classes.
     #[error("{count} draws have no classes yet: run the command to its end")]
     Missing {
@@ -110,24 +113,19 @@ pub fn classes(
     say: &(dyn Fn(&str) + Sync),
 ) -> Result<(), ComputeError> {
     let missing: Vec<&Draw> = hiding(study).filter(|draw| !study.class(draw.number).exists()).collect();
-    let queue = Mutex::new(missing.iter().enumerate());
-    let failed = Mutex::new(None);
-    let worker = || {
-        while !stop.load(Ordering::Relaxed) {
-            let Some((at, draw)) = queue.lock().expect("no holder panics").next() else { return };
-            if let Err(error) = one(study, draw) {
-                *failed.lock().expect("no holder panics") = Some(error);
-                return;
+    let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build()?;
+    let done = AtomicUsize::new(0);
+    let all = missing.len();
+    pool.install(|| {
+        missing.into_par_iter().with_max_len(1).try_for_each(|draw| {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
             }
-            say(&format!("classes {} of {}", at + 1, missing.len()));
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 0..jobs.max(1) {
-            scope.spawn(worker);
-        }
-    });
-    failed.into_inner().expect("no holder panics").map_or(Ok(()), Err)
+            one(study, draw)?;
+            say(&format!("classes {} of {all}", done.fetch_add(1, Ordering::Relaxed) + 1));
+            Ok(())
+        })
+    })
 }
 
 fn hiding(study: &Study) -> impl Iterator<Item = &Draw> {
@@ -142,18 +140,18 @@ fn one(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
     Ok(())
 }
 
-/// The classes of a study whose draws all have them, and of which it is a whole.
+/// The classes of a study whose draws all have them.
 ///
 /// # Errors
-/// [`ComputeError::Missing`] when some are missing, the shards of others included.
+/// [`ComputeError::Missing`] when some are missing.
 pub fn collected(study: &Study) -> Result<Classes, ComputeError> {
     let count = hiding(study).filter(|draw| !study.class(draw.number).exists()).count();
-    if count > 0 || study.plan.shard != Shard::WHOLE {
+    if count > 0 {
         return Err(ComputeError::Missing { count });
     }
     let read = |draw: &Draw| read_draw(&study.class(draw.number), draw.number);
     let draws = hiding(study).map(read).collect::<Result<Vec<DrawClasses>, _>>()?;
-    Ok(Classes { plan: Plan { shard: Shard::WHOLE, ..study.plan }, draws })
+    Ok(Classes { plan: study.plan, draws })
 }
 
 /// The text of committed classes: a line for each draw, so that a change is seen in a difference of files.

@@ -1,7 +1,7 @@
 //! Which effects, how strong, where, under which difficulties: a pure function of a study's seed and shape.
 //!
 //! Each draw has a generator of its own, seeded with the study's seed, the kind of draw and its number within the kind: a study
-//! with more draws keeps those of a smaller one, and a shard needs no other shard.
+//! with more draws keeps those of a smaller one.
 //!
 //! - Amplitude: log-uniform over the `drawn` range of the effect's sheet, either sign where the sheet says so. Each number
 //!   that only shapes the effect: one half its default, one half uniform over its `drawn` range.
@@ -22,8 +22,6 @@ use plant::effects::sheet::{EffectKey, Part, Place, PlaceKind, Sheet};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
-use std::fmt;
-use std::str::FromStr;
 
 /// Parameters that a case of wrong parameters alone is about, with their names in reports.
 pub const ALONE: [&str; 4] =
@@ -69,51 +67,6 @@ impl Default for Shape {
             triples: 20,
             noise_factor: 1.0,
             weaker_factor: 1.0,
-        }
-    }
-}
-
-/// Which part of a study: every draw whose number leaves this remainder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Shard {
-    /// Which, from 0.
-    pub part: u32,
-    /// Of how many.
-    pub parts: u32,
-}
-
-impl Shard {
-    /// The study as a whole.
-    pub const WHOLE: Shard = Shard { part: 0, parts: 1 };
-
-    /// Whether the draw of this number is of this shard.
-    #[must_use]
-    pub fn holds(self, number: usize) -> bool {
-        number % self.parts as usize == self.part as usize
-    }
-}
-
-impl fmt::Display for Shard {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}/{}", self.part, self.parts)
-    }
-}
-
-/// A shard that cannot be.
-#[derive(Debug, thiserror::Error)]
-#[error("shard '{0}': write PART/PARTS with PART from 0 and below PARTS, as 0/4")]
-pub struct BadShard(String);
-
-impl FromStr for Shard {
-    type Err = BadShard;
-
-    fn from_str(text: &str) -> Result<Self, BadShard> {
-        let numbers =
-            text.split_once('/').and_then(|(part, parts)| Some((part.parse().ok()?, parts.parse().ok()?)));
-        match numbers {
-            Some((part, parts)) if part < parts => Ok(Shard { part, parts }),
-            _ => Err(BadShard(text.to_owned())),
         }
     }
 }
@@ -395,20 +348,6 @@ mod tests {
         // What was begun before there were weaker ones is still read.
         assert!(!serde_json::to_string(&whole).unwrap().contains("weaker"));
         assert_eq!(serde_json::from_str::<Shape>(&serde_json::to_string(&whole).unwrap()).unwrap(), whole);
-    }
-
-    #[test]
-    fn shards_partition_the_draws() {
-        for parts in [1, 3, 7] {
-            for number in 0..100 {
-                let holders = (0..parts).filter(|part| Shard { part: *part, parts }.holds(number)).count();
-                assert_eq!(holders, 1, "draw {number} of {parts} shards");
-            }
-        }
-        assert_eq!("2/5".parse::<Shard>().unwrap(), Shard { part: 2, parts: 5 });
-        for bad in ["", "1", "5/5", "-1/2", "0/0", "a/b"] {
-            assert!(bad.parse::<Shard>().unwrap_err().to_string().contains("PART/PARTS"), "{bad}");
-        }
     }
 
     #[test]

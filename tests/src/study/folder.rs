@@ -1,7 +1,7 @@
 //! The files of a study's folder; each is whole or absent, so that a study can be killed at any time and goes on where it was.
 //!
 //! ```text
-//! OUT/draws.json               schema version, seed, shape, shard, all recipes of the shard
+//! OUT/draws.json               schema version, seed, shape, all recipes
 //! OUT/records/0007/            train, held-out-0, held-out-1: each with measurement.csv
 //! OUT/truth/0007/              the same folders with truth.json (and truth.csv, if it is kept)
 //! OUT/runs/LABEL/0007/         result.json, report.json, stderr.txt of the program with this label, and next-*.toml
@@ -16,11 +16,12 @@
 
 use crate::record_maker::{Hidden, Recipe};
 use crate::study::SCHEMA_VERSION;
-use crate::study::draws::{Draw, Shape, Shard, draws};
+use crate::study::draws::{Draw, Shape, draws};
+use campaign::parts;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// A study with its folder.
@@ -30,7 +31,7 @@ pub struct Study {
     pub root: PathBuf,
     /// What defines it.
     pub plan: Plan,
-    /// Its draws, or those of its shard.
+    /// Its draws.
     pub draws: Vec<Draw>,
 }
 
@@ -43,21 +44,19 @@ pub struct Plan {
     pub seed: u64,
     /// How many draws of what.
     pub shape: Shape,
-    /// Which part of them.
-    pub shard: Shard,
 }
 
 impl Plan {
-    /// The plan of a whole study.
+    /// The plan of a study.
     #[must_use]
     pub fn new(seed: u64, shape: Shape) -> Self {
-        Plan { schema_version: SCHEMA_VERSION, seed, shape, shard: Shard::WHOLE }
+        Plan { schema_version: SCHEMA_VERSION, seed, shape }
     }
 
-    /// The draws of its shard.
+    /// Its draws.
     #[must_use]
     pub fn draws(&self) -> Vec<Draw> {
-        draws(self.seed, &self.shape).into_iter().filter(|draw| self.shard.holds(draw.number)).collect()
+        draws(self.seed, &self.shape)
     }
 
     fn text(&self) -> String {
@@ -128,8 +127,7 @@ impl Study {
         let text = read(&path)?;
         let plan: Plan = serde_json::from_str(&text)
             .map_err(|error| FolderError::content(&path, format!("is no list of draws: {error}")))?;
-        if plan.schema_version != SCHEMA_VERSION || plan.shard.part >= plan.shard.parts || plan.text() != text
-        {
+        if plan.schema_version != SCHEMA_VERSION || plan.text() != text {
             let what =
                 "is not what this program draws from the same seed: use the version that began this study";
             return Err(FolderError::content(&path, what));
@@ -210,18 +208,7 @@ pub fn read(path: &Path) -> Result<String, FolderError> {
 /// # Errors
 /// [`FolderError`] with its path.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
-    let write = || {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        let beside = beside(path);
-        let mut file = fs::File::create(&beside)?;
-        file.write_all(bytes)?;
-        // A rename that reaches the disk before the bytes would leave an empty file behind a power cut.
-        file.sync_all()?;
-        fs::rename(&beside, path)
-    };
-    write().map_err(FolderError::file(path))
+    parts::write_whole(path, bytes).map_err(FolderError::file(path))
 }
 
 /// Makes a folder so that it is whole or absent: `fill` fills another one, which then gets the name.
@@ -271,9 +258,8 @@ mod tests {
     #[test]
     fn a_study_opens_as_it_was_begun_and_no_other_begins_in_its_folder() {
         let folder = tempfile::tempdir().unwrap();
-        let plan = Plan { shard: "1/3".parse().unwrap(), ..Plan::new(7, SHAPE) };
+        let plan = Plan::new(7, SHAPE);
         let begun = Study::begin(folder.path(), &plan).unwrap();
-        assert!(begun.draws.iter().all(|draw| draw.number % 3 == 1));
         assert_eq!(Study::open(folder.path()).unwrap().draws, begun.draws);
         assert_eq!(Study::begin(folder.path(), &plan).unwrap().draws, begun.draws);
         let other = Study::begin(folder.path(), &Plan::new(8, SHAPE)).unwrap_err();

@@ -73,7 +73,7 @@ fn lead(score: &Score) -> String {
     format!(
         "{} cases on 20 s records: {} draws of each of the {} effects, {} with nothing hidden, \
          {} of each wrong parameter, {} pairs, {} triples; seed {}, noise times {}, \
-         amplitudes over {}, {} shard(s). \
+         amplitudes over {}. \
          Program {} with CRC-32 {:08x} {}. Intervals: Wilson, 95 %; \
          'at most' is the exact one-sided bound, 95 %.{left_out}{classes}",
         score.cases.len(),
@@ -86,7 +86,6 @@ fn lead(score: &Score) -> String {
         score.seed,
         shape.noise_factor,
         shape.weaker_factor,
-        score.shards,
         score.program.name,
         score.program.crc32,
         score.program.arguments.join(" ")

@@ -25,11 +25,11 @@ pub mod tables;
 
 use crate::record_maker::{self, Hidden, Recipe};
 use crate::study::SCHEMA_VERSION;
-use crate::study::campaign::{Campaign, CampaignEnd, CampaignEndOr, CampaignError, check_blind, read_result};
 use crate::study::draws::{Draw, Kind};
 use crate::study::folder::{FolderError, make_whole, read};
 use crate::study::program::{Ended, Identity, Program, Start, Taken};
 use crate::study::report::{self, Named, Report, Verdict};
+use crate::study::step::{Step, StepEnd, StepError, check_blind, read_result};
 use plant::RigParameters;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -128,38 +128,55 @@ pub fn recipe(draw: &Draw) -> Recipe {
     Recipe { seed: draw.recipe.seed ^ OWN_NOISE, ..draw.recipe.clone() }
 }
 
-/// Runs what is proposed for the ambiguous draws of a campaign's label, with its program.
+/// What there was to do for a draw.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Found {
+    /// Nothing: it has no result yet, is not of one effect, or leaves the truth not open.
+    NotOpen,
+    /// Nothing: the program says that no experiment can tell.
+    NothingProposed,
+    /// What was proposed was measured.
+    Measured(Resolution),
+}
+
+/// Measures what is proposed for a draw, unless it was, and runs the program on both records; `None` when it was told to stop.
 ///
 /// # Errors
-/// [`CampaignError`] when a file of the study cannot be used, or the results are another program's.
-pub fn run(campaign: &Campaign<'_>, program: &Program) -> Result<CampaignEnd, CampaignError> {
-    let mut wanted = Vec::new();
-    for draw in campaign.study.draws.iter().filter(|draw| draw.kind == Kind::Single) {
-        let folder = campaign.study.run(campaign.label, draw.number);
-        if !folder.exists() {
-            continue;
-        }
-        let report = report::read(&folder.join("report.json")).ok();
-        let Some(report) = report.filter(|report| ambiguous(draw, report).is_some()) else { continue };
-        let path = folder.join("result.json");
-        check_program(&path, &read_result(&path)?.program, program)?;
-        let done = campaign.study.run(&label(campaign.label), draw.number);
-        if done.exists() {
-            let path = done.join("resolution.json");
-            check_program(&path, &read_resolution(&path)?.program, program)?;
-        }
-        let asked =
-            if campaign.only.is_empty() { !done.exists() } else { campaign.only.contains(&draw.number) };
-        if asked && report.proposed().is_some() {
-            wanted.push(draw);
+/// [`StepError`] when a file of the study cannot be used, or the results are another program's.
+pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Found>, StepError> {
+    let folder = step.study.run(step.label, draw.number);
+    if draw.kind != Kind::Single || !folder.exists() {
+        return Ok(Some(Found::NotOpen));
+    }
+    let report = report::read(&folder.join("report.json")).ok();
+    let Some(report) = report.filter(|report| ambiguous(draw, report).is_some()) else {
+        return Ok(Some(Found::NotOpen));
+    };
+    let path = folder.join("result.json");
+    check_program(&path, &read_result(&path)?.program, program)?;
+    let done = step.study.run(&label(step.label), draw.number);
+    if done.exists() {
+        let path = done.join("resolution.json");
+        let resolution = read_resolution(&path)?;
+        check_program(&path, &resolution.program, program)?;
+        if !step.again {
+            return Ok(Some(Found::Measured(resolution)));
         }
     }
-    (campaign.say)(&format!(
-        "{} proposed experiments are to be run, {} at once",
-        wanted.len(),
-        campaign.jobs
-    ));
-    campaign.each(&wanted, |draw| one(campaign, program, draw))
+    if report.proposed().is_none() {
+        return Ok(Some(Found::NothingProposed));
+    }
+    step.check_disk()?;
+    step.records(draw)?;
+    let ran = make_whole(&done, |folder| {
+        let resolution = resolve(step, program, draw, folder).map_err(StepEnd::Error)?;
+        resolution.ok_or(StepEnd::Interrupted)
+    });
+    match ran {
+        Ok(resolution) => Ok(Some(Found::Measured(resolution))),
+        Err(StepEnd::Interrupted) => Ok(None),
+        Err(StepEnd::Error(error)) => Err(error),
+    }
 }
 
 /// What is proposed is run by whoever proposed it.
@@ -174,40 +191,19 @@ fn check_program(path: &Path, own: &Identity, program: &Program) -> Result<(), F
     Err(FolderError::content(path, what))
 }
 
-fn one(campaign: &Campaign<'_>, program: &Program, draw: &Draw) -> Result<Option<String>, CampaignError> {
-    campaign.check_disk()?;
-    if !campaign.study.records(draw.number).exists() {
-        campaign.make_records(draw)?;
-    }
-    let path = campaign.study.run(&label(campaign.label), draw.number);
-    let ran = make_whole(&path, |folder| {
-        let resolution = resolve(campaign, program, draw, folder).map_err(CampaignEndOr::Error)?;
-        resolution.ok_or(CampaignEndOr::Interrupted)
-    });
-    match ran {
-        Ok(resolution) => {
-            let Resolution { experiment, problem, taken, .. } = resolution;
-            let how = problem.or_else(|| Some(format!("program {:?} {:.1} s", taken?.ended, taken?.wall_s)));
-            Ok(Some(format!("{experiment}: {}", how.unwrap_or_default())))
-        }
-        Err(CampaignEndOr::Interrupted) => Ok(None),
-        Err(CampaignEndOr::Error(error)) => Err(error),
-    }
-}
-
 /// Fills the folder of a draw; `None` when the study was told to stop.
 fn resolve(
-    campaign: &Campaign<'_>,
+    step: &Step<'_>,
     program: &Program,
     draw: &Draw,
     folder: &Path,
-) -> Result<Option<Resolution>, CampaignError> {
+) -> Result<Option<Resolution>, StepError> {
     let number = draw.number;
-    let files = |error| CampaignError::Files { number, error };
-    let first = report::read(&campaign.study.run(campaign.label, number).join("report.json"));
+    let files = |error| StepError::Files { number, error };
+    let first = report::read(&step.study.run(step.label, number).join("report.json"));
     let experiment = first.as_ref().ok().and_then(Report::proposed).unwrap_or_default().to_owned();
     let empty = tempfile::tempdir().map_err(files)?;
-    campaign.lay_out(draw, empty.path())?;
+    step.lay_out(draw, empty.path())?;
     let mut resolution = Resolution {
         schema_version: SCHEMA_VERSION,
         number,
@@ -216,13 +212,13 @@ fn resolve(
         problem: None,
         taken: None,
     };
-    let Some(text) = proposal(campaign, program, draw, &resolution.experiment)? else { return Ok(None) };
+    let Some(text) = proposal(step, program, draw, &resolution.experiment)? else { return Ok(None) };
     match text.and_then(|text| measure(draw, &resolution.experiment, &text, empty.path(), folder)) {
         Err(problem) => resolution.problem = Some(problem),
         Ok(()) => {
             check_blind(number, &empty.path().join("next.csv"))?;
             let start = Start { folder: empty.path(), train: &["train.csv", "next.csv"], own: &[] };
-            let Some(taken) = campaign.start(number, program, &start, folder)? else { return Ok(None) };
+            let Some(taken) = step.start(number, program, &start, folder)? else { return Ok(None) };
             resolution.taken = Some(taken);
         }
     }
@@ -232,22 +228,22 @@ fn resolve(
 
 /// Text of the proposed experiment, or why there is none; `None` when the study was told to stop.
 fn proposal(
-    campaign: &Campaign<'_>,
+    step: &Step<'_>,
     program: &Program,
     draw: &Draw,
     experiment: &str,
-) -> Result<Option<Result<String, String>>, CampaignError> {
+) -> Result<Option<Result<String, String>>, StepError> {
     let number = draw.number;
-    let files = |error| CampaignError::Files { number, error };
-    let kept = campaign.study.run(campaign.label, number).join(experiment);
+    let files = |error| StepError::Files { number, error };
+    let kept = step.study.run(step.label, number).join(experiment);
     if kept.is_file() {
         return Ok(Some(Ok(read(&kept)?)));
     }
     // It was not kept: equal records give an equal report, and the file beside it.
     let [empty, folder] = [tempfile::tempdir().map_err(files)?, tempfile::tempdir().map_err(files)?];
-    campaign.lay_out(draw, empty.path())?;
+    step.lay_out(draw, empty.path())?;
     let start = Start { folder: empty.path(), train: &["train.csv"], own: &[] };
-    if campaign.start(number, program, &start, folder.path())?.is_none() {
+    if step.start(number, program, &start, folder.path())?.is_none() {
         return Ok(None);
     }
     let again = fs::read_to_string(folder.path().join(experiment));

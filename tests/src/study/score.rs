@@ -1,14 +1,14 @@
-//! All cases of a study, or of all its shards: rates with intervals, confusion matrix, parameters, time.
+//! All cases of a study, from one folder or from several: rates with intervals, confusion matrix, parameters, time.
 
-use crate::study::campaign::{RunResult, read_result};
 use crate::study::classes::{DrawClasses, Member, read_draw};
-use crate::study::draws::{Draw, Kind, Shape, Shard};
+use crate::study::draws::{Draw, Kind, Shape};
 use crate::study::folder::{FolderError, Study, draw_as_json};
 use crate::study::judge::{Judgement, judge};
 use crate::study::leave_out::{self, Expectations, LeftOut};
 use crate::study::limits::Limits;
 use crate::study::program::Identity;
 use crate::study::report;
+use crate::study::step::{RunResult, read_result};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -34,8 +34,6 @@ pub struct Score {
     pub seed: u64,
     /// How many draws of what.
     pub shape: Shape,
-    /// Shards it was put together from.
-    pub shards: u32,
     /// Draws whose classes are not known: there an effect is alone in its class.
     pub without_classes: usize,
     /// What the cases say together; with effects left out, only what makes sense then.
@@ -88,37 +86,33 @@ pub enum ScoreError {
     /// No folder was given.
     #[error("no study to score: give its folder")]
     Nothing,
-    /// The folders are parts of different studies.
-    #[error("{left} and {right} are parts of different studies or of different shards: score those of one")]
+    /// The folders are of different studies.
+    #[error("{left} and {right} are of different studies: score those of one")]
     Mixed {
         /// One folder.
         left: String,
         /// Another one.
         right: String,
     },
-    /// A shard is there twice.
-    #[error("{left} and {right} are the same shard: give each once")]
+    /// A result is there twice.
+    #[error(
+        "draw {number} has a result in {left} and in {right}: give each folder once, or delete one of them"
+    )]
     Doubled {
+        /// Number of the draw.
+        number: usize,
         /// One folder.
         left: String,
         /// Another one.
         right: String,
     },
-    /// Shards are missing.
-    #[error("shards {missing} of {parts} are missing: run them, or give their folders")]
-    MissingShards {
-        /// Which.
-        missing: String,
-        /// Of how many.
-        parts: u32,
-    },
     /// Draws have no result.
     #[error(
-        "{folder}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
+        "{folders}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
     )]
     MissingRuns {
-        /// Folder of the study.
-        folder: String,
+        /// Folders of the study.
+        folders: String,
         /// Label of the results.
         label: String,
         /// How many.
@@ -152,42 +146,30 @@ pub struct Known<'a> {
     pub expectations: Option<&'a Expectations>,
 }
 
-/// Scores a study, given as a whole or as all of its shards.
+/// Scores a study whose results are in one folder or in several, as machines without a common disk leave them.
 ///
 /// # Errors
 /// [`ScoreError`] when anything is missing, doubled or mixed.
 pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score, ScoreError> {
     let studies = folders.iter().map(|folder| Study::open(folder)).collect::<Result<Vec<_>, _>>()?;
-    check_shards(&studies)?;
+    let first = studies.first().ok_or(ScoreError::Nothing)?;
+    check_mixed(first, &studies)?;
+    let leave_out = leaves_out(&studies, label)?;
     let mut cases = Vec::new();
     let mut program: Option<Identity> = None;
     let mut without_classes = 0;
-    let leave_out = leaves_out(&studies, label)?;
-    for study in &studies {
-        check_complete(study, label, leave_out)?;
-        for draw in wanted(study, leave_out) {
-            let folder = study.run(label, draw.number);
-            let result = read_result(&folder.join("result.json"))?;
-            let own = program.get_or_insert_with(|| result.program.clone());
-            if *own != result.program {
-                let (other, program) = (Box::new(result.program), Box::new(own.clone()));
-                return Err(ScoreError::Programs { number: draw.number, other, program });
-            }
-            let classes = classes_of(study, draw, known)?;
-            without_classes += usize::from(classes.is_none() && !draw.recipe.hidden.is_empty());
-            let report = report::read(&folder.join("report.json"));
-            let mut case = case(study, draw, &result, &report, classes.as_ref(), known.limits);
-            if leave_out {
-                let expectations = known.expectations.ok_or(ScoreError::NoExpectations)?;
-                let good = report.as_ref().ok().filter(|_| case.judgement.error.is_none());
-                case.left_out = Some(leave_out::judge(draw, &result.without, expectations, good));
-                case.repeat.push_str(" --leave-out");
-            }
-            cases.push(case);
+    for (study, draw) in places(&studies, label, leave_out)? {
+        let result = read_result(&study.run(label, draw.number).join("result.json"))?;
+        let own = program.get_or_insert_with(|| result.program.clone());
+        if *own != result.program {
+            let (other, program) = (Box::new(result.program), Box::new(own.clone()));
+            return Err(ScoreError::Programs { number: draw.number, other, program });
         }
+        let classes = classes_of(study, draw, known)?;
+        without_classes += usize::from(classes.is_none() && !draw.recipe.hidden.is_empty());
+        cases.push(case(study, draw, label, &result, classes.as_ref(), known)?);
     }
-    cases.sort_by_key(|case| case.number);
-    let (Some(first), Some(program)) = (studies.first(), program) else { return Err(ScoreError::Nothing) };
+    let program = program.ok_or(ScoreError::Nothing)?;
     let mut tables = Tables::of(&cases);
     if leave_out {
         // Nobody names what is not in the catalogue.
@@ -202,7 +184,6 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
         program,
         seed: first.plan.seed,
         shape: first.plan.shape,
-        shards: first.plan.shard.parts,
         without_classes,
         tables,
         leave_out: leave_out.then(|| leave_out::Tables::of(&cases)),
@@ -210,26 +191,49 @@ pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score
     })
 }
 
-/// Whether the folders are all shards of one study, each once.
-fn check_shards(studies: &[Study]) -> Result<(), ScoreError> {
-    let Some(first) = studies.first() else { return Err(ScoreError::Nothing) };
+/// One draw alone, as far as its classes are known.
+///
+/// # Errors
+/// [`ScoreError`] when a file of the study cannot be used.
+pub fn one(study: &Study, draw: &Draw, label: &str, known: Known<'_>) -> Result<Case, ScoreError> {
+    let result = read_result(&study.run(label, draw.number).join("result.json"))?;
+    let classes = classes_of(study, draw, known)?;
+    case(study, draw, label, &result, classes.as_ref(), known)
+}
+
+fn check_mixed(first: &Study, studies: &[Study]) -> Result<(), ScoreError> {
     let name = |study: &Study| study.root.display().to_string();
-    for (at, study) in studies.iter().enumerate() {
-        let (own, other) = (&study.plan, &first.plan);
-        if (own.seed, own.shape, own.shard.parts) != (other.seed, other.shape, other.shard.parts) {
-            return Err(ScoreError::Mixed { left: name(first), right: name(study) });
-        }
-        if let Some(twin) = studies[..at].iter().find(|twin| twin.plan.shard == own.shard) {
-            return Err(ScoreError::Doubled { left: name(twin), right: name(study) });
+    match studies.iter().find(|study| study.plan != first.plan) {
+        Some(other) => Err(ScoreError::Mixed { left: name(first), right: name(other) }),
+        None => Ok(()),
+    }
+}
+
+/// Which study has the result of each draw.
+fn places<'a>(
+    studies: &'a [Study],
+    label: &str,
+    leave_out: bool,
+) -> Result<Vec<(&'a Study, &'a Draw)>, ScoreError> {
+    let name = |study: &Study| study.root.display().to_string();
+    let mut places = Vec::new();
+    let mut missing = Vec::new();
+    // With effects left out, draws of one effect alone are run.
+    let wanted = |draw: &&Draw| !leave_out || draw.kind == Kind::Single;
+    for draw in studies.iter().take(1).flat_map(|study| &study.draws).filter(wanted) {
+        let mut own = studies.iter().filter(|study| study.run(label, draw.number).exists());
+        match (own.next(), own.next()) {
+            (None, _) => missing.push(draw.number),
+            (Some(study), None) => places.push((study, draw)),
+            (Some(one), Some(other)) => {
+                let (left, right) = (name(one), name(other));
+                return Err(ScoreError::Doubled { number: draw.number, left, right });
+            }
         }
     }
-    let parts = first.plan.shard.parts;
-    let has = |part| studies.iter().any(|study| study.plan.shard == Shard { part, parts });
-    let missing: Vec<_> = (0..parts).filter(|part| !has(*part)).map(|part| part.to_string()).collect();
-    if missing.is_empty() {
-        return Ok(());
-    }
-    Err(ScoreError::MissingShards { missing: missing.join(", "), parts })
+    let Some(first) = missing.first() else { return Ok(places) };
+    let folders = studies.iter().map(name).collect::<Vec<_>>().join(", ");
+    Err(ScoreError::MissingRuns { folders, label: label.to_owned(), count: missing.len(), first: *first })
 }
 
 /// Whether the hidden effects were left out: what the first result says, wherever it is.
@@ -239,21 +243,6 @@ fn leaves_out(studies: &[Study], label: &str) -> Result<bool, FolderError> {
         .flat_map(|study| study.draws.iter().map(|draw| study.run(label, draw.number).join("result.json")));
     let first = paths.into_iter().find(|path| path.exists());
     Ok(first.map(|path| read_result(&path)).transpose()?.is_some_and(|result| result.program.leave_out))
-}
-
-/// The draws that are scored: with effects left out those of one effect.
-fn wanted(study: &Study, leave_out: bool) -> impl Iterator<Item = &Draw> {
-    study.draws.iter().filter(move |draw| !leave_out || draw.kind == Kind::Single)
-}
-
-fn check_complete(study: &Study, label: &str, leave_out: bool) -> Result<(), ScoreError> {
-    let missing: Vec<_> = wanted(study, leave_out)
-        .map(|draw| draw.number)
-        .filter(|number| !study.run(label, *number).exists())
-        .collect();
-    let Some(first) = missing.first() else { return Ok(()) };
-    let folder = study.root.display().to_string();
-    Err(ScoreError::MissingRuns { folder, label: label.to_owned(), count: missing.len(), first: *first })
 }
 
 fn classes_of(study: &Study, draw: &Draw, known: Known<'_>) -> Result<Option<DrawClasses>, FolderError> {
@@ -267,17 +256,18 @@ fn classes_of(study: &Study, draw: &Draw, known: Known<'_>) -> Result<Option<Dra
 fn case(
     study: &Study,
     draw: &Draw,
+    label: &str,
     result: &RunResult,
-    report: &Result<report::Report, String>,
     classes: Option<&DrawClasses>,
-    limits: Option<&Limits>,
-) -> Case {
+    known: Known<'_>,
+) -> Result<Case, ScoreError> {
     let recipe = &draw.recipe;
+    let report = report::read(&study.run(label, draw.number).join("report.json"));
     let members: Vec<Vec<Member>> = classes.map_or_else(Vec::new, |classes| {
         classes.hidden.iter().map(|hidden| hidden.members.clone()).collect()
     });
     let over_limit: Vec<_> =
-        (0..recipe.hidden.len()).map(|at| over_limit(draw, at, classes, limits)).collect();
+        (0..recipe.hidden.len()).map(|at| over_limit(draw, at, classes, known.limits)).collect();
     let twins = recipe.hidden.iter().enumerate().any(|(at, _)| {
         let others = recipe.hidden.iter().enumerate().filter(|(other, _)| *other != at);
         let own = members.get(at);
@@ -286,9 +276,18 @@ fn case(
         })
     });
     let clear = over_limit.iter().all(|ratio| ratio.is_some_and(|ratio| ratio >= CLEAR));
-    let root = study.root.display();
-    Case {
-        number: draw.number,
+    let judgement = judge(draw, &members, &result.taken, &report);
+    let left_out = if result.program.leave_out {
+        let expectations = known.expectations.ok_or(ScoreError::NoExpectations)?;
+        let good = report.as_ref().ok().filter(|_| judgement.error.is_none());
+        Some(leave_out::judge(draw, &result.without, expectations, good))
+    } else {
+        None
+    };
+    let step = if left_out.is_some() { "leave-out" } else { "run" };
+    let (root, number) = (study.root.display(), draw.number);
+    Ok(Case {
+        number,
         kind: draw.kind,
         recipe: draw_as_json(draw),
         separable: recipe.hidden.len() > 1 && clear && !twins,
@@ -296,15 +295,14 @@ fn case(
         foreign_form: recipe.foreign_form,
         wrong_parameters: !recipe.wrong_parameters.is_empty(),
         coloured_noise: recipe.coloured_noise,
-        judgement: judge(draw, &members, &result.taken, report),
-        left_out: None,
+        judgement,
+        left_out,
         wall_s: result.taken.wall_s,
         memory_kib: result.taken.memory_kib,
         repeat: format!(
-            "scripts/study run --out {root} --only {} --label again --program PROGRAM",
-            draw.number
+            "scripts/study one {step} --out {root} --draw {number} --label again --program PROGRAM"
         ),
-    }
+    })
 }
 
 /// How far a hidden effect lies above its limit.

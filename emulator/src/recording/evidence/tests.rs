@@ -13,6 +13,7 @@ const MS: u64 = 1_000_000;
 fn evidence(folder: &Path, full_timing: bool) -> Evidence {
     let log = Log { interface: "bus0".into(), epoch_offset_ns: 0 };
     let setup = EvidenceSetup {
+        told: false,
         full_timing,
         flight_late: Some(Duration::from_micros(500)),
         started_unix_s: 0.0,

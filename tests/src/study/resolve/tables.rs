@@ -2,13 +2,13 @@
 
 use super::{Outcome, ambiguous, judge, label, leaves_open, names, read_resolution};
 use crate::study::SCHEMA_VERSION;
-use crate::study::campaign::read_result;
 use crate::study::compare::{grid, told};
 use crate::study::draws::{Draw, Kind, Shape};
 use crate::study::folder::{FolderError, Study};
 use crate::study::interval::Rate;
 use crate::study::program::Identity;
 use crate::study::report::{self, Named, Report};
+use crate::study::step::read_result;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

@@ -1,10 +1,10 @@
 //! What counts as resolved, which draws are grouped, and one ambiguous draw from its first report to its last.
 
 use super::*;
-use crate::study::campaign::make_record;
 use crate::study::draws::Shape;
 use crate::study::folder::{Plan, Study};
 use crate::study::judge::tests::{TAKEN, draw, said};
+use crate::study::step::make_record;
 use discrepancy::next::menu::MENU;
 use std::os::unix::fs::PermissionsExt;
 use std::sync::atomic::AtomicBool;
@@ -173,27 +173,24 @@ fi
         Program::new(&path, vec!["--more".to_owned()], Duration::from_secs(60)).unwrap()
     }
 
-    fn campaign<'a>(&'a self, label: &'a str, program: &'a Program, only: &'a [usize]) -> Campaign<'a> {
-        Campaign {
+    fn step<'a>(&'a self, label: &'a str, again: bool) -> Step<'a> {
+        Step {
             study: &self.study,
-            program: Some(program),
             label,
             make: &make_record,
             without: None,
-            only,
-            jobs: 1,
             keep_truth: false,
             drop_records: false,
+            again,
             least_free_mib: 0,
             stop: &self.stop,
-            say: &|_| {},
         }
     }
 
     /// Runs the draw, then what was proposed for it.
     fn run(&self, label: &str, program: &Program) -> Table {
-        self.campaign(label, program, &[self.draw.number]).run().unwrap();
-        assert_eq!(run(&self.campaign(label, program, &[]), program).unwrap(), CampaignEnd::Complete);
+        self.step(label, true).run(&self.draw, program).unwrap();
+        assert!(run(&self.step(label, false), program, &self.draw).unwrap().is_some());
         Table::of(&self.study, label).unwrap()
     }
 }
@@ -217,18 +214,17 @@ fn what_was_ambiguous_is_measured_again_and_judged_with_both_records() {
     assert_eq!(fs::read_to_string(folder.join("next.toml")).unwrap(), SHORT);
 
     // Done is done; a run that did not keep the experiment is repeated for it.
-    let campaign = bench.campaign("right", &program, &[]);
     fs::write(folder.join("mark"), "").unwrap();
-    run(&campaign, &program).unwrap();
+    run(&bench.step("right", false), &program, &bench.draw).unwrap();
     assert!(folder.join("mark").exists());
     fs::remove_file(bench.study.run("right", bench.draw.number).join("next-short.toml")).unwrap();
-    run(&bench.campaign("right", &program, &[bench.draw.number]), &program).unwrap();
+    run(&bench.step("right", true), &program, &bench.draw).unwrap();
     assert!(!folder.join("mark").exists());
     assert_eq!(Table::of(&bench.study, "right").unwrap().classes[0].resolved.count, 1);
 
     // Another program does not go on with the results of this one.
     let other = bench.program("TWIN", PROPOSES);
-    let error = run(&bench.campaign("right", &other, &[]), &other).unwrap_err().to_string();
+    let error = run(&bench.step("right", false), &other, &bench.draw).unwrap_err().to_string();
     assert!(error.contains("another program"), "{error}");
     let table = bench.run("wrong", &other);
     assert_eq!((table.all.wrong, table.all.resolved.count, table.all.resolved.of), (1, 0, 1));

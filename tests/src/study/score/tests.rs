@@ -1,4 +1,4 @@
-//! Studies put together by hand: what is counted where, and which shards go together.
+//! Studies put together by hand: what is counted where, and which folders go together.
 
 use super::*;
 use crate::study::folder::{Plan, make_whole};
@@ -15,10 +15,14 @@ fn identity(name: &str) -> Identity {
 }
 
 /// A study whose program always tells the truth.
-fn study(root: &Path, shard: &str, program: &str) -> Study {
-    let plan = Plan { shard: shard.parse().unwrap(), ..Plan::new(3, SHAPE) };
-    let study = Study::begin(root, &plan).unwrap();
-    for draw in &study.draws {
+fn study(root: &Path, program: &str) -> Study {
+    part_of_study(root, program, |_| true)
+}
+
+/// The same with the results of some draws.
+fn part_of_study(root: &Path, program: &str, holds: impl Fn(usize) -> bool) -> Study {
+    let study = Study::begin(root, &Plan::new(3, SHAPE)).unwrap();
+    for draw in study.draws.iter().filter(|draw| holds(draw.number)) {
         let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
         let result = RunResult {
             schema_version: 1,
@@ -75,7 +79,7 @@ fn truth_of(draw: &Draw) -> Value {
 /// A study of everything whose program always tells the truth, scored.
 pub(in crate::study) fn scored(label: &str) -> Score {
     let folder = tempfile::tempdir().unwrap();
-    study(folder.path(), "0/1", label);
+    study(folder.path(), label);
     let score = score(&[folder.path().to_owned()], "truth", UNKNOWN).unwrap();
     Score { label: label.to_owned(), ..score }
 }
@@ -132,7 +136,7 @@ fn with_effects_left_out_only_single_draws_are_wanted_and_the_tables_are_others(
     assert!(tables.splits[0].claimed_closed_ratio.quantiles.unwrap() == [0.625; 4]);
     let line = |name: &str| score.tables.headline.iter().find(|line| line.name.contains(name)).unwrap().rate;
     assert_eq!(line("all signals together closed").count, tables.splits[0].no_wrong_name.of);
-    assert!(score.tables.splits.is_empty() && score.cases[0].repeat.ends_with("--leave-out"));
+    assert!(score.tables.splits.is_empty() && score.cases[0].repeat.contains("one leave-out "));
     let page = crate::study::page::page(&score);
     for part in ["no wrong name", "What was told", "outside-catalogue 1", "were left out"] {
         assert!(page.contains(part), "{part}");
@@ -155,7 +159,7 @@ const UNKNOWN: Known<'_> = Known { limits: None, classes: None, expectations: No
 #[test]
 fn whoever_tells_the_truth_has_all_points() {
     let folder = tempfile::tempdir().unwrap();
-    study(folder.path(), "0/1", "oracle");
+    study(folder.path(), "oracle");
     let score = score(&[folder.path().to_owned()], "truth", UNKNOWN).unwrap();
     assert_eq!(score.cases.len(), 38 + 2 + 4 + 1 + 1);
     assert_eq!(score.without_classes, 40);
@@ -176,7 +180,7 @@ fn whoever_tells_the_truth_has_all_points() {
     assert_eq!(score.tables.confusion[3].called[&score.tables.confusion[3].truth], [1, 1, 1]);
 
     let page = crate::study::page::page(&score);
-    for part in ["oracle", "scripts/study run", "color-mix", "valve-hysteresis", "claimed"] {
+    for part in ["oracle", "scripts/study one run", "color-mix", "valve-hysteresis", "claimed"] {
         assert!(page.contains(part), "{part}");
     }
     // Nothing from elsewhere.
@@ -187,7 +191,7 @@ fn whoever_tells_the_truth_has_all_points() {
 #[test]
 fn amplitudes_stand_in_the_bin_of_their_limit() {
     let folder = tempfile::tempdir().unwrap();
-    let study = study(folder.path(), "0/1", "oracle");
+    let study = study(folder.path(), "oracle");
     let draw = study.draws.iter().find(|draw| draw.recipe.hidden[0].name == "inclination").unwrap();
     let hidden = &draw.recipe.hidden[0];
     let limits = |limit_value| Limits {
@@ -218,17 +222,18 @@ fn amplitudes_stand_in_the_bin_of_their_limit() {
 }
 
 #[test]
-fn shards_are_scored_together_when_each_is_there_once() {
+fn folders_are_scored_together_when_each_result_is_there_once() {
     let folder = tempfile::tempdir().unwrap();
-    let shard = |name: &str, shard: &str, program: &str| {
+    let part = |name: &str, index: usize, program: &str| {
         let root = folder.path().join(name);
-        study(&root, shard, program);
+        part_of_study(&root, program, |number| number % 3 == index);
         root
     };
-    let [a, b, c] = [shard("a", "0/3", "p"), shard("b", "1/3", "p"), shard("c", "2/3", "p")];
-    let again = shard("again", "1/3", "p");
-    let other = shard("other", "1/2", "p");
-    let foreign = shard("foreign", "2/3", "q");
+    let [a, b, c] = [part("a", 0, "p"), part("b", 1, "p"), part("c", 2, "p")];
+    let again = part("again", 1, "p");
+    let foreign = part("foreign", 2, "q");
+    let other = folder.path().join("other");
+    Study::begin(&other, &Plan::new(4, SHAPE)).unwrap();
     let of = |folders: &[&PathBuf]| {
         let folders: Vec<PathBuf> = folders.iter().map(|folder| (*folder).clone()).collect();
         score(&folders, "truth", UNKNOWN)
@@ -236,11 +241,9 @@ fn shards_are_scored_together_when_each_is_there_once() {
     let whole = of(&[&c, &a, &b]).unwrap();
     assert!(whole.cases.iter().enumerate().all(|(at, case)| case.number == at));
     assert_eq!(whole.tables.splits[0].top.count, 38);
-    assert!(matches!(of(&[&a, &b]), Err(ScoreError::MissingShards { parts: 3, .. })));
-    assert!(matches!(of(&[&a, &b, &again]), Err(ScoreError::Doubled { .. })));
+    assert!(matches!(of(&[&a, &b]), Err(ScoreError::MissingRuns { first: 2, .. })));
+    assert!(matches!(of(&[&a, &b, &again, &c]), Err(ScoreError::Doubled { number: 1, .. })));
     assert!(matches!(of(&[&a, &other, &c]), Err(ScoreError::Mixed { .. })));
     assert!(matches!(of(&[&a, &b, &foreign]), Err(ScoreError::Programs { .. })));
     assert!(matches!(of(&[]), Err(ScoreError::Nothing)));
-    fs::remove_dir_all(b.join("runs/truth/0001")).unwrap();
-    assert!(matches!(of(&[&a, &b, &c]), Err(ScoreError::MissingRuns { count: 1, first: 1, .. })));
 }

@@ -1,12 +1,13 @@
-//! Runs what is missing: makes a draw's records, lets the program loose on copies, keeps what it wrote.
+//! One draw: its records made, the program let loose on copies of them, what it wrote kept.
 //!
-//! Several draws at once; each is done when its folder has its name, so a study may be killed at any instant and is started again
-//! with the same command. A program that crashes, hangs or writes nonsense is a result. A disk that fills up is none: the
-//! study stops before it, since a report that found no room would tell nothing about the program.
+//! A draw is done when its folder has its name, so that a step may be killed at any instant and is taken again. Which draws are
+//! taken, by whom and how many at once is the affair of a campaign (`campaign/docs/campaigns.md`), whose command is
+//! `study one`. A program that crashes, hangs or writes nonsense is a result. A disk that fills up is none: the step is not taken
+//! then, since a report that found no room would tell nothing about the program.
 
 use crate::record_maker::{Experiment, Recipe};
 use crate::study::SCHEMA_VERSION;
-use crate::study::draws::{Draw, Kind};
+use crate::study::draws::Draw;
 use crate::study::folder::{FolderError, Study, make_whole, read};
 use crate::study::leave_out;
 use crate::study::program::{Identity, Interrupted, Program, Start, Taken};
@@ -18,9 +19,7 @@ use serde_json::json;
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::AtomicBool;
 
 /// Names of the folders of a draw's records.
 pub const EXPERIMENTS: [(Experiment, &str); 3] = [
@@ -39,9 +38,6 @@ const MOST_SAID: u64 = 1 << 20;
 /// Makes a record: measurement into the first folder, truth into the second; says why it cannot.
 pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
 
-/// Effects that a program has to do without on a draw.
-pub type Without<'a> = &'a (dyn Fn(&Draw) -> Vec<String> + Sync);
-
 /// Makes a record with the record maker.
 ///
 /// # Errors
@@ -55,46 +51,31 @@ pub fn make_record(
     crate::record_maker::make(recipe, rig, measurement, truth).map_err(|error| error.to_string())
 }
 
-/// How a campaign runs.
-pub struct Campaign<'a> {
+/// How a step is taken.
+pub struct Step<'a> {
     /// Study and folder.
     pub study: &'a Study,
-    /// The program under study; without one, only records are made.
-    pub program: Option<&'a Program>,
     /// What its results are called.
     pub label: &'a str,
     /// Makes records.
     pub make: Make<'a>,
-    /// What is left out of the program's catalogue; then only draws of one effect are run.
-    pub without: Option<Without<'a>>,
-    /// Numbers of draws that are run again; nothing: all that are missing.
-    pub only: &'a [usize],
-    /// Draws that run at once.
-    pub jobs: usize,
+    /// Effects that are left out of the program's catalogue.
+    pub without: Option<Vec<String>>,
     /// Whether truth.csv is kept, 17 MB each.
     pub keep_truth: bool,
     /// Whether records are deleted once a program has seen them.
     pub drop_records: bool,
-    /// Free space below which it stops, MiB.
+    /// Whether what is done is done again.
+    pub again: bool,
+    /// Free space below which nothing is begun, MiB.
     pub least_free_mib: u64,
     /// Set to stop.
     pub stop: &'a AtomicBool,
-    /// Told a line for each draw.
-    pub say: &'a (dyn Fn(&str) + Sync),
 }
 
-/// How a campaign ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CampaignEnd {
-    /// All draws are done.
-    Complete,
-    /// It was told to stop; so many are missing.
-    Stopped(usize),
-}
-
-/// Why a campaign cannot go on; what is done stays.
+/// Why a step cannot be taken; what is done stays.
 #[derive(Debug, thiserror::Error)]
-pub enum CampaignError {
+pub enum StepError {
     /// The study's own files.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -151,159 +132,81 @@ pub struct RunResult {
     pub without: Vec<String>,
 }
 
-impl Campaign<'_> {
-    /// Runs all draws that are not done.
+impl Step<'_> {
+    /// Makes the records of a draw, unless they are there.
     ///
     /// # Errors
-    /// [`CampaignError`] with the first draw that could not be run; those that ran at the same time are finished first. A draw
-    /// whose record cannot be made is told in the end, after all others are done.
-    pub fn run(&self) -> Result<CampaignEnd, CampaignError> {
-        let wanted = |draw: &&Draw| {
-            if self.only.is_empty() { !self.is_done(draw) } else { self.only.contains(&draw.number) }
-        };
-        let missing: Vec<&Draw> = self.draws().filter(wanted).collect();
-        self.check_program()?;
-        let all = self.draws().count();
-        (self.say)(&format!("{} of {all} draws are to be done, {} at once", missing.len(), self.jobs));
-        self.each(&missing, |draw| self.one(draw))
+    /// [`StepError`] when they cannot be made.
+    pub fn records(&self, draw: &Draw) -> Result<(), StepError> {
+        if self.study.records(draw.number).exists() {
+            return Ok(());
+        }
+        self.check_disk()?;
+        self.make_records(draw)
     }
 
-    /// Does something with draws, several at once; `one` says what it did, or `None` when it was told to stop in its midst.
+    /// Lets the program loose on a draw, unless it was; `None` when it was told to stop in its midst.
     ///
     /// # Errors
-    /// As [`Campaign::run`].
-    pub(crate) fn each(
-        &self,
-        missing: &[&Draw],
-        one: impl Fn(&Draw) -> Result<Option<String>, CampaignError> + Sync,
-    ) -> Result<CampaignEnd, CampaignError> {
-        let began = Instant::now();
-        let queue = Mutex::new(missing.iter());
-        let finished = Mutex::new(0);
-        let failed = Mutex::new(None);
-        let unmade = Mutex::new(None);
-        let worker = || {
-            while !self.stop.load(Ordering::Relaxed) && failed.lock().expect("no holder panics").is_none() {
-                let Some(draw) = queue.lock().expect("no holder panics").next() else { return };
-                match one(draw) {
-                    Err(error @ CampaignError::Make { .. }) => {
-                        // Of this draw alone; the others need not wait for it.
-                        (self.say)(&error.to_string());
-                        unmade.lock().expect("no holder panics").get_or_insert(error);
-                    }
-                    Err(error) => *failed.lock().expect("no holder panics") = Some(error),
-                    Ok(None) => {}
-                    Ok(Some(told)) => {
-                        let mut finished = finished.lock().expect("no holder panics");
-                        *finished += 1;
-                        let left = time_left(began.elapsed(), *finished, missing.len());
-                        (self.say)(&format!(
-                            "{finished}/{} draw {}: {told}; {left} left",
-                            missing.len(),
-                            draw.number
-                        ));
-                    }
-                }
-            }
-        };
-        std::thread::scope(|scope| {
-            for _ in 0..self.jobs.max(1) {
-                scope.spawn(worker);
-            }
+    /// [`StepError`] for what is no result of the program's.
+    pub fn run(&self, draw: &Draw, program: &Program) -> Result<Option<RunResult>, StepError> {
+        let number = draw.number;
+        let path = self.study.run(self.label, number);
+        if path.exists() && !self.again {
+            return self.done(&path.join("result.json"), program).map(Some);
+        }
+        self.check_disk()?;
+        self.records(draw)?;
+        let ran = make_whole(&path, |folder| {
+            self.let_loose(draw, program, folder).map_err(StepEnd::Error)?.ok_or(StepEnd::Interrupted)
         });
-        for error in [failed, unmade] {
-            if let Some(error) = error.into_inner().expect("no holder panics") {
-                return Err(error);
-            }
+        let result = match ran {
+            Ok(result) => result,
+            Err(StepEnd::Interrupted) => return Ok(None),
+            Err(StepEnd::Error(error)) => return Err(error),
+        };
+        if self.drop_records {
+            fs::remove_dir_all(self.study.records(number))
+                .map_err(|error| StepError::Files { number, error })?;
         }
-        match missing.len() - finished.into_inner().expect("no holder panics") {
-            0 => Ok(CampaignEnd::Complete),
-            left => Ok(CampaignEnd::Stopped(left)),
-        }
-    }
-
-    /// The draws that this campaign is about.
-    fn draws(&self) -> impl Iterator<Item = &Draw> {
-        self.study.draws.iter().filter(|draw| self.without.is_none() || draw.kind == Kind::Single)
+        Ok(Some(result))
     }
 
     fn identity(&self, program: &Program) -> Identity {
         Identity { leave_out: self.without.is_some(), ..program.identity().clone() }
     }
 
-    fn is_done(&self, draw: &Draw) -> bool {
-        match self.program {
-            Some(_) => self.study.run(self.label, draw.number).exists(),
-            None => self.study.records(draw.number).exists(),
-        }
-    }
-
     /// Results of another program under the same label are never mixed with its own.
-    fn check_program(&self) -> Result<(), CampaignError> {
-        let Some(program) = self.program else { return Ok(()) };
-        let identity = self.identity(program);
-        // Of all kinds: a label may hold what another mode would not run.
-        for draw in self.study.draws.iter().filter(|draw| self.is_done(draw)) {
-            let path = self.study.run(self.label, draw.number).join("result.json");
-            let result = read_result(&path)?;
-            if result.program != identity {
-                let what = format!(
-                    "is of another program ({:?}) than this one ({identity:?}): give another --label",
-                    result.program
-                );
-                return Err(FolderError::content(&path, what).into());
-            }
+    fn done(&self, path: &Path, program: &Program) -> Result<RunResult, StepError> {
+        let (result, identity) = (read_result(path)?, self.identity(program));
+        if result.program != identity {
+            let own = &result.program;
+            let what =
+                format!("is of another program ({own:?}) than this one ({identity:?}): give another --label");
+            return Err(FolderError::content(path, what).into());
         }
-        Ok(())
+        Ok(result)
     }
 
-    /// One draw; `None` when the study was told to stop in its midst.
-    fn one(&self, draw: &Draw) -> Result<Option<String>, CampaignError> {
-        self.check_disk()?;
-        let began = Instant::now();
-        if !self.study.records(draw.number).exists() {
-            self.make_records(draw)?;
-        }
-        let made_s = began.elapsed().as_secs_f64();
-        let Some(program) = self.program else { return Ok(Some(format!("records {made_s:.1} s"))) };
-        let number = draw.number;
-        let ran = make_whole(&self.study.run(self.label, number), |folder| {
-            self.let_loose(draw, program, folder)
-                .map_err(CampaignEndOr::Error)?
-                .ok_or(CampaignEndOr::Interrupted)
-        });
-        let taken = match ran {
-            Ok(taken) => taken,
-            Err(CampaignEndOr::Interrupted) => return Ok(None),
-            Err(CampaignEndOr::Error(error)) => return Err(error),
-        };
-        if self.drop_records {
-            fs::remove_dir_all(self.study.records(number))
-                .map_err(|error| CampaignError::Files { number, error })?;
-        }
-        let Taken { ended, wall_s, memory_kib } = taken;
-        Ok(Some(format!("records {made_s:.1} s, program {ended:?} {wall_s:.1} s {} MiB", memory_kib >> 10)))
-    }
-
-    pub(crate) fn check_disk(&self) -> Result<(), CampaignError> {
+    pub(crate) fn check_disk(&self) -> Result<(), StepError> {
         // A system that does not tell is no reason to stop.
         let Ok(told) = rustix::fs::statvfs(&self.study.root) else { return Ok(()) };
         let free_mib = told.f_bavail.saturating_mul(told.f_frsize) >> 20;
         let least_free_mib = self.least_free_mib;
-        if free_mib < least_free_mib { Err(CampaignError::Disk { free_mib, least_free_mib }) } else { Ok(()) }
+        if free_mib < least_free_mib { Err(StepError::Disk { free_mib, least_free_mib }) } else { Ok(()) }
     }
 
     /// The truth first: records without it would be of no use, the other way round they are made again.
-    pub(crate) fn make_records(&self, draw: &Draw) -> Result<(), CampaignError> {
+    fn make_records(&self, draw: &Draw) -> Result<(), StepError> {
         let (number, rig) = (draw.number, RigParameters::baseline());
         make_whole(&self.study.records(number), |records| {
             make_whole(&self.study.truth(number), |truth| {
                 for (experiment, name) in EXPERIMENTS {
                     let (record, truth) = (records.join(name), truth.join(name));
                     let folders = fs::create_dir_all(&record).and_then(|()| fs::create_dir_all(&truth));
-                    folders.map_err(|error| CampaignError::Files { number, error })?;
+                    folders.map_err(|error| StepError::Files { number, error })?;
                     (self.make)(&draw.recipe(experiment), &rig, &record, &truth)
-                        .map_err(|reason| CampaignError::Make { number, reason })?;
+                        .map_err(|reason| StepError::Make { number, reason })?;
                     if !self.keep_truth {
                         // It follows from the recipe.
                         let _ = fs::remove_file(truth.join("truth.csv"));
@@ -319,25 +222,25 @@ impl Campaign<'_> {
         draw: &Draw,
         program: &Program,
         folder: &Path,
-    ) -> Result<Option<Taken>, CampaignError> {
+    ) -> Result<Option<RunResult>, StepError> {
         let number = draw.number;
-        let files = |error| CampaignError::Files { number, error };
+        let files = |error| StepError::Files { number, error };
         let empty = tempfile::tempdir().map_err(files)?;
         self.lay_out(draw, empty.path())?;
-        let without = self.without.map_or_else(Vec::new, |without| without(draw));
+        let without = self.without.clone().unwrap_or_default();
         let own = leave_out::arguments(&without);
         let start = Start { folder: empty.path(), train: &["train.csv"], own: &own };
         let Some(taken) = self.start(number, program, &start, folder)? else { return Ok(None) };
         let program = self.identity(program);
         let result = RunResult { schema_version: SCHEMA_VERSION, number, program, taken, without };
         fs::write(folder.join("result.json"), format!("{:#}\n", json!(result))).map_err(files)?;
-        Ok(Some(taken))
+        Ok(Some(result))
     }
 
     /// Puts what a program may see of a draw into an empty folder.
-    pub(crate) fn lay_out(&self, draw: &Draw, empty: &Path) -> Result<(), CampaignError> {
+    pub(crate) fn lay_out(&self, draw: &Draw, empty: &Path) -> Result<(), StepError> {
         let number = draw.number;
-        let files = |error| CampaignError::Files { number, error };
+        let files = |error| StepError::Files { number, error };
         let folder_of_records = self.study.records(number);
         let test = EXPERIMENTS
             .iter()
@@ -359,8 +262,8 @@ impl Campaign<'_> {
         program: &Program,
         start: &Start<'_>,
         folder: &Path,
-    ) -> Result<Option<Taken>, CampaignError> {
-        let files = |error| CampaignError::Files { number, error };
+    ) -> Result<Option<Taken>, StepError> {
+        let files = |error| StepError::Files { number, error };
         let said = folder.join("stderr.txt");
         let taken = match program.run(start, File::create(&said).map_err(files)?, self.stop) {
             Ok(taken) => taken,
@@ -385,9 +288,9 @@ impl Campaign<'_> {
 }
 
 /// A record that holds more than a measurement could tell what is hidden.
-pub(crate) fn check_blind(number: usize, record: &Path) -> Result<(), CampaignError> {
+pub(crate) fn check_blind(number: usize, record: &Path) -> Result<(), StepError> {
     let blind = ReadOptions { unknown: Unknown::Refused, ..ReadOptions::default() };
-    records::read(record, &blind).map(drop).map_err(|error| CampaignError::Record { number, error })
+    records::read(record, &blind).map(drop).map_err(|error| StepError::Record { number, error })
 }
 
 /// Copies a file of a program's folder. What cannot be copied was not written, or is no file: the judge says so.
@@ -400,14 +303,14 @@ fn keep(out: &Path, folder: &Path, name: &str, largest: u64) -> io::Result<()> {
 }
 
 /// Why a run's folder is not finished.
-pub(crate) enum CampaignEndOr {
+pub(crate) enum StepEnd {
     Interrupted,
-    Error(CampaignError),
+    Error(StepError),
 }
 
-impl From<FolderError> for CampaignEndOr {
+impl From<FolderError> for StepEnd {
     fn from(error: FolderError) -> Self {
-        CampaignEndOr::Error(error.into())
+        StepEnd::Error(error.into())
     }
 }
 
@@ -423,12 +326,6 @@ pub fn read_result(path: &Path) -> Result<RunResult, FolderError> {
             if good { Ok(result) } else { Err(format!("schema version {}", result.schema_version)) }
         })
         .map_err(|what| FolderError::content(path, format!("is no result of this version: {what}")))
-}
-
-/// Time left in words, as the draws so far took.
-fn time_left(passed: Duration, finished: usize, all: usize) -> String {
-    let left_s = passed.as_secs_f64() / finished as f64 * (all - finished) as f64;
-    if left_s < 90.0 { format!("{left_s:.0} s") } else { format!("{:.0} min", left_s / 60.0) }
 }
 
 #[cfg(test)]

@@ -1,13 +1,11 @@
-//! The socket of the embedded bus as a file: its folder, its lock, and the listener that lets peers in.
+//! A Unix socket as a file, for this user alone: its folder, its lock, and the listener that lets peers in.
 //!
 //! The socket is guarded by a lock file beside it: whoever holds the lock may remove a stale socket; a second host is
-//! refused. The lock goes with the process that holds it, however it ends.
+//! refused. The lock goes with the process that holds it, however it ends. The embedded bus and the telemetry have one each.
 
-use super::BusError;
-use super::url::{BusUrl, WireOptions};
 use rustix::fs::{FlockOperation, Mode, OFlags};
 use rustix::io::Errno;
-use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType};
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags};
 use rustix::process::Uid;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -17,8 +15,24 @@ use std::path::{Path, PathBuf};
 /// Connections that wait to be accepted.
 const BACKLOG: i32 = 64;
 
+pub use rustix::net::SocketType;
+
+/// Why a socket's file cannot be taken into service.
+#[derive(Debug, thiserror::Error)]
+pub enum SocketFileError {
+    /// Another process serves there; it holds this lock.
+    #[error("another process serves there (lock file {0})")]
+    Taken(String),
+    /// The folder is not this user's alone.
+    #[error("{0}")]
+    NotPrivate(io::Error),
+    /// What the system said.
+    #[error(transparent)]
+    System(#[from] io::Error),
+}
+
 /// The socket's file, taken into service; goes with the value.
-pub(super) struct SocketFile {
+pub struct SocketFile {
     listener: OwnedFd,
     /// Held for the moment in which the process has no descriptor left; `None` when not even this could be had again.
     spare: Option<OwnedFd>,
@@ -28,30 +42,23 @@ pub(super) struct SocketFile {
 }
 
 impl SocketFile {
-    /// Makes folder, lock and socket at `path`; `wire` is for the error's text.
-    pub(super) fn bind(path: &Path, wire: WireOptions) -> Result<Self, BusError> {
-        let url = BusUrl::Unix { path: path.into(), wire }.to_string();
-        let refused = |error: io::Error, remedy: &'static str| BusError::Open {
-            url: url.clone(),
-            reason: error.to_string(),
-            remedy,
-        };
-        let opened = |error: io::Error| {
-            refused(error, "choose a socket path in a folder that you may write, with --bus unix:///PATH")
-        };
+    /// Makes folder, lock and socket of this type at `path`. With `private`, a folder that is there must be this user's alone:
+    /// for paths that anybody can foresee.
+    ///
+    /// # Errors
+    /// [`SocketFileError`].
+    pub fn bind(path: &Path, socket_type: SocketType, private: bool) -> Result<Self, SocketFileError> {
         if let Some(folder) = path.parent() {
-            make_private(folder).map_err(opened)?;
-            if is_default(path) {
-                check_private(folder, rustix::process::getuid()).map_err(|error| {
-                    refused(error, "remove that folder, or choose another with --bus unix:///PATH")
-                })?;
+            make_private(folder)?;
+            if private {
+                check_private(folder, rustix::process::getuid()).map_err(SocketFileError::NotPrivate)?;
             }
         }
-        let (lock, lock_path) = open_lock(path).map_err(opened)?;
+        let (lock, lock_path) = open_lock(path)?;
         if rustix::fs::flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
-            return Err(BusError::HostExists { url, lock: lock_path.display().to_string() });
+            return Err(SocketFileError::Taken(lock_path.display().to_string()));
         }
-        let listener = listen(path).map_err(opened)?;
+        let listener = listen(path, socket_type)?;
         Ok(Self { listener, spare: spare(), path: path.into(), _lock: lock })
     }
 
@@ -59,7 +66,7 @@ impl SocketFile {
     ///
     /// With no descriptor left, the spare one is given up to take the peer and turn it away at once: it sees its end and tries
     /// again, and the listener does not stay readable, which would keep the host turning without rest.
-    pub(super) fn accept(&mut self) -> Option<OwnedFd> {
+    pub fn accept(&mut self) -> Option<OwnedFd> {
         loop {
             match rustix::net::accept_with(&self.listener, SocketFlags::CLOEXEC | SocketFlags::NONBLOCK) {
                 Ok(peer) => {
@@ -98,10 +105,6 @@ fn spare() -> Option<OwnedFd> {
     rustix::fs::open("/dev/null", OFlags::RDONLY | OFlags::CLOEXEC, Mode::empty()).ok()
 }
 
-fn is_default(path: &Path) -> bool {
-    matches!(BusUrl::default_embedded(), BusUrl::Unix { path: default, .. } if default == path)
-}
-
 /// Makes the folder for this user alone; one that exists is left as it is.
 fn make_private(folder: &Path) -> io::Result<()> {
     if folder.exists() {
@@ -110,8 +113,7 @@ fn make_private(folder: &Path) -> io::Result<()> {
     std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder)
 }
 
-/// Refuses a folder that somebody else made or may write. The default's name can be foreseen, and in a temporary folder
-/// anybody can make it first; a folder that was named with `--bus` is the user's own choice.
+/// Refuses a folder that somebody else made or may write.
 fn check_private(folder: &Path, user: Uid) -> io::Result<()> {
     let found = std::fs::symlink_metadata(folder)?;
     let problem = if !found.is_dir() {
@@ -136,7 +138,7 @@ fn open_lock(path: &Path) -> io::Result<(OwnedFd, PathBuf)> {
     Ok((lock, lock_path))
 }
 
-fn listen(path: &Path) -> io::Result<OwnedFd> {
+fn listen(path: &Path, socket_type: SocketType) -> io::Result<OwnedFd> {
     // We hold the lock, so a socket file that is still there belongs to a host that is gone. Anything else stays.
     match std::fs::symlink_metadata(path) {
         Ok(found) if found.file_type().is_socket() => std::fs::remove_file(path)?,
@@ -146,7 +148,7 @@ fn listen(path: &Path) -> io::Result<OwnedFd> {
         Err(_) => {}
     }
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
-    let listener = rustix::net::socket_with(AddressFamily::UNIX, SocketType::SEQPACKET, flags, None)?;
+    let listener = rustix::net::socket_with(AddressFamily::UNIX, socket_type, flags, None)?;
     rustix::net::bind(&listener, &SocketAddrUnix::new(path)?)?;
     rustix::fs::chmod(path, Mode::RUSR | Mode::WUSR)?;
     rustix::net::listen(&listener, BACKLOG)?;
@@ -180,12 +182,5 @@ mod tests {
         let link = place.path().join("link");
         std::os::unix::fs::symlink(place.path(), &link).unwrap();
         assert!(problem(&link, getuid()).ends_with("is no folder"));
-    }
-
-    #[test]
-    fn only_the_default_bus_has_the_default_folder() {
-        let BusUrl::Unix { path, .. } = BusUrl::default_embedded() else { unreachable!("it is embedded") };
-        assert!(is_default(&path));
-        assert!(!is_default(Path::new("/somewhere/else/bus0")));
     }
 }

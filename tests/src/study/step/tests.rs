@@ -1,16 +1,17 @@
-//! A whole study with a tiny program and records of a few lines.
+//! Steps with a tiny program and records of a few lines.
 
 use super::*;
-use crate::study::draws::{Kind, Shape, Shard};
+use crate::study::draws::{Kind, Shape};
 use crate::study::folder::Plan;
 use crate::study::program::Ended;
 use crate::study::report;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 use tempfile::TempDir;
 
-/// Two nulls and a pair of shards of four parameters: three draws.
+/// Two nulls and a pair: three draws.
 const SHAPE: Shape =
     Shape { each: 0, nulls: 2, parameters: 0, pairs: 1, triples: 0, noise_factor: 1.0, weaker_factor: 1.0 };
 const HEAD: &str = "# linked=false added_mass_kg=0\ntime_s,drive_valve,drive_position_m\n";
@@ -24,8 +25,6 @@ struct Bench {
     head: &'static str,
     /// Seed of a draw whose record cannot be made.
     tripped: Option<u64>,
-    /// Whether the hidden effect and another one are left out.
-    leaves_out: bool,
 }
 
 impl Bench {
@@ -41,11 +40,11 @@ impl Bench {
             made: AtomicUsize::new(0),
             head: HEAD,
             tripped: None,
-            leaves_out: false,
         }
     }
 
-    fn run(&self, change: impl FnOnce(&mut Campaign<'_>)) -> Result<CampaignEnd, CampaignError> {
+    /// Takes the step of each draw.
+    fn run(&self, change: impl Fn(&Draw, &mut Step<'_>)) -> Result<Vec<Option<RunResult>>, StepError> {
         let make = |recipe: &Recipe, _: &RigParameters, measurement: &Path, truth: &Path| {
             if self.tripped == Some(recipe.seed) {
                 return Err("tripped".to_owned());
@@ -56,23 +55,22 @@ impl Bench {
             write(truth.join("truth.csv"), "time_s\n")?;
             write(truth.join("truth.json"), "{}")
         };
-        let without = |draw: &Draw| vec![draw.recipe.hidden[0].name.to_owned(), "inclination".to_owned()];
-        let mut campaign = Campaign {
-            study: &self.study,
-            program: Some(&self.program),
-            label: "fake",
-            make: &make,
-            without: if self.leaves_out { Some(&without) } else { None },
-            only: &[],
-            jobs: 2,
-            keep_truth: false,
-            drop_records: false,
-            least_free_mib: 0,
-            stop: &self.stop,
-            say: &|_| {},
+        let one = |draw: &Draw| {
+            let mut step = Step {
+                study: &self.study,
+                label: "fake",
+                make: &make,
+                without: None,
+                keep_truth: false,
+                drop_records: false,
+                again: false,
+                least_free_mib: 0,
+                stop: &self.stop,
+            };
+            change(draw, &mut step);
+            step.run(draw, &self.program)
         };
-        change(&mut campaign);
-        campaign.run()
+        self.study.draws.iter().map(one).collect()
     }
 
     fn path(&self, number: usize, name: &str) -> PathBuf {
@@ -101,9 +99,10 @@ fn a_program_sees_copies_in_an_empty_folder_and_its_report_is_kept() {
     let bench = Bench::new(
         &ANSWERS.replace("shift 9; [ \"$1\" = \"\" ] && exit 8", "shift 9; [ \"$1\" = --more ] || exit 8"),
     );
-    assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete);
+    let results = bench.run(|_, _| {}).unwrap();
     for draw in &bench.study.draws {
         let result = read_result(&bench.path(draw.number, "result.json")).unwrap();
+        assert_eq!(results[draw.number].as_ref(), Some(&result));
         let said = fs::read_to_string(bench.path(draw.number, "stderr.txt")).unwrap();
         assert_eq!((result.number, result.taken.ended), (draw.number, Ended::Exited(0)), "{said}");
         assert_eq!(said, "seen: # linked=false added_mass_kg=0\n");
@@ -112,26 +111,23 @@ fn a_program_sees_copies_in_an_empty_folder_and_its_report_is_kept() {
         assert!(bench.study.truth(draw.number).join("held-out-1/truth.json").exists());
     }
     // Three records for each draw, made once, however often it runs again.
-    assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete);
+    assert_eq!(bench.run(|_, _| {}).unwrap(), results);
     assert_eq!(bench.made.load(Ordering::Relaxed), 9);
 }
 
 #[test]
 fn a_study_that_was_killed_goes_on_where_it_was() {
     let bench = Bench::new("sleep 1000");
-    bench.stop.store(true, Ordering::Relaxed);
-    assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Stopped(3));
-    // Told to stop while programs run: they are killed, and their draws are not done.
-    bench.stop.store(false, Ordering::Relaxed);
-    let end = std::thread::scope(|scope| {
-        let running = scope.spawn(|| bench.run(|_| {}));
+    // Told to stop while the program runs: it is killed, and its draw is not done.
+    let ended = std::thread::scope(|scope| {
+        let running = scope.spawn(|| bench.run(|_, _| {}));
         while !bench.folder.path().join("study/runs/fake").exists() {
             std::thread::sleep(Duration::from_millis(5));
         }
         bench.stop.store(true, Ordering::Relaxed);
         running.join().unwrap()
     });
-    assert_eq!(end.unwrap(), CampaignEnd::Stopped(3));
+    assert_eq!(ended.unwrap(), [None, None, None]);
     assert!(bench.study.draws.iter().all(|draw| !bench.study.run("fake", draw.number).exists()));
 
     // What a kill leaves behind: half a folder of a run and of records.
@@ -140,7 +136,7 @@ fn a_study_that_was_killed_goes_on_where_it_was() {
         fs::write(bench.study.root.join(half).join("half"), "{").unwrap();
     }
     let bench = Bench { program: program(&bench.folder, "exit 0"), stop: AtomicBool::new(false), ..bench };
-    assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete);
+    assert!(bench.run(|_, _| {}).unwrap().iter().all(Option::is_some));
     assert!(!bench.path(0, "half").exists());
 }
 
@@ -156,8 +152,8 @@ fn a_program_that_crashes_hangs_or_writes_nonsense_is_a_result() {
     ] {
         let mut bench = Bench::new(script);
         bench.program.limit = Duration::from_millis(if ended == Ended::TimedOut { 100 } else { 60_000 });
-        assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete, "{script}");
-        let result = read_result(&bench.path(0, "result.json")).unwrap();
+        let results = bench.run(|_, _| {}).unwrap();
+        let result = results[0].as_ref().unwrap();
         assert_eq!(result.taken.ended, ended, "{script}");
         assert!(report::read(&bench.path(0, "report.json")).is_err(), "{script}");
     }
@@ -166,24 +162,23 @@ fn a_program_that_crashes_hangs_or_writes_nonsense_is_a_result() {
 #[test]
 fn a_column_that_could_tell_is_refused() {
     let bench = Bench { head: "time_s,drive_valve,drive_leakage\n", ..Bench::new("exit 0") };
-    let error = bench.run(|_| {}).unwrap_err().to_string();
+    let error = bench.run(|_, _| {}).unwrap_err().to_string();
     assert!(error.contains("drive_leakage"), "{error}");
 }
 
 #[test]
-fn a_record_that_cannot_be_made_does_not_keep_the_others_waiting() {
+fn a_record_that_cannot_be_made_is_told_and_leaves_nothing() {
     let mut bench = Bench::new("exit 0");
     bench.tripped = Some(bench.study.draws[0].recipe.seed);
-    let error = bench.run(|_| {}).unwrap_err().to_string();
+    let error = bench.run(|_, _| {}).unwrap_err().to_string();
     assert_eq!(error, "draw 0: its record cannot be made: tripped");
-    assert!(!bench.path(0, "result.json").exists());
-    assert!(bench.path(1, "result.json").exists() && bench.path(2, "result.json").exists());
+    assert!(!bench.path(0, "result.json").exists() && !bench.study.records(0).exists());
 }
 
 #[test]
 fn a_disk_nearly_full_stops_the_study_before_it_is() {
     let bench = Bench::new("exit 0");
-    let error = bench.run(|campaign| campaign.least_free_mib = u64::MAX).unwrap_err().to_string();
+    let error = bench.run(|_, step| step.least_free_mib = u64::MAX).unwrap_err().to_string();
     assert!(error.contains("nothing is lost"), "{error}");
     assert!(!bench.study.root.join("runs").exists());
 }
@@ -191,47 +186,46 @@ fn a_disk_nearly_full_stops_the_study_before_it_is() {
 #[test]
 fn another_program_does_not_go_on_with_the_results_of_one() {
     let bench = Bench::new("exit 0");
-    assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete);
+    bench.run(|_, _| {}).unwrap();
     let bench = Bench { program: program(&bench.folder, "exit 1"), ..bench };
-    assert!(bench.run(|_| {}).unwrap_err().to_string().contains("another --label"));
-    assert_eq!(bench.run(|campaign| campaign.label = "other").unwrap(), CampaignEnd::Complete);
+    assert!(bench.run(|_, _| {}).unwrap_err().to_string().contains("another --label"));
+    bench.run(|_, step| step.label = "other").unwrap();
 }
 
 #[test]
-fn what_is_left_out_is_said_on_the_command_line_and_only_single_effects_are_run() {
+fn what_is_left_out_is_said_on_the_command_line() {
     // The arguments of every program come first, so that both stay what they are.
     let bench = Bench::new("shift 10; echo \"$*\" >&2");
-    let folder = tempfile::tempdir().unwrap();
-    let shape = Shape { each: 1, ..SHAPE };
-    let bench = Bench { study: Study::begin(folder.path(), &Plan::new(5, shape)).unwrap(), ..bench };
-    let bench = Bench { leaves_out: true, ..bench };
-    assert_eq!(bench.run(|_| {}).unwrap(), CampaignEnd::Complete);
-    for draw in &bench.study.draws {
-        assert_eq!(bench.path(draw.number, "").exists(), draw.kind == Kind::Single);
-    }
-    let result = read_result(&bench.path(3, "result.json")).unwrap();
-    let effect = bench.study.draws[3].recipe.hidden[0].name;
-    assert_eq!(result.without, [effect, "inclination"]);
+    let results = bench.run(|_, step| step.without = Some(vec!["inclination".to_owned()])).unwrap();
+    let result = results[2].as_ref().unwrap();
+    assert_eq!(result.without, ["inclination"]);
     assert!(result.program.leave_out);
-    let said = fs::read_to_string(bench.path(3, "stderr.txt")).unwrap();
-    assert_eq!(said, format!("--without {effect} --without inclination\n"));
+    let said = fs::read_to_string(bench.path(2, "stderr.txt")).unwrap();
+    assert_eq!(said, "--without inclination\n");
     // The same program with its whole catalogue is another one.
-    let bench = Bench { leaves_out: false, ..bench };
-    assert!(bench.run(|_| {}).unwrap_err().to_string().contains("another --label"));
+    assert!(bench.run(|_, _| {}).unwrap_err().to_string().contains("another --label"));
 }
 
 #[test]
-fn single_draws_are_run_again_and_records_are_dropped_when_asked() {
+fn what_is_done_is_done_again_and_records_are_dropped_when_asked() {
     let bench = Bench::new("exit 0");
-    assert_eq!(bench.run(|campaign| campaign.only = &[1]).unwrap(), CampaignEnd::Complete);
-    assert_eq!(bench.run(|campaign| campaign.only = &[1]).unwrap(), CampaignEnd::Complete);
-    assert!(bench.path(1, "result.json").exists() && !bench.path(0, "result.json").exists());
-    assert_eq!(bench.run(|campaign| campaign.drop_records = true).unwrap(), CampaignEnd::Complete);
-    assert!(!bench.study.records(0).exists() && bench.study.truth(0).exists());
+    bench.run(|_, _| {}).unwrap();
+    fs::write(bench.path(1, "mark"), "").unwrap();
+    bench.run(|draw, step| step.again = draw.number == 0).unwrap();
+    assert!(bench.path(1, "mark").exists());
+    bench
+        .run(|draw, step| {
+            step.again = draw.number == 1;
+            step.drop_records = true;
+        })
+        .unwrap();
+    assert!(
+        !bench.path(1, "mark").exists() && !bench.study.records(1).exists() && bench.study.truth(1).exists()
+    );
 }
 
 #[test]
 fn the_draws_of_this_test_are_those_it_speaks_of() {
-    let draws = Plan { shard: Shard::WHOLE, ..Plan::new(5, SHAPE) }.draws();
+    let draws = Plan::new(5, SHAPE).draws();
     assert_eq!(draws.iter().map(|draw| draw.kind).collect::<Vec<_>>(), [Kind::Null, Kind::Null, Kind::Pair]);
 }

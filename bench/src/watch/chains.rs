@@ -1,0 +1,136 @@
+//! The chains of the axis controllers as diagrams: their states, which `rig.dbc` names, and the edges between them.
+//!
+//! The edges are those of the drawings at the heads of `controller/src/chains/*.rs`; a test holds every name against `rig.dbc`.
+//! What may happen in any state (a fault, an emergency stop, another phase of the main chain) is drawn from the state in which
+//! it is told of most, where the drawing says "any": a page cannot show arrows from everywhere.
+
+use protocol::frames::{ChainStatus, DRIVE_CHAIN_STATUS, Frame};
+use serde_json::{Map, Value, json};
+
+/// A chain: its name, its signal in the status of an axis, and its edges.
+struct Chain {
+    name: &'static str,
+    signal: &'static str,
+    edges: &'static [(&'static str, &'static str)],
+}
+
+const CHAINS: [Chain; 4] = [
+    Chain {
+        name: "main",
+        signal: "main_chain",
+        edges: &[
+            ("waiting-for-rig", "initial-positioning"),
+            ("initial-positioning", "preparing"),
+            ("preparing", "initial-force"),
+            ("initial-force", "settling"),
+            ("settling", "experiment"),
+            ("experiment", "final-settling"),
+            ("final-settling", "initial-positioning"),
+            ("final-settling", "done"),
+            ("experiment", "aborted"),
+            ("experiment", "fault"),
+            ("aborted", "initial-positioning"),
+            ("fault", "initial-positioning"),
+        ],
+    },
+    Chain {
+        name: "force",
+        signal: "force_chain",
+        edges: &[
+            ("idle", "limited"),
+            ("limited", "standstill"),
+            ("standstill", "moving"),
+            ("moving", "standstill"),
+            ("standstill", "done"),
+            ("limited", "fault"),
+            ("idle", "initial-ramp"),
+            ("initial-ramp", "load-profile"),
+            ("load-profile", "idle"),
+        ],
+    },
+    Chain {
+        name: "matching",
+        signal: "matching_chain",
+        edges: &[
+            ("idle", "waiting-for-rest"),
+            ("waiting-for-rest", "averaging"),
+            ("averaging", "waiting-for-rest"),
+            ("averaging", "matched"),
+            ("matched", "waiting-for-rest"),
+            ("waiting-for-rest", "fault"),
+            ("averaging", "fault"),
+        ],
+    },
+    Chain {
+        name: "emergency_stop",
+        signal: "emergency_stop_chain",
+        edges: &[
+            ("ready", "tripped"),
+            ("tripped", "waiting-for-release"),
+            ("waiting-for-release", "recovering"),
+            ("recovering", "ready"),
+            ("recovering", "waiting-for-start"),
+            ("waiting-for-start", "ready"),
+            ("recovering", "tripped"),
+            ("waiting-for-start", "tripped"),
+        ],
+    },
+];
+
+/// Names of a signal's values.
+fn states(signal: &str) -> &'static [&'static str] {
+    let spec = DRIVE_CHAIN_STATUS.signals.iter().find(|known| known.name == signal);
+    spec.map_or(&[], |spec| spec.values)
+}
+
+/// All chains: `name`, `states`, `edges`.
+#[must_use]
+pub fn diagrams() -> Value {
+    let diagram =
+        |chain: &Chain| json!({ "name": chain.name, "states": states(chain.signal), "edges": chain.edges });
+    CHAINS.iter().map(diagram).collect()
+}
+
+/// The states of an axis by chain.
+#[must_use]
+pub fn active(status: ChainStatus) -> Value {
+    let mut by_chain = Map::new();
+    // Both axes' statuses have one layout.
+    Frame::DriveChainStatus(status).for_each_signal(|signal, value| {
+        if let Some(chain) = CHAINS.iter().find(|chain| chain.signal == signal.name) {
+            by_chain.insert(chain.name.to_owned(), signal.values.get(value as usize).copied().into());
+        }
+    });
+    by_chain.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_state_of_an_edge_is_one_of_the_wire_and_every_state_has_an_edge() {
+        for chain in &CHAINS {
+            let states = states(chain.signal);
+            assert!(!states.is_empty(), "{}", chain.name);
+            for state in chain.edges.iter().flat_map(|(from, to)| [from, to]) {
+                assert!(states.contains(state), "{}: {state}", chain.name);
+            }
+            for state in states {
+                let touched = chain.edges.iter().any(|(from, to)| from == state || to == state);
+                assert!(touched, "{}: nothing leads to {state}", chain.name);
+            }
+        }
+    }
+
+    #[test]
+    fn active_states_are_told_by_name() {
+        let frame = Frame::from_values(DRIVE_CHAIN_STATUS.id, &[5.0, 2.0, 3.0, 0.0, 1.0, 9.0, 0.0]);
+        let Some(Frame::DriveChainStatus(status)) = frame else { panic!("{frame:?}") };
+        let told = active(status);
+        assert_eq!(told["main"], "experiment");
+        assert_eq!(told["force"], "standstill");
+        assert_eq!(told["matching"], "matched");
+        assert_eq!(told["emergency_stop"], "ready");
+    }
+}

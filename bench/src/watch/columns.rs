@@ -1,0 +1,183 @@
+//! The columns of the live page: name, unit, and where each value comes from. Nothing about them stands elsewhere.
+//!
+//! A value comes from the cycles of the telemetry, by the name that the column has in `measurement.csv` or `truth.csv`; what
+//! the controllers say comes from their ChainValues on the bus. Without telemetry the measured ones come from the bus, and what
+//! only a simulation knows is none.
+
+use std::sync::LazyLock;
+
+/// Columns of `measurement.csv` for one axis, in its order: those that the bus tells too.
+pub const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
+/// How many there are of both axes.
+pub const MEASURED_COUNT: usize = 2 * MEASURED.len();
+/// The axes as names begin.
+pub const AXES: [&str; 2] = ["drive", "load"];
+
+/// Where a value comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// Column of `measurement.csv`, by its place.
+    Measured(usize),
+    /// Sum of columns of `truth.csv`, each with this factor.
+    Truth(Vec<String>, f64),
+    /// What the controller of an axis says that it does.
+    Said(usize, Said),
+    /// The supply's pressure, which the bus tells too.
+    Supply,
+}
+
+/// What a controller says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Said {
+    /// Set-point of the position.
+    Position,
+    /// Set-point of the force.
+    Force,
+    /// Set-point less sensor.
+    Error,
+}
+
+/// A column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Name, ending in its unit where it has one.
+    pub name: String,
+    /// Unit in SI; `1` for a plain number.
+    pub unit: &'static str,
+    /// Where its values come from.
+    pub source: Source,
+}
+
+/// All columns.
+pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
+    let mut columns: Vec<_> = (0..AXES.len()).flat_map(of_axis).collect();
+    let truth = |name: &str| Source::Truth(vec![name.to_owned()], 1.0);
+    for (name, unit, source) in [
+        ("supply_pressure_pa", "Pa", Source::Supply),
+        ("linkage_distance_m", "m", truth("linkage_distance_m")),
+        ("linkage_force_n", "N", truth("linkage_contact_force_N")),
+    ] {
+        columns.push(Column { name: name.to_owned(), unit, source });
+    }
+    columns
+});
+
+fn of_axis(axis: usize) -> Vec<Column> {
+    // The load's rod goes out in -x: what is told along its own extension is turned round.
+    let along_x = [1.0, -1.0][axis];
+    let measured = |name: &str| {
+        let place = MEASURED.iter().position(|known| *known == name);
+        Source::Measured(axis * MEASURED.len() + place.expect("a column of the table above"))
+    };
+    let truth = |names: &[&str], factor: f64| {
+        Source::Truth(names.iter().map(|name| format!("{}_{name}", AXES[axis])).collect(), factor)
+    };
+    let friction = ["viscous_friction_N", "sliding_friction_N", "holding_force_N"];
+    [
+        ("position_m", "m", measured("position_m")),
+        ("set_point_m", "m", Source::Said(axis, Said::Position)),
+        ("control_error_m", "m", Source::Said(axis, Said::Error)),
+        ("true_position_m", "m", truth(&["position_m"], 1.0)),
+        ("velocity_m_per_s", "m/s", truth(&["rod_velocity_m_per_s"], along_x)),
+        ("pressure_a_pa", "Pa", measured("pressure_a_Pa")),
+        ("pressure_b_pa", "Pa", measured("pressure_b_Pa")),
+        ("true_pressure_a_pa", "Pa", truth(&["pressure_a_Pa"], 1.0)),
+        ("true_pressure_b_pa", "Pa", truth(&["pressure_b_Pa"], 1.0)),
+        ("valve_opening", "1", measured("valve")),
+        ("spool_opening", "1", truth(&["spool"], 1.0)),
+        ("force_n", "N", measured("force_N")),
+        ("force_set_point_n", "N", Source::Said(axis, Said::Force)),
+        ("flow_a_m3_per_s", "m^3/s", truth(&["flow_a_m3_per_s"], 1.0)),
+        ("flow_b_m3_per_s", "m^3/s", truth(&["flow_b_m3_per_s"], 1.0)),
+        ("pneumatic_force_n", "N", truth(&["pneumatic_force_N"], along_x)),
+        ("friction_force_n", "N", truth(&friction, along_x)),
+        ("hand_force_n", "N", truth(&["hand_force_N"], along_x)),
+    ]
+    .map(|(name, unit, source)| Column { name: format!("{}_{name}", AXES[axis]), unit, source })
+    .into()
+}
+
+/// Where the columns' values stand in a cycle of the telemetry.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layout {
+    measured: [Option<usize>; MEASURED_COUNT],
+    /// For each column that is a sum of true ones: their places; empty when one is missing.
+    truth: Vec<Vec<usize>>,
+    supply: Option<usize>,
+}
+
+impl Layout {
+    /// From the description's columns: table and name of each.
+    #[must_use]
+    pub fn new<'a>(described: impl Iterator<Item = (&'a str, &'a str)>) -> Self {
+        let described: Vec<_> = described.collect();
+        let place = |table: &str, name: &str| described.iter().position(|known| *known == (table, name));
+        let measured = std::array::from_fn(|index| {
+            let (axis, column) = (AXES[index / MEASURED.len()], MEASURED[index % MEASURED.len()]);
+            place("measurement", &format!("{axis}_{column}"))
+        });
+        let truth = COLUMNS.iter().map(|column| match &column.source {
+            Source::Truth(names, _) => {
+                let places: Option<Vec<_>> = names.iter().map(|name| place("truth", name)).collect();
+                places.unwrap_or_default()
+            }
+            _ => Vec::new(),
+        });
+        Self { measured, truth: truth.collect(), supply: place("truth", "supply_pressure_Pa") }
+    }
+
+    /// The measured values of a cycle.
+    #[must_use]
+    pub fn measured(&self, values: &[f64]) -> [Option<f64>; MEASURED_COUNT] {
+        self.measured.map(|place| values.get(place?).copied())
+    }
+
+    /// The supply's pressure in a cycle, Pa.
+    #[must_use]
+    pub fn supply_pa(&self, values: &[f64]) -> Option<f64> {
+        values.get(self.supply?).copied()
+    }
+
+    /// The value of a column that is a sum of true ones, by the column's place.
+    #[must_use]
+    pub fn truth(&self, column: usize, factor: f64, values: &[f64]) -> Option<f64> {
+        let places = self.truth.get(column).filter(|places| !places.is_empty())?;
+        let sum: Option<f64> = places.iter().map(|place| values.get(*place)).sum();
+        sum.map(|sum| factor * sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_end_with_their_unit() {
+        for (place, column) in COLUMNS.iter().enumerate() {
+            assert!(COLUMNS[..place].iter().all(|other| other.name != column.name), "{}", column.name);
+            let end = match column.unit {
+                "m" => "_m",
+                "m/s" => "_m_per_s",
+                "Pa" => "_pa",
+                "N" => "_n",
+                "m^3/s" => "_m3_per_s",
+                _ => "_opening",
+            };
+            assert!(column.name.ends_with(end), "{}", column.name);
+        }
+    }
+
+    #[test]
+    fn a_sum_is_none_unless_all_of_it_is_told() {
+        let place = |name: &str| COLUMNS.iter().position(|column| column.name == name).unwrap();
+        let friction = place("load_friction_force_n");
+        let names = ["load_viscous_friction_N", "load_sliding_friction_N", "load_holding_force_N"];
+        let layout = Layout::new(names.iter().map(|name| ("truth", *name)));
+        assert_eq!(layout.truth(friction, -1.0, &[1.0, 2.0, 4.0]), Some(-7.0));
+        let without = Layout::new(names[1..].iter().map(|name| ("truth", *name)));
+        assert_eq!(without.truth(friction, -1.0, &[1.0, 2.0]), None);
+        assert_eq!(layout.measured(&[1.0; 3]), [None; MEASURED_COUNT]);
+        let measured = Layout::new([("measurement", "load_valve")].into_iter());
+        assert_eq!(measured.measured(&[0.5])[MEASURED.len()], Some(0.5));
+    }
+}

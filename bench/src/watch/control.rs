@@ -1,0 +1,193 @@
+//! What the page may ask for, out of JSON; carried out by the bus, by the emulator's console, or here. Pure.
+//!
+//! Ranges are not checked here: the console of the emulator knows them, and its answer is handed on.
+
+use super::minute::LONGEST_S;
+use protocol::frames::{
+    EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis, RunControl, RunControlCommand,
+};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// What is asked for.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "command", rename_all = "kebab-case", deny_unknown_fields)]
+enum Asked {
+    EmergencyStop {},
+    Release {},
+    Start {},
+    Abort {},
+    Link {},
+    Unlink {},
+    Weights {
+        kg: f64,
+    },
+    Hand {
+        on: String,
+        newton: f64,
+    },
+    Fault {
+        name: String,
+        place: Option<String>,
+        #[serde(default)]
+        values: BTreeMap<String, f64>,
+    },
+    Mend {
+        name: Option<String>,
+        place: Option<String>,
+        #[serde(default)]
+        all: bool,
+    },
+    SetPoint {
+        axis: AskedAxis,
+        #[serde(default)]
+        position_m: f64,
+        #[serde(default)]
+        force_n: f64,
+    },
+    Save {
+        seconds: f64,
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum AskedAxis {
+    Drive,
+    Load,
+}
+
+/// How it is carried out.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Order {
+    /// A stop by the console, repeated on the bus until it is released.
+    Stop,
+    /// Its release.
+    Release,
+    /// A frame on the bus, once.
+    Frame(Frame),
+    /// A line for the emulator's console.
+    Line(String),
+    /// The last so many seconds, saved.
+    Save(f64),
+}
+
+/// The emergency stop of the console, or its release, as a person would send them: `108#0100`, `108#0001`.
+#[must_use]
+pub fn stop_frame(release: bool) -> EmergencyStop {
+    let reason = if release { EmergencyStopReason::None } else { EmergencyStopReason::Operator };
+    EmergencyStop { reason, release }
+}
+
+/// Reads what is asked for.
+///
+/// # Errors
+/// What is wrong with it, in words.
+pub fn read(body: &[u8]) -> Result<Order, String> {
+    let asked: Asked = serde_json::from_slice(body).map_err(|error| error.to_string())?;
+    let run = |command| Order::Frame(Frame::RunControl(RunControl { command, experiment: 0 }));
+    let line = |line: &str| Order::Line(line.to_owned());
+    Ok(match asked {
+        Asked::EmergencyStop {} => Order::Stop,
+        Asked::Release {} => Order::Release,
+        Asked::Start {} => run(RunControlCommand::Start),
+        Asked::Abort {} => run(RunControlCommand::Abort),
+        Asked::Link {} => line("link"),
+        Asked::Unlink {} => line("unlink"),
+        Asked::Weights { kg } => Order::Line(format!("weights {kg}")),
+        Asked::Hand { on, newton } => Order::Line(format!("hand {} {newton}", word(&on)?)),
+        Asked::Fault { name, place, values } => {
+            let mut text = format!("fault {}", at(&name, place.as_deref())?);
+            for (key, value) in &values {
+                let _ = write!(text, " {}={value}", word(key)?);
+            }
+            Order::Line(text)
+        }
+        Asked::Mend { all: true, name: None, place: None } => line("mend all"),
+        Asked::Mend { all: false, name: Some(name), place } => {
+            Order::Line(format!("mend {}", at(&name, place.as_deref())?))
+        }
+        Asked::Mend { .. } => return Err("mend takes a name and a place, or \"all\": true".into()),
+        Asked::SetPoint { axis, position_m, force_n } => {
+            let axis = match axis {
+                AskedAxis::Drive => HandSetPointAxis::Drive,
+                AskedAxis::Load => HandSetPointAxis::Load,
+            };
+            Order::Frame(Frame::HandSetPoint(HandSetPoint { axis, position_m, force_n }))
+        }
+        Asked::Save { seconds } if seconds > 0.0 && seconds <= LONGEST_S => Order::Save(seconds),
+        Asked::Save { .. } => return Err(format!("seconds: more than 0, at most {LONGEST_S}")),
+    })
+}
+
+fn at(name: &str, place: Option<&str>) -> Result<String, String> {
+    let name = word(name)?;
+    Ok(match place {
+        Some(place) => format!("{name} {}", word(place)?),
+        None => name.to_owned(),
+    })
+}
+
+/// Text as a word of a command: nothing of it may look like another word, or another line.
+fn word(text: &str) -> Result<&str, String> {
+    let good = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
+    if !text.is_empty() && text.chars().all(good) { Ok(text) } else { Err(format!("{text:?} is no name")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(json: &str) -> String {
+        match read(json.as_bytes()) {
+            Ok(Order::Line(line)) => line,
+            other => panic!("{json}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn each_command_has_its_line() {
+        assert_eq!(line(r#"{"command": "link"}"#), "link");
+        assert_eq!(line(r#"{"command": "weights", "kg": 2.5}"#), "weights 2.5");
+        assert_eq!(line(r#"{"command": "hand", "on": "load", "newton": -40}"#), "hand load -40");
+        let fault =
+            r#"{"command": "fault", "name": "hose-burst", "place": "load.b", "values": {"kv_m3_per_h": 2}}"#;
+        assert_eq!(line(fault), "fault hose-burst load.b kv_m3_per_h=2");
+        assert_eq!(line(r#"{"command": "mend", "name": "bus-loss"}"#), "mend bus-loss");
+        assert_eq!(line(r#"{"command": "mend", "all": true}"#), "mend all");
+    }
+
+    #[test]
+    fn what_goes_on_the_bus_or_stays_here() {
+        assert_eq!(read(br#"{"command": "emergency-stop"}"#), Ok(Order::Stop));
+        assert_eq!(read(br#"{"command": "release"}"#), Ok(Order::Release));
+        let start = RunControl { command: RunControlCommand::Start, experiment: 0 };
+        assert_eq!(read(br#"{"command": "start"}"#), Ok(Order::Frame(Frame::RunControl(start))));
+        assert_eq!(read(br#"{"command": "save", "seconds": 60}"#), Ok(Order::Save(60.0)));
+        let press = HandSetPoint { axis: HandSetPointAxis::Load, position_m: 0.0, force_n: 150.0 };
+        let asked = br#"{"command": "set-point", "axis": "load", "force_n": 150}"#;
+        assert_eq!(read(asked), Ok(Order::Frame(Frame::HandSetPoint(press))));
+    }
+
+    #[test]
+    fn nothing_smuggles_a_second_command() {
+        for bad in [
+            r#"{"command": "fault", "name": "bus-loss\nquit"}"#,
+            r#"{"command": "fault", "name": "valve-stuck", "place": "drive load"}"#,
+            r#"{"command": "hand", "on": "load 5\nquit", "newton": 1}"#,
+            r#"{"command": "fault", "name": "", "values": {}}"#,
+            r#"{"command": "fault", "name": "x", "values": {"a b": 1}}"#,
+            r#"{"command": "quit"}"#,
+            r#"{"command": "link", "and": "more"}"#,
+            r#"{"command": "mend"}"#,
+            r#"{"command": "save", "seconds": 61}"#,
+            r#"{"command": "save", "seconds": 0}"#,
+            r#"{"command": "weights"}"#,
+            r#"{"command": "set-point", "axis": "both"}"#,
+            "nothing",
+        ] {
+            assert!(read(bad.as_bytes()).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! What the charts are made of: a row every 10 ms with the controllers' set-points at the same moment, and the last minute.
+//!
+//! Cycles come by the telemetry and ChainValues by the bus, each by its own way and the latter every ten cycles at some cycle of
+//! their own. A row waits until the values after it are there, and takes what lies between them; where there is nothing on both
+//! sides, it has none: a set-point drawn beside a sensor of another cycle would be an error that nobody made.
+
+use super::columns::{COLUMNS, Said, Source};
+use protocol::frames::ChainValues;
+use serde_json::{Map, Value, json};
+use std::collections::VecDeque;
+
+/// Cycles from row to row.
+pub const SPACING_CYCLES: u64 = 10;
+/// Rows that are kept: a minute.
+const KEPT: usize = 6000;
+/// Cycles that a row waits for the controllers.
+const PATIENCE_CYCLES: u64 = 30;
+/// Most cycles between two values of a controller that a straight line is drawn through: one of them may be lost.
+const BRIDGED_CYCLES: u64 = 20;
+/// Values that are kept of a controller.
+const VALUES_KEPT: usize = 32;
+
+/// A row of the charts; values as the page gets them, to seven digits.
+#[derive(Clone, Debug, PartialEq)]
+struct Row {
+    cycle: u64,
+    values: Vec<Option<f32>>,
+}
+
+/// Rows of a run.
+#[derive(Debug, Default)]
+pub struct Rows {
+    /// Those that wait for the controllers.
+    waiting: VecDeque<Row>,
+    said: [VecDeque<(u64, ChainValues)>; 2],
+    kept: VecDeque<Row>,
+    /// Rows at the end of those kept that were not handed out yet.
+    fresh: usize,
+}
+
+impl Rows {
+    /// Takes what the controller of an axis said after the sensors of `cycle`.
+    pub fn hear(&mut self, axis: usize, cycle: u64, values: ChainValues) {
+        let said = &mut self.said[axis];
+        said.push_back((cycle, values));
+        if said.len() > VALUES_KEPT {
+            said.pop_front();
+        }
+    }
+
+    /// Takes a row, without what controllers say.
+    pub fn add(&mut self, cycle: u64, values: &[Option<f64>]) {
+        let values = values.iter().map(|value| value.map(|value| value as f32)).collect();
+        self.waiting.push_back(Row { cycle, values });
+        self.settle(cycle);
+    }
+
+    /// Completes the rows that need wait no longer, `newest` being the newest cycle.
+    fn settle(&mut self, newest: u64) {
+        while let Some(row) = self.waiting.front() {
+            let heard = |said: &VecDeque<(u64, ChainValues)>| {
+                said.back().is_some_and(|(cycle, _)| *cycle >= row.cycle)
+            };
+            if !self.said.iter().all(heard) && newest < row.cycle + PATIENCE_CYCLES {
+                return;
+            }
+            let Some(mut row) = self.waiting.pop_front() else { return };
+            for (value, column) in row.values.iter_mut().zip(COLUMNS.iter()) {
+                if let Source::Said(axis, what) = column.source {
+                    *value = between(&self.said[axis], row.cycle, what).map(|value| value as f32);
+                }
+            }
+            self.kept.push_back(row);
+            self.fresh = (self.fresh + 1).min(self.kept.len());
+            if self.kept.len() > KEPT {
+                self.kept.pop_front();
+            }
+        }
+    }
+
+    /// The rows that are new since this was asked the last time; `None` when there are none.
+    pub fn take_fresh(&mut self) -> Option<Value> {
+        let fresh = std::mem::take(&mut self.fresh);
+        (fresh > 0).then(|| table(self.kept.range(self.kept.len() - fresh..)))
+    }
+
+    /// The rows of the last so many seconds.
+    #[must_use]
+    pub fn last(&self, seconds: f64) -> Value {
+        let rows = (seconds * 1000.0 / SPACING_CYCLES as f64) as usize;
+        table(self.kept.range(self.kept.len().saturating_sub(rows)..))
+    }
+
+    /// The newest row, by column.
+    #[must_use]
+    pub fn newest(&self) -> Map<String, Value> {
+        let Some(row) = self.kept.back() else { return Map::new() };
+        let values = row.values.iter().map(|value| json!(value.map(short)));
+        COLUMNS.iter().zip(values).map(|(column, value)| (column.name.clone(), value)).collect()
+    }
+}
+
+/// What a controller said of a cycle, or between what it said before and after.
+fn between(said: &VecDeque<(u64, ChainValues)>, cycle: u64, what: Said) -> Option<f64> {
+    let value = |values: &ChainValues| match what {
+        Said::Position => values.position_set_point_m,
+        Said::Force => values.force_set_point_n,
+        Said::Error => values.control_error_m,
+    };
+    let after = said.iter().find(|(at, _)| *at >= cycle);
+    let before = said.iter().rev().find(|(at, _)| *at <= cycle);
+    match (before, after) {
+        (Some((at, values)), _) if *at == cycle => Some(value(values)),
+        (Some((from, first)), Some((to, second))) if to - from <= BRIDGED_CYCLES => {
+            let share = (cycle - from) as f64 / (to - from) as f64;
+            Some(value(first) + share * (value(second) - value(first)))
+        }
+        _ => None,
+    }
+}
+
+/// The shortest decimal number that is this one to its seven digits: JSON would spell out those that a wider type adds.
+fn short(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
+}
+
+/// Rows as columns.
+fn table<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Value {
+    let time_s: Vec<f64> = rows.clone().map(|row| row.cycle as f64 / 1000.0).collect();
+    let column = |place: usize| rows.clone().map(|row| row.values[place].map(short)).collect::<Vec<_>>();
+    let columns: Map<_, _> =
+        COLUMNS.iter().enumerate().map(|(place, known)| (known.name.clone(), json!(column(place)))).collect();
+    json!({ "t_s": time_s, "columns": columns })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(position_set_point_m: f64) -> ChainValues {
+        ChainValues {
+            averaged_position_m: 0.0,
+            position_set_point_m,
+            force_set_point_n: 0.0,
+            control_error_m: 0.0,
+        }
+    }
+
+    fn set_points(rows: &mut Rows) -> Vec<Value> {
+        let fresh = rows.take_fresh();
+        fresh.map_or(Vec::new(), |rows| rows["columns"]["drive_set_point_m"].as_array().unwrap().clone())
+    }
+
+    #[test]
+    fn a_set_point_is_that_of_the_rows_own_cycle() {
+        let mut rows = Rows::default();
+        let row = vec![Some(0.5); COLUMNS.len()];
+        (0..2).for_each(|axis| rows.hear(axis, 3, values(0.25)));
+        rows.add(0, &row);
+        rows.add(10, &row);
+        assert_eq!(set_points(&mut rows), [Value::Null], "of cycle 0 nothing is known, and 10 waits");
+        (0..2).for_each(|axis| rows.hear(axis, 13, values(0.5)));
+        rows.add(20, &row);
+        // 7 of the 10 cycles between 3 and 13: 0.25 + 0.7 0.25.
+        assert_eq!(set_points(&mut rows), [json!(0.425)]);
+    }
+
+    #[test]
+    fn a_controller_that_is_silent_holds_nobody_up_for_long() {
+        let mut rows = Rows::default();
+        let row = vec![None; COLUMNS.len()];
+        rows.hear(0, 0, values(0.25));
+        (0..=60).step_by(10).for_each(|cycle| rows.add(cycle, &row));
+        assert_eq!(set_points(&mut rows), [json!(0.25), Value::Null, Value::Null, Value::Null]);
+    }
+
+    #[test]
+    fn one_lost_word_is_bridged_and_two_are_not() {
+        for (after, expected) in [(20, json!(0.375)), (30, Value::Null)] {
+            let mut rows = Rows::default();
+            let row = vec![None; COLUMNS.len()];
+            (0..2).for_each(|axis| rows.hear(axis, 0, values(0.25)));
+            (0..2).for_each(|axis| rows.hear(axis, after, values(0.5)));
+            [0, 10].into_iter().for_each(|cycle| rows.add(cycle, &row));
+            assert_eq!(set_points(&mut rows), [json!(0.25), expected]);
+        }
+    }
+
+    #[test]
+    fn a_minute_is_kept_and_no_more() {
+        let mut rows = Rows::default();
+        let row = vec![None; COLUMNS.len()];
+        (0..KEPT as u64 + 50).for_each(|place| rows.add(place * SPACING_CYCLES, &row));
+        let last = rows.last(100.0);
+        assert_eq!(last["t_s"].as_array().unwrap().len(), KEPT);
+        assert_eq!(rows.last(0.5)["t_s"].as_array().unwrap().len(), 50);
+    }
+}

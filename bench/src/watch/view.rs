@@ -1,0 +1,357 @@
+//! What the page shows: everything that was heard of the run that goes on, from its telemetry and from the bus.
+
+use super::chains;
+use super::columns::{COLUMNS, Layout, Source};
+use super::light::Light;
+use super::minute::{Minute, SetUp};
+use super::rhythm::Rhythm;
+use super::rows::{Rows, SPACING_CYCLES};
+use super::wire::{News, Wire};
+use protocol::can::CanFrame;
+use protocol::candump::FrameRecord;
+use protocol::telemetry::Packet;
+use serde_json::{Map, Value, json};
+use std::collections::{BTreeMap, VecDeque};
+use std::path::{Path, PathBuf};
+
+/// Messages that are kept for who comes later.
+const MESSAGES_KEPT: usize = 200;
+/// Of overruns fewer, so that a bad machine's thousands hide nothing else.
+const OVERRUNS_KEPT: u64 = 20;
+/// Overruns of so many cycles count as of the last minute.
+const MINUTE_CYCLES: u64 = 60_000;
+/// Kinds of events that a person has to look at, and those that end or stop something.
+const WARNINGS: [&str; 7] =
+    ["skipped", "command-stale", "link-refused", "link-given-up", "weights-refused", "malformed", "fault"];
+const ERRORS: [&str; 5] = ["emergency-stop", "two-sources", "second-rig", "not-finite", "bus-lost"];
+
+/// Everything that was heard.
+pub struct View {
+    /// The run's folder, if it was named at the command line.
+    folder: Option<PathBuf>,
+    description: Value,
+    layout: Layout,
+    /// Whether cycles come by telemetry, and not by the bus alone.
+    pub telemetry: bool,
+    cycle: Option<u64>,
+    /// Frames of the bus.
+    pub wire: Wire,
+    /// Rows of the charts.
+    pub rows: Rows,
+    /// Histograms.
+    pub rhythm: Rhythm,
+    /// The last minute.
+    pub minute: Minute,
+    light: Light,
+    claim: Value,
+    overruns: u64,
+    recent_overruns: VecDeque<u64>,
+    skipped: u64,
+    records_lost: u64,
+    faults: BTreeMap<u64, Value>,
+    added_mass_kg: f64,
+    messages: VecDeque<Value>,
+    fresh: Vec<Value>,
+}
+
+/// What only the server knows of the state.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Audience {
+    /// Listeners to events.
+    pub viewers: usize,
+    /// Events that they missed.
+    pub missed: u64,
+    /// Milliseconds since the start of the program.
+    pub now_ms: u64,
+}
+
+impl View {
+    /// Nothing heard yet.
+    #[must_use]
+    pub fn new(folder: Option<&Path>) -> Self {
+        Self {
+            folder: folder.map(Path::to_path_buf),
+            description: Value::Null,
+            layout: Layout::default(),
+            telemetry: false,
+            cycle: None,
+            wire: Wire::default(),
+            rows: Rows::default(),
+            rhythm: Rhythm::default(),
+            minute: Minute::default(),
+            light: Light::new(folder),
+            claim: Value::Null,
+            overruns: 0,
+            recent_overruns: VecDeque::new(),
+            skipped: 0,
+            records_lost: 0,
+            faults: BTreeMap::new(),
+            added_mass_kg: 0.0,
+            messages: VecDeque::new(),
+            fresh: Vec::new(),
+        }
+    }
+
+    /// Takes a packet of the telemetry, save an answer, which is the server's.
+    pub fn packet(&mut self, packet: Packet) {
+        match packet {
+            Packet::Description(text) => self.describe(&text),
+            Packet::Cycle(cycle, values) => self.take_cycle(cycle, &values),
+            Packet::Event(text) => self.event(&text),
+            Packet::Histogram(line) => {
+                if let Err(error) = self.rhythm.take(&line) {
+                    self.tell("warning", &format!("a histogram of the telemetry cannot be read: {error}"));
+                }
+            }
+            Packet::Loss(records) => self.records_lost = records,
+            Packet::Answer(_) => {}
+        }
+    }
+
+    /// A run begins, or is joined.
+    fn describe(&mut self, text: &str) {
+        let description: Value = serde_json::from_str(text).unwrap_or_default();
+        let out = description["out"].as_str().map(PathBuf::from);
+        let folder = self.folder.clone().or(out);
+        let (messages, fresh) = (std::mem::take(&mut self.messages), std::mem::take(&mut self.fresh));
+        let columns = description["columns"].as_array().into_iter().flatten();
+        let named = columns.filter_map(|column| Some((column["table"].as_str()?, column["name"].as_str()?)));
+        *self = Self {
+            layout: Layout::new(named),
+            light: Light::new(folder.as_deref()),
+            added_mass_kg: description["setup"]["added_mass_kg"].as_f64().unwrap_or_default(),
+            telemetry: true,
+            messages,
+            fresh,
+            ..Self::new(self.folder.as_deref())
+        };
+        self.description = description;
+    }
+
+    fn take_cycle(&mut self, cycle: u64, values: &[f64]) {
+        self.cycle = Some(cycle);
+        let measured = self.layout.measured(values);
+        self.minute.cycle(cycle, measured);
+        if !cycle.is_multiple_of(SPACING_CYCLES) {
+            return;
+        }
+        let supply_pa = self.layout.supply_pa(values).or(self.supply_on_bus_pa());
+        let row: Vec<_> = COLUMNS
+            .iter()
+            .enumerate()
+            .map(|(place, column)| match &column.source {
+                Source::Measured(index) => measured[*index],
+                Source::Truth(_, factor) => self.layout.truth(place, *factor, values),
+                Source::Supply => supply_pa,
+                Source::Said(..) => None,
+            })
+            .collect();
+        self.rows.add(cycle, &row);
+    }
+
+    /// Takes a frame of the bus.
+    pub fn frame(&mut self, record: FrameRecord, now_ms: u64) {
+        self.minute.frame(record);
+        match self.wire.take(&record.frame, now_ms) {
+            Some(News::Said(axis, cycle, values)) => self.rows.hear(axis, cycle, values),
+            Some(News::Cycle(cycle, anew)) if !self.telemetry => self.row_of_bus(cycle, anew),
+            _ => {}
+        }
+    }
+
+    /// A row without telemetry: what the bus tells.
+    fn row_of_bus(&mut self, cycle: u64, anew: bool) {
+        if anew {
+            self.rows = Rows::default();
+        }
+        self.cycle = Some(cycle);
+        let measured = self.wire.measured();
+        let of = |source: &Source| match source {
+            Source::Measured(index) => measured[*index],
+            Source::Supply => self.supply_on_bus_pa(),
+            Source::Truth(..) | Source::Said(..) => None,
+        };
+        let row: Vec<_> = COLUMNS.iter().map(|column| of(&column.source)).collect();
+        self.rows.add(cycle, &row);
+    }
+
+    fn supply_on_bus_pa(&self) -> Option<f64> {
+        self.wire.status().map(|status| status.supply_pressure_pa)
+    }
+
+    fn event(&mut self, text: &str) {
+        let Ok(event) = serde_json::from_str::<Value>(text) else { return };
+        let cycle = event["cycle"].as_u64().unwrap_or_default();
+        let (kind, of) = match &event["kind"] {
+            Value::Object(kind) => kind.iter().next().map_or(("", &Value::Null), |(kind, of)| (kind, of)),
+            kind => (kind.as_str().unwrap_or_default(), &Value::Null),
+        };
+        match kind {
+            "skipped" => {
+                self.overruns += 1;
+                self.skipped += of["cycles"].as_u64().unwrap_or_default();
+                self.recent_overruns.push_back(cycle);
+            }
+            "weights" => self.added_mass_kg = of["added_mass_kg"].as_f64().unwrap_or(self.added_mass_kg),
+            "fault" => {
+                let number = of["number"].as_u64().unwrap_or_default();
+                if of["what"] == "begins" {
+                    let told = json!({ "name": of["fault"], "place": of["at"], "values": of["numbers"], "cause": of["cause"] });
+                    self.faults.insert(number, told);
+                } else {
+                    self.faults.remove(&number);
+                }
+            }
+            _ => {}
+        }
+        let level = if ERRORS.contains(&kind) {
+            "error"
+        } else if WARNINGS.contains(&kind) {
+            "warning"
+        } else {
+            "info"
+        };
+        let message = json!({ "t_s": cycle as f64 / 1000.0, "level": level, "text": event["text"].as_str().unwrap_or(kind) });
+        if kind != "skipped" || self.overruns <= OVERRUNS_KEPT {
+            self.keep(message.clone());
+        }
+        self.fresh.push(message);
+    }
+
+    /// A message of the page's own, at the run's newest moment.
+    pub fn tell(&mut self, level: &str, text: &str) {
+        let t_s = self.cycle.unwrap_or_default() as f64 / 1000.0;
+        let message = json!({ "t_s": t_s, "level": level, "text": text });
+        self.keep(message.clone());
+        self.fresh.push(message);
+    }
+
+    fn keep(&mut self, message: Value) {
+        self.messages.push_back(message);
+        if self.messages.len() > MESSAGES_KEPT {
+            self.messages.pop_front();
+        }
+    }
+
+    /// Messages that are new since this was asked the last time.
+    pub fn take_messages(&mut self) -> Vec<Value> {
+        std::mem::take(&mut self.fresh)
+    }
+
+    /// What is due once a second.
+    pub fn second(&mut self) {
+        let newest = self.cycle.unwrap_or_default();
+        self.recent_overruns.retain(|cycle| cycle + MINUTE_CYCLES >= newest);
+        self.claim = self.light.judge(newest, self.skipped);
+    }
+
+    /// The run's folder.
+    #[must_use]
+    pub fn run_folder(&self) -> Option<PathBuf> {
+        self.folder.clone().or_else(|| self.description["out"].as_str().map(PathBuf::from))
+    }
+
+    /// How the rig is set up.
+    #[must_use]
+    pub fn set_up(&self) -> SetUp {
+        let at_start = self.description["setup"]["linked"].as_bool().unwrap_or_default();
+        let linked = self.wire.status().map_or(at_start, |status| status.linked);
+        SetUp { linked, added_mass_kg: self.added_mass_kg }
+    }
+
+    /// What does not change while a run goes on.
+    #[must_use]
+    pub fn description(&self, control: bool) -> Value {
+        let described = &self.description;
+        let column = |column: &super::columns::Column| json!({ "name": column.name, "unit": column.unit });
+        json!({
+            "schema_version": protocol::run_folder::SCHEMA_VERSION,
+            "experiment": described["experiment"],
+            "pace": described["pace"],
+            "sealed": described["sealed"],
+            "console": described["console"],
+            "run_folder": self.run_folder(),
+            "control": control,
+            "telemetry": { "connected": self.telemetry },
+            "spacing_s": SPACING_CYCLES as f64 / 1000.0,
+            "columns": COLUMNS.iter().map(column).collect::<Vec<_>>(),
+            "rig": described["rig"],
+            "chains": chains::diagrams(),
+            "faults": faults(&described["faults"]),
+        })
+    }
+
+    /// What is so now.
+    #[must_use]
+    pub fn state(&self, audience: Audience) -> Value {
+        let SetUp { linked, added_mass_kg } = self.set_up();
+        let mut timing = self.rhythm.percentiles();
+        if let Value::Object(timing) = &mut timing {
+            timing.insert("overruns".into(), self.overruns.into());
+            timing.insert("overruns_last_minute".into(), self.recent_overruns.len().into());
+            timing.insert("skipped".into(), self.skipped.into());
+        }
+        json!({
+            "cycle": self.cycle,
+            "t_s": self.cycle.map(|cycle| cycle as f64 / 1000.0),
+            "last": self.rows.newest(),
+            "emergency_stop": self.wire.emergency_stop(audience.now_ms),
+            "linked": linked,
+            "check_valves_shut": self.wire.status().map(|status| status.check_valves_shut),
+            "weights_kg": added_mass_kg,
+            "chains": self.wire.chains(audience.now_ms),
+            "faults_active": self.faults.values().collect::<Vec<_>>(),
+            "bus": self.wire.load(),
+            "timing": timing,
+            "claim": self.claim,
+            "viewers": audience.viewers,
+            "dropped": audience.missed,
+            "telemetry_records_lost": self.records_lost,
+        })
+    }
+
+    /// The same, and the last messages, for who comes later.
+    #[must_use]
+    pub fn state_with_messages(&self, audience: Audience) -> Value {
+        let mut state = self.state(audience);
+        if let Value::Object(state) = &mut state {
+            state.insert("messages".into(), json!(self.messages));
+        }
+        state
+    }
+
+    /// A frame that was sent from here.
+    pub fn sent(&mut self, frame: CanFrame, stamp_ns: u64) {
+        self.minute.frame(FrameRecord { stamp_ns, frame });
+    }
+}
+
+/// The table of faults in the words of the page.
+fn faults(listed: &Value) -> Value {
+    let number = |key: &Value| {
+        let mut told = Map::new();
+        for (name, of) in [
+            ("name", "key"),
+            ("unit", "unit"),
+            ("low", "min"),
+            ("high", "max"),
+            ("default", "default"),
+            ("whole", "whole"),
+            ("about", "meaning"),
+        ] {
+            told.insert(name.into(), key[of].clone());
+        }
+        told
+    };
+    let fault = |fault: &Value| {
+        let numbers = fault["keys"].as_array().into_iter().flatten().map(number);
+        json!({
+            "name": fault["fault"],
+            "group": fault["group"],
+            "about": fault["about"],
+            "places": fault["places"],
+            "parameters": numbers.collect::<Vec<_>>(),
+        })
+    };
+    listed.as_array().into_iter().flatten().map(fault).collect()
+}

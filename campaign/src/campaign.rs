@@ -1,0 +1,263 @@
+//! A campaign, ready to be run: its file, the files that this names, its runs, and how they are shared out.
+
+use crate::child::Limit;
+use crate::command::{self, CommandError, Words};
+use crate::condition::{self, Condition, ConditionError};
+use crate::factor::Value;
+use crate::figures;
+use crate::file;
+use crate::file::{CampaignFile, ExperimentKind, FileError, Kind, Pace, RESERVED};
+use crate::outcome::Outcome;
+use crate::parts::{Parts, hash, usual_runs_per_part};
+use crate::points::{Point, Points, TooMany};
+use crate::processes::{self, ProcessesError, Programs};
+use crate::rehearsed;
+use crate::shelf::{Shelf, ShelfError};
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// A campaign.
+#[derive(Debug)]
+pub struct Campaign {
+    /// Its file.
+    pub file: CampaignFile,
+    /// Its runs.
+    pub points: Points,
+    /// How they are shared out.
+    pub parts: Parts,
+    /// The files that it names; none for a command.
+    shelf: Option<Shelf>,
+    programs: Programs,
+}
+
+/// Where a campaign finds what it needs.
+#[derive(Clone, Debug)]
+pub struct Places {
+    /// Folder with the shipped `experiments` and `programs`.
+    pub shipped: PathBuf,
+    /// Folder of `emulator` and `controller`.
+    pub programs: PathBuf,
+}
+
+/// Why a campaign cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// Its file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A file that it names.
+    #[error(transparent)]
+    Shelf(#[from] ShelfError),
+    /// It is too large.
+    #[error("{0}: {1}")]
+    TooMany(String, TooMany),
+    /// A run's values go into no file.
+    #[error("{0}: {1}")]
+    Condition(String, ConditionError),
+    /// A program.
+    #[error("{0}: {1}")]
+    Program(String, io::Error),
+    /// A run of a program that is no result: program, run, reason.
+    #[error("{0}: run {1}: {2}")]
+    Command(String, u64, CommandError),
+    /// A run of processes.
+    #[error(transparent)]
+    Processes(ProcessesError),
+}
+
+impl Campaign {
+    /// Reads a campaign's file and all that it names, and tries the values at the ends of its lists.
+    ///
+    /// # Errors
+    /// [`CampaignError`] with the file and what is wrong with it.
+    pub fn read(path: &Path, places: &Places) -> Result<Self, CampaignError> {
+        let mut file = CampaignFile::read(path)?;
+        let folder = file.folder()?;
+        if let Kind::Command(words) = &mut file.kind {
+            words[0] = program(&words[0], &folder)?;
+        }
+        let shelf = match &file.kind {
+            Kind::Experiment(kind) => Some(Shelf::read(&file, kind, &places.shipped)?),
+            Kind::Command(_) => None,
+        };
+        let name = || path.display().to_string();
+        let points = Points::new(&file.factors, file.draws, file.seed)
+            .map_err(|error| CampaignError::TooMany(name(), error))?;
+        let runs = points.runs();
+        let parts = Parts {
+            campaign: which_campaign(&file, shelf.as_ref()),
+            program: which_program(&file, places)?,
+            columns: columns(&file),
+            runs,
+            runs_per_part: file.runs_per_part.unwrap_or_else(|| usual_runs_per_part(runs)),
+        };
+        let programs = Programs { folder: places.programs.clone() };
+        let campaign = Self { file, points, parts, shelf, programs };
+        if campaign.shelf.is_some() {
+            for run in [0, runs - 1] {
+                campaign.condition(&campaign.points.point(run))?;
+            }
+        }
+        Ok(campaign)
+    }
+
+    /// The experiment of its runs; none for a command.
+    #[must_use]
+    pub fn experiment(&self) -> Option<&ExperimentKind> {
+        match &self.file.kind {
+            Kind::Experiment(kind) => Some(kind),
+            Kind::Command(_) => None,
+        }
+    }
+
+    fn condition(&self, point: &Point) -> Result<Condition<'_>, CampaignError> {
+        let shelf = self.shelf.as_ref().expect("only campaigns of experiments have conditions");
+        condition::condition(shelf, &self.points, point).map_err(|error| self.refused(error))
+    }
+
+    fn refused(&self, error: ConditionError) -> CampaignError {
+        CampaignError::Condition(self.file.path.display().to_string(), error)
+    }
+
+    /// A run; `None` when it was told to stop.
+    ///
+    /// # Errors
+    /// [`CampaignError`] for what is no result: values that go into no file, programs that cannot be started.
+    pub fn run(&self, point: &Point, stop: &AtomicBool) -> Result<Option<Outcome>, CampaignError> {
+        let limit = Limit::of(file::LONGEST_WALL_S, stop);
+        let kind = match &self.file.kind {
+            Kind::Experiment(kind) => kind,
+            Kind::Command(words) => {
+                let words = Words { command: words, folder: &self.file.folder()? };
+                return command::run(words, self.points.factors(), point, limit)
+                    .map_err(|error| CampaignError::Command(words.command[0].clone(), point.run, error));
+            }
+        };
+        match kind.pace {
+            Pace::Rehearsal => {
+                let condition = self.condition(point)?;
+                let shelf = self.shelf.as_ref().expect("an experiment has its files");
+                let outcome = rehearsed::rehearse(&condition, shelf, point.run, kind.longest_s);
+                outcome.map(Some).map_err(|error| self.refused(error))
+            }
+            Pace::Lockstep => {
+                let folder = tempfile::Builder::new().prefix("airbench-run-").tempdir();
+                let folder =
+                    folder.map_err(|error| CampaignError::Program("a folder for the run".into(), error))?;
+                self.run_in(point, folder.path(), limit)
+            }
+        }
+    }
+
+    /// A run of an experiment as processes, which leave their files in `folder`; `None` when it was told to stop.
+    ///
+    /// # Errors
+    /// As [`Campaign::run`].
+    pub fn run_in(
+        &self,
+        point: &Point,
+        folder: &Path,
+        limit: Limit<'_>,
+    ) -> Result<Option<Outcome>, CampaignError> {
+        let condition = self.condition(point)?;
+        let shelf = self.shelf.as_ref().expect("only campaigns of experiments run in folders");
+        let seconds = self.experiment().map_or(0.0, |kind| kind.longest_s);
+        match processes::run(&condition, shelf, (point.run, seconds), &self.programs, folder, limit) {
+            Ok(outcome) => Ok(Some(outcome)),
+            Err(ProcessesError::Stopped) => Ok(None),
+            Err(ProcessesError::Condition(error)) => Err(self.refused(error)),
+            Err(error) => Err(CampaignError::Processes(error)),
+        }
+    }
+
+    /// The row of a run.
+    #[must_use]
+    pub fn row(&self, point: &Point, outcome: &Outcome) -> String {
+        let passed = outcome.passed.map_or("", |passed| if passed { "1" } else { "0" });
+        let mut row = format!("{},{},{}", point.run, point.draw, point.seed);
+        for value in &point.values {
+            push_cell(&mut row, &value.to_string());
+        }
+        push_cell(&mut row, outcome.ended.name());
+        push_cell(&mut row, &outcome.because);
+        push_cell(&mut row, &outcome.simulated_s.to_string());
+        push_cell(&mut row, passed);
+        for name in collected(&self.file) {
+            push_cell(&mut row, &outcome.figures.get(&name).map_or_else(String::new, Value::to_string));
+        }
+        row.push('\n');
+        row
+    }
+}
+
+/// Adds a cell, quoted where it has to be.
+fn push_cell(row: &mut String, text: &str) {
+    row.push(',');
+    if text.contains([',', '"', '\n', '\r']) {
+        // Lines of a part are lines of its file.
+        let text = text.replace(['\n', '\r'], " ").replace('"', "\"\"");
+        let _ = write!(row, "\"{text}\"");
+    } else {
+        row.push_str(text);
+    }
+}
+
+/// The figures that are collected.
+fn collected(file: &CampaignFile) -> Vec<String> {
+    if file.figures.is_empty() { figures::all() } else { file.figures.clone() }
+}
+
+fn columns(file: &CampaignFile) -> Vec<String> {
+    let (before, after) = RESERVED.split_at(3);
+    let factors = file.factors.iter().map(|factor| factor.name.clone());
+    let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    own(before).into_iter().chain(factors).chain(own(after)).chain(collected(file)).collect()
+}
+
+/// A command's program: a path is from the campaign's file, a name is looked for as a shell does.
+fn program(word: &str, folder: &Path) -> Result<String, CampaignError> {
+    if word.contains('/') {
+        return Ok(folder.join(word).display().to_string());
+    }
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&path).map(|folder| folder.join(word)).find(|path| path.is_file());
+    let missing = || io::Error::new(io::ErrorKind::NotFound, "is in no folder of PATH");
+    let found = found.ok_or_else(|| CampaignError::Program(word.to_owned(), missing()))?;
+    Ok(found.display().to_string())
+}
+
+/// Tells one campaign from another by all that its results follow from.
+fn which_campaign(file: &CampaignFile, shelf: Option<&Shelf>) -> String {
+    let mut all = String::new();
+    let mut add = |name: &str, text: &str| {
+        let _ = writeln!(all, "{name} {}", hash(text.as_bytes()));
+    };
+    add("campaign", &file.text);
+    shelf.into_iter().flat_map(Shelf::texts).for_each(|(name, text)| add(name, text));
+    hash(all.as_bytes())[..16].to_owned()
+}
+
+/// Tells one version from another by the programs themselves: this one, and those that it starts.
+fn which_program(file: &CampaignFile, places: &Places) -> Result<String, CampaignError> {
+    let own =
+        std::env::current_exe().map_err(|error| CampaignError::Program("this program".into(), error))?;
+    let mut programs = vec![own];
+    if let Kind::Experiment(ExperimentKind { pace: Pace::Lockstep, .. }) = &file.kind {
+        programs.extend(["emulator", "controller"].map(|name| places.programs.join(name)));
+    }
+    if let Kind::Command(words) = &file.kind {
+        // As far as its words are files: scripts and programs.
+        let folder = file.folder()?;
+        programs.extend(words.iter().map(|word| folder.join(word)).filter(|path| path.is_file()));
+    }
+    let mut all = Sha256::new();
+    for path in programs {
+        let bytes = std::fs::read(&path)
+            .map_err(|error| CampaignError::Program(path.display().to_string(), error))?;
+        all.update(Sha256::digest(&bytes));
+    }
+    Ok(hash(&all.finalize())[..16].to_owned())
+}

@@ -1,0 +1,116 @@
+//! A process that a run is made of: waited for, and ended when the campaign is or when it takes too long.
+
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, ExitStatus};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Between two looks at it.
+const LOOK: Duration = Duration::from_millis(2);
+/// How long a process that was asked to end may take to save what it has.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A process that ends with its owner.
+#[derive(Debug)]
+pub struct Own {
+    child: Child,
+    /// Whether it and what it starts are a group of their own.
+    is_group: bool,
+}
+
+/// Why a process did not come to its own end.
+#[derive(Debug, thiserror::Error)]
+pub enum Cut {
+    /// The campaign was told to stop.
+    #[error("stopped")]
+    Stopped,
+    /// It took too long.
+    #[error("took longer than {0} s, and was ended")]
+    TooLong(f64),
+    /// The system says so.
+    #[error(transparent)]
+    System(#[from] io::Error),
+}
+
+impl Own {
+    /// Starts it.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn start(command: &mut Command) -> io::Result<Self> {
+        command.spawn().map(|child| Self { child, is_group: false })
+    }
+
+    /// Starts it as a group of its own, which a Ctrl-C at the terminal does not reach: it ends with its owner as a whole.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn start_group(command: &mut Command) -> io::Result<Self> {
+        command.process_group(0).spawn().map(|child| Self { child, is_group: true })
+    }
+
+    /// The process.
+    pub fn child(&mut self) -> &mut Child {
+        &mut self.child
+    }
+
+    /// Waits for its end, until `deadline` at most.
+    ///
+    /// # Errors
+    /// [`Cut`] when it was ended instead.
+    pub fn wait(&mut self, limit: Limit<'_>) -> Result<ExitStatus, Cut> {
+        loop {
+            if let Some(status) = self.child.try_wait()? {
+                return Ok(status);
+            }
+            if limit.stop.load(Ordering::Relaxed) {
+                return Err(Cut::Stopped);
+            }
+            if limit.began.elapsed().as_secs_f64() > limit.longest_s {
+                return Err(Cut::TooLong(limit.longest_s));
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+impl Drop for Own {
+    /// Asks it to end first: it may have started others that it has to end itself.
+    fn drop(&mut self) {
+        let process = Pid::from_child(&self.child);
+        if matches!(self.child.try_wait(), Ok(None)) {
+            // What has ended meanwhile needs no signal.
+            let _ = kill_process(process, Signal::TERM);
+            let asked = Instant::now();
+            while matches!(self.child.try_wait(), Ok(None)) && asked.elapsed() < PATIENCE {
+                std::thread::sleep(LOOK);
+            }
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+        if self.is_group {
+            let _ = kill_process_group(process, Signal::KILL);
+        }
+    }
+}
+
+/// How long a run may take.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit<'a> {
+    /// When it began.
+    pub began: Instant,
+    /// Longest time, s of the wall clock.
+    pub longest_s: f64,
+    /// Set to stop at once.
+    pub stop: &'a AtomicBool,
+}
+
+impl<'a> Limit<'a> {
+    /// From now on.
+    #[must_use]
+    pub fn of(longest_s: f64, stop: &'a AtomicBool) -> Self {
+        Self { began: Instant::now(), longest_s, stop }
+    }
+}

@@ -1,0 +1,104 @@
+//! The command line.
+
+use crate::shard::Asked;
+use clap::{Args, Parser, Subcommand};
+use protocol::exit::EXIT_CODE_HELP;
+use std::path::PathBuf;
+
+/// Thousands of simulated runs from one file: shared out over cores and machines, merged into one table and one page.
+#[derive(Parser, Debug)]
+#[command(version, after_help = EXIT_CODE_HELP)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Tell how many runs there are, and what the first ones are made with; runs nothing.
+    Plan(PlanArguments),
+    /// Do what is missing of a campaign or of one shard; the whole is merged at the end.
+    Run(RunArguments),
+    /// Merge parts, of one folder or of several, into runs.csv and report.html.
+    Merge(MergeArguments),
+    /// Repeat one run: an experiment as emulator and controller in lockstep, with all files of a run; a program as it was.
+    Repeat(RepeatArguments),
+}
+
+/// Where things are.
+#[derive(Args, Clone, Debug)]
+pub struct CommonArguments {
+    /// The campaign file.
+    pub file: PathBuf,
+    /// Folder with the shipped experiments and programs.
+    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../controller"))]
+    pub shipped: PathBuf,
+    /// Folder of the programs emulator and controller; default: that of this one.
+    #[arg(long)]
+    pub programs: Option<PathBuf>,
+}
+
+/// Arguments of `plan`.
+#[derive(Args, Debug)]
+pub struct PlanArguments {
+    /// The campaign.
+    #[command(flatten)]
+    pub common: CommonArguments,
+    /// How many runs are told.
+    #[arg(long, default_value_t = 5)]
+    pub first: u64,
+    /// As JSON, for programs, on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `run`.
+#[derive(Args, Debug)]
+pub struct RunArguments {
+    /// The campaign.
+    #[command(flatten)]
+    pub common: CommonArguments,
+    /// Folder of its parts and results; default: runs/campaigns/NAME.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// One of several starts that share the campaign: INDEX/COUNT from 0, or COUNT alone in a Slurm array or an indexed job.
+    #[arg(long, value_name = "INDEX/COUNT")]
+    pub shard: Option<Asked>,
+    /// Runs at once; default: as many as there are cores.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
+    pub jobs: Option<u64>,
+    /// Exit with 1 unless every run came to its end and kept its experiment's bounds.
+    #[arg(long)]
+    pub expect_passed: bool,
+}
+
+/// Arguments of `merge`.
+#[derive(Args, Debug)]
+pub struct MergeArguments {
+    /// The campaign.
+    #[command(flatten)]
+    pub common: CommonArguments,
+    /// Folders with its parts; default: runs/campaigns/NAME.
+    pub folders: Vec<PathBuf>,
+    /// Folder of the results; default: the first of the folders.
+    #[arg(long)]
+    pub to: Option<PathBuf>,
+    /// Exit with 1 unless every run came to its end and kept its experiment's bounds.
+    #[arg(long)]
+    pub expect_passed: bool,
+}
+
+/// Arguments of `repeat`.
+#[derive(Args, Debug)]
+pub struct RepeatArguments {
+    /// The campaign.
+    #[command(flatten)]
+    pub common: CommonArguments,
+    /// Number of the run.
+    pub run: u64,
+    /// Folder of its files; default: runs/NAME-run-NUMBER.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}

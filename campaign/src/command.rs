@@ -1,0 +1,221 @@
+//! A run as a program of somebody else's: it is told the run as a line of JSON, and answers with one.
+//!
+//! ```text
+//! stdin    {"run": 17, "draw": 2, "seed": 93, "values": {"hidden": "valve-offset", "noise": 0.5}}
+//! stdout   anything, and as the last line a JSON object; its keys that the campaign collects become columns
+//! ```
+//!
+//! An exit code other than 0, a hang and an answer that is none are results: `failed`, with what the program said last. A crash
+//! in one of ten thousand runs costs one run. A program that ends with 75 says that nothing was tried, for want of a disk or of
+//! anything else that is not the run's affair: the start ends, and the run stays missing.
+//!
+//! Programs run in the folder of the campaign's file, so that paths beside it are right wherever the start was made.
+
+use crate::child::{Cut, Limit, Own};
+use crate::factor::{Factor, Value};
+use crate::outcome::{Ended, Outcome};
+use crate::points::Point;
+use serde_json::{Map, Value as Json, json};
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+
+/// Bytes that are kept of what a program says, at least: the last ones.
+const MOST_SAID: usize = 1 << 20;
+/// Most of its words that a result keeps.
+const WORDS: usize = 400;
+/// Exit code of a program that tried nothing: `EX_TEMPFAIL` of sysexits.h.
+pub const NOT_TRIED: i32 = 75;
+
+/// A program and where it runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Words<'a> {
+    /// The program and its arguments.
+    pub command: &'a [String],
+    /// The folder that it runs in.
+    pub folder: &'a Path,
+}
+
+/// Why there is no result.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// The program cannot be started, or not be waited for.
+    #[error(transparent)]
+    System(#[from] io::Error),
+    /// It says that it tried nothing.
+    #[error("nothing was tried (exit code {NOT_TRIED}): {0}; what is done is kept")]
+    NotTried(String),
+}
+
+/// Runs the program; `None` when the campaign was told to stop.
+///
+/// # Errors
+/// [`CommandError`] for what is no result.
+pub fn run(
+    Words { command, folder }: Words<'_>,
+    factors: &[Factor],
+    point: &Point,
+    limit: Limit<'_>,
+) -> Result<Option<Outcome>, CommandError> {
+    let mut own = Own::start_group(
+        Command::new(&command[0])
+            .args(&command[1..])
+            .current_dir(folder)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
+    )?;
+    let child = own.child();
+    if let Some(mut stdin) = child.stdin.take() {
+        // A program that does not ask for its values has them not.
+        let _ = writeln!(stdin, "{}", question(factors, point));
+    }
+    let (out, err) = (child.stdout.take().map(listen), child.stderr.take().map(listen));
+    let status = match own.wait(limit) {
+        Ok(status) => status,
+        Err(Cut::Stopped) => return Ok(None),
+        Err(Cut::System(error)) => return Err(error.into()),
+        Err(cut @ Cut::TooLong(_)) => return Ok(Some(Outcome::failed(format!("the program {cut}")))),
+    };
+    let said = |listener: Option<thread::JoinHandle<String>>| {
+        listener.and_then(|listener| listener.join().ok()).unwrap_or_default()
+    };
+    let (out, err) = (said(out), said(err));
+    if status.code() == Some(NOT_TRIED) {
+        return Err(CommandError::NotTried(last_words(&err)));
+    }
+    if !status.success() {
+        return Ok(Some(Outcome::failed(format!("{status}: {}", last_words(&err)))));
+    }
+    let line = out.trim_end().lines().next_back().unwrap_or_default();
+    Ok(Some(match serde_json::from_str::<Map<String, Json>>(line) {
+        Ok(answer) => answered(&answer),
+        Err(error) => {
+            Outcome::failed(format!("its answer is no JSON object ({error}): {}", last_words(&out)))
+        }
+    }))
+}
+
+fn question(factors: &[Factor], point: &Point) -> Json {
+    let told = |value: &Value| match value {
+        Value::Number(number) => json!(number),
+        Value::Text(text) => json!(text),
+    };
+    let values: Map<_, _> =
+        factors.iter().zip(&point.values).map(|(factor, value)| (factor.name.clone(), told(value))).collect();
+    json!({ "run": point.run, "draw": point.draw, "seed": point.seed, "values": values })
+}
+
+fn answered(answer: &Map<String, Json>) -> Outcome {
+    let value = |value: &Json| match value {
+        Json::Number(number) => number.as_f64().map(Value::Number),
+        Json::String(text) => Some(Value::Text(text.clone())),
+        Json::Bool(yes) => Some(Value::Number(f64::from(u8::from(*yes)))),
+        Json::Null | Json::Array(_) | Json::Object(_) => None,
+    };
+    let figures = answer.iter().filter_map(|(name, told)| Some((name.clone(), value(told)?)));
+    Outcome {
+        ended: Ended::Done,
+        because: String::new(),
+        simulated_s: answer.get("simulated_s").and_then(Json::as_f64).unwrap_or(0.0),
+        passed: answer.get("passed").and_then(Json::as_bool),
+        figures: figures.collect(),
+    }
+}
+
+/// The last line, cut where it is long.
+fn last_words(text: &str) -> String {
+    text.trim_end().lines().next_back().unwrap_or_default().chars().take(WORDS).collect()
+}
+
+/// Reads to the end, so that a program never waits for its listener, and keeps the end.
+fn listen(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
+    thread::spawn(move || {
+        let mut said = Vec::new();
+        let mut piece = [0; 1 << 16];
+        // What cannot be read any more is over.
+        while let Ok(length @ 1..) = pipe.read(&mut piece) {
+            said.extend_from_slice(&piece[..length]);
+            if said.len() > 2 * MOST_SAID {
+                said.drain(..said.len() - MOST_SAID);
+            }
+        }
+        String::from_utf8_lossy(&said).into_owned()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::factor::{Changes, Values};
+    use std::sync::atomic::AtomicBool;
+
+    fn ask(script: &str, longest_s: f64) -> Result<Option<Outcome>, CommandError> {
+        let factor = Factor {
+            name: "hidden".into(),
+            changes: Changes::Told,
+            values: Values::List(vec![Value::Text("x".into())]),
+        };
+        let point = Point { run: 3, draw: 1, seed: 7, hidden_seed: 0, values: vec![Value::Text("x".into())] };
+        let command: Vec<_> = ["sh", "-c", script].map(str::to_owned).into();
+        let stop = AtomicBool::new(false);
+        let words = Words { command: &command, folder: Path::new("/") };
+        run(words, &[factor], &point, Limit::of(longest_s, &stop))
+    }
+
+    fn answer(script: &str, longest_s: f64) -> Outcome {
+        ask(script, longest_s).unwrap().unwrap()
+    }
+
+    #[test]
+    fn the_program_is_told_its_run_and_its_last_line_counts() {
+        let script = "read line; echo hello; echo \"{\\\"told\\\": \\\"$(echo $line | tr -d '\\\"')\\\", \\\"n\\\": 2}\"";
+        let outcome = answer(script, 60.0);
+        assert_eq!(outcome.ended, Ended::Done, "{outcome:?}");
+        assert_eq!(outcome.figures["n"], Value::Number(2.0));
+        let Value::Text(told) = &outcome.figures["told"] else { panic!("a text") };
+        assert_eq!(told, "{draw:1,run:3,seed:7,values:{hidden:x}}");
+    }
+
+    #[test]
+    fn it_runs_in_the_folder_that_it_is_given() {
+        assert_eq!(answer("echo \"{\\\"n\\\": $(pwd | wc -c)}\"", 60.0).figures["n"], Value::Number(2.0));
+    }
+
+    #[test]
+    fn what_was_not_tried_is_no_result() {
+        let error = ask("echo the disk is full >&2; exit 75", 60.0).unwrap_err().to_string();
+        assert!(error.contains("the disk is full"), "{error}");
+    }
+
+    #[test]
+    fn a_program_that_takes_too_long_is_asked_to_end_with_all_that_it_started() {
+        let folder = tempfile::tempdir().unwrap();
+        let told = folder.path().join("told");
+        let script = format!("trap 'echo asked >{}; exit' TERM; sleep 60 & wait", told.display());
+        assert_eq!(answer(&script, 0.3).ended, Ended::Failed);
+        assert_eq!(std::fs::read_to_string(told).unwrap(), "asked\n");
+    }
+
+    #[test]
+    fn a_crash_a_hang_and_nonsense_are_results() {
+        for (script, longest_s, words) in [
+            ("echo first >&2; echo no luck >&2; exit 4", 60.0, "no luck"),
+            ("sleep 60", 0.05, "longer than"),
+            ("echo nonsense", 60.0, "no JSON object"),
+            ("true", 60.0, "no JSON object"),
+            ("kill -SEGV $$", 60.0, "signal"),
+        ] {
+            let outcome = answer(script, longest_s);
+            assert_eq!(outcome.ended, Ended::Failed, "{script}");
+            assert!(outcome.because.contains(words), "{script}: {}", outcome.because);
+        }
+    }
+
+    #[test]
+    fn a_program_that_says_much_does_not_wait_for_its_listener() {
+        let outcome = answer("yes | head -c 5000000; echo; echo '{\"a\": 1}'", 60.0);
+        assert_eq!(outcome.ended, Ended::Done, "{outcome:?}");
+    }
+}

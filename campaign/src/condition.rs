@@ -1,0 +1,251 @@
+//! What a run is made with: the campaign's files, with the values of the run put in.
+//!
+//! Rig and experiment become texts, as files would hold them, so that a run of two processes and a rehearsal read the same. The
+//! simulated rig has the values of the run; the controllers know the rig file as it stands, as they know a real rig.
+
+use crate::edits::{self, EditError};
+use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
+use crate::points::{Point, Points};
+use crate::shelf::{RigFile, Shelf, Text};
+use controller::program::file::Source;
+use plant::effects::draw::{Among, Urn};
+use plant::effects::sheet;
+use plant::{Axis, RigParameters, Scene};
+use std::fmt::Write as _;
+
+/// What a run is made with.
+#[derive(Debug)]
+pub struct Condition<'s> {
+    /// The rig that controllers know.
+    pub nominal: &'s RigFile,
+    /// The rig that is simulated.
+    pub rig: RigParameters,
+    /// Its file.
+    pub rig_toml: String,
+    /// The experiment, with its path.
+    pub experiment: &'s Text,
+    /// Its text with the run's values.
+    pub experiment_toml: String,
+    /// How the rig is set up.
+    pub scene: Scene,
+    /// Programs in place of the experiment's.
+    pub programs: [Option<&'s Source>; 2],
+    /// Variables of controllers, as `--set` takes them.
+    pub set: Vec<String>,
+    /// Script of the faults; empty without any.
+    pub faults_toml: String,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+}
+
+/// Values that do not go into the campaign's files.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("run {run}: {message}")]
+pub struct ConditionError {
+    /// Which run.
+    pub run: u64,
+    /// What the file's reader says.
+    pub message: String,
+}
+
+/// The condition of a run.
+///
+/// # Errors
+/// [`ConditionError`] with what the reader of rig, experiment or setup says.
+pub fn condition<'s>(
+    shelf: &'s Shelf,
+    points: &Points,
+    point: &Point,
+) -> Result<Condition<'s>, ConditionError> {
+    let refused = |message: String| ConditionError { run: point.run, message };
+    let mut sorted = Sorted::default();
+    for (factor, value) in points.factors().iter().zip(&point.values) {
+        sorted.take(&factor.changes, value, point);
+    }
+    let nominal = shelf.rig(sorted.file(FileChoice::Rig));
+    let experiment = shelf.experiment(sorted.file(FileChoice::Experiment));
+    let edited = |file: &Text, numbers: &[(String, f64)]| {
+        let numbers = numbers.iter().map(|(path, number)| (path.as_str(), *number));
+        edits::with(&file.text, numbers)
+            .map_err(|error: EditError| refused(format!("{}: {error}", file.path.display())))
+    };
+    let rig_toml = edited(&nominal.file, &sorted.rig)?;
+    let rig_name = nominal.file.path.display().to_string();
+    let rig = RigParameters::from_toml(&rig_toml, &rig_name).map_err(|error| refused(error.to_string()))?;
+    let experiment_toml = edited(experiment, &sorted.experiment)?;
+    let file = experiment.path.display().to_string();
+    let scene =
+        Scene::from_toml(&experiment_toml, &file, &rig).map_err(|error| refused(error.to_string()))?;
+    if scene.sealed.is_some() {
+        return Err(refused(format!(
+            "{file}: rig.sealed: a campaign says itself what is hidden, by choose = \"hidden\""
+        )));
+    }
+    let program = |choice| sorted.file(choice).map(|name| shelf.chosen_program(name));
+    Ok(Condition {
+        programs: [program(FileChoice::DriveProgram), program(FileChoice::LoadProgram)],
+        set: sorted.set.clone(),
+        faults_toml: sorted.faults_toml(),
+        seed: point.seed,
+        nominal,
+        rig,
+        rig_toml,
+        experiment,
+        experiment_toml,
+        scene,
+    })
+}
+
+impl Condition<'_> {
+    /// The program of an axis that the experiment calls `written`.
+    #[must_use]
+    pub fn program(&self, shelf: &Shelf, axis: Axis, written: &str) -> Option<Source> {
+        self.programs[axis.index()].or_else(|| shelf.program(written, self.experiment)).cloned()
+    }
+}
+
+/// A run's values by what they change.
+#[derive(Default)]
+struct Sorted<'p> {
+    rig: Vec<(String, f64)>,
+    experiment: Vec<(String, f64)>,
+    set: Vec<String>,
+    faults: Vec<(&'p FaultNumber, f64)>,
+    files: Vec<(FileChoice, &'p str)>,
+}
+
+impl<'p> Sorted<'p> {
+    fn take(&mut self, changes: &'p Changes, value: &'p Value, point: &Point) {
+        match (changes, value) {
+            (Changes::Rig(path), Value::Number(number)) => self.rig.push((path.clone(), *number)),
+            (Changes::Experiment(path), Value::Number(number)) => {
+                self.experiment.push((path.clone(), *number));
+            }
+            (Changes::Variable(name), Value::Number(number)) => self.set.push(format!("{name}={number}")),
+            (Changes::Fault(fault), Value::Number(number)) => self.faults.push((fault, *number)),
+            (Changes::File(choice), Value::Text(name)) => self.files.push((*choice, name)),
+            (Changes::Hidden(among), Value::Text(name)) => {
+                self.rig.extend(hidden(name, *among, point.hidden_seed));
+            }
+            // Numbers for what has numbers, names for what has names: `factor.rs` holds the file to that.
+            _ => {}
+        }
+    }
+
+    fn file(&self, choice: FileChoice) -> Option<&'p str> {
+        self.files.iter().find(|(own, _)| *own == choice).map(|(_, name)| *name)
+    }
+
+    /// Numbers of one fault at one place stand together.
+    fn faults_toml(&self) -> String {
+        let mut text = String::new();
+        for (place, (fault, _)) in self.faults.iter().enumerate() {
+            let same = |other: &FaultNumber| {
+                (&other.fault, &other.at, other.from_s, other.to_s)
+                    == (&fault.fault, &fault.at, fault.from_s, fault.to_s)
+            };
+            if self.faults[..place].iter().any(|(other, _)| same(other)) {
+                continue;
+            }
+            // Writing to a text cannot fail.
+            let _ = writeln!(text, "[[fault]]\nname = {:?}\nfrom_s = {:?}", fault.fault, fault.from_s);
+            if let Some(at) = &fault.at {
+                let _ = writeln!(text, "at = {at:?}");
+            }
+            if let Some(to_s) = fault.to_s {
+                let _ = writeln!(text, "to_s = {to_s:?}");
+            }
+            for (own, number) in self.faults.iter().filter(|(other, _)| same(other)) {
+                let _ = writeln!(text, "{} = {number}", own.key);
+            }
+        }
+        text
+    }
+}
+
+/// Paths and numbers of a hidden effect in a rig file; none for no effect.
+fn hidden(name: &str, among: Among, seed: u64) -> Vec<(String, f64)> {
+    let Some(sheet) = sheet(name).filter(|_| name != NONE_HIDDEN) else { return Vec::new() };
+    let mut urn = Urn::new(seed);
+    // The file's reader has seen to it that it has a place there.
+    let Some(place) = urn.place(sheet, among) else { return Vec::new() };
+    let numbers = urn.numbers(sheet);
+    let path = |key: &str| format!("effects.{name}.{place}.{key}");
+    sheet.keys.iter().zip(numbers).map(|(key, number)| (path(key.name), number)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::{CampaignFile, Kind};
+    use std::path::Path;
+
+    fn shelf(text: &str) -> (Shelf, Points) {
+        let file = CampaignFile::from_toml(text, Path::new("c.toml")).unwrap();
+        let Kind::Experiment(kind) = &file.kind else { panic!("an experiment") };
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller");
+        let shelf = Shelf::read(&file, kind, &shipped).unwrap();
+        (shelf, Points::new(&file.factors, file.draws, file.seed).unwrap())
+    }
+
+    #[test]
+    fn values_reach_the_simulated_rig_and_the_controllers_keep_the_nominal_one() {
+        let (shelf, points) = shelf(
+            "title = \"t\"\nexperiment = \"step\"\n\
+             [[vary]]\nrig = \"friction.sliding_force_n\"\nlist = [20]\n\
+             [[vary]]\nrig = \"effects.valve-offset.drive.offset_percent\"\nlist = [1.5]\n\
+             [[vary]]\nexperiment = \"rig.added_mass_kg\"\nlist = [10]\n\
+             [[vary]]\nset = \"drive.algorithm.gain_per_s\"\nlist = [30.5]\n\
+             [[vary]]\nchoose = \"drive-program\"\nlist = [\"position-cascade\"]\n",
+        );
+        let condition = condition(&shelf, &points, &points.point(0)).unwrap();
+        assert_eq!(condition.rig.friction().sliding_force_n, 20.0);
+        assert_eq!(condition.nominal.nominal.friction().sliding_force_n, 26.0);
+        assert_eq!(condition.rig.effects().len(), 1);
+        assert_eq!(condition.scene.added_mass_kg, 10.0);
+        assert_eq!(condition.set, ["drive.algorithm.gain_per_s=30.5"]);
+        let program = condition.program(&shelf, Axis::Drive, "position-p").unwrap();
+        assert!(program.path.ends_with("position-cascade.toml"));
+    }
+
+    #[test]
+    fn a_hidden_effect_is_drawn_by_the_run_and_none_is_none() {
+        let (shelf, points) = shelf(
+            "title = \"t\"\nexperiment = \"step\"\ndraws = 3\n\
+             [[vary]]\nchoose = \"hidden\"\nlist = [\"none\", \"rod-leakage\"]\n",
+        );
+        let effects = |run| {
+            let point = points.point(run);
+            condition(&shelf, &points, &point).unwrap().rig.effects().to_vec()
+        };
+        assert!(effects(0).is_empty());
+        assert_eq!(effects(3)[0].name, "rod-leakage");
+        assert_ne!(effects(3)[0].numbers, effects(4)[0].numbers);
+    }
+
+    #[test]
+    fn a_value_that_the_rig_cannot_have_is_told_with_the_run() {
+        let (shelf, points) = shelf(
+            "title = \"t\"\nexperiment = \"step\"\n[[vary]]\nrig = \"friction.sliding_force_n\"\nlist = [26, 1e6]\n",
+        );
+        let error = condition(&shelf, &points, &points.point(1)).unwrap_err();
+        assert!(
+            error.to_string().contains("run 1: rig.toml:") && error.message.contains("sliding_force_n"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn numbers_of_one_fault_make_one_entry_of_the_script() {
+        let (shelf, points) = shelf(
+            "title = \"t\"\nexperiment = \"step\"\npace = \"lockstep\"\n\
+             [[vary]]\nfault = \"position-sensor-spike\"\nat = \"drive\"\nkey = \"spike_m\"\nfrom_s = 1\nlist = [0.1]\n\
+             [[vary]]\nfault = \"position-sensor-spike\"\nat = \"drive\"\nkey = \"every_ms\"\nfrom_s = 1\nlist = [50]\n",
+        );
+        let text = condition(&shelf, &points, &points.point(0)).unwrap().faults_toml;
+        assert_eq!(
+            text,
+            "[[fault]]\nname = \"position-sensor-spike\"\nfrom_s = 1.0\nat = \"drive\"\nspike_m = 0.1\nevery_ms = 50\n"
+        );
+    }
+}

@@ -1,0 +1,241 @@
+//! Does the parts that are missing, on as many cores as it may use, and tells how it goes.
+//!
+//! The order in which parts are done changes nothing: each follows from the campaign and its number. What is done is on the disk
+//! at once, so that a start that is killed loses the parts that it was at and nothing else.
+
+use crate::campaign::{Campaign, CampaignError};
+use crate::parts::{PartError, WriteError};
+use crate::shard::Shard;
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Between two lines of progress.
+const TELL_EACH: Duration = Duration::from_secs(2);
+
+/// How a start went on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Done {
+    /// Runs that this start did.
+    pub runs: u64,
+    /// Of the rig's time, s.
+    pub simulated_s: f64,
+    /// Of the wall clock, s.
+    pub wall_s: f64,
+    /// Parts of this shard that are still missing.
+    pub missing: u64,
+}
+
+/// Why a start cannot go on; what is done stays.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    /// A run that cannot be made.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    /// A part that is there and is none of ours.
+    #[error(transparent)]
+    Part(#[from] PartError),
+    /// A part that cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The threads.
+    #[error("no threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+/// What a start does.
+pub struct Start<'a> {
+    /// The campaign.
+    pub campaign: &'a Campaign,
+    /// Where its parts are.
+    pub out: &'a Path,
+    /// Which of them are this start's.
+    pub shard: Shard,
+    /// Runs at once.
+    pub jobs: usize,
+    /// Set to stop.
+    pub stop: &'a AtomicBool,
+    /// Told a line now and then.
+    pub say: &'a (dyn Fn(&str) + Sync),
+}
+
+impl Start<'_> {
+    /// Does what is missing of its shard.
+    ///
+    /// # Errors
+    /// [`EngineError`] with the first that went wrong; the parts that were done at the same time are finished first.
+    pub fn run(&self) -> Result<Done, EngineError> {
+        let parts = &self.campaign.parts;
+        let own: Vec<u64> = (0..parts.count()).filter(|part| self.shard.holds(*part)).collect();
+        let missing = self.missing(&own)?;
+        let runs_of = |list: &[u64]| list.iter().map(|part| parts.runs_of(*part).count() as u64).sum::<u64>();
+        let todo = runs_of(&missing);
+        (self.say)(&self.announcement(&own, runs_of(&own), todo));
+        self.tell_expected(&missing, todo)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.jobs.max(1)).build()?;
+        let progress = Progress::new(todo, self.say);
+        let failed = Mutex::new(None);
+        pool.install(|| {
+            // One part at a time, in order: what is done first is what a page would show first.
+            missing.par_iter().with_max_len(1).for_each(|part| {
+                if self.is_over(&failed) {
+                    return;
+                }
+                if let Err(error) = self.part(*part, &progress, &failed) {
+                    failed.lock().expect("no holder panics").get_or_insert(error);
+                }
+            });
+        });
+        match failed.into_inner().expect("no holder panics") {
+            Some(error) => Err(error),
+            None => {
+                let missing = self.missing(&own)?.len() as u64;
+                Ok(Done { missing, ..progress.done() })
+            }
+        }
+    }
+
+    /// Parts that are not there. One that cannot be read is made again; one of somebody else's is not touched.
+    fn missing(&self, own: &[u64]) -> Result<Vec<u64>, PartError> {
+        let mut missing = Vec::new();
+        for part in own {
+            match self.campaign.parts.read(self.out, *part) {
+                Ok(Some(_)) => {}
+                Ok(None) => missing.push(*part),
+                Err(PartError::Unreadable { path, what }) => {
+                    (self.say)(&format!("{path}: {what}; it is made again"));
+                    missing.push(*part);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(missing)
+    }
+
+    fn announcement(&self, own: &[u64], own_runs: u64, todo: u64) -> String {
+        let of_shard = if self.shard == Shard::WHOLE {
+            String::new()
+        } else {
+            format!(", {own_runs} of them in shard {}", self.shard)
+        };
+        format!(
+            "{} runs ({} combinations, {} draws){of_shard}; {todo} to do in {} parts, {} at once",
+            self.campaign.parts.runs,
+            self.campaign.points.combinations(),
+            self.campaign.file.draws,
+            own.len(),
+            self.jobs
+        )
+    }
+
+    /// Tries the first run that is missing and tells how long all will take. Of a program of somebody else's nobody knows how
+    /// long one takes: there the first that is done tells it.
+    fn tell_expected(&self, missing: &[u64], todo: u64) -> Result<(), EngineError> {
+        let (Some(first), Some(_)) = (missing.first(), self.campaign.experiment()) else { return Ok(()) };
+        let point = self.campaign.points.point(self.campaign.parts.runs_of(*first).start);
+        let began = Instant::now();
+        self.campaign.run(&point, self.stop)?;
+        let at_once = self.jobs.clamp(1, missing.len()) as f64;
+        let expected_s = began.elapsed().as_secs_f64() * todo as f64 / at_once;
+        (self.say)(&format!("expected: {}", in_words(expected_s)));
+        Ok(())
+    }
+
+    fn is_over(&self, failed: &Mutex<Option<EngineError>>) -> bool {
+        self.stop.load(Ordering::Relaxed) || failed.lock().expect("no holder panics").is_some()
+    }
+
+    fn part(
+        &self,
+        part: u64,
+        progress: &Progress<'_>,
+        failed: &Mutex<Option<EngineError>>,
+    ) -> Result<(), EngineError> {
+        let mut rows = String::new();
+        for run in self.campaign.parts.runs_of(part) {
+            // A part that is not whole is none: nothing is gained by its other runs.
+            if self.is_over(failed) {
+                return Ok(());
+            }
+            let point = self.campaign.points.point(run);
+            let Some(outcome) = self.campaign.run(&point, self.stop)? else { return Ok(()) };
+            rows += &self.campaign.row(&point, &outcome);
+            progress.ran(outcome.simulated_s);
+        }
+        self.campaign.parts.write(self.out, part, &rows)?;
+        Ok(())
+    }
+}
+
+/// What is told while it goes on.
+struct Progress<'a> {
+    todo: u64,
+    began: Instant,
+    runs: AtomicU64,
+    simulated_ms: AtomicU64,
+    told: Mutex<Instant>,
+    say: &'a (dyn Fn(&str) + Sync),
+}
+
+impl<'a> Progress<'a> {
+    fn new(todo: u64, say: &'a (dyn Fn(&str) + Sync)) -> Self {
+        let began = Instant::now();
+        Self {
+            todo,
+            began,
+            runs: AtomicU64::new(0),
+            simulated_ms: AtomicU64::new(0),
+            told: Mutex::new(began),
+            say,
+        }
+    }
+
+    fn ran(&self, simulated_s: f64) {
+        self.simulated_ms.fetch_add((simulated_s * 1e3).round() as u64, Ordering::Relaxed);
+        let runs = self.runs.fetch_add(1, Ordering::Relaxed) + 1;
+        let mut told = self.told.lock().expect("no holder panics");
+        if runs == 1 || told.elapsed() >= TELL_EACH {
+            *told = Instant::now();
+            let wall_s = self.began.elapsed().as_secs_f64();
+            let left_s = wall_s / runs as f64 * (self.todo - runs) as f64;
+            (self.say)(&format!("{runs}/{} runs, {} left", self.todo, in_words(left_s)));
+        }
+    }
+
+    fn done(&self) -> Done {
+        Done {
+            runs: self.runs.load(Ordering::Relaxed),
+            simulated_s: self.simulated_ms.load(Ordering::Relaxed) as f64 * 1e-3,
+            wall_s: self.began.elapsed().as_secs_f64(),
+            missing: 0,
+        }
+    }
+}
+
+/// A time for people.
+#[must_use]
+pub fn in_words(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{seconds:.0} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        3600..172_800 => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
+        _ => format!("{:.1} days", seconds / 86_400.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_told_in_the_units_that_people_use() {
+        let told = [0.4, 59.0, 60.0, 3599.0, 3600.0, 90_000.0, 864_000.0].map(in_words);
+        assert_eq!(
+            told,
+            ["0 s", "59 s", "1 min 00 s", "59 min 59 s", "1 h 00 min", "25 h 00 min", "10.0 days"]
+        );
+    }
+}

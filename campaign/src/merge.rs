@@ -1,0 +1,239 @@
+//! The parts of a campaign, from one folder or from several, made into one table: `runs.csv`.
+//!
+//! Nothing is merged unless all of it is there, once, and of one version.
+
+use crate::campaign::Campaign;
+use crate::factor::Values;
+use crate::figures::TOP;
+use crate::parts::{PartError, Parts, beside};
+use bench::figures::definition;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Why parts are not merged.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    /// Not all parts are there.
+    #[error(
+        "{missing} of {all} parts are missing, the first is part {first} (runs {from} to {to}); the same 'run' does only what is missing"
+    )]
+    Missing {
+        /// How many.
+        missing: u64,
+        /// Of how many.
+        all: u64,
+        /// The first of them.
+        first: u64,
+        /// Its first run.
+        from: u64,
+        /// Its last run.
+        to: u64,
+    },
+    /// A part is there twice.
+    #[error(
+        "part {part} is in {one} and in {other}: one run would count twice; name one folder once, or delete one of them"
+    )]
+    Doubled {
+        /// Which.
+        part: u64,
+        /// In this folder.
+        one: String,
+        /// And in this.
+        other: String,
+    },
+    /// A part is none of ours, or not whole.
+    #[error(transparent)]
+    Part(#[from] PartError),
+    /// The table cannot be written.
+    #[error("{path}: {error}")]
+    Write {
+        /// Which file.
+        path: String,
+        /// What the system says.
+        error: io::Error,
+    },
+}
+
+/// The table of all runs, column by column, as far as the page needs it.
+#[derive(Debug, Default)]
+pub struct Results {
+    /// How many runs.
+    pub runs: u64,
+    /// Of the rig's time, s.
+    pub simulated_s: f64,
+    /// Numbers by the name of their column; NaN where a run has none.
+    numbers: BTreeMap<String, Vec<f64>>,
+    /// Words by the name of their column: places in the list of different ones.
+    words: BTreeMap<String, Words>,
+    /// The first of the runs that did not come to their end.
+    pub unfinished: Vec<Unfinished>,
+}
+
+/// A run that did not come to its end.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Unfinished {
+    /// Which run.
+    pub run: u64,
+    /// How it ended instead.
+    pub ended: String,
+    /// Why.
+    pub because: String,
+}
+
+/// Most runs whose trouble is told one by one.
+const MOST_TOLD: usize = 100;
+
+/// A column of words, each kept once.
+#[derive(Debug, Default)]
+pub struct Words {
+    /// The different ones, in the order in which they came.
+    pub known: Vec<String>,
+    /// The word of each run.
+    pub places: Vec<u32>,
+}
+
+impl Words {
+    fn push(&mut self, word: &str) {
+        let place = self.known.iter().position(|known| known == word).unwrap_or_else(|| {
+            self.known.push(word.to_owned());
+            self.known.len() - 1
+        });
+        self.places.push(place as u32);
+    }
+}
+
+/// Merges the parts in `folders`, which all have a place, into `to`/runs.csv.
+///
+/// # Errors
+/// [`MergeError`]; `runs.csv` is as it was then.
+pub fn merge(campaign: &Campaign, folders: &[PathBuf], to: &Path) -> Result<Results, MergeError> {
+    let parts = &campaign.parts;
+    let places = places(parts, folders)?;
+    let path = to.join("runs.csv");
+    let failed = |error| MergeError::Write { path: path.display().to_string(), error };
+    std::fs::create_dir_all(to).map_err(failed)?;
+    let beside = beside(to).map_err(failed)?;
+    let mut file = BufWriter::new(beside);
+    writeln!(file, "{}", parts.columns.join(",")).map_err(failed)?;
+    let mut results = Results::of(campaign);
+    for (part, folder) in places.iter().enumerate() {
+        let rows = parts.read(folder, part as u64)?.ok_or_else(|| missing(parts, &[part as u64]))?;
+        file.write_all(rows.as_bytes()).map_err(failed)?;
+        results.add(&parts.columns, &rows);
+    }
+    assert_eq!(results.runs, parts.runs, "parts that are whole have a row for each of their runs");
+    let beside = file.into_inner().map_err(|error| failed(error.into_error()))?;
+    beside.as_file().sync_all().map_err(failed)?;
+    beside.persist(&path).map_err(|error| failed(error.error))?;
+    File::open(to).and_then(|folder| folder.sync_all()).map_err(failed)?;
+    Ok(results)
+}
+
+/// The folder of each part.
+fn places<'f>(parts: &Parts, folders: &'f [PathBuf]) -> Result<Vec<&'f Path>, MergeError> {
+    let mut places = Vec::new();
+    let mut absent = Vec::new();
+    for part in 0..parts.count() {
+        let mut holders = folders.iter().filter(|folder| parts.path(folder, part).exists());
+        match (holders.next(), holders.next()) {
+            (Some(one), Some(other)) => {
+                let (one, other) = (one.display().to_string(), other.display().to_string());
+                return Err(MergeError::Doubled { part, one, other });
+            }
+            (Some(one), None) => places.push(one.as_path()),
+            (None, _) => absent.push(part),
+        }
+    }
+    if absent.is_empty() { Ok(places) } else { Err(missing(parts, &absent)) }
+}
+
+fn missing(parts: &Parts, absent: &[u64]) -> MergeError {
+    let first = absent.first().copied().unwrap_or(0);
+    let runs = parts.runs_of(first);
+    MergeError::Missing {
+        missing: absent.len() as u64,
+        all: parts.count(),
+        first,
+        from: runs.start,
+        to: runs.end - 1,
+    }
+}
+
+impl Results {
+    fn of(campaign: &Campaign) -> Self {
+        let mut results = Self::default();
+        let numbers_of = |values: &Values| match values {
+            Values::Range(_) => true,
+            Values::List(list) => list.iter().all(|value| value.number().is_some()),
+        };
+        for factor in &campaign.file.factors {
+            if numbers_of(&factor.values) {
+                results.numbers.insert(factor.name.clone(), Vec::new());
+            } else {
+                results.words.insert(factor.name.clone(), Words::default());
+            }
+        }
+        for name in ["run", "passed"] {
+            results.numbers.insert(name.to_owned(), Vec::new());
+        }
+        results.words.insert("ended".to_owned(), Words::default());
+        let confusion = campaign.file.confusion.iter().flatten();
+        for name in confusion.filter(|name| !results.numbers.contains_key(*name)).cloned().collect::<Vec<_>>()
+        {
+            results.words.entry(name).or_default();
+        }
+        // Of a command nobody knows beforehand what is a number; of an experiment all figures are.
+        for name in &campaign.parts.columns {
+            let is_figure = TOP.contains(&name.as_str()) || definition(name).is_some();
+            let is_collected = campaign.file.figures.contains(name) && !results.words.contains_key(name);
+            if is_figure || is_collected {
+                results.numbers.insert(name.clone(), Vec::new());
+            }
+        }
+        results
+    }
+
+    fn add(&mut self, columns: &[String], rows: &str) {
+        let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(rows.as_bytes());
+        let place = |name: &str| columns.iter().position(|column| column == name);
+        let (ended, because) = (place("ended"), place("because"));
+        for row in reader.records().map_while(Result::ok) {
+            let cell = |place: Option<usize>| place.and_then(|place| row.get(place)).unwrap_or_default();
+            if cell(ended) != "done" && self.unfinished.len() < MOST_TOLD {
+                let (ended, because) = (cell(ended).to_owned(), cell(because).to_owned());
+                self.unfinished.push(Unfinished { run: self.runs, ended, because });
+            }
+            self.runs += 1;
+            for (name, cell) in columns.iter().zip(&row) {
+                if name == "simulated_s" {
+                    self.simulated_s += cell.parse().unwrap_or(0.0);
+                }
+                if let Some(column) = self.numbers.get_mut(name) {
+                    column.push(cell.parse().unwrap_or(f64::NAN));
+                } else if let Some(column) = self.words.get_mut(name) {
+                    column.push(cell);
+                }
+            }
+        }
+    }
+
+    /// A column of numbers, a place for each run; NaN where a run has none.
+    #[must_use]
+    pub fn numbers(&self, name: &str) -> Option<&[f64]> {
+        self.numbers.get(name).map(Vec::as_slice)
+    }
+
+    /// Whether every run is done and none broke its experiment's bounds.
+    #[must_use]
+    pub fn all_passed(&self) -> bool {
+        self.unfinished.is_empty() && !self.numbers("passed").unwrap_or_default().contains(&0.0)
+    }
+
+    /// A column of words.
+    #[must_use]
+    pub fn words(&self, name: &str) -> Option<&Words> {
+        self.words.get(name)
+    }
+}

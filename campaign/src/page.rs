@@ -1,0 +1,131 @@
+//! The page of a campaign: how its runs ended, how its figures lie, over what they change, and its worst cases.
+//!
+//! One file without anything from elsewhere, in the look of all pages.
+
+mod confusion;
+mod distribution;
+mod heat;
+mod worst;
+
+use crate::campaign::Campaign;
+use crate::figures::TOP;
+use crate::merge::Results;
+use bench::figures::definition;
+use bench::grid::Grid;
+use bench::page_style::{document, escaped};
+use bench::table::{in_use, short, without_unit};
+use std::fmt::Write as _;
+
+/// Figures that the page shows when the campaign's file names none to be worst.
+const USUAL: usize = 4;
+
+/// The page; `repeat` makes the command that repeats a run.
+#[must_use]
+pub fn page(campaign: &Campaign, results: &Results, repeat: &dyn Fn(u64) -> String) -> String {
+    let shown = shown(campaign, results);
+    let mut body = format!("<h1>{}</h1>\n", escaped(&campaign.file.title));
+    body += &lead(campaign, results);
+    body += &endings(results);
+    // Writing to a text cannot fail.
+    let _ = write!(body, "<h2>How the figures lie</h2>\n{}", distribution::section(results, &shown));
+    body += &heat::section(campaign, results, &shown);
+    body += &confusion::section(campaign, results);
+    body += &worst::section(campaign, results, &shown, repeat);
+    body += &file_section(campaign);
+    document(&campaign.file.title, &body)
+}
+
+/// Figures of which the page shows more than a line.
+fn shown(campaign: &Campaign, results: &Results) -> Vec<String> {
+    if !campaign.file.worst.is_empty() {
+        return campaign.file.worst.clone();
+    }
+    let measured = |name: &&String| {
+        let column = results.numbers(name).unwrap_or_default();
+        (campaign.file.figures.contains(name) || campaign.file.figures.is_empty())
+            && (TOP.contains(&name.as_str())
+                || definition(name).is_some()
+                || campaign.file.figures.contains(name))
+            && column.iter().any(|value| value.is_finite())
+    };
+    campaign.parts.columns.iter().filter(measured).take(USUAL).cloned().collect()
+}
+
+fn lead(campaign: &Campaign, results: &Results) -> String {
+    let parts = &campaign.parts;
+    let factors: Vec<_> = campaign.file.factors.iter().map(|factor| escaped(&factor.name)).collect();
+    let over =
+        if factors.is_empty() { "nothing but the sensors' noise".to_owned() } else { factors.join(", ") };
+    let time = if results.simulated_s > 0.0 {
+        format!(", {} h of the rig's time", short(results.simulated_s / 3600.0))
+    } else {
+        String::new()
+    };
+    format!(
+        "<p class=\"lead\">{} runs{time}: {} combinations of what is listed, {} draws of each. Varied: {over}.</p>\n\
+         <p class=\"soft\">Campaign <span class=\"code\">{}</span>, made by <span class=\"code\">{}</span>. All rows: \
+         <a href=\"runs.csv\">runs.csv</a>.</p>\n",
+        results.runs,
+        campaign.points.combinations(),
+        campaign.file.draws,
+        parts.campaign,
+        parts.program
+    )
+}
+
+fn endings(results: &Results) -> String {
+    let share =
+        |count: usize| format!("{} ({} %)", count, short(100.0 * count as f64 / results.runs.max(1) as f64));
+    let mut rows = Vec::new();
+    if let Some(ended) = results.words("ended") {
+        for (place, word) in ended.known.iter().enumerate() {
+            let count = ended.places.iter().filter(|own| **own as usize == place).count();
+            rows.push(vec![format!("ended: {word}"), share(count)]);
+        }
+    }
+    let passed = results.numbers("passed").unwrap_or_default();
+    let judged = passed.iter().filter(|value| value.is_finite()).count();
+    if judged > 0 {
+        let kept = passed.iter().filter(|value| **value == 1.0).count();
+        rows.push(vec!["kept the experiment's bounds".to_owned(), share(kept)]);
+    }
+    format!(
+        "<h2>How the runs ended</h2>\n{}",
+        Grid { head: vec!["runs".into(), "how many".into()], rows }.html()
+    )
+}
+
+fn file_section(campaign: &Campaign) -> String {
+    format!(
+        "<h2>The campaign's file</h2>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"File\"><pre>{}</pre>\
+         </div>\n",
+        escaped(&campaign.file.text)
+    )
+}
+
+/// A figure's name for people.
+fn name(figure: &str) -> String {
+    without_unit(figure)
+}
+
+/// A value in the unit that people use.
+fn value(figure: &str, number: f64) -> String {
+    let unit = match definition(figure) {
+        Some(definition) => definition.unit,
+        None if TOP.contains(&figure) => "m",
+        None => "1",
+    };
+    in_use(number, unit)
+}
+
+/// The finite values of a column, growing.
+fn sorted(column: &[f64]) -> Vec<f64> {
+    let mut values: Vec<_> = column.iter().copied().filter(|value| value.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// The value below which this share lies; values grow and are not none.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    values[((values.len() - 1) as f64 * share).round() as usize]
+}

@@ -1,0 +1,58 @@
+//! Worst cases: the runs with the largest figures, and the command that repeats each.
+
+use super::{name, value};
+use crate::campaign::Campaign;
+use crate::factor::Values;
+use crate::merge::{Results, Unfinished};
+use bench::grid::Grid;
+use bench::page_style::escaped;
+
+/// Runs that are told of each figure.
+const TOLD: usize = 8;
+
+/// The worst of each figure that is shown.
+pub(super) fn section(
+    campaign: &Campaign,
+    results: &Results,
+    shown: &[String],
+    repeat: &dyn Fn(u64) -> String,
+) -> String {
+    let mut text = "<h2>Worst cases</h2>\n".to_owned();
+    if !results.unfinished.is_empty() {
+        let head = ["run", "ended", "because", "with", "repeated by"].map(str::to_owned).to_vec();
+        let rows = results.unfinished.iter().take(TOLD).map(|Unfinished { run, ended, because }| {
+            vec![run.to_string(), ended.clone(), because.clone(), values(campaign, *run), repeat(*run)]
+        });
+        let rows = rows.collect();
+        text += &format!(
+            "<h3>Runs that did not come to their end, the first</h3>\n{}",
+            Grid { head, rows }.html()
+        );
+    }
+    for figure in shown {
+        let Some(column) = results.numbers(figure) else { continue };
+        let mut runs: Vec<_> = (0..column.len()).filter(|run| column[*run].is_finite()).collect();
+        // Of equals the first.
+        runs.sort_by(|one, other| column[*other].total_cmp(&column[*one]));
+        let head = [name(figure), "run".into(), "with".into(), "repeated by".into()].to_vec();
+        let rows = runs.iter().take(TOLD).map(|run| {
+            let number = *run as u64;
+            vec![value(figure, column[*run]), number.to_string(), values(campaign, number), repeat(number)]
+        });
+        let rows = rows.collect();
+        text += &format!("<h3>{}</h3>\n{}", escaped(&name(figure)), Grid { head, rows }.html());
+    }
+    text
+}
+
+/// What the run was made with.
+fn values(campaign: &Campaign, run: u64) -> String {
+    let point = campaign.points.point(run);
+    let told = campaign.file.factors.iter().zip(&point.values).map(|(factor, value)| match &factor.values {
+        Values::Range(_) => {
+            format!("{} {}", factor.name, value.number().map_or_else(String::new, bench::table::short))
+        }
+        Values::List(_) => format!("{} {value}", factor.name),
+    });
+    told.collect::<Vec<_>>().join(", ")
+}

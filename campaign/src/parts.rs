@@ -1,0 +1,270 @@
+//! Results on disk: parts of some runs each, whole or absent.
+//!
+//! ```text
+//! OUT/parts/000012.csv
+//!   # airbench campaign 9f2c…, made by 51d0…, part 12 of 250: runs 96 to 103
+//!   run,draw,seed,…
+//!   96,0,…
+//!   # whole: sha256 77ab…
+//! ```
+//!
+//! A part is written beside its place, brought to the disk and renamed, so that a power cut leaves it whole or not at all. Its
+//! first line tells which campaign it is of and which program made it, its last that nothing of it is missing. Which runs a part
+//! holds follows from the campaign alone: shards in any number may fill one folder, one after the other or at once, and a part
+//! that is there is never made again.
+
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::fs::{self, File, Permissions};
+use std::io::{self, Write};
+use std::ops::Range;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// How a campaign's runs are shared out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parts {
+    /// Which campaign: the hash of its file and of all that this names.
+    pub campaign: String,
+    /// Which program: the hash of its executables.
+    pub program: String,
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// How many runs there are.
+    pub runs: u64,
+    /// How many a part has, but for the last.
+    pub runs_per_part: u64,
+}
+
+/// What is wrong with a part that is there.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PartError {
+    /// It is of another campaign.
+    #[error(
+        "{path}: is of another campaign, or the file or one that it names has changed since; give another --out"
+    )]
+    OtherCampaign {
+        /// The part.
+        path: String,
+    },
+    /// Another version made it.
+    #[error(
+        "{path}: was made by another version of the programs ({theirs}, this is {ours}); use that version, or another --out"
+    )]
+    OtherProgram {
+        /// The part.
+        path: String,
+        /// Who made it.
+        theirs: String,
+        /// Who reads it.
+        ours: String,
+    },
+    /// It cannot be read, or is not whole.
+    #[error("{path}: {what}; delete it, and run the campaign again: it does only what is missing")]
+    Unreadable {
+        /// The part.
+        path: String,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+/// A part that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {error}; what is done is kept: make room and start again, only what is missing is done")]
+pub struct WriteError {
+    path: String,
+    error: io::Error,
+}
+
+/// Parts that a campaign is cut into when its file does not say: enough for a thousand machines.
+const USUAL_PARTS: u64 = 1024;
+/// Runs of a part when the file does not say.
+const USUAL_RUNS: Range<u64> = 8..1001;
+
+/// Runs of a part when the file does not say.
+#[must_use]
+pub fn usual_runs_per_part(runs: u64) -> u64 {
+    (runs / USUAL_PARTS).clamp(USUAL_RUNS.start, USUAL_RUNS.end - 1)
+}
+
+impl Parts {
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.runs.div_ceil(self.runs_per_part)
+    }
+
+    /// The runs of a part.
+    #[must_use]
+    pub fn runs_of(&self, part: u64) -> Range<u64> {
+        part * self.runs_per_part..((part + 1) * self.runs_per_part).min(self.runs)
+    }
+
+    /// Its file.
+    #[must_use]
+    pub fn path(&self, out: &Path, part: u64) -> PathBuf {
+        out.join("parts").join(format!("{part:06}.csv"))
+    }
+
+    fn head(&self, part: u64) -> String {
+        let Range { start, end } = self.runs_of(part);
+        let (campaign, program, count, last) = (&self.campaign, &self.program, self.count(), end - 1);
+        format!(
+            "# airbench campaign {campaign}, made by {program}, part {part} of {count}: runs {start} to {last}\n{}\n",
+            self.columns.join(",")
+        )
+    }
+
+    /// Writes a part; `rows` are its lines.
+    ///
+    /// # Errors
+    /// [`WriteError`], and nothing is left of it.
+    pub fn write(&self, out: &Path, part: u64, rows: &str) -> Result<(), WriteError> {
+        let path = self.path(out, part);
+        let mut text = self.head(part) + rows;
+        let hash = hash(text.as_bytes());
+        // Writing to a text cannot fail.
+        let _ = writeln!(text, "# whole: sha256 {hash}");
+        write_whole(&path, text.as_bytes())
+            .map_err(|error| WriteError { path: path.display().to_string(), error })
+    }
+
+    /// The lines of a part; `None` when it is not there.
+    ///
+    /// # Errors
+    /// [`PartError`] for one that is there and is not this campaign's, or not whole.
+    pub fn read(&self, out: &Path, part: u64) -> Result<Option<String>, PartError> {
+        let path = self.path(out, part);
+        let unreadable =
+            |what: &str| PartError::Unreadable { path: path.display().to_string(), what: what.to_owned() };
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(unreadable(&format!("cannot be read: {error}"))),
+        };
+        let head = self.head(part);
+        if !text.starts_with(&head) {
+            return Err(self
+                .stranger(&text, &path)
+                .unwrap_or_else(|| unreadable("does not begin as a part does")));
+        }
+        let cut = text.rfind("# whole: sha256 ").ok_or_else(|| unreadable("its end is missing"))?;
+        let (whole, seal) = text.split_at(cut);
+        if seal != format!("# whole: sha256 {}\n", hash(whole.as_bytes())) {
+            return Err(unreadable("is not as it was written"));
+        }
+        Ok(Some(whole[head.len()..].to_owned()))
+    }
+
+    /// Why a part with another head is none of ours.
+    fn stranger(&self, text: &str, path: &Path) -> Option<PartError> {
+        let told = text.lines().next()?.strip_prefix("# airbench campaign ")?;
+        let (campaign, told) = told.split_once(", made by ")?;
+        let (program, _) = told.split_once(", part ")?;
+        let path = path.display().to_string();
+        if campaign != self.campaign {
+            Some(PartError::OtherCampaign { path })
+        } else if program != self.program {
+            Some(PartError::OtherProgram { path, theirs: program.to_owned(), ours: self.program.clone() })
+        } else {
+            None
+        }
+    }
+}
+
+/// A file that is there as a whole, or not.
+///
+/// # Errors
+/// What the system says; then it is not there.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    // Another process that does the same part has another name; whichever is renamed last has the same bytes.
+    let mut beside = beside(folder)?;
+    beside.write_all(bytes)?;
+    beside.as_file().sync_all()?;
+    beside.persist(path).map_err(|error| error.error)?;
+    // The rename is on the disk when its folder is.
+    File::open(folder)?.sync_all()
+}
+
+/// A file that is to get its name when it is whole; whoever may read its folder's other files may read it.
+///
+/// # Errors
+/// What the system says.
+pub fn beside(folder: &Path) -> io::Result<NamedTempFile> {
+    let readable = Permissions::from_mode(0o666); // less what the umask takes
+    tempfile::Builder::new().prefix(".part-").suffix(".tmp").permissions(readable).tempfile_in(folder)
+}
+
+/// SHA-256 in hexadecimal.
+#[must_use]
+pub fn hash(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(64);
+    for byte in Sha256::digest(bytes) {
+        // Writing to a text cannot fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parts(campaign: &str, program: &str) -> Parts {
+        let columns = vec!["run".to_owned(), "x".to_owned()];
+        Parts { campaign: campaign.into(), program: program.into(), columns, runs: 20, runs_per_part: 8 }
+    }
+
+    #[test]
+    fn every_run_is_of_one_part() {
+        let parts = parts("c", "p");
+        assert_eq!(parts.count(), 3);
+        let runs: Vec<_> = (0..3).flat_map(|part| parts.runs_of(part)).collect();
+        assert_eq!(runs, (0..20).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn parts_are_enough_for_many_machines_and_not_too_many_files() {
+        assert_eq!([30, 2000, 1_000_000, 1_000_000_000].map(usual_runs_per_part), [8, 8, 976, 1000]);
+    }
+
+    #[test]
+    fn a_part_is_read_as_it_was_written_and_leaves_nothing_beside_it() {
+        let out = tempfile::tempdir().unwrap();
+        let parts = parts("c", "p");
+        assert_eq!(parts.read(out.path(), 1), Ok(None));
+        parts.write(out.path(), 1, "8,1\n9,2\n").unwrap();
+        assert_eq!(parts.read(out.path(), 1), Ok(Some("8,1\n9,2\n".to_owned())));
+        assert_eq!(fs::read_dir(out.path().join("parts")).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_is_cut_changed_or_somebody_elses_is_told() {
+        let out = tempfile::tempdir().unwrap();
+        let ours = parts("c", "p");
+        ours.write(out.path(), 0, "0,1\n").unwrap();
+        let path = ours.path(out.path(), 0);
+        let text = fs::read_to_string(&path).unwrap();
+        for (bad, words) in [
+            (text[..text.len() - 1].to_owned(), "not as it was written"),
+            (text[..text.find("# whole").unwrap()].to_owned(), "end is missing"),
+            (text.replace("0,1\n", "0,2\n"), "not as it was written"),
+            (String::new(), "does not begin"),
+            ("hello\n".to_owned(), "does not begin"),
+        ] {
+            fs::write(&path, &bad).unwrap();
+            let told = ours.read(out.path(), 0).unwrap_err().to_string();
+            assert!(told.contains(words) && told.contains("delete it"), "{bad}: {told}");
+        }
+        fs::write(&path, [0xff, 0xfe]).unwrap();
+        assert!(ours.read(out.path(), 0).unwrap_err().to_string().contains("cannot be read"));
+        parts("other", "p").write(out.path(), 0, "0,1\n").unwrap();
+        assert!(matches!(ours.read(out.path(), 0), Err(PartError::OtherCampaign { .. })));
+        parts("c", "other").write(out.path(), 0, "0,1\n").unwrap();
+        assert!(matches!(ours.read(out.path(), 0), Err(PartError::OtherProgram { .. })));
+    }
+}

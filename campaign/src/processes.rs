@@ -1,0 +1,197 @@
+//! A run as two processes in lockstep on an embedded bus of their own, with all the files of a run.
+//!
+//! It is slower than a rehearsal, and the only way for what needs a rig process: faults, frames that are lost.
+
+use crate::child::{Cut, Limit, Own};
+use crate::condition::{Condition, ConditionError};
+use crate::factor::Value;
+use crate::figures::TOP;
+use crate::outcome::{Ended, Outcome};
+use crate::shelf::Shelf;
+use bench::join;
+use controller::experiment::Experiment;
+use protocol::exit::Exit;
+use serde_json::Value as Json;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Programs that a run is made of.
+#[derive(Clone, Debug)]
+pub struct Programs {
+    /// Folder of `emulator` and `controller`.
+    pub folder: PathBuf,
+}
+
+/// How a run of processes went wrong for a reason that is not the run's.
+#[derive(Debug, thiserror::Error)]
+pub enum ProcessesError {
+    /// The campaign was told to stop.
+    #[error("stopped")]
+    Stopped,
+    /// Values and files do not go together.
+    #[error(transparent)]
+    Condition(#[from] ConditionError),
+    /// A file or a program.
+    #[error("run {run}: {what}: {error}")]
+    System {
+        /// Which run.
+        run: u64,
+        /// Which file or program.
+        what: String,
+        /// What the system says.
+        error: io::Error,
+    },
+}
+
+/// A run in a folder, of at most `seconds` of the rig's time.
+///
+/// # Errors
+/// [`ProcessesError`]; a rig or controllers that fail are a result.
+pub fn run(
+    condition: &Condition<'_>,
+    shelf: &Shelf,
+    (run, seconds): (u64, f64),
+    programs: &Programs,
+    folder: &Path,
+    limit: Limit<'_>,
+) -> Result<Outcome, ProcessesError> {
+    let system = |what: &str| {
+        let what = what.to_owned();
+        move |error| ProcessesError::System { run, what, error }
+    };
+    let files = Files::write(condition, shelf, run, folder)?;
+    // The socket's path may not be long, and a folder's may.
+    let private =
+        tempfile::Builder::new().prefix("airbench-").tempdir().map_err(system("a folder for the bus"))?;
+    let bus = format!("unix://{}/bus", private.path().display());
+    let start = |name: &str, add: &dyn Fn(&mut Command)| {
+        let mut command = Command::new(programs.folder.join(name));
+        command.args(["run", "--pace", "lockstep", "--bus", &bus, "--out"]).arg(folder);
+        command.arg("--experiment").arg(&files.experiment);
+        add(&mut command);
+        let said = fs::File::create(folder.join(format!("{name}.txt"))).map_err(system(name))?;
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said);
+        Own::start(&mut command).map_err(system(name))
+    };
+    let mut emulator = start("emulator", &|command| {
+        command.arg("--rig").arg(&files.rig);
+        command.args(["--seed", &condition.seed.to_string(), "--seconds", &seconds.to_string()]);
+        if let Some(faults) = &files.faults {
+            command.arg("--faults").arg(faults);
+        }
+    })?;
+    let mut controller = start("controller", &|command| {
+        command.arg("--rig").arg(&files.nominal);
+        for (name, path) in ["--drive-program", "--load-program"].into_iter().zip(&files.programs) {
+            if let Some(path) = path {
+                command.arg(name).arg(path);
+            }
+        }
+        for set in &condition.set {
+            command.args(["--set", set]);
+        }
+    })?;
+    let mut codes = Vec::new();
+    for (name, process) in [("emulator", &mut emulator), ("controller", &mut controller)] {
+        match process.wait(limit) {
+            Ok(status) => codes.push((name, status.code())),
+            Err(Cut::Stopped) => return Err(ProcessesError::Stopped),
+            Err(Cut::System(error)) => return Err(system(name)(error)),
+            Err(cut @ Cut::TooLong(_)) => return Ok(Outcome::failed(format!("{name}: {cut}"))),
+        }
+    }
+    if let Some((name, _)) = codes.iter().find(|(_, code)| *code == Some(Exit::BadInput as i32)) {
+        let message = last_line(&folder.join(format!("{name}.txt")));
+        return Err(ConditionError { run, message }.into());
+    }
+    Ok(outcome(folder, &codes))
+}
+
+/// What the run's folder tells.
+fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Outcome {
+    let joined = match join::join(folder) {
+        Ok(joined) => joined,
+        Err(error) => return Outcome::failed(error.to_string()),
+    };
+    let number = |key: &str| joined.figure(key).as_f64();
+    let of_table = joined.figure("figures").as_object().into_iter().flatten();
+    let figures = of_table.filter_map(|(name, value)| Some((name.clone(), Value::Number(value.as_f64()?))));
+    let at_top = TOP.into_iter().filter_map(|name| Some((name.to_owned(), Value::Number(number(name)?))));
+    let figures: BTreeMap<_, _> = at_top.chain(figures).collect();
+    let words = |key: &str| joined.figure("controller")[key].as_str().unwrap_or_default().to_owned();
+    let code = |name: &str| codes.iter().find(|(own, _)| *own == name).and_then(|(_, code)| *code);
+    let (ended, because) = match (code("emulator"), code("controller")) {
+        (Some(0), Some(0)) => (Ended::Done, String::new()),
+        (Some(0), Some(3)) => (Ended::TimeOver, words("ended_because")),
+        (Some(0 | 1), Some(0 | 1)) => (Ended::Stopped, words("ended_because")),
+        other => (Ended::Failed, format!("exit codes {other:?} of emulator and controller")),
+    };
+    let has_bounds = joined.figure("thresholds").as_object().is_some_and(|bounds| !bounds.is_empty());
+    let passed = has_bounds.then(|| joined.figure("passed") == &Json::Bool(true));
+    Outcome { ended, because, simulated_s: number("cycles").unwrap_or(0.0) * 1e-3, passed, figures }
+}
+
+/// The files that both programs read.
+struct Files {
+    rig: PathBuf,
+    nominal: PathBuf,
+    experiment: PathBuf,
+    faults: Option<PathBuf>,
+    programs: [Option<PathBuf>; 2],
+}
+
+impl Files {
+    fn write(
+        condition: &Condition<'_>,
+        shelf: &Shelf,
+        run: u64,
+        folder: &Path,
+    ) -> Result<Self, ProcessesError> {
+        let put = |name: &str, text: &str| {
+            let path = folder.join(name);
+            fs::write(&path, text).map_err(|error| ProcessesError::System {
+                run,
+                what: path.display().to_string(),
+                error,
+            })?;
+            Ok::<_, ProcessesError>(path)
+        };
+        let experiment = condition.experiment;
+        let unchanged = condition.experiment_toml == experiment.text;
+        let refused = |message: String| ConditionError { run, message };
+        let stroke_m = condition.nominal.nominal.cylinder().stroke_m;
+        let read = Experiment::from_toml(&condition.experiment_toml, &experiment.path, stroke_m)
+            .map_err(|error| refused(error.to_string()))?;
+        let program = |axis, section: Option<&controller::experiment::AxisExperiment>| {
+            let source = condition.program(shelf, axis, &section?.program.written)?;
+            Some(fs::canonicalize(&source.path).unwrap_or(source.path))
+        };
+        Ok(Self {
+            rig: put("simulated-rig.toml", &condition.rig_toml)?,
+            nominal: put("nominal-rig.toml", &condition.nominal.file.text)?,
+            // Tables are read beside it.
+            experiment: if unchanged {
+                experiment.path.clone()
+            } else {
+                put("experiment.toml", &condition.experiment_toml)?
+            },
+            faults: match condition.faults_toml.as_str() {
+                "" => None,
+                text => Some(put("faults.toml", text)?),
+            },
+            programs: [
+                program(plant::Axis::Drive, read.drive.as_ref()),
+                program(plant::Axis::Load, read.load.as_ref()),
+            ],
+        })
+    }
+}
+
+/// The last words of a program that refused its input.
+fn last_line(path: &Path) -> String {
+    let text = fs::read_to_string(path).unwrap_or_default();
+    text.trim_end().lines().next_back().unwrap_or("a program refused its input").to_owned()
+}

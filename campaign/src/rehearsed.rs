@@ -1,0 +1,214 @@
+//! A run as a rehearsal: plant and controllers in this process, nothing written.
+//!
+//! The columns are collected as they would be written, so that the figures are those of a run's folder to the bit; a test
+//! holds them against one.
+
+use crate::condition::{Condition, ConditionError};
+use crate::factor::Value;
+use crate::figures::TOP;
+use crate::outcome::{Ended, Outcome};
+use crate::shelf::Shelf;
+use bench::figures::{self, position};
+use bench::record::{MEASURED, Record, TRUE};
+use bench::series::Series;
+use bench::tables_read::{StateSpan, Table, enter};
+use bench::thresholds;
+use controller::axis::{AxisController, AxisRecord};
+use controller::rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
+use controller::setup::{Inputs, Mode};
+use plant::tables::{self, CycleRecord};
+use plant::{Axis, Truth};
+use protocol::frames::MainChainState;
+use serde_json::{Map, json};
+use std::collections::BTreeMap;
+
+/// Rehearses a run of at most `seconds` of the rig's time.
+///
+/// # Errors
+/// [`ConditionError`] when experiment, programs and variables do not go together: not a result but a mistake in the campaign.
+pub fn rehearse(
+    condition: &Condition<'_>,
+    shelf: &Shelf,
+    run: u64,
+    seconds: f64,
+) -> Result<Outcome, ConditionError> {
+    let refused = |message: String| ConditionError { run, message };
+    let inputs = Inputs::of_sources(
+        &condition.nominal.nominal,
+        (&condition.experiment.path, &condition.experiment_toml),
+        |axis, written| condition.program(shelf, axis, written),
+        &condition.set,
+    )
+    .map_err(|error| refused(error.to_string()))?;
+    let mode = Mode { partner_needed: true, real_time: false, forever: false };
+    let controllers = Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode));
+    let controllers = controllers
+        .collect::<Result<_, _>>()
+        .map_err(|error: controller::run::RunError| refused(error.to_string()))?;
+    let parts =
+        RehearsalParts { rig: &condition.rig, scene: &condition.scene, seed: condition.seed, controllers };
+    let mut rehearsal = Rehearsal::new(parts).map_err(|error| refused(error.to_string()))?;
+    let cycles = (seconds * 1000.0).round() as u64;
+    let mut columns = Columns::new();
+    while rehearsal.cycles() < cycles && !rehearsal.ended() {
+        columns.push(&rehearsal.step(|_, _| {}));
+    }
+    let record = columns.record(&inputs);
+    outcome(&rehearsal, &record, &inputs).map_err(refused)
+}
+
+fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Outcome, String> {
+    let controllers = || rehearsal.station().controllers();
+    let is_stopped = |controller: &&AxisController| {
+        matches!(controller.state(), MainChainState::Aborted | MainChainState::Fault)
+    };
+    // The axis with the fault before one that only followed it.
+    let stopped =
+        controllers().filter(is_stopped).max_by_key(|controller| controller.state() == MainChainState::Fault);
+    let (ended, because) = match stopped {
+        Some(axis) => (Ended::Stopped, format!("{}: {}", axis.axis().name(), axis.cause())),
+        None if rehearsal.station().done() => (Ended::Done, String::new()),
+        None => (Ended::TimeOver, "the longest time was over before the experiment was done".to_owned()),
+    };
+    let drive =
+        controllers().find(|controller| controller.axis() == Axis::Drive).map(AxisController::figures);
+    let top = [
+        drive.and_then(|figures| figures.dynamic_m()).or_else(|| position::error_dynamic_m(record)),
+        drive.and_then(|figures| figures.static_m()).or_else(|| position::error_static_m(record)),
+    ];
+    let figures = figures::of(record);
+    let known = TOP.into_iter().zip(top).filter_map(|(name, value)| Some((name, value?)));
+    let figures: BTreeMap<_, _> =
+        known.chain(figures.iter()).map(|(name, value)| (name.to_owned(), Value::Number(value))).collect();
+    let passed = passed(inputs, &figures, ended)?;
+    let simulated_s = rehearsal.cycles() as f64 * 1e-3;
+    Ok(Outcome { ended, because, simulated_s, passed, figures })
+}
+
+/// Whether the experiment's bounds are kept; a rehearsal loses no frames, is never late, and has no latency to bound.
+fn passed(inputs: &Inputs, figures: &BTreeMap<String, Value>, ended: Ended) -> Result<Option<bool>, String> {
+    let bounds = &inputs.experiment.passed;
+    if bounds.is_empty() {
+        return Ok(None);
+    }
+    let mut summary = Map::new();
+    for name in
+        ["skipped", "overruns", "frames_lost", "frames_malformed", "stale_commands", "records_dropped"]
+    {
+        summary.insert(name.to_owned(), json!(0));
+    }
+    summary.insert("figures".to_owned(), json!({}));
+    for (name, value) in figures {
+        let at_top = TOP.contains(&name.as_str());
+        let table = if at_top { Some(&mut summary) } else { summary["figures"].as_object_mut() };
+        table.and_then(|table| table.insert(name.clone(), json!(value.number())));
+    }
+    let judged = thresholds::judge(bounds, &summary).map_err(|error| error.to_string())?;
+    Ok(Some(ended == Ended::Done && judged.values().all(thresholds::is_kept)))
+}
+
+/// A column of a controller's table.
+type OfAxis = (&'static str, fn(&AxisRecord) -> Option<f64>);
+
+/// In the words of the controller's own table.
+const OF_AXIS: [OfAxis; 10] = [
+    ("set_position_m", |row| row.set_position.map(|point| point.position_m)),
+    ("set_velocity_m_per_s", |row| row.set_position.map(|point| point.velocity_m_per_s)),
+    ("set_force_N", |row| row.set_force.map(|point| point.force_n)),
+    ("position_m", |row| Some(row.position_m)),
+    ("velocity_m_per_s", |row| Some(row.velocity_m_per_s)),
+    ("force_N", |row| Some(row.force_n)),
+    ("wanted_velocity_m_per_s", |row| Some(row.wanted_velocity_m_per_s)),
+    ("opening", |row| Some(row.opening)),
+    ("enabled", |row| Some(f64::from(u8::from(row.enabled)))),
+    ("moving", |row| {
+        let moving = row.set_position.is_some_and(|point| point.moving)
+            || row.set_force.is_some_and(|point| point.moving);
+        Some(f64::from(u8::from(moving)))
+    }),
+];
+
+/// A chain of a controller's table.
+type Chain = (&'static str, fn(&AxisRecord) -> &'static str);
+
+const CHAINS: [Chain; 4] = [
+    ("main_chain", |row| row.main.name()),
+    ("force_chain", |row| row.force_chain.name()),
+    ("matching_chain", |row| row.matching.name()),
+    ("emergency_stop_chain", |row| row.emergency_stop.name()),
+];
+
+/// The tables of a run, column by column.
+struct Columns {
+    axes: [AxisColumns; 2],
+    measured: Vec<Series>,
+    truth: Vec<(usize, &'static str, Series)>,
+}
+
+#[derive(Default)]
+struct AxisColumns {
+    numbers: [Series; OF_AXIS.len()],
+    states: [Vec<StateSpan>; CHAINS.len()],
+}
+
+impl Columns {
+    fn new() -> Self {
+        debug_assert!(tables::measurement_columns().eq(MEASURED.iter().copied()), "one order for both");
+        let place = |name: &str| Truth::COLUMNS.iter().position(|column| *column == name);
+        let truth = TRUE.iter().filter_map(|name| Some((place(name)?, *name, Series::default())));
+        Self {
+            axes: Default::default(),
+            measured: vec![Series::default(); MEASURED.len()],
+            truth: truth.collect(),
+        }
+    }
+
+    fn push(&mut self, rehearsed: &Rehearsed) {
+        let CycleRecord { cycle, truth, .. } = &rehearsed.cycle;
+        // The double next to the decimal number that a table has.
+        let time_s = *cycle as f64 / 1000.0;
+        for (column, value) in self.measured.iter_mut().zip(rehearsed.cycle.measured()) {
+            column.push(time_s, value);
+        }
+        let values = truth.values();
+        for (place, _, column) in &mut self.truth {
+            column.push(time_s, values[*place]);
+        }
+        for (columns, row) in self.axes.iter_mut().zip(&rehearsed.axes) {
+            if let Some(row) = row {
+                columns.push(row, time_s);
+            }
+        }
+    }
+
+    fn record(self, inputs: &Inputs) -> Record {
+        let [drive, load] = self.axes.map(AxisColumns::table);
+        let mut measured = Table::default();
+        MEASURED.iter().zip(self.measured).for_each(|(name, column)| measured.set_numbers(name, column));
+        let mut truth = Table::default();
+        self.truth.into_iter().for_each(|(_, name, column)| truth.set_numbers(name, column));
+        // Read once already, by the experiment's own reader.
+        let experiment = inputs.experiment_toml.parse().unwrap_or_default();
+        Record { drive, load, measured, truth, experiment }
+    }
+}
+
+impl AxisColumns {
+    fn push(&mut self, row: &AxisRecord, time_s: f64) {
+        for (column, (_, value)) in self.numbers.iter_mut().zip(OF_AXIS) {
+            if let Some(value) = value(row) {
+                column.push(time_s, value);
+            }
+        }
+        for (column, (_, state)) in self.states.iter_mut().zip(CHAINS) {
+            enter(column, state(row), time_s);
+        }
+    }
+
+    fn table(self) -> Table {
+        let mut table = Table::default();
+        OF_AXIS.iter().zip(self.numbers).for_each(|((name, _), column)| table.set_numbers(name, column));
+        CHAINS.iter().zip(self.states).for_each(|((name, _), column)| table.set_states(name, column));
+        table
+    }
+}

@@ -1,0 +1,151 @@
+//! Which part of a campaign one start does: `--shard i/n`, or the index that a batch system gives.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// One of several starts that share a campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// Which, from 0.
+    pub index: u32,
+    /// Of how many.
+    pub count: u32,
+}
+
+/// A shard that cannot be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ShardError {
+    /// The text is none.
+    #[error(
+        "shard '{0}': write INDEX/COUNT with INDEX from 0 and below COUNT, as 0/4, or COUNT alone where a batch system gives the index"
+    )]
+    Form(String),
+    /// Only the number of shards was given, and no batch system tells which.
+    #[error(
+        "--shard {count}: which one? write INDEX/{count}, or start it as an array of Slurm or an indexed job of Kubernetes ({names})"
+    )]
+    NoIndex {
+        /// Of how many.
+        count: u32,
+        /// Where the index is looked for.
+        names: String,
+    },
+    /// The batch system tells an index that is none.
+    #[error(
+        "{name}={value}: allowed is 0 to {most} with --shard {count}; an array of Slurm begins at 0 with --array=0-{most}"
+    )]
+    Index {
+        /// Name of the variable.
+        name: &'static str,
+        /// What it holds.
+        value: String,
+        /// Of how many.
+        count: u32,
+        /// Largest index.
+        most: u32,
+    },
+}
+
+/// Where batch systems tell the index: arrays of Slurm, indexed jobs of Kubernetes.
+pub const INDEX_VARIABLES: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"];
+
+/// `--shard` as it is written: the index may be left to the batch system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asked {
+    index: Option<u32>,
+    count: u32,
+}
+
+impl Shard {
+    /// The campaign as a whole.
+    pub const WHOLE: Shard = Shard { index: 0, count: 1 };
+
+    /// Whether the part of this number is of this shard.
+    #[must_use]
+    pub fn holds(self, part: u64) -> bool {
+        part % u64::from(self.count) == u64::from(self.index)
+    }
+}
+
+impl Asked {
+    /// The shard, with the index of the batch system where none was written; `variable` tells the environment's.
+    ///
+    /// # Errors
+    /// [`ShardError`] when nobody tells an index, or one that is none.
+    pub fn shard(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, ShardError> {
+        let count = self.count;
+        if let Some(index) = self.index {
+            return Ok(Shard { index, count });
+        }
+        let told = INDEX_VARIABLES.into_iter().find_map(|name| Some((name, variable(name)?)));
+        let (name, value) =
+            told.ok_or_else(|| ShardError::NoIndex { count, names: INDEX_VARIABLES.join(", ") })?;
+        match value.parse() {
+            Ok(index) if index < count => Ok(Shard { index, count }),
+            _ => Err(ShardError::Index { name, value, count, most: count - 1 }),
+        }
+    }
+}
+
+impl FromStr for Asked {
+    type Err = ShardError;
+
+    fn from_str(text: &str) -> Result<Self, ShardError> {
+        let bad = || ShardError::Form(text.to_owned());
+        let (index, count) = match text.split_once('/') {
+            Some((index, count)) => (Some(index.parse().map_err(|_| bad())?), count),
+            None => (None, text),
+        };
+        let count = count.parse().map_err(|_| bad())?;
+        if count == 0 || index.is_some_and(|index| index >= count) {
+            Err(bad())
+        } else {
+            Ok(Asked { index, count })
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}/{}", self.index, self.count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shard(text: &str, variable: Option<(&str, &str)>) -> Result<Shard, ShardError> {
+        let told = |name: &str| variable.filter(|(own, _)| *own == name).map(|(_, value)| value.to_owned());
+        text.parse::<Asked>()?.shard(told)
+    }
+
+    #[test]
+    fn every_part_is_of_exactly_one_shard() {
+        for count in 1..8 {
+            for part in 0..100 {
+                let holders = (0..count).filter(|index| Shard { index: *index, count }.holds(part)).count();
+                assert_eq!(holders, 1, "part {part} of {count} shards");
+            }
+        }
+    }
+
+    #[test]
+    fn the_index_is_written_or_told_by_the_batch_system() {
+        let third = Ok(Shard { index: 2, count: 5 });
+        assert_eq!(shard("2/5", None), third);
+        assert_eq!(shard("5", Some(("SLURM_ARRAY_TASK_ID", "2"))), third);
+        assert_eq!(shard("5", Some(("JOB_COMPLETION_INDEX", "2"))), third);
+        assert_eq!(shard("2/5", Some(("SLURM_ARRAY_TASK_ID", "4"))), third, "what is written counts");
+    }
+
+    #[test]
+    fn what_is_no_shard_is_told_with_what_would_be_one() {
+        for bad in ["", "5/5", "-1/2", "0/0", "0", "a/b", "1/2/3"] {
+            assert!(shard(bad, None).unwrap_err().to_string().contains("INDEX/COUNT"), "{bad}");
+        }
+        assert!(shard("4", None).unwrap_err().to_string().contains("SLURM_ARRAY_TASK_ID"));
+        let beyond = shard("4", Some(("SLURM_ARRAY_TASK_ID", "4"))).unwrap_err().to_string();
+        assert!(beyond.contains("0 to 3"), "{beyond}");
+    }
+}

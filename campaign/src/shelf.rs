@@ -1,0 +1,199 @@
+//! The files that a campaign names, read once before anything runs, and what tells this campaign from every other.
+
+use crate::factor::{Changes, Factor, FileChoice, Value, Values};
+use crate::file::{CampaignFile, ExperimentKind};
+use controller::experiment::Experiment;
+use controller::program::file::Source;
+use plant::RigParameters;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The shipped rig's name in results.
+const SHIPPED: &str = "shipped";
+
+/// What a campaign of experiments reads.
+#[derive(Debug)]
+pub struct Shelf {
+    /// Experiments by the name that the file gives them.
+    experiments: BTreeMap<String, Text>,
+    /// Rigs likewise.
+    rigs: BTreeMap<String, RigFile>,
+    /// Programs by their paths.
+    programs: BTreeMap<PathBuf, Source>,
+    /// Where names are looked up.
+    folders: Folders,
+    /// The experiment and the rig where they are not varied.
+    usual: [String; 2],
+}
+
+/// Where names are looked up.
+#[derive(Debug)]
+struct Folders {
+    /// Of the campaign's file.
+    own: PathBuf,
+    /// With the shipped `experiments` and `programs`.
+    shipped: PathBuf,
+}
+
+impl Folders {
+    /// The file of this name: a path from `own`, or a name in a shipped folder.
+    fn file(&self, name: &str, folder: &str, own: &Path) -> PathBuf {
+        if name.ends_with(".toml") {
+            own.join(name)
+        } else {
+            self.shipped.join(folder).join(format!("{name}.toml"))
+        }
+    }
+
+    fn experiment(&self, name: &str) -> PathBuf {
+        self.file(name, "experiments", &self.own)
+    }
+
+    /// A program as an experiment names it.
+    fn program(&self, name: &str, experiment: &Path) -> PathBuf {
+        self.file(name, "programs", experiment.parent().unwrap_or(Path::new("")))
+    }
+
+    /// A program as a `[[vary]]` names it.
+    fn chosen_program(&self, name: &str) -> PathBuf {
+        self.file(name, "programs", &self.own)
+    }
+}
+
+/// A file.
+#[derive(Clone, Debug)]
+pub struct Text {
+    /// Its path.
+    pub path: PathBuf,
+    /// What it holds.
+    pub text: String,
+}
+
+/// A rig file and what it says.
+#[derive(Debug)]
+pub struct RigFile {
+    /// The file.
+    pub file: Text,
+    /// Its numbers: those that controllers know.
+    pub nominal: RigParameters,
+}
+
+/// A file that a campaign names and that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{campaign}: {message}")]
+pub struct ShelfError {
+    campaign: String,
+    message: String,
+}
+
+impl Shelf {
+    /// Reads all files; `shipped` is the folder with the shipped `experiments` and `programs`.
+    ///
+    /// # Errors
+    /// [`ShelfError`] with the file and what is wrong with it.
+    pub fn read(file: &CampaignFile, kind: &ExperimentKind, shipped: &Path) -> Result<Self, ShelfError> {
+        let error = |message: String| ShelfError { campaign: file.path.display().to_string(), message };
+        let own = file.path.parent().unwrap_or(Path::new("")).to_owned();
+        let folders = Folders { own, shipped: shipped.to_owned() };
+        let read = |path: PathBuf| {
+            let text = std::fs::read_to_string(&path)
+                .map_err(|told| error(format!("{}: {told}", path.display())))?;
+            Ok(Text { path, text })
+        };
+        let chosen = |choice| names(&file.factors, choice);
+        let mut rigs = BTreeMap::new();
+        for name in kind.rig.clone().into_iter().chain(chosen(FileChoice::Rig)) {
+            rigs.insert(name.clone(), rig_file(read(folders.own.join(&name))?).map_err(error)?);
+        }
+        if rigs.is_empty() {
+            let text = Text { path: "rig.toml".into(), text: RigParameters::BASELINE_TOML.to_owned() };
+            rigs.insert(SHIPPED.to_owned(), rig_file(text).map_err(error)?);
+        }
+        let mut experiments = BTreeMap::new();
+        for name in kind.experiment.clone().into_iter().chain(chosen(FileChoice::Experiment)) {
+            experiments.insert(name.clone(), read(folders.experiment(&name))?);
+        }
+        let first = |keys: Option<&String>| keys.cloned().unwrap_or_default();
+        let usual = [first(experiments.keys().next()), first(rigs.keys().next())];
+        let mut programs = BTreeMap::new();
+        let mut add = |path: PathBuf| match Source::read(&path) {
+            Ok(source) => {
+                programs.insert(path, source);
+                Ok(())
+            }
+            Err(told) => Err(error(told.to_string())),
+        };
+        let stroke_m = rigs[&usual[1]].nominal.cylinder().stroke_m;
+        for Text { path, text } in experiments.values() {
+            let experiment =
+                Experiment::from_toml(text, path, stroke_m).map_err(|told| error(told.to_string()))?;
+            for section in [&experiment.drive, &experiment.load].into_iter().flatten() {
+                add(folders.program(&section.program.written, path))?;
+            }
+        }
+        for name in chosen(FileChoice::DriveProgram).iter().chain(&chosen(FileChoice::LoadProgram)) {
+            add(folders.chosen_program(name))?;
+        }
+        Ok(Self { experiments, rigs, programs, folders, usual })
+    }
+
+    /// The experiment of this name, or the only one.
+    ///
+    /// # Panics
+    /// If the campaign names no such file.
+    #[must_use]
+    pub fn experiment(&self, name: Option<&str>) -> &Text {
+        &self.experiments[name.unwrap_or(&self.usual[0])]
+    }
+
+    /// The rig of this name, or the only one.
+    ///
+    /// # Panics
+    /// If the campaign names no such file.
+    #[must_use]
+    pub fn rig(&self, name: Option<&str>) -> &RigFile {
+        &self.rigs[name.unwrap_or(&self.usual[1])]
+    }
+
+    /// A program that an experiment names.
+    #[must_use]
+    pub fn program(&self, name: &str, experiment: &Text) -> Option<&Source> {
+        self.programs.get(&self.folders.program(name, &experiment.path))
+    }
+
+    /// A program that a `[[vary]]` chooses.
+    ///
+    /// # Panics
+    /// If the campaign names no such file.
+    #[must_use]
+    pub fn chosen_program(&self, name: &str) -> &Source {
+        &self.programs[&self.folders.chosen_program(name)]
+    }
+
+    /// The texts of all files, each behind the name of its file, in an order that depends on the names alone.
+    pub fn texts(&self) -> impl Iterator<Item = (&str, &str)> {
+        let experiments = self.experiments.iter().map(|(name, file)| (name.as_str(), file.text.as_str()));
+        let rigs = self.rigs.iter().map(|(name, rig)| (name.as_str(), rig.file.text.as_str()));
+        let programs = self.programs.iter().map(|(path, source)| {
+            (path.file_name().and_then(|name| name.to_str()).unwrap_or_default(), source.text.as_str())
+        });
+        experiments.chain(rigs).chain(programs)
+    }
+}
+
+/// The files among which the factors choose.
+fn names(factors: &[Factor], choice: FileChoice) -> Vec<String> {
+    let lists = factors.iter().filter(|factor| factor.changes == Changes::File(choice));
+    lists
+        .flat_map(|factor| match &factor.values {
+            Values::List(list) => list.iter().map(Value::to_string).collect(),
+            Values::Range(_) => Vec::new(),
+        })
+        .collect()
+}
+
+fn rig_file(file: Text) -> Result<RigFile, String> {
+    let nominal = RigParameters::from_toml(&file.text, &file.path.display().to_string())
+        .map_err(|told| told.to_string())?;
+    Ok(RigFile { file, nominal })
+}

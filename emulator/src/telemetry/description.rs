@@ -1,0 +1,124 @@
+//! What a viewer has to know before the first cycle: the run, the rig's numbers, the columns, what can be broken.
+//!
+//! | key | holds |
+//! |---|---|
+//! | `schema_version` | [`SCHEMA_VERSION`] |
+//! | `pace`, `bus`, `seed`, `started_unix_s`, `out` | as in `run.json`; `out` is the run's folder, absolute |
+//! | `experiment` | `name` of the file and `title` in it; null without one |
+//! | `console` | whether commands are obeyed |
+//! | `sealed` | whether effects are on that nobody shall know: then cycles have the columns of `measurement.csv` alone |
+//! | `columns` | of each cycle, in order: `table` (`measurement` or `truth`, the file it is a column of), `name` there, `unit` |
+//! | `rig` | numbers that a drawing needs, in SI, the unit in the name |
+//! | `setup` | linkage and weights at the start |
+//! | `faults` | as `emulator faults --json` lists them |
+
+use crate::cli::RunArguments;
+use crate::faults::listing;
+use crate::inputs::Inputs;
+use plant::{Truth, tables};
+use protocol::run_folder::SCHEMA_VERSION;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// What is described.
+pub struct Described<'a> {
+    /// How the emulator was started.
+    pub arguments: &'a RunArguments,
+    /// What it read.
+    pub inputs: &'a Inputs,
+    /// Columns of `truth.csv` after the baseline's.
+    pub terms: &'a [String],
+    /// Start of the run's clock, s since 1970; `None` in lockstep.
+    pub started_unix_s: Option<f64>,
+}
+
+impl Described<'_> {
+    /// Whether viewers get what only a simulation knows. Of sealed effects nothing but `truth.csv` may tell.
+    #[must_use]
+    pub fn with_truth(&self) -> bool {
+        !self.inputs.sealed
+    }
+
+    fn columns(&self) -> Vec<Value> {
+        let of = |table: &str, name: &str| json!({ "table": table, "name": name, "unit": unit(name) });
+        let measured = tables::measurement_columns().map(|name| of("measurement", &name));
+        let truth = Truth::COLUMNS.into_iter().chain(self.terms.iter().map(String::as_str));
+        let truth = truth.filter(|_| self.with_truth()).map(|name| of("truth", name));
+        measured.chain(truth).collect()
+    }
+}
+
+/// The description as JSON.
+#[must_use]
+pub fn description(run: &Described<'_>) -> Value {
+    let Described { arguments, inputs, started_unix_s, .. } = run;
+    let (cylinder, supply, mass) = (inputs.rig.cylinder(), inputs.rig.supply(), inputs.rig.mass());
+    json!({
+        "schema_version": SCHEMA_VERSION,
+        "pace": arguments.pace.to_string(),
+        "bus": arguments.bus.to_string(),
+        "seed": arguments.seed,
+        "started_unix_s": started_unix_s,
+        "out": std::path::absolute(&arguments.out).unwrap_or_else(|_| arguments.out.clone()),
+        "experiment": arguments.experiment.as_deref().map(|file| experiment(file, inputs)),
+        "console": arguments.console,
+        "sealed": inputs.sealed,
+        "columns": run.columns(),
+        "rig": {
+            "stroke_m": cylinder.stroke_m,
+            "piston_area_m2": cylinder.piston_area_m2,
+            "annulus_area_m2": cylinder.annulus_area_m2,
+            "supply_pressure_pa": supply.pressure_pa,
+            "exhaust_pressure_pa": supply.exhaust_pressure_pa,
+            "atmospheric_pressure_pa": supply.atmospheric_pressure_pa,
+            "drive_mass_kg": mass.drive_kg,
+            "carriage_mass_kg": mass.carriage_kg,
+            "load_mass_kg": mass.load_kg,
+            "added_mass_limit_kg": mass.added_limit_kg,
+            "gap_m": inputs.rig.linkage().gap_m,
+            "force_range_n": inputs.rig.sensors().force_range_n,
+        },
+        "setup": {
+            "linked": inputs.scene.linked,
+            "added_mass_kg": inputs.scene.added_mass_kg,
+        },
+        "faults": listing::faults(),
+    })
+}
+
+fn experiment(file: &Path, inputs: &Inputs) -> Value {
+    // Only `[rig]` of the file is the emulator's; what else is in it is the controllers' to check.
+    let table: Option<toml::Table> = inputs.experiment_toml.as_deref().and_then(|text| text.parse().ok());
+    let title = table.as_ref().and_then(|table| table.get("title")?.as_str());
+    json!({ "name": file.file_stem().map(|name| name.to_string_lossy()), "title": title })
+}
+
+/// Ends of a column's name, the longer ones first, and the unit that each stands for.
+const UNITS: [(&str, &str); 6] = [
+    ("_m3_per_s", "m^3/s"),
+    ("_m_per_s2", "m/s^2"),
+    ("_m_per_s", "m/s"),
+    ("_Pa", "Pa"),
+    ("_J", "J"),
+    ("_N", "N"),
+];
+
+/// Unit of a column of a run's tables, whose name ends with it; `1` for a plain number.
+fn unit(column: &str) -> &'static str {
+    let metre = column.ends_with("_m").then_some("m");
+    UNITS.iter().find(|(end, _)| column.ends_with(end)).map(|(_, unit)| *unit).or(metre).unwrap_or("1")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_column_of_the_baseline_has_its_unit() {
+        let plain: Vec<_> = Truth::COLUMNS.into_iter().filter(|name| unit(name) == "1").collect();
+        assert_eq!(plain, ["drive_spool", "load_spool", "check_valves_shut"]);
+        assert_eq!(unit("drive_flow_a_m3_per_s"), "m^3/s");
+        assert_eq!(unit("drive_position_m"), "m");
+        assert_eq!(unit("load_rod_velocity_m_per_s"), "m/s");
+    }
+}

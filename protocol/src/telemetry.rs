@@ -1,0 +1,269 @@
+//! Telemetry: what the emulator tells whoever looks on, as packets over a Unix stream; and what a viewer asks, as lines.
+//!
+//! ```text
+//!   emulator ──► [length u32 LE][kind u8][payload of that length] … ──► viewer
+//!            ◄── a command of the console, one a line                ◄──
+//! ```
+//!
+//! | kind | payload |
+//! |---|---|
+//! | 0 description | JSON, once, first: see `emulator/src/telemetry/description.rs`, which writes it |
+//! | 1 cycle | u64 LE number of the cycle, then an f64 LE for each column of the description |
+//! | 2 event | JSON: `cycle` and `kind` as `summary.json` has them, and `text` for a person |
+//! | 3 histogram | a line of `emulator.hlog`: one second of one stage, HdrHistogram V2 in base64; of no time in lockstep: none |
+//! | 4 loss | u64 LE: records that this viewer's buffer had no room for, in all |
+//! | 5 answer | JSON, one for each line asked, in their order: `ok`, and `text` for a person |
+//!
+//! The stream is lossy: a viewer that reads too slowly misses whole records, never parts of one, and is told how many before the
+//! next that it gets. Events that came before a viewer did follow the description, so that it knows what is broken and loaded.
+//! Nothing that a viewer does or leaves undone reaches the run, save commands of a run with `--console`.
+
+use std::collections::VecDeque;
+
+/// Longest payload: the description, which holds the table of faults with all their places.
+pub const LONGEST_PAYLOAD: usize = 1 << 20;
+/// Longest line that is read as a command, in bytes.
+pub const LONGEST_LINE: usize = 200;
+/// Bytes before a payload.
+const HEAD: usize = 5;
+/// Bytes of a number.
+const WORD: usize = 8;
+
+/// What a packet holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// What the run is, and what the columns of its cycles are.
+    Description,
+    /// A cycle.
+    Cycle,
+    /// An event.
+    Event,
+    /// A second of a stage.
+    Histogram,
+    /// Records that a viewer missed.
+    Loss,
+    /// The answer to a line.
+    Answer,
+}
+
+/// In the order of their numbers.
+const KINDS: [Kind; 6] =
+    [Kind::Description, Kind::Cycle, Kind::Event, Kind::Histogram, Kind::Loss, Kind::Answer];
+
+/// A packet as a viewer reads it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Packet {
+    /// The description, JSON.
+    Description(String),
+    /// A cycle: its number, and a value for each column.
+    Cycle(u64, Vec<f64>),
+    /// An event, JSON.
+    Event(String),
+    /// A line of an interval log.
+    Histogram(String),
+    /// Records missed so far.
+    Loss(u64),
+    /// An answer, JSON.
+    Answer(String),
+}
+
+/// A stream that is none of telemetry; nothing can be read of it any more.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TelemetryError {
+    /// No packet is as long.
+    #[error("a packet of {0} bytes: {LONGEST_PAYLOAD} at most")]
+    TooLong(usize),
+    /// No packet is of this kind.
+    #[error("a packet of kind {0}, which is not known")]
+    Kind(u8),
+    /// The payload is not as its kind has it.
+    #[error("a packet of kind {0:?} whose {1} bytes are not as they should be")]
+    Payload(Kind, usize),
+}
+
+/// Appends a packet of text or bytes.
+///
+/// # Panics
+/// When the payload is longer than [`LONGEST_PAYLOAD`]: only a description could be, and it is made before the run.
+pub fn write_packet(out: &mut Vec<u8>, kind: Kind, payload: &[u8]) {
+    write_head(out, kind, payload.len());
+    out.extend(payload);
+}
+
+/// Appends a cycle.
+///
+/// # Panics
+/// As [`write_packet`].
+pub fn write_cycle(out: &mut Vec<u8>, cycle: u64, values: impl IntoIterator<Item = f64>) {
+    let head = out.len();
+    write_head(out, Kind::Cycle, 0);
+    out.extend(cycle.to_le_bytes());
+    values.into_iter().for_each(|value| out.extend(value.to_le_bytes()));
+    let payload = out.len() - head - HEAD;
+    out[head..head + HEAD].copy_from_slice(&head_of(Kind::Cycle, payload));
+}
+
+/// Appends how many records a viewer has missed.
+pub fn write_loss(out: &mut Vec<u8>, lost: u64) {
+    write_packet(out, Kind::Loss, &lost.to_le_bytes());
+}
+
+fn write_head(out: &mut Vec<u8>, kind: Kind, payload: usize) {
+    out.extend(head_of(kind, payload));
+}
+
+fn head_of(kind: Kind, payload: usize) -> [u8; HEAD] {
+    assert!(payload <= LONGEST_PAYLOAD, "{kind:?} of {payload} bytes");
+    let [a, b, c, d] = (payload as u32).to_le_bytes();
+    [a, b, c, d, kind as u8]
+}
+
+/// Turns a stream, in whatever pieces it comes, into packets.
+#[derive(Debug, Default)]
+pub struct Decoder {
+    bytes: VecDeque<u8>,
+}
+
+impl Decoder {
+    /// Takes a piece of the stream.
+    pub fn take(&mut self, bytes: &[u8]) {
+        self.bytes.extend(bytes);
+    }
+
+    /// The next whole packet; `None` until more comes.
+    ///
+    /// # Errors
+    /// [`TelemetryError`] when the stream is none of telemetry; it stays so.
+    pub fn packet(&mut self) -> Result<Option<Packet>, TelemetryError> {
+        let Some(head) = self.front::<HEAD>() else { return Ok(None) };
+        let [a, b, c, d, number] = head;
+        let length = u32::from_le_bytes([a, b, c, d]) as usize;
+        if length > LONGEST_PAYLOAD {
+            return Err(TelemetryError::TooLong(length));
+        }
+        let kind = *KINDS.get(usize::from(number)).ok_or(TelemetryError::Kind(number))?;
+        if self.bytes.len() < HEAD + length {
+            return Ok(None);
+        }
+        let payload = self.bytes.drain(..HEAD + length).skip(HEAD).collect();
+        read(kind, payload).map(Some)
+    }
+
+    fn front<const N: usize>(&self) -> Option<[u8; N]> {
+        let mut front = self.bytes.iter().copied();
+        let mut bytes = [0; N];
+        for byte in &mut bytes {
+            *byte = front.next()?;
+        }
+        Some(bytes)
+    }
+}
+
+fn read(kind: Kind, payload: Vec<u8>) -> Result<Packet, TelemetryError> {
+    let wrong = TelemetryError::Payload(kind, payload.len());
+    let text = |payload: Vec<u8>| String::from_utf8(payload).map_err(|_| wrong.clone());
+    Ok(match kind {
+        Kind::Description => Packet::Description(text(payload)?),
+        Kind::Event => Packet::Event(text(payload)?),
+        Kind::Histogram => Packet::Histogram(text(payload)?),
+        Kind::Answer => Packet::Answer(text(payload)?),
+        Kind::Loss => match words(&payload).as_deref() {
+            Some(&[lost]) => Packet::Loss(lost),
+            _ => return Err(wrong),
+        },
+        Kind::Cycle => match words(&payload).as_deref() {
+            Some([cycle, values @ ..]) => {
+                Packet::Cycle(*cycle, values.iter().copied().map(f64::from_bits).collect())
+            }
+            _ => return Err(wrong),
+        },
+    })
+}
+
+/// The payload as numbers of eight bytes, if it consists of such.
+fn words(payload: &[u8]) -> Option<Vec<u64>> {
+    let (words, []) = payload.as_chunks::<WORD>() else { return None };
+    Some(words.iter().map(|word| u64::from_le_bytes(*word)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn all_of(decoder: &mut Decoder) -> Vec<Packet> {
+        std::iter::from_fn(|| decoder.packet().unwrap()).collect()
+    }
+
+    #[test]
+    fn every_kind_comes_back() {
+        let mut stream = Vec::new();
+        write_packet(&mut stream, Kind::Description, b"{}");
+        write_cycle(&mut stream, 7, [1.5, f64::NAN, -0.0]);
+        write_packet(&mut stream, Kind::Event, "{\"text\": \"µ\"}".as_bytes());
+        write_packet(&mut stream, Kind::Histogram, b"Tag=a,0,1,2,HISTF");
+        write_loss(&mut stream, u64::MAX);
+        write_packet(&mut stream, Kind::Answer, b"");
+        let mut decoder = Decoder::default();
+        decoder.take(&stream);
+        let packets = all_of(&mut decoder);
+        assert_eq!(packets[0], Packet::Description("{}".into()));
+        let Packet::Cycle(7, values) = &packets[1] else { panic!("{packets:?}") };
+        assert!(values[0] == 1.5 && values[1].is_nan() && values[2].is_sign_negative(), "to the bit");
+        assert_eq!(packets[2], Packet::Event("{\"text\": \"µ\"}".into()));
+        assert_eq!(packets[3], Packet::Histogram("Tag=a,0,1,2,HISTF".into()));
+        assert_eq!(packets[4..], [Packet::Loss(u64::MAX), Packet::Answer(String::new())]);
+    }
+
+    #[test]
+    fn a_packet_is_as_the_head_of_this_file_says() {
+        let mut stream = Vec::new();
+        write_cycle(&mut stream, 258, [1.0]);
+        let bits = 1.0f64.to_le_bytes();
+        assert_eq!(stream, [&[16, 0, 0, 0, 1, 2, 1, 0, 0, 0, 0, 0, 0][..], &bits].concat());
+    }
+
+    #[test]
+    fn what_is_no_telemetry_is_refused() {
+        let refused = |bytes: &[u8]| {
+            let mut decoder = Decoder::default();
+            decoder.take(bytes);
+            decoder.packet().unwrap_err()
+        };
+        assert_eq!(refused(&[0, 0, 0, 1, 1]), TelemetryError::TooLong(1 << 24));
+        assert_eq!(refused(&[0, 0, 0, 0, 6]), TelemetryError::Kind(6));
+        assert_eq!(refused(&[1, 0, 0, 0, 1, 0]), TelemetryError::Payload(Kind::Cycle, 1));
+        assert_eq!(refused(&[0, 0, 0, 0, 1]), TelemetryError::Payload(Kind::Cycle, 0));
+        assert_eq!(refused(&[0, 0, 0, 0, 4]), TelemetryError::Payload(Kind::Loss, 0));
+        assert_eq!(refused(&[1, 0, 0, 0, 2, 0xFF]), TelemetryError::Payload(Kind::Event, 1));
+    }
+
+    proptest! {
+        #[test]
+        fn a_stream_reads_the_same_in_whatever_pieces(cut in 1usize..20, cycles in 0u64..20) {
+            let mut stream = Vec::new();
+            for cycle in 0..cycles {
+                write_cycle(&mut stream, cycle, [cycle as f64; 3]);
+                write_packet(&mut stream, Kind::Event, b"x");
+            }
+            let (mut decoder, mut packets) = (Decoder::default(), Vec::new());
+            for piece in stream.chunks(cut) {
+                decoder.take(piece);
+                packets.extend(all_of(&mut decoder));
+            }
+            let mut expected = Vec::new();
+            for cycle in 0..cycles {
+                expected.push(Packet::Cycle(cycle, vec![cycle as f64; 3]));
+                expected.push(Packet::Event("x".into()));
+            }
+            prop_assert_eq!(packets, expected);
+        }
+
+        #[test]
+        fn no_bytes_make_the_decoder_panic(bytes: Vec<u8>) {
+            let mut decoder = Decoder::default();
+            decoder.take(&bytes);
+            while let Ok(Some(_)) = decoder.packet() {}
+        }
+    }
+}

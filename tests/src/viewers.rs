@@ -1,0 +1,96 @@
+//! Ten viewers of the live page while the loop runs: a browser, eight that listen to events, and one that reads none.
+
+use crate::launch::Pace;
+use crate::onlooker::LivePage;
+use crate::process::{PATIENCE, Running};
+use crate::records::{count, json};
+use crate::scene::{RESTLESS, Scene};
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::process::Command;
+use std::time::Duration;
+
+/// Viewers that listen and read; with the browser and the one that stands still there are ten.
+const LISTENERS: usize = 8;
+
+/// What became of a run in real time.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Cycles that the rig missed.
+    pub missed: u64,
+    /// Its wake-ups that came late enough to be counted.
+    pub overruns: u64,
+    /// Median and 99th percentile of its wake-up, ns.
+    pub wakeup_ns: [u64; 2],
+    /// 99th percentile of the drive's round trip, ns.
+    pub round_trip_p99_ns: u64,
+    /// Records that did not reach the run's files.
+    pub records_dropped: u64,
+    /// Viewers that the page had when the run was half over.
+    pub viewers: u64,
+}
+
+/// Runs rig and controllers in real time for so long, with the live page and ten viewers, or with neither.
+///
+/// # Panics
+/// When a program fails, or there is no chromium.
+#[must_use]
+pub fn run(seconds: u32, with: bool) -> Outcome {
+    let scene = Scene::new(RESTLESS);
+    let mut options = format!("--seconds {seconds}");
+    if with {
+        options += &format!(" --telemetry {}", scene.path("telemetry").display());
+    }
+    let emulator = scene.emulator(Pace::Real).with(&options).start();
+    let controller = scene.controller(Pace::Real).with("--repeat").start();
+    let page = with.then(|| LivePage::open(&scene, ""));
+    let audience = page.as_ref().map(|page| Audience::gather(&scene, page));
+    scene.wait_for_rows("emulator", seconds as usize * 500);
+    let viewers = page.as_ref().map_or(0, |page| count(&page.state(), "/viewers"));
+    let _ = emulator.wait_within(Duration::from_secs(u64::from(seconds)) + PATIENCE).expect_code(0);
+    let _ = controller.wait();
+    drop(audience);
+    if let Some(page) = page {
+        page.close();
+    }
+    let summary = json(&scene.path("emulator/summary.json"));
+    let of = |pointer: &str| count(&summary, pointer);
+    Outcome {
+        missed: of("/skipped"),
+        overruns: of("/overruns"),
+        wakeup_ns: [of("/wakeup_ns/p50"), of("/wakeup_ns/p99")],
+        round_trip_p99_ns: of("/round_trip_ns/p99"),
+        records_dropped: of("/records_dropped"),
+        viewers,
+    }
+}
+
+/// Ten viewers.
+struct Audience {
+    _browser: Running,
+    _still: TcpStream,
+}
+
+impl Audience {
+    fn gather(scene: &Scene, page: &LivePage) -> Self {
+        let mut command = Command::new("chromium");
+        command.args(["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run"]);
+        command.arg(format!("--user-data-dir={}", scene.path("browser").display()));
+        command.arg("--remote-debugging-port=0").arg(format!("http://{}/", page.address));
+        let listen = || {
+            let mut stream = page.connect();
+            let request = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\n\r\n", page.address);
+            stream.write_all(request.as_bytes()).expect("it listens");
+            stream
+        };
+        for _ in 0..LISTENERS {
+            let mut stream = listen();
+            // Each ends with its connection.
+            std::thread::spawn(move || {
+                let mut bytes = [0; 65536];
+                while stream.read(&mut bytes).is_ok_and(|read| read > 0) {}
+            });
+        }
+        Self { _browser: Running::start("chromium", &mut command), _still: listen() }
+    }
+}
