@@ -3,13 +3,16 @@
     can.Bus(interface="airbench", channel="/path/of/the/bus")
 
 The embedded bus is a Unix SEQPACKET socket that carries one `struct can_frame` a packet. With `member` the client joins the lockstep
-barrier under that name: time waits until it has read what came, so that it loses nothing however slow it is. Importing this
-file makes the interface known to python-can, as an entry point of a package would.
+barrier under that name: time waits until it has read what came, so that it loses nothing however slow it is. A member that is silent
+for 5 s ends the run, so one that does not read for a second (it starts, or is between two sessions) has what came put by, one cycle a
+second. Importing this file makes the interface known to python-can, as an entry point of a package would.
 """
 
+import collections
 import select
 import socket
 import struct
+import threading
 import time
 
 import can
@@ -19,6 +22,7 @@ FRAME = struct.Struct("=IB3x8s")
 CONTROL = struct.Struct("<4sBBxxI20s")
 MAGIC = b"ABLS"
 JOIN_AS_MEMBER, DONE, GO = 2, 3, 4
+PATIENCE_S = 1.0
 
 
 class AirbenchBus(can.BusABC):
@@ -31,8 +35,11 @@ class AirbenchBus(can.BusABC):
         self.poll.register(self.socket, select.POLLIN)
         self.wanted = None
         self.closed = False
+        self.put_by = collections.deque()
+        self.reading, self.last_read = threading.Lock(), time.monotonic()
         if member:
             self.socket.send(CONTROL.pack(MAGIC, JOIN_AS_MEMBER, 0, 0, member.encode()))
+            threading.Thread(target=self._keep_alive, daemon=True).start()
         super().__init__(channel=channel, can_filters=can_filters, **kwargs)
 
     @staticmethod
@@ -55,31 +62,51 @@ class AirbenchBus(can.BusABC):
         self.wanted = {each["can_id"] for each in filters} if plain else None
 
     def _recv_internal(self, timeout):
-        until = None if timeout is None else time.monotonic() + timeout
-        # A bus that is never silent must not keep whoever has waited long enough.
-        left = timeout
-        while not self.closed and (left is None or left >= 0):
-            if not self.poll.poll(None if left is None else left * 1000):
-                return None, False
-            try:
-                packet = self.socket.recv(64)
-            except ConnectionResetError:
-                packet = b""
-            if not packet:
-                # The host has gone; whoever asks again gets nothing, as from a bus that is silent.
-                self.closed = True
-            elif len(packet) == CONTROL.size:
-                kind, cycle = packet[4], packet[8:12]
-                if kind == GO:
-                    self._send(packet[:4] + bytes([DONE, 0, 0, 0]) + cycle + bytes(20))
-            else:
-                raw_id, length, data = FRAME.unpack(packet)
-                if self.wanted is None or raw_id in self.wanted:
-                    return self._message(raw_id, length, data), self.wanted is not None
-            left = None if until is None else until - time.monotonic()
+        with self.reading:
+            until = None if timeout is None else time.monotonic() + timeout
+            # A bus that is never silent must not keep whoever has waited long enough.
+            left = timeout
+            while not self.closed and (left is None or left >= 0):
+                if not self.put_by and not self.poll.poll(None if left is None else left * 1000):
+                    break
+                frame = self.put_by.popleft() if self.put_by else self._frame()
+                if frame and (self.wanted is None or frame[0] in self.wanted):
+                    self.last_read = time.monotonic()
+                    return self._message(*frame), self.wanted is not None
+                left = None if until is None else until - time.monotonic()
+            self.last_read = time.monotonic()
         if self.closed and timeout:
             time.sleep(timeout)
         return None, False
+
+    def _frame(self):
+        """The next packet, if it is a frame; what else comes is seen to."""
+        try:
+            packet = self.socket.recv(64)
+        except ConnectionResetError:
+            packet = b""
+        if not packet:
+            # The host has gone; whoever asks again gets nothing, as from a bus that is silent.
+            self.closed = True
+        elif len(packet) != CONTROL.size:
+            return FRAME.unpack(packet)
+        elif packet[4] == GO:
+            self._send(packet[:4] + bytes([DONE, 0, 0, 0]) + packet[8:12] + bytes(20))
+        return None
+
+    def _keep_alive(self):
+        """Reads up to the end of a cycle whenever nobody has read for a while."""
+        while not self.closed:
+            time.sleep(PATIENCE_S / 4)
+            with self.reading:
+                if time.monotonic() - self.last_read < PATIENCE_S:
+                    continue
+                while not self.closed and self.poll.poll(0):
+                    frame = self._frame()
+                    if frame is None:
+                        break
+                    self.put_by.append(frame)
+                self.last_read = time.monotonic()
 
     def _message(self, raw_id, length, data):
         return can.Message(
@@ -105,7 +132,8 @@ class AirbenchBus(can.BusABC):
     def shutdown(self):
         super().shutdown()
         self.closed = True
-        self.socket.close()
+        with self.reading:
+            self.socket.close()
 
     @property
     def state(self):
