@@ -66,7 +66,7 @@ install_stress_ng() {
 install_cargo_fuzz() {
     install_compiler || return 1
     [ -x "$tools/bin/cargo-fuzz" ] && "$tools/bin/cargo-fuzz" --version | grep -q "$cargo_fuzz_version" && return
-    cargo install --quiet --locked cargo-fuzz --version "$cargo_fuzz_version" --root "$tools"
+    cargo install --quiet --locked --debug cargo-fuzz --version "$cargo_fuzz_version" --root "$tools" # it starts others
 }
 
 # The benchmark's floor is C, libFuzzer is C++; a Rust toolchain links with a C compiler anyway.
@@ -132,7 +132,7 @@ install_dask() { install_requirements dask "$(dirname "${BASH_SOURCE[0]}")/../ca
 
 install_gungraun() {
     [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return
-    cargo install --quiet --locked gungraun-runner --version "$gungraun_version" --root "$tools"
+    cargo install --quiet --locked --debug gungraun-runner --version "$gungraun_version" --root "$tools" # it starts valgrind
 }
 
 # The browser of the live page's tests: Debian's chromium, Node, and what drives the one from the other, as its lock file pins it.
