@@ -79,7 +79,7 @@ class Client:
             log_level=logging.CRITICAL,
         )
         application.transport.layer = "CAN"
-        application.transport.timeout = 30.0
+        application.transport.timeout = 120.0  # others of the barrier may still be starting
         application.general.disable_error_handling = True
         application.general.seed_n_key_function = lambda _, seed: self.key(seed)
         set_application(application)

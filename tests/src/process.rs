@@ -67,6 +67,22 @@ impl Running {
         }
     }
 
+    /// Stops the program as a debugger does, and returns once all its threads stand still.
+    ///
+    /// # Panics
+    /// As [`Running::signal`], and when a thread goes on.
+    pub fn stop(&self) {
+        self.signal(Signal::STOP);
+        let tasks = format!("/proc/{}/task", self.number());
+        wait_until("all threads to stand still", || {
+            let mut threads = std::fs::read_dir(&tasks).into_iter().flatten().flatten();
+            // The state follows the name, which may hold anything but ends with the last bracket.
+            let stands = |stat: &str| stat.rsplit(')').next().is_some_and(|rest| rest.starts_with(" T"));
+            threads
+                .all(|own| std::fs::read_to_string(own.path().join("stat")).is_ok_and(|stat| stands(&stat)))
+        });
+    }
+
     /// Types a line at its standard input.
     ///
     /// # Panics

@@ -13,6 +13,13 @@ use system_tests::scene::{RESTLESS, Scene};
 use system_tests::turn;
 use system_tests::xcp::{Foreign, config, said, wait_for_a2l};
 
+/// pyXCP takes its time to start, on a busy machine more than a controller waits for those that are missing.
+const PATIENT: &str = "--bus-grace 60";
+
+fn lockstep_of(members: usize) -> String {
+    format!("--members {members} --join-timeout 60 --seconds 200")
+}
+
 fn texts(value: &Value, keys: &[&str]) -> Vec<String> {
     keys.iter().map(|key| value[*key].as_str().unwrap_or("accepted").to_owned()).collect()
 }
@@ -58,8 +65,8 @@ fn end(emulator: Running, controllers: Vec<Running>) {
 fn pyxcp_reads_writes_is_refused_measures_without_a_gap_and_triggers() {
     let scene = Scene::new(RESTLESS);
     let config = config(&scene);
-    let emulator = scene.emulator(Pace::Lockstep).with("--members 2 --seconds 200").start();
-    let options = format!("--repeat --xcp {}", config.display());
+    let emulator = scene.emulator(Pace::Lockstep).with(&lockstep_of(2)).start();
+    let options = format!("--repeat --xcp {} {PATIENT}", config.display());
     let controller = scene.controller(Pace::Lockstep).with(&options).start();
     wait_for_a2l(&scene, "controller", "drive");
     let seen = Foreign::start(&scene, "whole", "controller", "drive", true).wait();
@@ -154,8 +161,8 @@ fn expect_trace(scene: &Scene, drive: &AxisTable, trace: &Value) {
 fn two_processes_are_measured_at_once_each_under_identifiers_of_its_own() {
     let scene = Scene::new(RESTLESS);
     let config = config(&scene);
-    let emulator = scene.emulator(Pace::Lockstep).with("--members 4 --seconds 200").start();
-    let options = format!("--repeat --xcp {}", config.display());
+    let emulator = scene.emulator(Pace::Lockstep).with(&lockstep_of(4)).start();
+    let options = format!("--repeat --xcp {} {PATIENT}", config.display());
     let axes = ["drive", "load"];
     let controllers: Vec<_> =
         axes.iter().map(|axis| scene.axis_controller(Pace::Lockstep, axis).with(&options).start()).collect();
