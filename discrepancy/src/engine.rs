@@ -10,7 +10,7 @@
 //! cores; what they give is gathered in the order of the candidates, so that two runs have the same bits.
 
 use crate::course::Course;
-use crate::parameters::{COUNT, PARAMETERS, with_factors};
+use crate::parameters::{COUNT, with_factors};
 use crate::windows::{Windows, dot};
 use plant::RigParameters;
 use rayon::prelude::*;
@@ -115,6 +115,21 @@ impl<'a> Engine<'a> {
         self.windows.iter().flat_map(|windows| windows.simulate_coarsely(rig)).collect()
     }
 
+    /// The same of several rigs that differ in numbers of the baseline: on all cores, and side by side where that pays.
+    fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
+        // Rigs with effects do not run in lanes, and are shared out one by one.
+        let at_once = if rigs.iter().any(|rig| !rig.effects().is_empty()) { 1 } else { COUNT };
+        let simulate = |rigs: &[RigParameters]| {
+            let mut all = vec![Vec::new(); rigs.len()];
+            for windows in &self.windows {
+                let own = windows.simulate_side_by_side(rigs);
+                all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+            }
+            all
+        };
+        rigs.par_chunks(at_once).flat_map_iter(simulate).collect()
+    }
+
     /// What is left of the readings beside a simulation.
     #[must_use]
     pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
@@ -156,12 +171,20 @@ impl<'a> Engine<'a> {
         let around = |at: usize, change: f64| {
             let mut factors = *factors;
             factors[at] += change;
-            self.simulate_coarsely(&with_factors(rig, &factors))
+            with_factors(rig, &factors)
         };
-        let columns: Vec<Vec<f64>> = (0..PARAMETERS.len())
-            .into_par_iter()
-            .map(|at| {
-                let mut column = self.difference(&around(at, FACTOR_CHANGE), &around(at, -FACTOR_CHANGE));
+        // All upwards, then all downwards.
+        let rigs: Vec<RigParameters> = [FACTOR_CHANGE, -FACTOR_CHANGE]
+            .into_iter()
+            .flat_map(|change| (0..COUNT).map(move |at| around(at, change)))
+            .collect();
+        let simulated = self.simulate_side_by_side(&rigs);
+        let (up, down) = simulated.split_at(COUNT);
+        let columns: Vec<Vec<f64>> = up
+            .par_iter()
+            .zip(down)
+            .map(|(up, down)| {
+                let mut column = self.difference(up, down);
                 column.iter_mut().for_each(|own| *own /= 2.0 * FACTOR_CHANGE);
                 column
             })

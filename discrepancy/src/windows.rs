@@ -20,7 +20,7 @@ mod whiten;
 
 use crate::course::{CHANNELS, Course, Point};
 use crate::seats::Seats;
-use plant::{Inputs, Plant, RigParameters};
+use plant::{Batch, Inputs, Plant, RigParameters};
 use starts::orthonormal;
 pub(crate) use starts::{first_state, seat, seated};
 use whiten::drift;
@@ -145,34 +145,43 @@ impl<'a> Windows<'a> {
     /// Readings over their noise that this rig would have given, without noise and rounding.
     #[must_use]
     pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
-        self.run(self.plant(rig))
+        self.run(vec![self.plant(rig)]).remove(0)
     }
 
     /// The same in longer steps: half the time, good enough for what one simulation differs from another by.
     #[must_use]
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
-        self.run(self.plant(rig).with_substeps(COARSE_SUBSTEPS))
+        self.simulate_side_by_side(std::slice::from_ref(rig)).remove(0)
+    }
+
+    /// The same of several rigs, each with the bits that it has alone: those without effects cost a third side by side.
+    #[must_use]
+    pub fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
+        self.run(rigs.iter().map(|rig| self.plant(rig).with_substeps(COARSE_SUBSTEPS)).collect())
     }
 
     fn plant(&self, rig: &RigParameters) -> Plant {
         Plant::in_state(rig, &first_state(self.course, rig)).expect("a start state is one of the rig's")
     }
 
-    fn run(&self, mut plant: Plant) -> Vec<f64> {
-        let mut simulated = Vec::with_capacity(self.readings.len());
-        let seats = Seats::of(plant.rig());
+    fn run(&self, plants: Vec<Plant>) -> Vec<Vec<f64>> {
+        let mut simulated = vec![Vec::with_capacity(self.readings.len()); plants.len()];
+        let seats: Vec<Seats> = plants.iter().map(|plant| Seats::of(plant.rig())).collect();
+        let mut batch = Batch::new(plants);
         let mut next = 0;
         // Windows that are not judged are simulated as well: memories go on.
         for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
-            let points = seats.points(self.course, start, &self.points[start / WINDOW]);
-            seat(&mut plant, self.course, &points);
+            for (at, seats) in seats.iter().enumerate() {
+                let points = seats.points(self.course, start, &self.points[start / WINDOW]);
+                seat(batch.plant_mut(at), self.course, &points);
+            }
             let judged = self.starts.get(next) == Some(&start);
             next += usize::from(judged);
             for inputs in &self.course.inputs[start..start + WINDOW] {
                 if judged {
-                    self.read(&plant, inputs, &mut simulated);
+                    self.read_each(&batch, inputs, &mut simulated);
                 }
-                plant.step(inputs);
+                batch.step_alike(inputs);
             }
         }
         simulated
@@ -205,6 +214,10 @@ impl<'a> Windows<'a> {
             self.whiten(at, window);
             project(window, basis);
         }
+    }
+
+    fn read_each(&self, batch: &Batch, inputs: &Inputs, into: &mut [Vec<f64>]) {
+        batch.plants().iter().zip(into).for_each(|(plant, into)| self.read(plant, inputs, into));
     }
 
     fn read(&self, plant: &Plant, inputs: &Inputs, into: &mut Vec<f64>) {

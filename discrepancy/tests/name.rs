@@ -6,7 +6,7 @@ use common::course;
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{Found, name};
-use discrepancy::parameters::COUNT;
+use discrepancy::parameters::{COUNT, with_factors};
 use plant::RigParameters;
 
 fn found(hidden: &RigParameters, without: &[&str]) -> Found {
@@ -34,6 +34,27 @@ fn names(found: &Found) -> Vec<String> {
 fn factors(found: &Found) -> Vec<(f64, f64)> {
     let errors = &found.model.errors[found.model.errors.len() - COUNT..];
     found.model.factors.iter().copied().zip(errors.iter().copied()).collect()
+}
+
+#[test]
+fn rigs_side_by_side_show_what_each_shows_alone() {
+    let courses = [course(&RigParameters::baseline(), 11)];
+    let engine = Engine::new(&courses, &RigParameters::baseline());
+    let off = |at: usize| {
+        let mut factors = [1.0; COUNT];
+        factors[at] = 1.01;
+        with_factors(&RigParameters::baseline(), &factors)
+    };
+    // More than have room in one group, and one that does not run in lanes.
+    let mut rigs: Vec<RigParameters> = (0..COUNT).map(off).collect();
+    rigs[3] = with(&[("inclination", "drive", &[("force_n", 20.0)])]);
+    let windows = &engine.windows()[0];
+    let together = windows.simulate_side_by_side(&rigs);
+    for (rig, own) in rigs.iter().zip(&together) {
+        let alone = windows.simulate_coarsely(rig);
+        assert!(alone.iter().map(|value| value.to_bits()).eq(own.iter().map(|value| value.to_bits())));
+    }
+    assert!((1..rigs.len()).all(|at| together[at] != together[0]), "each moves something");
 }
 
 #[test]

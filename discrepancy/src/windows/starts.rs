@@ -4,8 +4,9 @@ use super::whiten::SPIKE_REACH;
 use super::{FORCE, WINDOW, Windows, dot, project};
 use crate::course::{Course, Point};
 use nalgebra::{DMatrix, DVector};
-use plant::{Inputs, Plant, RigParameters, Setup, State};
+use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
 use rand_pcg::Pcg64;
+use std::iter::once;
 
 /// How far a start may move at a time where the rods are linked.
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
@@ -212,39 +213,39 @@ impl Windows<'_> {
     pub(super) fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
         let mut plant = self.plant(&self.rig);
         let rows = self.rows();
+        let nudges: Vec<(usize, usize)> = (0..2)
+            .filter(|axis| self.course.measured[*axis])
+            .flat_map(|axis| (0..NUDGES.len()).map(move |number| (axis, number)))
+            .collect();
         let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
         for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
-            let place = self.starts.get(all.len()).is_some_and(|own| *own == start);
-            let before = plant.clone();
-            self.seat(&mut plant, start, None);
-            let mut straight = Vec::with_capacity(rows);
-            for inputs in &self.course.inputs[start..start + WINDOW] {
-                self.read(&plant, inputs, &mut straight);
-                plant.step(inputs);
+            let judged = self.starts.get(all.len()) == Some(&start);
+            let mut plants = vec![plant; 1 + if judged { nudges.len() } else { 0 }];
+            for (plant, nudged) in plants.iter_mut().zip(once(None).chain(nudges.iter().copied().map(Some))) {
+                self.seat(plant, start, nudged);
             }
-            if !place {
+            let mut read = vec![Vec::with_capacity(rows); plants.len()];
+            let mut batch = Batch::new(plants);
+            for inputs in &self.course.inputs[start..start + WINDOW] {
+                self.read_each(&batch, inputs, &mut read);
+                batch.step_alike(inputs);
+            }
+            plant = batch.into_plants().swap_remove(0);
+            if !judged {
                 continue;
             }
             let valid = &self.valid[all.len() * rows..][..rows];
-            let mut columns: Vec<Vec<f64>> = Vec::new();
-            for axis in (0..2).filter(|axis| self.course.measured[*axis]) {
-                for (number, nudge) in NUDGES.iter().enumerate() {
-                    let mut nudged = before.clone();
-                    self.seat(&mut nudged, start, Some((axis, number)));
-                    let mut own = Vec::with_capacity(rows);
-                    for inputs in &self.course.inputs[start..start + WINDOW] {
-                        self.read(&nudged, inputs, &mut own);
-                        nudged.step(inputs);
-                    }
-                    let scale = DOUBT[number] / nudge;
-                    for ((own, straight), valid) in own.iter_mut().zip(&straight).zip(valid) {
-                        *own = if *valid { (*own - straight) * scale } else { 0.0 };
-                    }
-                    self.flatten_jumps(&mut own, scale);
-                    self.whiten(all.len(), &mut own);
-                    columns.push(own);
+            let straight = read.remove(0);
+            let columns = read.into_iter().zip(&nudges).map(|(mut own, (_, number))| {
+                let scale = DOUBT[*number] / NUDGES[*number];
+                for ((own, straight), valid) in own.iter_mut().zip(&straight).zip(valid) {
+                    *own = if *valid { (*own - straight) * scale } else { 0.0 };
                 }
-            }
+                self.flatten_jumps(&mut own, scale);
+                self.whiten(all.len(), &mut own);
+                own
+            });
+            let columns = columns.collect();
             all.push(columns);
         }
         all
