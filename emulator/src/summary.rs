@@ -140,6 +140,6 @@ pub struct Summary {
     pub bus_host: Option<HostReport>,
     /// Events in all.
     pub event_count: u64,
-    /// The first events.
+    /// The first events of each kind.
     pub events: Vec<Event>,
 }

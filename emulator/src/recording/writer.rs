@@ -15,7 +15,9 @@ use protocol::candump::{self, FrameRecord};
 use protocol::flight_dump::Log;
 use protocol::run_folder::{FAULTS_CSV, LineFile};
 use realtime::{Clock, MonotonicClock};
+use std::collections::HashMap;
 use std::io::{self, Write};
+use std::mem::{Discriminant, discriminant};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -24,12 +26,11 @@ use std::time::{Duration, Instant};
 const POLL_PERIOD: Duration = Duration::from_millis(4);
 /// Longest time that a recorded line stays in memory.
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
-/// Events told on the terminal, and kept for the summary.
+/// Events of a kind that are told on the terminal, and kept for the summary.
 const EVENTS_TOLD: usize = 100;
 const EVENTS_KEPT: usize = 1000;
-/// The same for late wake-ups, of which a bad machine makes thousands.
+/// Late wake-ups that are told, of which a bad machine makes thousands.
 const SKIPS_TOLD: usize = 10;
-const SKIPS_KEPT: usize = 1000;
 /// How long a frame waits for those that were read later but arrived earlier: longer than any stall of note.
 const FRAME_DELAY_NS: u64 = 250_000_000;
 
@@ -62,7 +63,7 @@ pub struct WriterReport {
     pub rows: u64,
     /// Lines in `bus.log`.
     pub frames: u64,
-    /// The first events.
+    /// The first events of each kind.
     pub events: Vec<Event>,
     /// Events in all.
     pub event_count: u64,
@@ -82,8 +83,7 @@ pub struct Writer {
     faults: Option<LineFile>,
     evidence: Option<Evidence>,
     pending: Vec<FrameRecord>,
-    events_told: usize,
-    skips_told: usize,
+    told: HashMap<Discriminant<EventKind>, usize>,
     report: WriterReport,
 }
 
@@ -118,8 +118,7 @@ impl Writer {
             faults,
             evidence,
             pending,
-            events_told: 0,
-            skips_told: 0,
+            told: HashMap::new(),
             report,
         })
     }
@@ -227,7 +226,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Tells and keeps the event. Late wake-ups have a quota of their own, so that they hide nothing else.
+    /// Tells and keeps the event. Each kind has a quota of its own: on a bad machine late wake-ups and stale commands come by thousands,
+    /// and must hide nothing else.
     fn tell(&mut self, event: Event) -> io::Result<()> {
         self.report.event_count += 1;
         if let Some(telemetry) = &mut self.telemetry {
@@ -240,13 +240,10 @@ impl Writer {
             evidence.event(&event);
         }
         let late = matches!(event.kind, EventKind::Skipped { .. });
-        let (told, most_told, most_kept) = if late {
-            (&mut self.skips_told, SKIPS_TOLD, SKIPS_KEPT)
-        } else {
-            (&mut self.events_told, EVENTS_TOLD, EVENTS_KEPT)
-        };
+        let most_told = if late { SKIPS_TOLD } else { EVENTS_TOLD };
+        let told = self.told.entry(discriminant(&event.kind)).or_default();
         *told += 1;
-        if *told <= most_kept {
+        if *told <= EVENTS_KEPT {
             self.report.events.push(event);
         }
         if *told < most_told {
@@ -279,5 +276,41 @@ impl Writer {
             let _ = file.write_out();
         }
         shared.output_failed.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::Axis;
+
+    #[test]
+    fn however_often_one_kind_comes_it_hides_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let setup = WriterSetup {
+            folder: folder.path().to_owned(),
+            interface: "can0".to_owned(),
+            epoch_offset_ns: 0,
+            linked: false,
+            added_mass_kg: 0.0,
+            terms: Vec::new(),
+            faults: false,
+            evidence: None,
+            telemetry: None,
+        };
+        let mut writer = Writer::create(setup).unwrap();
+        let often = EVENTS_KEPT as u64 + 10;
+        for cycle in 0..often {
+            for kind in [EventKind::Skipped { cycles: 3 }, EventKind::CommandStale(Axis::Drive)] {
+                writer.tell(Event { cycle, kind }).unwrap();
+            }
+        }
+        let rare = Event { cycle: often, kind: EventKind::BusLost };
+        writer.tell(rare).unwrap();
+        assert_eq!(writer.report.event_count, 2 * often + 1);
+        assert_eq!(
+            (writer.report.events.len(), writer.report.events.last()),
+            (2 * EVENTS_KEPT + 1, Some(&rare))
+        );
     }
 }
