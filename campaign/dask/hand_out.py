@@ -68,10 +68,11 @@ def main():
     plan = subprocess.run([asked.campaign, "plan", file, *shipped, "--json"], stdout=subprocess.PIPE, text=True)
     if plan.returncode != 0:
         return plan.returncode
-    parts = json.loads(plan.stdout)["parts"]
+    plan = json.loads(plan.stdout)
+    parts = plan["parts"]
     path = lambda part: asked.out / "parts" / f"{part:06}.csv"
     missing = [part for part in range(parts) if not path(part).exists()]
-    print(f"campaign: {len(missing)} of {parts} parts to do", file=sys.stderr, flush=True)
+    print(f"campaign: {plan['runs']} runs in {parts} parts; {len(missing)} parts to do", file=sys.stderr, flush=True)
     # Every task of a worker that dies counts as suspicious, whether it was at work or waiting.
     dask.config.set({"distributed.scheduler.allowed-failures": 20})
     if asked.scheduler:

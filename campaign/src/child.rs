@@ -12,12 +12,10 @@ const LOOK: Duration = Duration::from_millis(2);
 /// How long a process that was asked to end may take to save what it has.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A process that ends with its owner.
+/// A process that ends with its owner, and with it all that it started.
 #[derive(Debug)]
 pub struct Own {
     child: Child,
-    /// Whether it and what it starts are a group of their own.
-    is_group: bool,
 }
 
 /// Why a process did not come to its own end.
@@ -35,20 +33,13 @@ pub enum Cut {
 }
 
 impl Own {
-    /// Starts it.
+    /// Starts it as a group of its own, which a Ctrl-C at the terminal does not reach: what that does to a run is for its owner
+    /// to say.
     ///
     /// # Errors
     /// What the system says.
     pub fn start(command: &mut Command) -> io::Result<Self> {
-        command.spawn().map(|child| Self { child, is_group: false })
-    }
-
-    /// Starts it as a group of its own, which a Ctrl-C at the terminal does not reach: it ends with its owner as a whole.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub fn start_group(command: &mut Command) -> io::Result<Self> {
-        command.process_group(0).spawn().map(|child| Self { child, is_group: true })
+        command.process_group(0).spawn().map(|child| Self { child })
     }
 
     /// The process.
@@ -90,9 +81,7 @@ impl Drop for Own {
             let _ = self.child.kill();
             let _ = self.child.wait();
         }
-        if self.is_group {
-            let _ = kill_process_group(process, Signal::KILL);
-        }
+        let _ = kill_process_group(process, Signal::KILL);
     }
 }
 

@@ -70,7 +70,7 @@ pub struct RunArguments {
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
     pub jobs: Option<u64>,
     /// Exit with 1 unless every run came to its end and kept its experiment's bounds.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "shard")]
     pub expect_passed: bool,
 }
 

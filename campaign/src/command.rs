@@ -1,7 +1,7 @@
 //! A run as a program of somebody else's: it is told the run as a line of JSON, and answers with one.
 //!
 //! ```text
-//! stdin    {"run": 17, "draw": 2, "seed": 93, "values": {"hidden": "valve-offset", "noise": 0.5}}
+//! stdin    {"run": 17, "draw": 2, "seed": 93, "values": {"hidden": "valve-offset", "noise": 0.5}, "again": false}
 //! stdout   anything, and as the last line a JSON object; its keys that the campaign collects become columns
 //! ```
 //!
@@ -28,13 +28,15 @@ const WORDS: usize = 400;
 /// Exit code of a program that tried nothing: `EX_TEMPFAIL` of sysexits.h.
 pub const NOT_TRIED: i32 = 75;
 
-/// A program and where it runs.
+/// A program, where it runs, and what for.
 #[derive(Clone, Copy, Debug)]
 pub struct Words<'a> {
     /// The program and its arguments.
     pub command: &'a [String],
     /// The folder that it runs in.
     pub folder: &'a Path,
+    /// Whether somebody wants to see the run once more: what the program keeps of it does not do.
+    pub again: bool,
 }
 
 /// Why there is no result.
@@ -53,12 +55,12 @@ pub enum CommandError {
 /// # Errors
 /// [`CommandError`] for what is no result.
 pub fn run(
-    Words { command, folder }: Words<'_>,
+    Words { command, folder, again }: Words<'_>,
     factors: &[Factor],
     point: &Point,
     limit: Limit<'_>,
 ) -> Result<Option<Outcome>, CommandError> {
-    let mut own = Own::start_group(
+    let mut own = Own::start(
         Command::new(&command[0])
             .args(&command[1..])
             .current_dir(folder)
@@ -69,7 +71,7 @@ pub fn run(
     let child = own.child();
     if let Some(mut stdin) = child.stdin.take() {
         // A program that does not ask for its values has them not.
-        let _ = writeln!(stdin, "{}", question(factors, point));
+        let _ = writeln!(stdin, "{}", question(factors, point, again));
     }
     let (out, err) = (child.stdout.take().map(listen), child.stderr.take().map(listen));
     let status = match own.wait(limit) {
@@ -97,14 +99,14 @@ pub fn run(
     }))
 }
 
-fn question(factors: &[Factor], point: &Point) -> Json {
+fn question(factors: &[Factor], point: &Point, again: bool) -> Json {
     let told = |value: &Value| match value {
         Value::Number(number) => json!(number),
         Value::Text(text) => json!(text),
     };
     let values: Map<_, _> =
         factors.iter().zip(&point.values).map(|(factor, value)| (factor.name.clone(), told(value))).collect();
-    json!({ "run": point.run, "draw": point.draw, "seed": point.seed, "values": values })
+    json!({ "run": point.run, "draw": point.draw, "seed": point.seed, "values": values, "again": again })
 }
 
 fn answered(answer: &Map<String, Json>) -> Outcome {
@@ -160,7 +162,7 @@ mod tests {
         let point = Point { run: 3, draw: 1, seed: 7, hidden_seed: 0, values: vec![Value::Text("x".into())] };
         let command: Vec<_> = ["sh", "-c", script].map(str::to_owned).into();
         let stop = AtomicBool::new(false);
-        let words = Words { command: &command, folder: Path::new("/") };
+        let words = Words { command: &command, folder: Path::new("/"), again: false };
         run(words, &[factor], &point, Limit::of(longest_s, &stop))
     }
 
@@ -175,7 +177,7 @@ mod tests {
         assert_eq!(outcome.ended, Ended::Done, "{outcome:?}");
         assert_eq!(outcome.figures["n"], Value::Number(2.0));
         let Value::Text(told) = &outcome.figures["told"] else { panic!("a text") };
-        assert_eq!(told, "{draw:1,run:3,seed:7,values:{hidden:x}}");
+        assert_eq!(told, "{again:false,draw:1,run:3,seed:7,values:{hidden:x}}");
     }
 
     #[test]

@@ -174,7 +174,9 @@ fn results(
 ) -> Result<Exit, CommandError> {
     let began = Instant::now();
     let results = merge(campaign, folders, to)?;
-    let file = campaign.file.path.display().to_string();
+    // From wherever it is typed, and the same whoever merges.
+    let file = std::fs::canonicalize(&campaign.file.path).unwrap_or_else(|_| campaign.file.path.clone());
+    let file = quoted(&file.display().to_string());
     let command = |run: u64| format!("scripts/campaign repeat {file} {run}");
     let path = to.join("report.html");
     write_whole(&path, page(campaign, &results, &command).as_bytes())
@@ -193,6 +195,12 @@ fn results(
     Ok(Exit::Good)
 }
 
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |letter: char| letter.is_alphanumeric() || "/._-+:@%".contains(letter);
+    if word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
 fn repeat(arguments: &RepeatArguments, stop: &AtomicBool) -> Result<Exit, CommandError> {
     let campaign = read(&arguments.common)?;
     let (run, last) = (arguments.run, campaign.parts.runs - 1);
@@ -200,19 +208,17 @@ fn repeat(arguments: &RepeatArguments, stop: &AtomicBool) -> Result<Exit, Comman
         return Err(CommandError::NoSuchRun { run, last });
     }
     let point = campaign.points.point(run);
+    let usual = || PathBuf::from(format!("runs/{}-run-{run}", stem(&arguments.common.file)));
+    let out = arguments.out.clone().unwrap_or_else(usual);
     let mut files = String::new();
-    let outcome = if campaign.experiment().is_some() {
-        let usual = || PathBuf::from(format!("runs/{}-run-{run}", stem(&arguments.common.file)));
-        let out = arguments.out.clone().unwrap_or_else(usual);
+    // What a program leaves is its own affair.
+    if campaign.experiment().is_some() {
         std::fs::create_dir_all(&out)
             .map_err(|error| CommandError::File(out.display().to_string(), error))?;
         files = format!("; all its files are in {}", out.display());
-        campaign.run_in(&point, &out, Limit::of(LONGEST_WALL_S, stop))?
-    } else {
-        // What a program leaves is its own affair.
-        campaign.run(&point, stop)?
-    };
-    let Some(outcome) = outcome else { return Ok(Exit::Interrupted) };
+    }
+    let limit = Limit::of(LONGEST_WALL_S, stop);
+    let Some(outcome) = campaign.repeat(&point, &out, limit)? else { return Ok(Exit::Interrupted) };
     let because = if outcome.because.is_empty() { String::new() } else { format!(": {}", outcome.because) };
     say(&format!("run {run} {}{because}{files}", outcome.ended.name()));
     say(campaign.row(&point, &outcome).trim_end());

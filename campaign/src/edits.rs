@@ -8,7 +8,12 @@
 //! ```
 //!
 //! Whether the file may hold the key, and such a number there, is for its reader to say.
+//!
+//! Files that a text names, tables of set-points and libraries, are found by their being there: a text that is moved names them
+//! by their whole paths.
 
+use std::path::{Path, PathBuf};
+use toml_edit::visit_mut::{VisitMut, visit_value_mut};
 use toml_edit::{DocumentMut, Item, Table, Value};
 
 /// Why a path leads nowhere.
@@ -38,12 +43,59 @@ pub fn with<'a>(text: &str, numbers: impl IntoIterator<Item = (&'a str, f64)>) -
     if numbers.peek().is_none() {
         return Ok(text.to_owned());
     }
-    let mut document: DocumentMut =
-        text.parse().map_err(|error: toml_edit::TomlError| EditError::Form(error.to_string()))?;
+    let mut document = document(text)?;
     for (path, number) in numbers {
         put(document.as_item_mut(), path, path, number)?;
     }
     Ok(document.to_string())
+}
+
+/// The files that are there and that the text at `path` names, as it names them.
+///
+/// # Errors
+/// [`EditError`] for a text that is no TOML.
+pub fn files_beside(text: &str, path: &Path) -> Result<Vec<String>, EditError> {
+    let mut found = Found { path, names: Vec::new() };
+    found.visit_document_mut(&mut document(text)?);
+    Ok(found.names)
+}
+
+/// The text at `path` as it may stand elsewhere.
+///
+/// # Errors
+/// [`EditError`] for a text that is no TOML.
+pub fn moved(text: &str, path: &Path) -> Result<String, EditError> {
+    let mut document = document(text)?;
+    Found { path, names: Vec::new() }.visit_document_mut(&mut document);
+    Ok(document.to_string())
+}
+
+/// The file that the one at `path` calls `name`.
+#[must_use]
+pub fn beside(path: &Path, name: &str) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).join(name)
+}
+
+/// Files that a text names, replaced by their whole paths.
+struct Found<'a> {
+    path: &'a Path,
+    names: Vec<String>,
+}
+
+impl VisitMut for Found<'_> {
+    fn visit_value_mut(&mut self, value: &mut Value) {
+        let name = value.as_str().filter(|name| beside(self.path, name).is_file());
+        let whole = name.and_then(|name| std::path::absolute(beside(self.path, name)).ok());
+        if let (Some(name), Some(whole)) = (name, whole.as_ref().and_then(|whole| whole.to_str())) {
+            self.names.push(name.to_owned());
+            *value = whole.into();
+        }
+        visit_value_mut(self, value);
+    }
+}
+
+fn document(text: &str) -> Result<DocumentMut, EditError> {
+    text.parse().map_err(|error: toml_edit::TomlError| EditError::Form(error.to_string()))
 }
 
 /// Puts the number at `rest` below `item`; `path` is the whole, for messages.
@@ -117,6 +169,19 @@ mod tests {
         assert_eq!(number(&text, &["s", "p", "1", "x"]), 4.0);
         assert_eq!(number(&text, &["t", "new"]), 5.0);
         assert!(text.starts_with("# kept\n"), "{text}");
+    }
+
+    #[test]
+    fn a_text_that_is_moved_names_its_files_by_their_whole_paths() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("way.csv"), "time_s,position_m\n").unwrap();
+        let path = folder.path().join("e.toml");
+        let text = "title = \"no file\"\n[[drive.set-point]]\nfile = \"way.csv\" # a table\n";
+        assert_eq!(files_beside(text, &path).unwrap(), ["way.csv"]);
+        let moved = moved(text, &path).unwrap();
+        let whole = folder.path().join("way.csv").display().to_string();
+        assert!(moved.contains(&format!("file = \"{whole}\"")) && moved.contains("no file"), "{moved}");
+        assert_eq!(files_beside(&moved, Path::new("elsewhere/e.toml")).unwrap(), [whole]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! at once, so that a start that is killed loses the parts that it was at and nothing else.
 
 use crate::campaign::{Campaign, CampaignError};
+use crate::outcome::Outcome;
 use crate::parts::{PartError, WriteError};
 use crate::shard::Shard;
 use rayon::prelude::*;
@@ -65,25 +66,25 @@ impl Start<'_> {
     /// Does what is missing of its shard.
     ///
     /// # Errors
-    /// [`EngineError`] with the first that went wrong; the parts that were done at the same time are finished first.
+    /// [`EngineError`] with the first that went wrong; the parts that others were at stay missing.
     pub fn run(&self) -> Result<Done, EngineError> {
         let parts = &self.campaign.parts;
         let own: Vec<u64> = (0..parts.count()).filter(|part| self.shard.holds(*part)).collect();
         let missing = self.missing(&own)?;
         let runs_of = |list: &[u64]| list.iter().map(|part| parts.runs_of(*part).count() as u64).sum::<u64>();
         let todo = runs_of(&missing);
-        (self.say)(&self.announcement(&own, runs_of(&own), todo));
-        self.tell_expected(&missing, todo)?;
+        (self.say)(&self.announcement(runs_of(&own), missing.len(), todo));
+        let tried = self.try_first(&missing, todo)?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.jobs.max(1)).build()?;
         let progress = Progress::new(todo, self.say);
         let failed = Mutex::new(None);
         pool.install(|| {
-            // One part at a time, in order: what is done first is what a page would show first.
+            // One part at a time: no core goes idle while another has several before it.
             missing.par_iter().with_max_len(1).for_each(|part| {
                 if self.is_over(&failed) {
                     return;
                 }
-                if let Err(error) = self.part(*part, &progress, &failed) {
+                if let Err(error) = self.part(*part, tried.as_ref(), &progress, &failed) {
                     failed.lock().expect("no holder panics").get_or_insert(error);
                 }
             });
@@ -114,33 +115,32 @@ impl Start<'_> {
         Ok(missing)
     }
 
-    fn announcement(&self, own: &[u64], own_runs: u64, todo: u64) -> String {
+    fn announcement(&self, own_runs: u64, parts: usize, todo: u64) -> String {
         let of_shard = if self.shard == Shard::WHOLE {
             String::new()
         } else {
             format!(", {own_runs} of them in shard {}", self.shard)
         };
         format!(
-            "{} runs ({} combinations, {} draws){of_shard}; {todo} to do in {} parts, {} at once",
+            "{} runs ({} combinations, {} draws){of_shard}; {todo} to do in {parts} parts, {} at once",
             self.campaign.parts.runs,
             self.campaign.points.combinations(),
             self.campaign.file.draws,
-            own.len(),
             self.jobs
         )
     }
 
-    /// Tries the first run that is missing and tells how long all will take. Of a program of somebody else's nobody knows how
+    /// Does the first run that is missing, and tells how long all will take. Of a program of somebody else's nobody knows how
     /// long one takes: there the first that is done tells it.
-    fn tell_expected(&self, missing: &[u64], todo: u64) -> Result<(), EngineError> {
-        let (Some(first), Some(_)) = (missing.first(), self.campaign.experiment()) else { return Ok(()) };
-        let point = self.campaign.points.point(self.campaign.parts.runs_of(*first).start);
+    fn try_first(&self, missing: &[u64], todo: u64) -> Result<Option<(u64, Outcome)>, EngineError> {
+        let (Some(first), Some(_)) = (missing.first(), self.campaign.experiment()) else { return Ok(None) };
+        let run = self.campaign.parts.runs_of(*first).start;
         let began = Instant::now();
-        self.campaign.run(&point, self.stop)?;
+        let outcome = self.campaign.run(&self.campaign.points.point(run), self.stop)?;
         let at_once = self.jobs.clamp(1, missing.len()) as f64;
         let expected_s = began.elapsed().as_secs_f64() * todo as f64 / at_once;
         (self.say)(&format!("expected: {}", in_words(expected_s)));
-        Ok(())
+        Ok(outcome.map(|outcome| (run, outcome)))
     }
 
     fn is_over(&self, failed: &Mutex<Option<EngineError>>) -> bool {
@@ -150,6 +150,7 @@ impl Start<'_> {
     fn part(
         &self,
         part: u64,
+        tried: Option<&(u64, Outcome)>,
         progress: &Progress<'_>,
         failed: &Mutex<Option<EngineError>>,
     ) -> Result<(), EngineError> {
@@ -160,7 +161,12 @@ impl Start<'_> {
                 return Ok(());
             }
             let point = self.campaign.points.point(run);
-            let Some(outcome) = self.campaign.run(&point, self.stop)? else { return Ok(()) };
+            let outcome = match tried {
+                Some((tried, outcome)) if *tried == run => Some(outcome.clone()),
+                _ => self.campaign.run(&point, self.stop)?,
+            };
+            // A signal that ends this one may have ended the run's programs, too: what they came to is no result then.
+            let Some(outcome) = outcome.filter(|_| !self.stop.load(Ordering::Relaxed)) else { return Ok(()) };
             rows += &self.campaign.row(&point, &outcome);
             progress.ran(outcome.simulated_s);
         }

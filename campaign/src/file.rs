@@ -20,7 +20,8 @@
 //! ```
 //!
 //! In place of an experiment, `command = ["PROGRAM", "ARGUMENT", …]` runs anything that answers with a line of JSON
-//! (`command.rs`); `figures` are the keys of its answer that are collected.
+//! (`command.rs`); `figures` are the keys of its answer that are collected, and `programs = ["NAME", …]` those that it starts
+//! in its turn: results of another version of one of them are none of this campaign's.
 
 use crate::factor::{Changes, Factor, FileChoice, VaryTable};
 use crate::figures;
@@ -40,6 +41,8 @@ pub struct CampaignFile {
     pub title: String,
     /// What a run is.
     pub kind: Kind,
+    /// Programs that a command starts.
+    pub programs: Vec<String>,
     /// Runs of each combination of lists.
     pub draws: u64,
     /// Of all that is drawn.
@@ -108,6 +111,7 @@ struct Form {
     experiment: Option<String>,
     rig: Option<String>,
     command: Option<Spanned<Vec<String>>>,
+    programs: Option<Spanned<Vec<String>>>,
     seconds: Option<Spanned<f64>>,
     pace: Option<Spanned<Pace>>,
     draws: Option<Spanned<u64>>,
@@ -176,14 +180,16 @@ impl CampaignFile {
             let told = "experiment: name one, or let a [[vary]] choose = \"experiment\", or give a command";
             return Err(at.error(&(0..0), told.into()));
         }
+        let programs = form.programs.map(Spanned::into_inner).unwrap_or_default();
         let file = Self {
             path: path.to_owned(),
+            programs,
             text: text.to_owned(),
             title: form.title,
             draws: at.whole(form.draws, "draws", MOST_DRAWS)?.unwrap_or(1),
             seed: form.seed.unwrap_or(1),
             runs_per_part: at.whole(form.runs_per_part, "runs_per_part", MOST_PER_PART)?,
-            figures: at.figures(&form.collect.figures, &kind)?,
+            figures: at.figures(&form.collect.figures, &kind, &factors)?,
             worst: form.collect.worst.iter().map(|name| name.as_ref().clone()).collect(),
             confusion: form.collect.confusion.iter().map(|pair| pair.as_ref().clone()).collect(),
             kind,
@@ -253,6 +259,10 @@ impl At<'_> {
             };
             return Err(self.error(&command.span(), told.into()));
         }
+        if let Some(programs) = &form.programs {
+            let told = "programs: what a command starts; a campaign of experiments knows its programs";
+            return Err(self.error(&programs.span(), told.into()));
+        }
         if let Some(seconds) = form.seconds.as_ref().filter(|s| !(s.as_ref() > &0.0 && s.as_ref() <= &MOST_S))
         {
             let told = format!("seconds = {}: allowed is more than 0, to {MOST_S}", seconds.as_ref());
@@ -276,7 +286,19 @@ impl At<'_> {
         }
     }
 
-    fn figures(&self, names: &[Spanned<String>], kind: &Kind) -> Result<Vec<String>, FileError> {
+    fn figures(
+        &self,
+        names: &[Spanned<String>],
+        kind: &Kind,
+        factors: &[Factor],
+    ) -> Result<Vec<String>, FileError> {
+        let mut taken: Vec<&str> = RESERVED.iter().copied().collect();
+        taken.extend(factors.iter().map(|factor| factor.name.as_str()));
+        for name in names {
+            check_column(name.as_ref(), &taken)
+                .map_err(|told| self.error(&name.span(), format!("collect.figures: {told}")))?;
+            taken.push(name.as_ref());
+        }
         let experiment = matches!(kind, Kind::Experiment(_));
         if let Some(name) = names.iter().find(|name| experiment && !figures::is_known(name.as_ref())) {
             let told = format!("collect.figures: no figure {}; `bench figures` lists them", name.as_ref());
@@ -298,8 +320,9 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
     {
         return Err(format!("{name} is varied twice; give one of them another name, or leave one out"));
     }
-    if RESERVED.contains(&name.as_str()) || figures::is_known(name) || name.is_empty() {
-        return Err(format!("name = \"{name}\": a column of the result has this name, choose another"));
+    check_column(name, RESERVED).map_err(|told| format!("name = {told}"))?;
+    if figures::is_known(name) {
+        return Err(format!("name = \"{name}\": a figure has this name, choose another"));
     }
     match (kind, changes) {
         (Kind::Command(_), Changes::Told) => Ok(()),
@@ -320,6 +343,19 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
         }
         _ => Ok(()),
     }
+}
+
+/// Whether a column of the result may have this name beside those that are `taken`.
+fn check_column(name: &str, taken: &[&str]) -> Result<(), String> {
+    if taken.contains(&name) {
+        return Err(format!("\"{name}\": another column of the result has this name, choose another"));
+    }
+    if name.is_empty() || name.contains([',', '"', '\n', '\r']) {
+        return Err(format!(
+            "{name:?}: a column's name has no comma, no quote, no new line, and is not empty"
+        ));
+    }
+    Ok(())
 }
 
 /// Columns that every result has.
@@ -346,6 +382,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told_with_file_line_and_what_would_be_right() {
         let after = |more: &str| format!("{PLAIN}{more}");
+        let ask = |more: &str| format!("title = \"t\"\ncommand = [\"x\"]\n[collect]\n{more}\n");
         for (text, line, words) in [
             (after("draws = 0\n"), 3, "1 to"),
             (after("seconds = -1.0\n"), 3, "more than 0"),
@@ -359,6 +396,11 @@ mod tests {
             (after("[[vary]]\nchoose = \"experiment\"\nlist = [\"step\"]\n"), 3, "already"),
             (after("[[vary]]\nname = \"x\"\nlist = [1]\n"), 3, "exactly one"),
             (after("[[vary]]\nrig = \"a.b\"\nlist = [1]\n[[vary]]\nrig = \"a.b\"\nlist = [2]\n"), 6, "twice"),
+            (after("programs = [\"x\"]\n"), 3, "what a command starts"),
+            (after("[[vary]]\nrig = \"a.b\"\nname = \"a,b\"\nlist = [1]\n"), 3, "no comma"),
+            (ask("figures = [\"x\", \"y\", \"x\"]"), 4, "another column"),
+            (ask("figures = [\"seed\"]"), 4, "another column"),
+            (ask("figures = [\"hidden\"]\n[[vary]]\nname = \"hidden\"\nlist = [1]"), 4, "another column"),
             ("title = \"t\"\ncommand = []\n".into(), 2, "at least the program"),
             ("title = \"t\"\ncommand = [\"x\"]\n".into(), 1, "collect.figures"),
             ("experiment = \"step\"\n".into(), 1, "title"),

@@ -4,11 +4,12 @@
 
 use crate::child::{Cut, Limit, Own};
 use crate::condition::{Condition, ConditionError};
+use crate::edits;
 use crate::factor::Value;
 use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
 use crate::shelf::Shelf;
-use bench::join;
+use bench::{SummaryError, join};
 use controller::experiment::Experiment;
 use protocol::exit::Exit;
 use serde_json::Value as Json;
@@ -107,14 +108,18 @@ pub fn run(
         let message = last_line(&folder.join(format!("{name}.txt")));
         return Err(ConditionError { run, message }.into());
     }
-    Ok(outcome(folder, &codes))
+    outcome(folder, &codes).map_err(|error| system("its folder")(io::Error::other(error)))
 }
 
 /// What the run's folder tells.
-fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Outcome {
+///
+/// # Errors
+/// [`SummaryError`] for a folder that cannot be written, which is none of the run's doing.
+fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, SummaryError> {
     let joined = match join::join(folder) {
         Ok(joined) => joined,
-        Err(error) => return Outcome::failed(error.to_string()),
+        Err(error @ SummaryError::Write { .. }) => return Err(error),
+        Err(error) => return Ok(Outcome::failed(error.to_string())),
     };
     let number = |key: &str| joined.figure(key).as_f64();
     let of_table = joined.figure("figures").as_object().into_iter().flatten();
@@ -127,11 +132,15 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Outcome {
         (Some(0), Some(0)) => (Ended::Done, String::new()),
         (Some(0), Some(3)) => (Ended::TimeOver, words("ended_because")),
         (Some(0 | 1), Some(0 | 1)) => (Ended::Stopped, words("ended_because")),
-        other => (Ended::Failed, format!("exit codes {other:?} of emulator and controller")),
+        (emulator, controller) => {
+            let told = |code: Option<i32>| code.map_or("a signal".to_owned(), |code| format!("code {code}"));
+            let (emulator, controller) = (told(emulator), told(controller));
+            (Ended::Failed, format!("the emulator ended with {emulator}, the controller with {controller}"))
+        }
     };
     let has_bounds = joined.figure("thresholds").as_object().is_some_and(|bounds| !bounds.is_empty());
     let passed = has_bounds.then(|| joined.figure("passed") == &Json::Bool(true));
-    Outcome { ended, because, simulated_s: number("cycles").unwrap_or(0.0) * 1e-3, passed, figures }
+    Ok(Outcome { ended, because, simulated_s: number("cycles").unwrap_or(0.0) * 1e-3, passed, figures })
 }
 
 /// The files that both programs read.
@@ -172,11 +181,11 @@ impl Files {
         Ok(Self {
             rig: put("simulated-rig.toml", &condition.rig_toml)?,
             nominal: put("nominal-rig.toml", &condition.nominal.file.text)?,
-            // Tables are read beside it.
             experiment: if unchanged {
                 experiment.path.clone()
             } else {
-                put("experiment.toml", &condition.experiment_toml)?
+                let moved = edits::moved(&condition.experiment_toml, &experiment.path);
+                put("experiment.toml", &moved.map_err(|error| refused(error.to_string()))?)?
             },
             faults: match condition.faults_toml.as_str() {
                 "" => None,

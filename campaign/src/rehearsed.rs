@@ -65,7 +65,9 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
     // The axis with the fault before one that only followed it.
     let stopped =
         controllers().filter(is_stopped).max_by_key(|controller| controller.state() == MainChainState::Fault);
+    let broken = rehearsal.off_the_wire().map(|error| format!("the simulated rig broke: {error}"));
     let (ended, because) = match stopped {
+        _ if broken.is_some() => (Ended::Failed, broken.unwrap_or_default()),
         Some(axis) => (Ended::Stopped, format!("{}: {}", axis.axis().name(), axis.cause())),
         None if rehearsal.station().done() => (Ended::Done, String::new()),
         None => (Ended::TimeOver, "the longest time was over before the experiment was done".to_owned()),

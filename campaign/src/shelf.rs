@@ -1,11 +1,13 @@
 //! The files that a campaign names, read once before anything runs, and what tells this campaign from every other.
 
+use crate::edits::{self, EditError, beside};
 use crate::factor::{Changes, Factor, FileChoice, Value, Values};
 use crate::file::{CampaignFile, ExperimentKind};
+use crate::parts::hash;
 use controller::experiment::Experiment;
 use controller::program::file::Source;
 use plant::RigParameters;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The shipped rig's name in results.
@@ -20,6 +22,8 @@ pub struct Shelf {
     rigs: BTreeMap<String, RigFile>,
     /// Programs by their paths.
     programs: BTreeMap<PathBuf, Source>,
+    /// Hashes of what experiments and programs name in their turn, tables of set-points and libraries, by their names there.
+    further: BTreeSet<(String, String)>,
     /// Where names are looked up.
     folders: Folders,
     /// The experiment and the rig where they are not varied.
@@ -134,7 +138,18 @@ impl Shelf {
         for name in chosen(FileChoice::DriveProgram).iter().chain(&chosen(FileChoice::LoadProgram)) {
             add(folders.chosen_program(name))?;
         }
-        Ok(Self { experiments, rigs, programs, folders, usual })
+        let mut further = BTreeSet::new();
+        let sources = programs.values().map(|source| (&source.path, &source.text));
+        for (path, text) in experiments.values().map(|file| (&file.path, &file.text)).chain(sources) {
+            let told = |told: EditError| error(format!("{}: {told}", path.display()));
+            for name in edits::files_beside(text, path).map_err(told)? {
+                let file = beside(path, &name);
+                let bytes =
+                    std::fs::read(&file).map_err(|told| error(format!("{}: {told}", file.display())))?;
+                further.insert((name, hash(&bytes)));
+            }
+        }
+        Ok(Self { experiments, rigs, programs, further, folders, usual })
     }
 
     /// The experiment of this name, or the only one.
@@ -170,14 +185,17 @@ impl Shelf {
         &self.programs[&self.folders.chosen_program(name)]
     }
 
-    /// The texts of all files, each behind the name of its file, in an order that depends on the names alone.
-    pub fn texts(&self) -> impl Iterator<Item = (&str, &str)> {
-        let experiments = self.experiments.iter().map(|(name, file)| (name.as_str(), file.text.as_str()));
-        let rigs = self.rigs.iter().map(|(name, rig)| (name.as_str(), rig.file.text.as_str()));
+    /// The hashes of all files, each behind the name of its file, in an order that does not depend on where they are.
+    #[must_use]
+    pub fn hashes(&self) -> BTreeSet<(String, String)> {
+        let experiments = self.experiments.iter().map(|(name, file)| (name.as_str(), &file.text));
+        let rigs = self.rigs.iter().map(|(name, rig)| (name.as_str(), &rig.file.text));
         let programs = self.programs.iter().map(|(path, source)| {
-            (path.file_name().and_then(|name| name.to_str()).unwrap_or_default(), source.text.as_str())
+            (path.file_name().and_then(|name| name.to_str()).unwrap_or_default(), &source.text)
         });
-        experiments.chain(rigs).chain(programs)
+        let texts = experiments.chain(rigs).chain(programs);
+        let texts = texts.map(|(name, text)| (name.to_owned(), hash(text.as_bytes())));
+        texts.chain(self.further.iter().cloned()).collect()
     }
 }
 

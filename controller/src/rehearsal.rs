@@ -23,8 +23,8 @@ use protocol::bus::control::Role;
 use protocol::bus::{Bus, BusCounters, BusError, Received, SendError};
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, Frame, RIG_STATUS, RigStatus, Sensors as SensorFrame,
-    Tick, ValveCommand,
+    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, EncodeError, Frame, RIG_STATUS, RigStatus,
+    Sensors as SensorFrame, Tick, ValveCommand,
 };
 use protocol::periods;
 use std::time::Duration;
@@ -90,6 +90,7 @@ pub struct Rehearsal<R = PeopledPlant> {
     saturated: [[bool; 4]; 2],
     cycle: u64,
     closing: bool,
+    off_the_wire: Option<EncodeError>,
 }
 
 /// What a cycle left.
@@ -201,6 +202,7 @@ impl<R: SimulatedRig> Rehearsal<R> {
             saturated: [[false; 4]; 2],
             cycle: 0,
             closing: false,
+            off_the_wire: None,
         }
     }
 
@@ -276,10 +278,14 @@ impl<R: SimulatedRig> Rehearsal<R> {
     }
 
     fn hand_over(&mut self, frame: &Frame) {
-        let frame = frame.encode().unwrap_or_else(|error| {
-            panic!("the rehearsed rig made a frame that rig.dbc does not allow: {error}")
-        });
-        self.station.take(&frame);
+        match frame.encode() {
+            Ok(frame) => {
+                self.station.take(&frame);
+            }
+            Err(error) => {
+                let _ = self.off_the_wire.get_or_insert(error);
+            }
+        }
     }
 
     /// The rig.
@@ -310,10 +316,16 @@ impl<R: SimulatedRig> Rehearsal<R> {
         self.news.try_iter()
     }
 
-    /// Whether the controllers are done, or stopped for good.
+    /// Whether the controllers are done, or stopped for good, or the rig broke.
     #[must_use]
     pub fn ended(&self) -> bool {
-        self.closing || self.station.stopped_for() > STOPPED_CYCLES
+        self.closing || self.off_the_wire.is_some() || self.station.stopped_for() > STOPPED_CYCLES
+    }
+
+    /// The first value of the rig that rig.dbc does not allow: its numbers drive it out of all bounds.
+    #[must_use]
+    pub fn off_the_wire(&self) -> Option<EncodeError> {
+        self.off_the_wire
     }
 }
 

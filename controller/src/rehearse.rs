@@ -60,6 +60,12 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
         interrupted = interrupt.came();
     }
     files.write_out().map_err(RunError::output)?;
+    if let Some(error) = rehearsal.off_the_wire() {
+        let cycle = rehearsal.cycles();
+        return Err(RunError::Input(format!(
+            "the simulated rig broke in cycle {cycle}: {error}; its file makes it so"
+        )));
+    }
     let ended = Ended { rehearsal, interrupted, told, news, took_s: started.elapsed().as_secs_f64() };
     save(arguments, &inputs, &scene, &ended)
 }

@@ -12,7 +12,7 @@
 use crate::course::Course;
 use crate::parameters::{COUNT, with_factors};
 use crate::windows::{Windows, dot};
-use plant::RigParameters;
+use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -117,8 +117,10 @@ impl<'a> Engine<'a> {
 
     /// The same of several rigs that differ in numbers of the baseline: on all cores, and side by side where that pays.
     fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
-        // Rigs with effects do not run in lanes, and are shared out one by one.
-        let at_once = if rigs.iter().any(|rig| !rig.effects().is_empty()) { 1 } else { COUNT };
+        // Rigs with effects do not run in lanes, and are shared out one by one; the others as far as cores are fewer.
+        let alone = rigs.iter().any(|rig| !rig.effects().is_empty());
+        let to_each = rigs.len().div_ceil(rayon::current_num_threads());
+        let at_once = if alone { 1 } else { to_each.clamp(1, Batch::GROUP) };
         let simulate = |rigs: &[RigParameters]| {
             let mut all = vec![Vec::new(); rigs.len()];
             for windows in &self.windows {

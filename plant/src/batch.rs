@@ -66,6 +66,9 @@ struct Group {
 }
 
 impl Batch {
+    /// Neighbours that move together.
+    pub const GROUP: usize = WIDTH;
+
     /// A batch of these plants, in this order.
     #[must_use]
     pub fn new(plants: Vec<Plant>) -> Self {

@@ -231,6 +231,26 @@ fn what_a_program_answers_becomes_a_table_and_a_confusion_matrix() {
     assert!(page.contains("hidden and named") && page.contains("The same in 2 of 6 runs"), "{page}");
 }
 
+/// An experiment with a table beside it, of which one number is varied.
+#[test]
+fn a_table_of_set_points_is_of_the_campaign_and_goes_with_a_run() {
+    let place = Place::new(
+        "title = \"way\"\nexperiment = \"way.toml\"\nseconds = 3\n[collect]\nfigures = [\"position_error_dynamic_m\"]\n\
+         [[vary]]\nexperiment = \"rig.added_mass_kg\"\nlist = [0, 10]\n",
+    );
+    let experiment = "title = \"way\"\n[rig]\ncarriage_position_m = 0.1\n[drive]\nprogram = \"position-p\"\nstart_m = 0.1\n\
+        [[drive.set-point]]\nlaw = \"table\"\nfile = \"way.csv\"\ninterpolation = \"smooth\"\n";
+    fs::write(place.path("way.toml"), experiment).expect("an experiment");
+    fs::write(place.path("way.csv"), "time_s,position_m\n0,0.1\n1,0.2\n2,0.15\n").expect("a table");
+    let table = undisturbed(&place);
+    let _ = place.run("repeat", &["1", "--out", "again"]).expect_code(GOOD);
+    let summary = json(&place.path("again/summary.json"));
+    let error = row(&table, 1)["position_error_dynamic_m"].parse::<f64>().ok();
+    assert!(error.is_some() && error == summary["position_error_dynamic_m"].as_f64(), "{table}");
+    fs::write(place.path("way.csv"), "time_s,position_m\n0,0.1\n1,0.3\n2,0.15\n").expect("a table");
+    let _ = place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_said(&["another campaign"]);
+}
+
 #[test]
 fn every_shipped_campaign_is_one_and_faults_run_as_processes() {
     for entry in fs::read_dir(workspace().join("campaign/campaigns")).expect("campaigns").flatten() {
@@ -259,9 +279,8 @@ fn the_page_is_whole_and_asks_for_nothing_from_elsewhere() {
         roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() },
     );
     let document = document.expect("well-formed");
-    for words in
-        ["How the runs ended", "Over what they change", "Worst cases", "scripts/campaign repeat c.toml"]
-    {
+    let repeat = format!("scripts/campaign repeat {} ", place.path("c.toml").display());
+    for words in ["How the runs ended", "Over what they change", "Worst cases", &repeat] {
         assert!(page.contains(words), "'{words}' is missing");
     }
     for node in document.descendants() {
@@ -289,6 +308,8 @@ fn dask_gives_the_same_bytes_when_a_worker_is_killed() {
     assert!(place.parts("out") < 32, "it was done before anybody could be killed");
     let _ = driver.wait().expect_code(GOOD);
     assert!(place.text("out/runs.csv") == whole, "with a worker killed the bytes are others");
+    let pages = ["out", "whole"].map(|folder| place.text(&format!("{folder}/report.html")));
+    assert!(pages[0] == pages[1], "with a worker killed the page is another");
 }
 
 /// A process below `driver` that has a `campaign run` below it.

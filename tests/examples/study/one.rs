@@ -1,7 +1,7 @@
 //! A step with one draw, as the program of a campaign.
 //!
 //! ```text
-//! stdin   {"run": 17, "draw": 17, …}
+//! stdin   {"run": 17, "draw": 17, …}; with "again": true also what was done is done again
 //! stdout  {"kind": "single", "hidden": "valve-offset", "called": "valve-offset", "right": true, …}
 //! exit    0; 1 a record cannot be made; 75 nothing was tried, and the campaign ends; 130 stopped
 //! ```
@@ -49,7 +49,7 @@ pub(crate) fn one(arguments: &OneArguments, stop: &AtomicBool) -> ExitCode {
 /// Takes the step; `None` when it was told to stop in its midst.
 fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Box<dyn Error>> {
     let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
-    let number = arguments.draw.map_or_else(asked, Ok)?;
+    let (number, again) = arguments.draw.map_or_else(asked, |draw| Ok((draw, true)))?;
     let draw = study.draws.get(number).ok_or_else(|| {
         let all = study.draws.len();
         format!("draw {number}: this study has {all}, from 0; its campaign file needs draws = {all}")
@@ -62,7 +62,7 @@ fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Bo
         without: None,
         keep_truth: arguments.keep_truth,
         drop_records: arguments.drop_records,
-        again: arguments.draw.is_some(),
+        again,
         least_free_mib: arguments.least_free,
         stop,
     };
@@ -93,15 +93,15 @@ fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Bo
     Ok(Some(answer::of_case(&score::one(&study, draw, &arguments.label, known)?)))
 }
 
-/// The draw that the campaign asks for.
-fn asked() -> Result<usize, Box<dyn Error>> {
+/// The draw that the campaign asks for, and whether again.
+fn asked() -> Result<(usize, bool), Box<dyn Error>> {
     let mut line = String::new();
     io::stdin().lock().read_line(&mut line)?;
     let question: Value = serde_json::from_str(&line).map_err(|error| {
         format!("standard input: {error}; a campaign tells its run there, or give --draw")
     })?;
     let draw = question["draw"].as_u64().ok_or("standard input: no draw in it")?;
-    Ok(usize::try_from(draw)?)
+    Ok((usize::try_from(draw)?, question["again"] == true))
 }
 
 fn program(arguments: &OneArguments) -> Result<Program, Box<dyn Error>> {

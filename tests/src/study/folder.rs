@@ -22,7 +22,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::fs;
 use std::io;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 /// A study with its folder.
 #[derive(Debug, Clone)]
@@ -211,7 +213,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
     parts::write_whole(path, bytes).map_err(FolderError::file(path))
 }
 
-/// Makes a folder so that it is whole or absent: `fill` fills another one, which then gets the name.
+/// Makes a folder so that it is whole or absent: `fill` fills another one, which then gets the name. When two starts are at the
+/// same folder, the first that is done has made it.
 ///
 /// # Errors
 /// Those of `fill`, and [`FolderError`] with the path.
@@ -219,26 +222,33 @@ pub fn make_whole<T, E: From<FolderError>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<T, E>,
 ) -> Result<T, E> {
-    let beside = beside(path);
-    let fresh = || {
-        if beside.exists() {
-            fs::remove_dir_all(&beside)?;
-        }
-        fs::create_dir_all(&beside)
-    };
-    fresh().map_err(FolderError::file(&beside))?;
-    let filled = fill(&beside)?;
-    if path.exists() {
+    let is_made_again = path.exists();
+    let beside = beside(path).map_err(FolderError::file(path))?;
+    let filled = fill(beside.path())?;
+    if is_made_again {
         fs::remove_dir_all(path).map_err(FolderError::file(path))?;
     }
-    fs::rename(&beside, path).map_err(FolderError::file(path))?;
-    Ok(filled)
+    match fs::rename(beside.path(), path) {
+        Ok(()) => {
+            let _ = beside.keep();
+            Ok(filled)
+        }
+        Err(_) if !is_made_again && path.exists() => Ok(filled),
+        Err(error) => Err(FolderError::file(path)(error).into()),
+    }
 }
 
-/// The unfinished twin of a file or folder.
-fn beside(path: &Path) -> PathBuf {
+/// The unfinished twin of a folder: hidden, and each start's own.
+fn beside(path: &Path) -> io::Result<TempDir> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!(".{name}.unfinished"))
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let readable = fs::Permissions::from_mode(0o777); // less what the umask takes
+    tempfile::Builder::new()
+        .prefix(&format!(".{name}."))
+        .suffix(".unfinished")
+        .permissions(readable)
+        .tempdir_in(folder)
 }
 
 #[cfg(test)]

@@ -53,11 +53,8 @@ fn rig_events(summary: &Value, first: u64, last: u64) -> Vec<String> {
     let near = first.saturating_sub(RIG_WITHIN_CYCLES)..=last + RIG_WITHIN_CYCLES;
     let noted = summary["events"].as_array().map_or(&[][..], Vec::as_slice);
     let mut told: Vec<_> = noted.iter().filter_map(|noted| in_words(noted, &near)).collect();
-    let is_cut = summary["event_count"].as_u64().is_some_and(|count| count > noted.len() as u64);
-    if is_cut
-        && noted.last().and_then(|noted| noted["cycle"].as_u64()).is_some_and(|cycle| cycle < *near.end())
-    {
-        told.push("What the rig noted later is only counted in summary.json.".to_owned());
+    if summary["event_count"].as_u64().is_some_and(|count| count > noted.len() as u64) {
+        told.push("Of what came often the rig noted the first only.".to_owned());
     }
     told
 }
