@@ -18,6 +18,7 @@ use plant::tables::CycleRecord;
 use protocol::socket_file::{SocketFile, SocketFileError, SocketType};
 use protocol::telemetry::{Kind, write_cycle, write_packet};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::path::Path;
 use viewer::Viewer;
 
@@ -29,8 +30,8 @@ const MOST_VIEWERS: usize = 8;
 /// The socket and its viewers.
 pub struct Telemetry {
     socket: SocketFile,
-    /// The first packet of each viewer.
-    description: Vec<u8>,
+    /// The first packet of each viewer, save what it is told as of its coming.
+    description: Value,
     /// Whether cycles show what only a simulation knows.
     with_truth: bool,
     /// Takes the commands of viewers; `None` in a run without a console.
@@ -38,6 +39,15 @@ pub struct Telemetry {
     viewers: Vec<Viewer>,
     /// The packet that is made; kept so that it need not be allocated anew.
     packet: Vec<u8>,
+}
+
+/// Late wake-ups beyond those that are kept for viewers to come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Untold {
+    /// How many.
+    pub overruns: u64,
+    /// Cycles that they skipped.
+    pub skipped: u64,
 }
 
 /// An event as viewers get it.
@@ -55,10 +65,8 @@ impl Telemetry {
     /// [`SocketFileError`] when it cannot be had.
     pub fn open(path: &Path, run: &Described<'_>, console: Option<Console>) -> Result<Self, SocketFileError> {
         let socket = SocketFile::bind(path, SocketType::STREAM, false)?;
-        let mut first = Vec::new();
-        write_packet(&mut first, Kind::Description, description(run).to_string().as_bytes());
-        let with_truth = run.with_truth();
-        Ok(Self { socket, description: first, with_truth, console, viewers: Vec::new(), packet: Vec::new() })
+        let (description, with_truth) = (description(run), run.with_truth());
+        Ok(Self { socket, description, with_truth, console, viewers: Vec::new(), packet: Vec::new() })
     }
 
     /// Tells a cycle.
@@ -95,15 +103,18 @@ impl Telemetry {
         }
     }
 
-    /// Lets viewers in, tells them what the run is and what `happened` so far, obeys their commands, and writes what their
-    /// sockets take.
-    pub fn serve(&mut self, happened: &[Event]) {
+    /// Lets viewers in, tells them what the run is and what `happened` so far, as far as it is not `untold`, obeys their
+    /// commands, and writes what their sockets take.
+    pub fn serve(&mut self, happened: &[Event], untold: Untold) {
         while let Some(socket) = self.socket.accept() {
             if self.viewers.len() >= MOST_VIEWERS {
                 continue;
             }
             let mut viewer = Viewer::new(socket.into());
-            viewer.offer(&self.description);
+            self.description["untold"] = json!(untold);
+            self.packet.clear();
+            write_packet(&mut self.packet, Kind::Description, self.description.to_string().as_bytes());
+            viewer.offer(&self.packet);
             for event in happened {
                 self.packet.clear();
                 write_event(&mut self.packet, event);

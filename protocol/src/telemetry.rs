@@ -15,7 +15,8 @@
 //! | 5 answer | JSON, one for each line asked, in their order: `ok`, and `text` for a person |
 //!
 //! The stream is lossy: a viewer that reads too slowly misses whole records, never parts of one, and is told how many before the
-//! next that it gets. Events that came before a viewer did follow the description, so that it knows what is broken and loaded.
+//! next that it gets. Events that came before a viewer did follow the description, so that it knows what is broken and loaded:
+//! the first thousand of each kind, and of late wake-ups the description counts the others.
 //! Nothing that a viewer does or leaves undone reaches the run, save commands of a run with `--console`.
 
 use std::collections::VecDeque;
@@ -84,7 +85,7 @@ pub enum TelemetryError {
 /// Appends a packet of text or bytes.
 ///
 /// # Panics
-/// When the payload is longer than [`LONGEST_PAYLOAD`]: only a description could be, and it is made before the run.
+/// When the payload is longer than [`LONGEST_PAYLOAD`]: only a description could be, which has a tenth of it.
 pub fn write_packet(out: &mut Vec<u8>, kind: Kind, payload: &[u8]) {
     write_head(out, kind, payload.len());
     out.extend(payload);

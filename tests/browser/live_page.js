@@ -164,7 +164,11 @@ const cases = {
     }
   },
 
-  async "a set-point by hand goes on the bus"(page) {
+  async "a set-point by hand goes on the bus, and one that is not filled in does not"(page) {
+    assert.equal(await page.getAttribute("#place", "max"), "500", "the stroke of the rig");
+    await page.fill("#place", "");
+    await page.getByRole("button", { name: "Go", exact: true }).click();
+    await until("it is refused", async () => (await page.innerText("#answer")).startsWith("Fill in a number"));
     await page.fill("#place", "200");
     await page.getByRole("button", { name: "Go", exact: true }).click();
     await until("it is sent", async () => (await page.innerText("#answer")) === "on the bus");
@@ -234,6 +238,7 @@ const cases = {
   },
 
   async "it connects again when the emulator has started anew"(page) {
+    assert.equal(await page.innerText("#experiment"), "to and fro");
     await ask("end");
     await until("the banner", async () => (await page.innerText("#banner")) !== "");
     const before = number(await page.innerText("#clock"));
@@ -241,6 +246,7 @@ const cases = {
     await until("no banner", async () => !(await page.locator("#banner").isVisible()));
     await moves(page);
     await until("another run's time", async () => number(await page.innerText("#clock")) < before);
+    await until("its name", async () => (await page.innerText("#experiment")) === "to and fro again");
     await until("charts of it", async () => Number.isFinite(await plotted(page, "position", "drive")));
   },
 

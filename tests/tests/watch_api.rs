@@ -3,13 +3,14 @@
 use rustix::process::Signal;
 use serde_json::{Value, json as value};
 use std::io::{Read, Write};
+use std::path::Path;
 use std::process::{Command, Stdio};
-use system_tests::binaries::{Build, Program, executable};
+use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::guest::python;
 use system_tests::launch::Pace;
 use system_tests::onlooker::LivePage;
 use system_tests::process::{Running, wait_until};
-use system_tests::records::{bus_log, count, json};
+use system_tests::records::{Table, bus_log, count, json};
 use system_tests::scene::{LINKED, RESTLESS, Scene};
 use system_tests::turn;
 
@@ -114,6 +115,7 @@ fn a_run_is_told_by_description_state_history_events_and_metrics() {
     assert_eq!(state["emergency_stop"], value!({ "active": false, "senders": [] }));
     assert!(state["bus"]["load_percent"].as_f64() > Some(20.0), "{}", state["bus"]);
     assert_eq!(state["bus"]["lost"], 0);
+    assert_eq!(state["timing"]["overruns_by_second"].as_array().map(Vec::len), Some(60));
     assert!(["yes", "doubtful", "no"].iter().any(|word| state["claim"]["supported"] == *word));
 
     let metrics = page.get("/metrics");
@@ -204,7 +206,7 @@ fn orders_reach_rig_controllers_and_folder() {
     let mut events = page.events();
 
     assert_eq!(order(value!({ "command": "weights", "kg": 2.5 })).json()["ok"], true);
-    events.wait_for("state", |state| state["weights_kg"] == 2.5);
+    let weighted = events.wait_for("state", |state| state["weights_kg"] == 2.5);
     let refused = order(value!({ "command": "weights", "kg": 250 }));
     assert_eq!(refused.status, 400);
     assert_eq!(refused.json()["message"], "weights '250': allowed are 0 to 20 kg");
@@ -221,15 +223,19 @@ fn orders_reach_rig_controllers_and_folder() {
         order(value!({ "command": "set-point", "axis": "drive", "position_m": position_m }))
     };
     assert_eq!((go(0.3).status, go(0.6).status), (200, 400));
+    let nowhere = order(value!({ "command": "set-point", "axis": "drive" }));
+    assert_eq!(nowhere.status, 400, "a position that is not given is not 0 m: {}", nowhere.body);
 
     // Of linked axes: an axis that lies at its end is no record of anything.
     // More than the second that a record needs at least: its ends lie within a frame, not on one.
-    wait_until("two seconds of history", || {
-        page.get("/api/history?seconds=2").json()["t_s"].as_array().map(Vec::len) == Some(200)
-    });
-    let saved = order(value!({ "command": "save", "seconds": 1.5 })).json();
+    let enough_s = weighted["t_s"].as_f64().map(|t_s| t_s + 1.5);
+    events.wait_for("state", |state| state["t_s"].as_f64() > enough_s);
+    let saved = order(value!({ "command": "save", "seconds": 60 })).json();
     let message = saved["message"].as_str().expect("a message").to_owned();
-    let folder = message.strip_prefix("saved in ").unwrap_or_else(|| panic!("{message}")).to_owned();
+    let (folder, of) =
+        message.strip_prefix("saved in ").and_then(|said| said.split_once(" (")).expect(&message);
+    assert!(of.ends_with("s, since linkage or weights changed before)"), "{message}");
+    let record_s = Table::read(&Path::new(folder).join("measurement.csv")).column("time_s");
     for file in ["measurement.csv", "bus.log"] {
         let mut check = Command::new(executable(Program::Discrepancy, Build::Shipped));
         check.arg("check").arg("--rig").arg(watched.scene.path("rig.toml"));
@@ -249,6 +255,10 @@ fn orders_reach_rig_controllers_and_folder() {
 
     let scene = watched.end();
     let summary = json(&scene.path("emulator/summary.json"));
+    let mut events = summary["events"].as_array().expect("events").iter();
+    let weights = events.find(|event| event["kind"]["weights"].is_object()).expect("they were put on");
+    let cycle = (record_s[0] * 1000.0).round() as u64;
+    assert_eq!(Some(cycle), weights["cycle"].as_u64().map(|cycle| cycle + 1), "the record has one set-up");
     let kinds = summary["events"].to_string();
     assert!(kinds.contains("\"emergency-stop\"") && kinds.contains("emergency-stop-released"), "{kinds}");
     // Called out again every 100 ms until it was released, once.
@@ -299,10 +309,13 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     let mut events = watched.page.events();
     watched.emulator.signal(Signal::INT);
     events.wait_for("status", |status| status["telemetry"] == "gone");
+    watched.scene.write("experiment.toml", &RESTLESS.replace("restless", "restless again"));
     let before = std::mem::replace(&mut watched.emulator, emulator(&watched.scene));
     // It had its folder first; both write the same one, and the first has ended by now.
     let _ = before.wait().expect_code(130);
     events.wait_for("status", |status| status["telemetry"] == "connected");
+    let description = watched.page.get("/api/description").json();
+    assert_eq!(description["experiment"]["title"], "restless again", "it is there when connected is told");
     let rows = events.wait_for("rows", |_| true);
     assert!(rows["t_s"][0].as_f64() < Some(5.0), "time begins anew: {rows}");
 
@@ -330,4 +343,32 @@ fn without_telemetry_the_page_shows_what_is_on_the_bus() {
     emulator.signal(Signal::INT);
     let _ = emulator.wait().expect_code(130);
     let _ = controller.wait();
+}
+
+#[test]
+fn a_run_with_its_page_is_one_command() {
+    let _machine = turn::take();
+    let scene = Scene::new(RESTLESS);
+    let bench = executable(Program::Bench, Build::Shipped);
+    let mut command = Command::new(workspace().join("scripts/run"));
+    // Built already: the test is of the script, and a build would want the machine for itself.
+    command.env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
+    command.args(["--watch", "--http", "127.0.0.1:0", "--seconds", "60", "--bus", &scene.url()]);
+    command.arg("--out").arg(scene.path("run")).arg(scene.path("experiment.toml"));
+    let page = LivePage::announced_by(Running::start("scripts/run --watch", &mut command));
+    assert_eq!(page.token.len(), 32, "its page has controls");
+    page.events().wait_for("state", |state| state["chains"]["drive"]["main"] == "experiment");
+    let description = page.get("/api/description").json();
+    assert_eq!((&description["control"], &description["console"]), (&value!(true), &value!(true)));
+    let address = page.address;
+    page.close();
+    assert!(std::net::TcpStream::connect(address).is_err(), "the page ends with the run");
+    assert_eq!(json(&scene.path("run/summary.json"))["records_dropped"], 0);
+}
+
+#[test]
+fn the_program_with_the_page_inside_has_less_than_10_mb() {
+    let bench = executable(Program::Bench, Build::Shipped);
+    let bytes = std::fs::metadata(bench).expect("it is there").len();
+    assert!(bytes < 10_000_000, "bench has {bytes} bytes: is it stripped of line tables?");
 }

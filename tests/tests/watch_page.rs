@@ -13,6 +13,7 @@ use system_tests::launch::Pace;
 use system_tests::process::Running;
 use system_tests::records::{Table, bus_log};
 use system_tests::scene::Scene;
+use system_tests::turn;
 
 /// To and fro, slowly enough for an eye, and a start after a stop.
 const TO_AND_FRO: &str = r#"title = "to and fro"
@@ -71,6 +72,7 @@ fn browser_modules() -> PathBuf {
 
 #[test]
 fn the_page_shows_a_run_and_a_hand_on_it_reaches_the_rig() {
+    let _machine = turn::take();
     let scene = Scene::new(TO_AND_FRO);
     let first = Rig::start(&scene, "first");
     let mut command = Command::new(executable(Program::Bench, Build::Shipped));
@@ -91,6 +93,7 @@ fn the_page_shows_a_run_and_a_hand_on_it_reaches_the_rig() {
     first.end();
     browser.type_line("done");
     browser.wait_for("asks: start");
+    scene.write("experiment.toml", &TO_AND_FRO.replace("to and fro", "to and fro again"));
     let second = Rig::start(&scene, "second");
     browser.type_line("done");
     let ended = browser.wait().expect_code(0);

@@ -199,3 +199,87 @@ fn is_for_later(error: &io::Error) -> bool {
 pub(super) fn refusal() -> Vec<u8> {
     http::said(Status::Busy, "too many clients; --clients N allows more")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+
+    const EVENTS: &str = "GET /api/events HTTP/1.1\r\nHost: localhost:1\r\n\r\n";
+
+    /// A client that came at 0 ms, and its far end.
+    fn pair() -> (Client, TcpStream) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let far = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        (Client::new(listener.accept().unwrap().0, 1, 0).unwrap(), far)
+    }
+
+    /// Has it ask at `now_ms`, and waits until that is there.
+    fn ask(client: &mut Client, far: &mut TcpStream, now_ms: u64) {
+        far.write_all(EVENTS.as_bytes()).unwrap();
+        while client.read(now_ms).is_none() {
+            std::thread::yield_now();
+        }
+    }
+
+    fn is_gone(client: &mut Client, now_ms: u64) -> bool {
+        client.write(now_ms);
+        client.is_gone()
+    }
+
+    #[test]
+    fn one_that_does_not_get_to_the_point_is_parted_with_whatever_it_sends_meanwhile() {
+        let (mut client, mut far) = pair();
+        far.write_all(b"GET /").unwrap();
+        while client.incoming.is_empty() {
+            assert_eq!(client.read(REQUEST_MS - 1), None);
+        }
+        assert!(!is_gone(&mut client, REQUEST_MS - 1));
+        assert!(is_gone(&mut client, REQUEST_MS));
+    }
+
+    #[test]
+    fn an_answer_that_does_not_come_is_told_in_time() {
+        let (mut client, mut far) = pair();
+        ask(&mut client, &mut far, 1000);
+        client.write(1000 + ANSWER_MS - 1);
+        assert_eq!(client.stage, Stage::Waiting);
+        // In this turn it is answered, in the next one that is written.
+        (0..2).for_each(|_| client.write(1000 + ANSWER_MS));
+        assert_eq!(client.stage, Stage::Closing);
+        let mut answer = String::new();
+        far.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 504"), "{answer}");
+        client.answer(http::said(Status::Good, "too late"), 1000 + ANSWER_MS);
+        assert!(!client.has_something_to_write());
+        // It has its answer and does not go.
+        assert!(!is_gone(&mut client, 1000 + ANSWER_MS + CLOSING_MS - 1));
+        assert!(is_gone(&mut client, 1000 + ANSWER_MS + CLOSING_MS));
+    }
+
+    #[test]
+    fn a_listener_that_takes_nothing_is_parted_with_and_a_slow_one_is_not() {
+        let (mut client, mut far) = pair();
+        ask(&mut client, &mut far, 0);
+        client.stream_events(0);
+        let event: Arc<[u8]> = vec![b'x'; QUEUE / 4].into();
+        while client.missed == 0 {
+            client.offer(&event, 0);
+            client.write(0);
+        }
+        assert!(!is_gone(&mut client, STUCK_MS - 1));
+        // It reads all that the kernel holds for it: room for more.
+        let mut bytes = vec![0; QUEUE];
+        while client.last_progress_ms == 0 {
+            let _ = far.read(&mut bytes).unwrap();
+            client.write(STUCK_MS - 1);
+        }
+        assert!(!is_gone(&mut client, STUCK_MS));
+        // It reads no more; what it read before may have made some more room.
+        let mut now_ms = STUCK_MS;
+        while !is_gone(&mut client, now_ms) {
+            assert!(client.has_something_to_write() && now_ms < 10 * STUCK_MS, "{now_ms} ms");
+            now_ms += STUCK_MS;
+        }
+    }
+}

@@ -4,7 +4,7 @@
 
 use super::minute::LONGEST_S;
 use protocol::frames::{
-    EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis, RunControl, RunControlCommand,
+    EmergencyStop, EmergencyStopReason, Frame, HandSetPointAxis, RunControl, RunControlCommand,
 };
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -41,10 +41,8 @@ enum Asked {
     },
     SetPoint {
         axis: AskedAxis,
-        #[serde(default)]
-        position_m: f64,
-        #[serde(default)]
-        force_n: f64,
+        position_m: Option<f64>,
+        force_n: Option<f64>,
     },
     Save {
         seconds: f64,
@@ -67,6 +65,15 @@ pub enum Order {
     Release,
     /// A frame on the bus, once.
     Frame(Frame),
+    /// A set-point by hand on the bus, once: one of both, of which the other is not to change.
+    SetPoint {
+        /// Which axis it is for.
+        axis: HandSetPointAxis,
+        /// Where it is to go, m.
+        position_m: Option<f64>,
+        /// How hard it is to press, N.
+        force_n: Option<f64>,
+    },
     /// A line for the emulator's console.
     Line(String),
     /// The last so many seconds, saved.
@@ -110,11 +117,17 @@ pub fn read(body: &[u8]) -> Result<Order, String> {
         }
         Asked::Mend { .. } => return Err("mend takes a name and a place, or \"all\": true".into()),
         Asked::SetPoint { axis, position_m, force_n } => {
-            let axis = match axis {
-                AskedAxis::Drive => HandSetPointAxis::Drive,
-                AskedAxis::Load => HandSetPointAxis::Load,
+            let (axis, is_fitting) = match axis {
+                AskedAxis::Drive => (HandSetPointAxis::Drive, position_m.is_some() && force_n.is_none()),
+                AskedAxis::Load => (HandSetPointAxis::Load, position_m.is_some() != force_n.is_some()),
             };
-            Order::Frame(Frame::HandSetPoint(HandSetPoint { axis, position_m, force_n }))
+            if !is_fitting {
+                return Err(
+                    "set-point takes position_m of the drive; of the load force_n or position_m, one of both"
+                        .into(),
+                );
+            }
+            Order::SetPoint { axis, position_m, force_n }
         }
         Asked::Save { seconds } if seconds > 0.0 && seconds <= LONGEST_S => Order::Save(seconds),
         Asked::Save { .. } => return Err(format!("seconds: more than 0, at most {LONGEST_S}")),
@@ -165,9 +178,25 @@ mod tests {
         let start = RunControl { command: RunControlCommand::Start, experiment: 0 };
         assert_eq!(read(br#"{"command": "start"}"#), Ok(Order::Frame(Frame::RunControl(start))));
         assert_eq!(read(br#"{"command": "save", "seconds": 60}"#), Ok(Order::Save(60.0)));
-        let press = HandSetPoint { axis: HandSetPointAxis::Load, position_m: 0.0, force_n: 150.0 };
-        let asked = br#"{"command": "set-point", "axis": "load", "force_n": 150}"#;
-        assert_eq!(read(asked), Ok(Order::Frame(Frame::HandSetPoint(press))));
+        let press = Order::SetPoint { axis: HandSetPointAxis::Load, position_m: None, force_n: Some(150.0) };
+        assert_eq!(read(br#"{"command": "set-point", "axis": "load", "force_n": 150}"#), Ok(press));
+        let go = Order::SetPoint { axis: HandSetPointAxis::Drive, position_m: Some(0.0), force_n: None };
+        assert_eq!(read(br#"{"command": "set-point", "axis": "drive", "position_m": 0}"#), Ok(go));
+    }
+
+    #[test]
+    fn a_set_point_that_is_not_given_is_asked_for_and_never_taken_for_0() {
+        for given in [
+            r#""axis": "drive""#,
+            r#""axis": "drive", "position_m": null"#,
+            r#""axis": "drive", "force_n": 100"#,
+            r#""axis": "drive", "position_m": 0.2, "force_n": 0"#,
+            r#""axis": "load""#,
+            r#""axis": "load", "position_m": 0.2, "force_n": 100"#,
+        ] {
+            let refused = read(format!(r#"{{"command": "set-point", {given}}}"#).as_bytes());
+            assert!(refused.is_err_and(|why| why.starts_with("set-point takes position_m")), "{given}");
+        }
     }
 
     #[test]

@@ -4,22 +4,13 @@ use protocol::telemetry::{Decoder, Packet};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Time between two attempts to connect.
 const RETRY_PERIOD: Duration = Duration::from_millis(100);
 /// Bytes taken in one turn: more than the emulator tells in 100 ms.
 const READ_A_TURN: usize = 256 << 10;
-
-/// What became of the connection since it was asked last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Change {
-    /// It is there.
-    Connected,
-    /// It is gone: the emulator ended, or started anew.
-    Gone,
-}
 
 /// The connection.
 pub(super) struct Feed {
@@ -44,16 +35,20 @@ impl Feed {
         }
     }
 
-    /// Hands out what has come, and tells a change; connects if it is time to.
-    pub(super) fn turn(&mut self, mut take: impl FnMut(Packet)) -> Option<Change> {
+    /// Hands out what has come, and connects if it is time to; whether the connection has gone, since the emulator ended or
+    /// started anew.
+    pub(super) fn turn(&mut self, mut take: impl FnMut(Packet)) -> bool {
         if std::mem::take(&mut self.half_a_line) {
             return self.part();
         }
-        let Some(stream) = &mut self.stream else { return self.try_to_connect() };
+        let Some(stream) = &mut self.stream else {
+            self.try_to_connect();
+            return false;
+        };
         let read = match stream.read(&mut self.bytes) {
             Ok(read) if read > 0 => read,
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {
-                return None;
+                return false;
             }
             Ok(_) | Err(_) => return self.part(),
         };
@@ -61,7 +56,7 @@ impl Feed {
         loop {
             match self.decoder.packet() {
                 Ok(Some(packet)) => take(packet),
-                Ok(None) => return None,
+                Ok(None) => return false,
                 Err(error) => {
                     eprintln!("bench watch: {}: {error}", self.path.display());
                     return self.part();
@@ -85,22 +80,25 @@ impl Feed {
         }
     }
 
-    fn part(&mut self) -> Option<Change> {
+    fn part(&mut self) -> bool {
         (self.stream, self.decoder) = (None, Decoder::default());
         self.next_attempt = Instant::now() + RETRY_PERIOD;
-        Some(Change::Gone)
+        true
     }
 
-    fn try_to_connect(&mut self) -> Option<Change> {
+    fn try_to_connect(&mut self) {
         let now = Instant::now();
-        if now < self.next_attempt {
-            return None;
+        if now >= self.next_attempt {
+            self.next_attempt = now + RETRY_PERIOD;
+            // Mostly nobody listens yet.
+            self.stream = connected(&self.path).ok();
         }
-        self.next_attempt = now + RETRY_PERIOD;
-        let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
-        let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None).ok()?;
-        connect(&socket, &SocketAddrUnix::new(&self.path).ok()?).ok()?;
-        self.stream = Some(socket.into());
-        Some(Change::Connected)
     }
+}
+
+fn connected(path: &Path) -> rustix::io::Result<UnixStream> {
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
+    connect(&socket, &SocketAddrUnix::new(path)?)?;
+    Ok(socket.into())
 }

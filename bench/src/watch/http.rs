@@ -141,7 +141,11 @@ pub fn parse(bytes: &[u8]) -> Progress {
 /// digits. A name of somebody's own that leads here (DNS rebinding) would make a foreign page's requests look like ours.
 #[must_use]
 pub fn is_ours(host: &str, port: u16) -> bool {
-    let Some((name, told)) = host.rsplit_once(':') else { return false };
+    let (name, told) = match host.rsplit_once(':') {
+        Some((name, told)) if !told.ends_with(']') => (name, told),
+        // Browsers leave out the port that http has by itself.
+        _ => (host, "80"),
+    };
     let bare = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
     told.parse() == Ok(port) && (name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok())
 }
@@ -240,9 +244,21 @@ mod tests {
         for host in ["localhost:8080", "LOCALHOST:8080", "127.0.0.1:8080", "[::1]:8080", "192.168.0.7:8080"] {
             assert!(is_ours(host, 8080), "{host}");
         }
-        for host in ["localhost", "localhost:80", "evil.example:8080", "127.0.0.1.evil.example:8080", ":8080"]
-        {
+        for host in [
+            "localhost",
+            "localhost:80",
+            "[::1]",
+            "evil.example:8080",
+            "127.0.0.1.evil.example:8080",
+            ":8080",
+        ] {
             assert!(!is_ours(host, 8080), "{host}");
+        }
+        for host in ["localhost", "127.0.0.1", "[::1]", "localhost:80"] {
+            assert!(is_ours(host, 80), "{host}");
+        }
+        for host in ["evil.example", "localhost:8080", ""] {
+            assert!(!is_ours(host, 80), "{host}");
         }
     }
 

@@ -5,9 +5,6 @@ use super::view::{Audience, View};
 use serde_json::Value;
 use std::fmt::{Display, Write as _};
 
-/// Quantiles that are told of a distribution.
-const QUANTILES: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
-
 /// The text of `/metrics`.
 #[must_use]
 pub fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
@@ -68,14 +65,17 @@ pub fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
         let _ = writeln!(text, "airbench_frames_total{{frame=\"{frame}\"}} {count}");
     }
     for (name, samples) in view.rhythm.samples() {
-        let histogram = samples.histogram();
         head(&mut text, format!("{name}_seconds"), "summary", "Latency since this program looks on.");
-        for quantile in QUANTILES {
-            let seconds = histogram.value_at_quantile(quantile) as f64 * 1e-9;
-            let _ = writeln!(text, "airbench_{name}_seconds{{quantile=\"{quantile}\"}} {seconds}");
+        let told = samples.percentiles_ns();
+        for (quantile, ns) in [(0.5, told.p50), (0.9, told.p90), (0.99, told.p99), (0.999, told.p999)] {
+            // One that there are too few samples for has no line, as it is null in the state.
+            if let Some(ns) = ns {
+                let seconds = ns as f64 * 1e-9;
+                let _ = writeln!(text, "airbench_{name}_seconds{{quantile=\"{quantile}\"}} {seconds}");
+            }
         }
         let count = samples.count();
-        let sum_s = histogram.mean() * count as f64 * 1e-9;
+        let sum_s = samples.histogram().mean() * count as f64 * 1e-9;
         let _ = writeln!(text, "airbench_{name}_seconds_sum {sum_s}\nairbench_{name}_seconds_count {count}");
     }
     text
@@ -88,4 +88,29 @@ fn head(text: &mut String, name: impl Display, kind: &str, help: &str) {
 /// A number, or a flag as 0 or 1; what is null has no line.
 fn number(value: &Value) -> Option<f64> {
     value.as_bool().map(|flag| f64::from(u8::from(flag))).or_else(|| value.as_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::hlog::{self, Interval};
+    use protocol::telemetry::Packet;
+
+    #[test]
+    fn a_quantile_that_too_few_samples_cannot_tell_has_no_line() {
+        let mut view = View::new(None);
+        let quantiles = |view: &View| {
+            let text = text(view, Audience::default(), true);
+            text.lines().filter(|line| line.contains("wake_up_seconds{quantile=")).count()
+        };
+        assert_eq!(quantiles(&view), 0, "nothing was measured, and nothing took 0 s");
+        let samples = std::iter::repeat_n(20_000, 100).collect();
+        let interval = Interval { tag: "emulator-wakeup".into(), start_s: 0.0, duration_s: 1.0, samples };
+        let mut log = Vec::new();
+        hlog::write(&mut log, 0.0, [&interval]).unwrap();
+        for line in String::from_utf8(log).unwrap().lines() {
+            view.packet(Packet::Histogram(line.to_owned()));
+        }
+        assert_eq!(quantiles(&view), 3, "all but p99.9, which wants a thousand");
+    }
 }

@@ -14,7 +14,7 @@ const CYCLES_KEPT: usize = 60_000;
 /// Frames that are kept: those of a minute, with room for noise.
 const FRAMES_KEPT: usize = 600_000;
 
-/// What sensors and valves showed in a cycle, and whether the rods were linked with how many weights.
+/// What sensors and valves showed in a cycle.
 #[derive(Clone, Copy, Debug)]
 struct Measured {
     cycle: u64,
@@ -27,6 +27,8 @@ pub struct Minute {
     cycles: VecDeque<Measured>,
     /// Stamped with the time of day.
     frames: VecDeque<FrameRecord>,
+    /// Cycle in which linkage or weights changed last.
+    changed: u64,
 }
 
 /// A record that is to be written; it owns what it needs, so that another thread can.
@@ -37,10 +39,12 @@ pub struct Saved {
     added_mass_kg: f64,
     cycles: Vec<Measured>,
     frames: Vec<FrameRecord>,
+    /// What it has less than was asked for, in words.
+    cut: String,
 }
 
-/// How the rig is set up while a record is saved.
-#[derive(Clone, Copy, Debug)]
+/// How the rig is set up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetUp {
     /// Whether the rods are linked.
     pub linked: bool,
@@ -68,13 +72,25 @@ impl Minute {
         }
     }
 
-    /// The last so many seconds, to be written to a folder of their own in `folder`.
+    /// Notes that linkage or weights changed in this cycle.
+    pub fn change(&mut self, cycle: u64) {
+        self.changed = cycle;
+    }
+
+    /// The last so many seconds, to be written to a folder of their own in `folder`. A record tells one set-up for all of it,
+    /// which is that of its end: it begins no earlier than the last change.
     #[must_use]
     pub fn last(&self, seconds: f64, folder: &Path, interface: &str, set_up: SetUp) -> Saved {
         let newest = self.cycles.back().map_or(0, |measured| measured.cycle);
-        let from = newest.saturating_sub((seconds * 1000.0) as u64);
+        let oldest = self.cycles.front().map_or(0, |measured| measured.cycle);
+        let (mut cycles, mut cut) = ((seconds * 1000.0) as u64, String::new());
+        if self.changed > oldest.max(newest.saturating_sub(cycles)) {
+            cycles = newest.saturating_sub(self.changed);
+            cut = format!(" ({} s, since linkage or weights changed before)", cycles as f64 / 1000.0);
+        }
+        let from = newest.saturating_sub(cycles);
         let newest_ns = self.frames.back().map_or(0, |record| record.stamp_ns);
-        let from_ns = newest_ns.saturating_sub((seconds * 1e9) as u64);
+        let from_ns = newest_ns.saturating_sub(cycles * 1_000_000);
         let SetUp { linked, added_mass_kg } = set_up;
         Saved {
             folder: folder.join(format!("saved-{}", newest_ns / 1_000_000)),
@@ -83,19 +99,21 @@ impl Minute {
             added_mass_kg,
             cycles: self.cycles.iter().filter(|measured| measured.cycle > from).copied().collect(),
             frames: self.frames.iter().filter(|record| record.stamp_ns > from_ns).copied().collect(),
+            cut,
         }
     }
 }
 
 impl Saved {
-    /// Writes it, and gives the folder.
+    /// Writes it, and tells where.
     ///
     /// # Errors
     /// What the system says, with the file's name; an error too when there is nothing to write.
-    pub fn write(self) -> io::Result<PathBuf> {
+    pub fn write(self) -> io::Result<String> {
         if self.frames.is_empty() && self.cycles.is_empty() {
-            return Err(io::Error::other("nothing was heard yet"));
+            return Err(io::Error::other("nothing was heard yet, or not since linkage or weights changed"));
         }
+        let told = format!("saved in {}{}", self.folder.display(), self.cut);
         std::fs::create_dir_all(&self.folder)?;
         let mut log = LineFile::create(&self.folder.join("bus.log"))?;
         for record in &self.frames {
@@ -105,7 +123,7 @@ impl Saved {
         log.write_out()?;
         if self.cycles.is_empty() {
             // Only telemetry tells which valve opening acted in which cycle.
-            return Ok(self.folder);
+            return Ok(told);
         }
         let mut table = LineFile::create(&self.folder.join("measurement.csv"))?;
         write!(table.lines(), "# linked={} added_mass_kg={}\ntime_s", self.linked, self.added_mass_kg)?;
@@ -120,7 +138,7 @@ impl Saved {
             table.write_when_full()?;
         }
         table.write_out()?;
-        Ok(self.folder)
+        Ok(told)
     }
 }
 
@@ -129,8 +147,10 @@ mod tests {
     use super::*;
     use protocol::can::CanFrame;
 
-    #[test]
-    fn a_record_has_the_seconds_that_were_asked_for() {
+    const SET_UP: SetUp = SetUp { linked: true, added_mass_kg: 2.5 };
+
+    /// Three seconds, and a cycle that lacks a value.
+    fn minute() -> Minute {
         let mut minute = Minute::default();
         for cycle in 0..3000 {
             minute.cycle(cycle, [Some(0.25); MEASURED_COUNT]);
@@ -140,15 +160,37 @@ mod tests {
         let mut lacking = [Some(0.25); MEASURED_COUNT];
         lacking[3] = None;
         minute.cycle(3000, lacking);
+        minute
+    }
+
+    /// Saves so many seconds: what is told after the folder, and the lines of `measurement.csv` and `bus.log`.
+    fn saved(minute: &Minute, seconds: f64) -> (String, Vec<String>, usize) {
         let folder = tempfile::tempdir().unwrap();
-        let set_up = SetUp { linked: true, added_mass_kg: 2.5 };
-        let saved = minute.last(1.0, folder.path(), "bus0", set_up).write().unwrap();
-        let table = std::fs::read_to_string(saved.join("measurement.csv")).unwrap();
-        let lines: Vec<_> = table.lines().collect();
-        assert_eq!(lines[0], "# linked=true added_mass_kg=2.5");
+        let told = minute.last(seconds, folder.path(), "bus0", SET_UP).write().unwrap();
+        let told = told.strip_prefix("saved in ").unwrap();
+        let (path, rest) = told.split_once(' ').unwrap_or((told, ""));
+        let table = std::fs::read_to_string(Path::new(path).join("measurement.csv")).unwrap();
+        let log = std::fs::read_to_string(Path::new(path).join("bus.log")).unwrap();
+        (rest.to_owned(), table.lines().map(str::to_owned).collect(), log.lines().count())
+    }
+
+    #[test]
+    fn a_record_has_the_seconds_that_were_asked_for() {
+        let (rest, lines, frames) = saved(&minute(), 1.0);
+        assert_eq!((rest.as_str(), lines[0].as_str()), ("", "# linked=true added_mass_kg=2.5"));
         assert!(lines[1].starts_with("time_s,drive_valve,drive_position_m,drive_force_N"), "{}", lines[1]);
-        assert_eq!((lines.len(), lines[2].split(',').next()), (1002, Some("2.000")));
-        assert_eq!(std::fs::read_to_string(saved.join("bus.log")).unwrap().lines().count(), 1000);
-        assert!(Minute::default().last(1.0, folder.path(), "bus0", set_up).write().is_err());
+        assert_eq!((lines.len(), lines[2].split(',').next(), frames), (1002, Some("2.000"), 1000));
+        let nothing = Minute::default().last(1.0, Path::new("/nowhere"), "bus0", SET_UP);
+        assert!(nothing.write().is_err());
+    }
+
+    #[test]
+    fn a_record_begins_where_its_set_up_did() {
+        let mut minute = minute();
+        minute.change(2499);
+        let (rest, lines, frames) = saved(&minute, 1.0);
+        assert_eq!(rest, "(0.5 s, since linkage or weights changed before)");
+        assert_eq!((lines.len(), lines[2].split(',').next(), frames), (502, Some("2.500"), 500));
+        assert_eq!(saved(&minute, 0.25).0, "", "no change in the last quarter of a second");
     }
 }

@@ -5,7 +5,7 @@ use super::assets;
 use super::cli::WatchArguments;
 use super::client::{Client, refusal};
 use super::control::{self, Order, stop_frame};
-use super::feed::{Change, Feed};
+use super::feed::Feed;
 use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, response, said};
 use super::metrics;
 use super::view::{Audience, View};
@@ -42,8 +42,8 @@ const TOKEN_BYTES: usize = 16;
 /// Interface name in saved logs of a bus without a name of its own.
 const NAMELESS: &str = "bus0";
 
-/// A record that was saved for a client, or why it was not.
-type Saved = (u64, io::Result<PathBuf>);
+/// What became of a record that was saved for a client, or why it was not.
+type Saved = (u64, io::Result<String>);
 
 /// The page and everything behind it.
 pub(super) struct Server {
@@ -198,17 +198,24 @@ impl Server {
             self.tell_status(now_ms);
         }
         let Some(feed) = &mut self.feed else { return };
+        let (had_telemetry, mut described) = (self.view.telemetry, false);
         let (view, mut answers) = (&mut self.view, Vec::new());
-        let change = feed.turn(|packet| match packet {
+        let gone = feed.turn(|packet| match packet {
             Packet::Answer(text) => answers.push(text),
-            packet => view.packet(packet),
+            packet => {
+                described |= matches!(packet, Packet::Description(_));
+                view.packet(packet);
+            }
         });
         answers.iter().for_each(|text| self.hand_on(text, now_ms));
-        if let Some(change) = change {
-            self.view.telemetry = change == Change::Connected;
+        if gone {
+            self.view.telemetry = false;
             for number in std::mem::take(&mut self.asked) {
                 self.answer(number, said(Status::Busy, "the emulator is gone"), now_ms);
             }
+        }
+        // Connected is told with the description, not before it: who hears of it asks for that at once.
+        if described || had_telemetry && gone {
             self.tell_status(now_ms);
         }
     }
@@ -256,7 +263,7 @@ impl Server {
         if let Ok((number, saved)) = self.saved.1.try_recv() {
             self.saving = false;
             let told = match saved {
-                Ok(folder) => said(Status::Good, &format!("saved in {}", folder.display())),
+                Ok(told) => said(Status::Good, &told),
                 Err(error) => said(Status::BadRequest, &error.to_string()),
             };
             self.answer(number, told, now_ms);
@@ -384,6 +391,13 @@ impl Server {
                 Some(self.send(&Frame::ConsoleEmergencyStop(stop_frame(true)), now_ms))
             }
             Order::Frame(frame) => Some(self.send(&frame, now_ms)),
+            Order::SetPoint { axis, position_m, force_n } => {
+                let asked = self.view.wire.hand_set_point(axis, position_m, force_n);
+                Some(match asked {
+                    Some(asked) => self.send(&Frame::HandSetPoint(asked), now_ms),
+                    None => said(Status::Busy, "no controller of this axis is heard"),
+                })
+            }
             Order::Line(line) => {
                 let left = self.feed.as_mut().is_some_and(|feed| feed.command(&line));
                 if left {

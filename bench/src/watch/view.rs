@@ -18,8 +18,9 @@ use std::path::{Path, PathBuf};
 const MESSAGES_KEPT: usize = 200;
 /// Of overruns fewer, so that a bad machine's thousands hide nothing else.
 const OVERRUNS_KEPT: u64 = 20;
-/// Overruns of so many cycles count as of the last minute.
-const MINUTE_CYCLES: u64 = 60_000;
+/// Seconds for which overruns are counted one by one.
+const OVERRUN_SECONDS: usize = 60;
+const SECOND_CYCLES: u64 = 1000;
 /// Kinds of events that a person has to look at, and those that end or stop something.
 const WARNINGS: [&str; 7] =
     ["skipped", "command-stale", "link-refused", "link-given-up", "weights-refused", "malformed", "fault"];
@@ -49,7 +50,8 @@ pub struct View {
     skipped: u64,
     records_lost: u64,
     faults: BTreeMap<u64, Value>,
-    added_mass_kg: f64,
+    /// As the telemetry tells it.
+    set_up: SetUp,
     messages: VecDeque<Value>,
     fresh: Vec<Value>,
 }
@@ -86,7 +88,7 @@ impl View {
             skipped: 0,
             records_lost: 0,
             faults: BTreeMap::new(),
-            added_mass_kg: 0.0,
+            set_up: SetUp::default(),
             messages: VecDeque::new(),
             fresh: Vec::new(),
         }
@@ -103,26 +105,40 @@ impl View {
                     self.tell("warning", &format!("a histogram of the telemetry cannot be read: {error}"));
                 }
             }
-            Packet::Loss(records) => self.records_lost = records,
+            Packet::Loss(records) => {
+                self.records_lost = records;
+                let text = format!("{records} records of the telemetry did not come here");
+                self.tell(
+                    "warning",
+                    &format!("{text}: what is broken and how much was skipped may be out of date"),
+                );
+            }
             Packet::Answer(_) => {}
         }
     }
 
-    /// A run begins, or is joined.
+    /// A run begins, or is joined. The emulator tells what happened in it before; what was of another run would be taken for this
+    /// one's.
     fn describe(&mut self, text: &str) {
         let description: Value = serde_json::from_str(text).unwrap_or_default();
         let out = description["out"].as_str().map(PathBuf::from);
         let folder = self.folder.clone().or(out);
-        let (messages, fresh) = (std::mem::take(&mut self.messages), std::mem::take(&mut self.fresh));
+        let mut wire = std::mem::take(&mut self.wire);
+        wire.begin_anew();
+        let (setup, untold) = (&description["setup"], &description["untold"]);
         let columns = description["columns"].as_array().into_iter().flatten();
         let named = columns.filter_map(|column| Some((column["table"].as_str()?, column["name"].as_str()?)));
         *self = Self {
             layout: Layout::new(named),
             light: Light::new(folder.as_deref()),
-            added_mass_kg: description["setup"]["added_mass_kg"].as_f64().unwrap_or_default(),
+            set_up: SetUp {
+                linked: setup["linked"].as_bool().unwrap_or_default(),
+                added_mass_kg: setup["added_mass_kg"].as_f64().unwrap_or_default(),
+            },
+            overruns: untold["overruns"].as_u64().unwrap_or_default(),
+            skipped: untold["skipped"].as_u64().unwrap_or_default(),
             telemetry: true,
-            messages,
-            fresh,
+            wire,
             ..Self::new(self.folder.as_deref())
         };
         self.description = description;
@@ -192,7 +208,12 @@ impl View {
                 self.skipped += of["cycles"].as_u64().unwrap_or_default();
                 self.recent_overruns.push_back(cycle);
             }
-            "weights" => self.added_mass_kg = of["added_mass_kg"].as_f64().unwrap_or(self.added_mass_kg),
+            "linked" => self.change(cycle, SetUp { linked: true, ..self.set_up }),
+            "unlinked" => self.change(cycle, SetUp { linked: false, ..self.set_up }),
+            "weights" => {
+                let added_mass_kg = of["added_mass_kg"].as_f64().unwrap_or(self.set_up.added_mass_kg);
+                self.change(cycle, SetUp { added_mass_kg, ..self.set_up });
+            }
             "fault" => {
                 let number = of["number"].as_u64().unwrap_or_default();
                 if of["what"] == "begins" {
@@ -218,6 +239,13 @@ impl View {
         self.fresh.push(message);
     }
 
+    fn change(&mut self, cycle: u64, set_up: SetUp) {
+        if set_up != self.set_up {
+            self.set_up = set_up;
+            self.minute.change(cycle);
+        }
+    }
+
     /// A message of the page's own, at the run's newest moment.
     pub fn tell(&mut self, level: &str, text: &str) {
         let t_s = self.cycle.unwrap_or_default() as f64 / 1000.0;
@@ -241,7 +269,8 @@ impl View {
     /// What is due once a second.
     pub fn second(&mut self) {
         let newest = self.cycle.unwrap_or_default();
-        self.recent_overruns.retain(|cycle| cycle + MINUTE_CYCLES >= newest);
+        self.recent_overruns
+            .retain(|cycle| newest.saturating_sub(*cycle) < OVERRUN_SECONDS as u64 * SECOND_CYCLES);
         self.claim = self.light.judge(newest, self.skipped);
     }
 
@@ -251,12 +280,25 @@ impl View {
         self.folder.clone().or_else(|| self.description["out"].as_str().map(PathBuf::from))
     }
 
-    /// How the rig is set up.
+    /// How the rig is set up in the newest cycles.
     #[must_use]
     pub fn set_up(&self) -> SetUp {
-        let at_start = self.description["setup"]["linked"].as_bool().unwrap_or_default();
-        let linked = self.wire.status().map_or(at_start, |status| status.linked);
-        SetUp { linked, added_mass_kg: self.added_mass_kg }
+        self.set_up
+    }
+
+    /// Overruns in each of the last seconds, the one that goes on last.
+    fn overruns_by_second(&self) -> Vec<u64> {
+        let second = |cycle: u64| cycle / SECOND_CYCLES;
+        let now = second(self.cycle.unwrap_or_default());
+        let mut counts = vec![0; OVERRUN_SECONDS];
+        for cycle in &self.recent_overruns {
+            // One that is told ahead of its cycle is of the second that goes on.
+            let ago = now.saturating_sub(second(*cycle)) as usize;
+            if let Some(count) = counts.iter_mut().rev().nth(ago) {
+                *count += 1;
+            }
+        }
+        counts
     }
 
     /// What does not change while a run goes on.
@@ -284,11 +326,11 @@ impl View {
     /// What is so now.
     #[must_use]
     pub fn state(&self, audience: Audience) -> Value {
-        let SetUp { linked, added_mass_kg } = self.set_up();
+        let status = self.wire.status();
         let mut timing = self.rhythm.percentiles();
         if let Value::Object(timing) = &mut timing {
             timing.insert("overruns".into(), self.overruns.into());
-            timing.insert("overruns_last_minute".into(), self.recent_overruns.len().into());
+            timing.insert("overruns_by_second".into(), self.overruns_by_second().into());
             timing.insert("skipped".into(), self.skipped.into());
         }
         json!({
@@ -296,9 +338,9 @@ impl View {
             "t_s": self.cycle.map(|cycle| cycle as f64 / 1000.0),
             "last": self.rows.newest(),
             "emergency_stop": self.wire.emergency_stop(audience.now_ms),
-            "linked": linked,
-            "check_valves_shut": self.wire.status().map(|status| status.check_valves_shut),
-            "weights_kg": added_mass_kg,
+            "linked": status.map_or(self.set_up.linked, |status| status.linked),
+            "check_valves_shut": status.map(|status| status.check_valves_shut),
+            "weights_kg": self.set_up.added_mass_kg,
             "chains": self.wire.chains(audience.now_ms),
             "faults_active": self.faults.values().collect::<Vec<_>>(),
             "bus": self.wire.load(),
@@ -354,4 +396,80 @@ fn faults(listed: &Value) -> Value {
         })
     };
     listed.as_array().into_iter().flatten().map(fault).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::frames::{Frame, Tick};
+
+    fn described(view: &mut View, more: &Value) {
+        let mut description = json!({ "columns": [], "setup": { "linked": false, "added_mass_kg": 1.0 } });
+        description["untold"] = more.clone();
+        view.packet(Packet::Description(description.to_string()));
+    }
+
+    fn event(view: &mut View, cycle: u64, kind: &Value) {
+        view.packet(Packet::Event(json!({ "cycle": cycle, "kind": kind, "text": "so" }).to_string()));
+    }
+
+    fn state(view: &View) -> Value {
+        view.state_with_messages(Audience::default())
+    }
+
+    #[test]
+    fn another_run_begins_with_nothing_of_the_one_before_but_counts_of_frames() {
+        let mut view = View::new(None);
+        described(&mut view, &Value::Null);
+        event(&mut view, 5000, &json!("emergency-stop"));
+        event(&mut view, 5000, &json!({ "skipped": { "cycles": 3 } }));
+        let tick = Tick { cycle: 5000, skipped: 3, catch_up: false, lockstep: false, ending: false };
+        let frame = Frame::Tick(tick).encode().unwrap();
+        view.frame(FrameRecord { stamp_ns: 0, frame }, 900);
+        view.wire.turn(1000);
+        assert_eq!(state(&view)["messages"].as_array().map(Vec::len), Some(2));
+        described(&mut view, &Value::Null);
+        let state = state(&view);
+        assert_eq!((&state["messages"], &state["timing"]["skipped"]), (&json!([]), &json!(0)));
+        assert_eq!(state["bus"]["frames_per_s"]["Tick"], 1.0, "the bus is as full as it was");
+        assert_eq!(view.wire.totals().map(|(_, count)| count).sum::<u64>(), 1);
+    }
+
+    #[test]
+    fn who_comes_late_counts_what_the_emulator_kept_no_event_of() {
+        let mut view = View::new(None);
+        described(&mut view, &json!({ "overruns": 1500, "skipped": 4000 }));
+        view.packet(Packet::Cycle(61_500, Vec::new()));
+        for cycle in [1000, 2000, 60_900, 61_100, 61_200] {
+            event(&mut view, cycle, &json!({ "skipped": { "cycles": 2 } }));
+        }
+        let timing = &state(&view)["timing"];
+        assert_eq!((&timing["overruns"], &timing["skipped"]), (&json!(1505), &json!(4010)));
+        let mut by_second = vec![0; OVERRUN_SECONDS];
+        // Of the seconds 2 to 61, the first, the last but one and the last.
+        (by_second[0], by_second[58], by_second[59]) = (1, 1, 2);
+        assert_eq!(timing["overruns_by_second"], json!(by_second));
+    }
+
+    #[test]
+    fn the_set_up_is_that_of_the_newest_change() {
+        let mut view = View::new(None);
+        described(&mut view, &Value::Null);
+        assert_eq!(view.set_up(), SetUp { linked: false, added_mass_kg: 1.0 });
+        event(&mut view, 10, &json!("linked"));
+        event(&mut view, 20, &json!({ "weights": { "added_mass_kg": 2.5 } }));
+        assert_eq!(view.set_up(), SetUp { linked: true, added_mass_kg: 2.5 });
+        event(&mut view, 30, &json!("unlinked"));
+        assert_eq!(state(&view)["linked"], false);
+    }
+
+    #[test]
+    fn lost_records_are_told() {
+        let mut view = View::new(None);
+        described(&mut view, &Value::Null);
+        view.packet(Packet::Loss(7));
+        let message = &state(&view)["messages"][0];
+        assert_eq!(message["level"], "warning");
+        assert!(message["text"].as_str().unwrap().starts_with("7 records"), "{message}");
+    }
 }

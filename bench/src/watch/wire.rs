@@ -4,8 +4,8 @@ use super::columns::{AXES, MEASURED, MEASURED_COUNT};
 use protocol::bus_load::worst_case_bits;
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ALIVE_RANGE, BIT_RATE_PER_S, ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MESSAGES,
-    RigStatus, Sensors, Tick,
+    ALIVE_RANGE, BIT_RATE_PER_S, ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, HandSetPoint,
+    HandSetPointAxis, MESSAGES, RigStatus, Sensors, Tick,
 };
 use serde_json::{Map, Value, json};
 
@@ -34,15 +34,16 @@ pub enum News {
 /// Frames of the bus, taken in.
 #[derive(Debug, Default)]
 pub struct Wire {
-    /// Of the newest sensors, once a tick has told it.
+    /// The newest that is known of, once a tick has told one.
     cycle: Option<u64>,
-    alive: Option<u8>,
     /// Low bits of the cycle that each controller answered last, as its command to the valve tells.
     echo: [Option<u16>; 2],
-    /// Cycles without sensors here, and how many of them the rig skipped, since the first tick.
-    missing: u64,
-    skipped_at_first: Option<u16>,
+    said: [Option<ChainValues>; 2],
+    /// Sensors of each axis, since the first tick.
+    sensors: [Came; 2],
+    /// Cycles that the rig skipped since then, and what its own count was when it told it last.
     skipped: u64,
+    skipped_told: Option<u16>,
     status: Option<RigStatus>,
     chains: [Option<(u64, ChainStatus)>; 2],
     stops: [Option<u64>; 4],
@@ -50,6 +51,17 @@ pub struct Wire {
     lost: u64,
     malformed: u64,
     frames: Counts,
+}
+
+/// Which sensors of an axis came.
+#[derive(Clone, Copy, Debug, Default)]
+struct Came {
+    /// The newest cycle that was looked for.
+    newest: u64,
+    /// Whether its sensors came, whether those of the cycle before did, and so on: from the lowest bit up.
+    bits: u64,
+    /// Cycles up to it whose sensors did not come.
+    missing: u64,
 }
 
 /// Frames by message, this second and the last.
@@ -78,10 +90,7 @@ impl Wire {
 
     fn obey(&mut self, frame: Frame, now_ms: u64) -> Option<News> {
         match frame {
-            Frame::DriveSensors(sensors) => {
-                self.follow(sensors.alive);
-                self.measure(0, &sensors);
-            }
+            Frame::DriveSensors(sensors) => self.measure(0, &sensors),
             Frame::LoadSensors(sensors) => self.measure(1, &sensors),
             Frame::DriveValveCommand(command) => {
                 self.echo[0] = Some(command.echo);
@@ -95,8 +104,8 @@ impl Wire {
             Frame::RigStatus(status) => self.status = Some(status),
             Frame::DriveChainStatus(status) => self.chains[0] = Some((now_ms, status)),
             Frame::LoadChainStatus(status) => self.chains[1] = Some((now_ms, status)),
-            Frame::DriveChainValues(values) => return Some(News::Said(0, self.answered(0)?, values)),
-            Frame::LoadChainValues(values) => return Some(News::Said(1, self.answered(1)?, values)),
+            Frame::DriveChainValues(values) => return self.hear(0, values),
+            Frame::LoadChainValues(values) => return self.hear(1, values),
             Frame::ConsoleEmergencyStop(stop) => self.note_stop(CONSOLE, stop, now_ms),
             Frame::RigEmergencyStop(stop) => self.note_stop(1, stop, now_ms),
             Frame::DriveEmergencyStop(stop) => self.note_stop(2, stop, now_ms),
@@ -106,6 +115,11 @@ impl Wire {
         None
     }
 
+    fn hear(&mut self, axis: usize, values: ChainValues) -> Option<News> {
+        self.said[axis] = Some(values);
+        Some(News::Said(axis, self.answered(axis)?, values))
+    }
+
     /// The cycle that a controller answered last. Newer sensors may have passed since: a late answer is of its own cycle.
     fn answered(&self, axis: usize) -> Option<u64> {
         let (cycle, echo) = (self.cycle?, self.echo[axis]?);
@@ -113,7 +127,11 @@ impl Wire {
         cycle.checked_sub(age)
     }
 
+    /// Takes sensors; what they show stands until newer ones come, whatever comes late.
     fn measure(&mut self, axis: usize, sensors: &Sensors) {
+        if !self.follow(axis, sensors.alive) {
+            return;
+        }
         let Sensors { position_m, force_n, pressure_a_pa, pressure_b_pa, .. } = *sensors;
         let first = axis * MEASURED.len();
         for (place, value) in [position_m, force_n, pressure_a_pa, pressure_b_pa].into_iter().enumerate() {
@@ -121,34 +139,58 @@ impl Wire {
         }
     }
 
-    /// Goes on to the sensors with this counter, the low bits of their cycle.
-    fn follow(&mut self, alive: u8) {
-        if let (Some(cycle), Some(before)) = (&mut self.cycle, self.alive) {
-            let ahead = (ALIVE_RANGE + u64::from(alive) - u64::from(before)) % ALIVE_RANGE;
-            *cycle += ahead;
-            self.missing += ahead.saturating_sub(1);
-        }
-        self.alive = Some(alive);
+    /// Notes that sensors of an axis came, and tells whether they are its newest. Their counter has the low bits of their cycle,
+    /// which is the one nearest to the newest cycle that is known: a step of more than half of the counter's range goes back.
+    fn follow(&mut self, axis: usize, alive: u8) -> bool {
+        let Some(known) = self.cycle else { return true };
+        let ahead = (ALIVE_RANGE + u64::from(alive) - known % ALIVE_RANGE) % ALIVE_RANGE;
+        let behind = ALIVE_RANGE - ahead;
+        let cycle = if ahead <= behind { known + ahead } else { known.saturating_sub(behind) };
+        self.cycle = Some(known.max(cycle));
+        self.sensors[axis].take(cycle)
     }
 
     fn tick(&mut self, tick: &Tick) -> Option<News> {
         let told = u64::from(tick.cycle);
         let anew = self.cycle.is_some_and(|cycle| told + ALIVE_RANGE < cycle);
         if anew {
-            let frames = std::mem::take(&mut self.frames);
-            *self = Self { frames, malformed: self.malformed, ..Self::default() };
+            self.begin_anew();
         }
-        let first = *self.skipped_at_first.get_or_insert(tick.skipped);
-        self.skipped = (SKIPPED_RANGE + u64::from(tick.skipped) - u64::from(first)) % SKIPPED_RANGE;
-        // A tick ahead of its sensors, after a miss, is of a cycle that is still to come.
-        let behind = self.alive.map_or(0, |alive| (told + ALIVE_RANGE - u64::from(alive)) % ALIVE_RANGE);
-        let cycle = *self.cycle.get_or_insert(told.saturating_sub(behind));
-        if told >= cycle + ALIVE_RANGE {
-            self.missing += (told - cycle) / ALIVE_RANGE * ALIVE_RANGE;
-            self.cycle = Some(cycle + (told - cycle) / ALIVE_RANGE * ALIVE_RANGE);
+        let before = self.skipped_told.replace(tick.skipped).unwrap_or(tick.skipped);
+        self.skipped += (SKIPPED_RANGE + u64::from(tick.skipped) - u64::from(before)) % SKIPPED_RANGE;
+        match self.cycle {
+            None => self.sensors = [Came::since(told); 2],
+            // A tick after a miss comes ahead of the sensors of its cycle, but of no earlier ones.
+            Some(_) => self.sensors.iter_mut().for_each(|came| came.look_for(told.saturating_sub(1))),
         }
-        self.lost = self.lost.max(self.missing.saturating_sub(self.skipped));
+        self.cycle = self.cycle.max(Some(told));
+        let lost = self.sensors.iter().map(|came| came.missing.saturating_sub(self.skipped)).sum();
+        self.lost = self.lost.max(lost);
         Some(News::Cycle(told, anew))
+    }
+
+    /// Another run: of the one before nothing but the counts of frames holds.
+    pub fn begin_anew(&mut self) {
+        let frames = std::mem::take(&mut self.frames);
+        *self = Self { frames, malformed: self.malformed, ..Self::default() };
+    }
+
+    /// A set-point by hand. The frame has room for a position and a force, and the axis follows the one that it controls: what
+    /// was not given is what its controller told last, and leads nowhere. `None` as long as no controller of it was heard.
+    #[must_use]
+    pub fn hand_set_point(
+        &self,
+        axis: HandSetPointAxis,
+        position_m: Option<f64>,
+        force_n: Option<f64>,
+    ) -> Option<HandSetPoint> {
+        let said = match axis {
+            HandSetPointAxis::Drive => self.said[0]?,
+            HandSetPointAxis::Load => self.said[1]?,
+        };
+        let position_m = position_m.unwrap_or(said.position_set_point_m);
+        let force_n = force_n.unwrap_or(said.force_set_point_n);
+        Some(HandSetPoint { axis, position_m, force_n })
     }
 
     /// Notes a stop or its release.
@@ -233,6 +275,33 @@ fn bits(place: usize) -> u32 {
     worst_case_bits(MESSAGES.get(place).map_or(8, |message| message.length))
 }
 
+impl Came {
+    /// From the cycle after this one on: what came before is not known, and nobody's loss.
+    fn since(cycle: u64) -> Self {
+        Self { newest: cycle, bits: u64::MAX, missing: 0 }
+    }
+
+    /// Looks for the sensors of all cycles up to this one: each is missing until it comes.
+    fn look_for(&mut self, cycle: u64) {
+        let more = cycle.saturating_sub(self.newest);
+        self.bits = self.bits.checked_shl(more.min(u64::from(u64::BITS)) as u32).unwrap_or(0);
+        self.newest += more;
+        self.missing += more;
+    }
+
+    /// Takes the sensors of a cycle in time, late or again, and tells whether they are the newest.
+    fn take(&mut self, cycle: u64) -> bool {
+        self.look_for(cycle);
+        // Half of the counter's range at most, since no cycle is looked for that is not known of.
+        let bit = 1 << (self.newest - cycle);
+        if self.bits & bit == 0 {
+            self.bits |= bit;
+            self.missing -= 1;
+        }
+        cycle == self.newest
+    }
+}
+
 impl Counts {
     fn count(&mut self, frame: &CanFrame) {
         self.now.resize(MESSAGES.len() + 1, 0);
@@ -257,12 +326,12 @@ mod tests {
     use super::*;
     use protocol::frames::ValveCommand;
 
-    fn sensors(cycle: u64) -> CanFrame {
-        let (position_m, force_n, pressure_a_pa, pressure_b_pa) = (0.1, 0.0, 1e5, 1e5);
+    /// Of both axes; the position tells the cycle, in mm.
+    fn sensors(cycle: u64) -> [CanFrame; 2] {
+        let (position_m, force_n, pressure_a_pa, pressure_b_pa) = (cycle as f64 * 1e-3, 0.0, 1e5, 1e5);
         let alive = (cycle % ALIVE_RANGE) as u8;
-        Frame::DriveSensors(Sensors { position_m, force_n, pressure_a_pa, pressure_b_pa, alive })
-            .encode()
-            .unwrap()
+        let sensors = Sensors { position_m, force_n, pressure_a_pa, pressure_b_pa, alive };
+        [Frame::DriveSensors(sensors), Frame::LoadSensors(sensors)].map(|frame| frame.encode().unwrap())
     }
 
     fn tick(cycle: u64, skipped: u16) -> CanFrame {
@@ -275,7 +344,7 @@ mod tests {
         let mut wire = Wire::default();
         for cycle in 100..100 + cycles {
             if !without.contains(&cycle) {
-                wire.take(&sensors(cycle), cycle);
+                go_on(&mut wire, cycle..cycle + 1);
             }
             if cycle % 10 == 0 {
                 wire.take(&tick(cycle, if cycle > 120 { skipped } else { 0 }), cycle);
@@ -284,13 +353,67 @@ mod tests {
         wire
     }
 
+    fn go_on(wire: &mut Wire, cycles: impl IntoIterator<Item = u64>) {
+        for frame in cycles.into_iter().flat_map(sensors) {
+            wire.take(&frame, 0);
+        }
+    }
+
     #[test]
     fn cycles_are_followed_between_ticks_and_over_gaps() {
         let wire = wire(58, &[103, 131, 132], 2);
         assert_eq!(wire.cycle, Some(157));
-        assert_eq!(wire.load()["lost"], 1, "three are missing, and two of them the rig skipped");
+        assert_eq!(wire.load()["lost"], 2, "three are missing of each axis, and two of them the rig skipped");
         let gap: Vec<u64> = (125..165).collect();
-        assert_eq!(self::wire(80, &gap, 0).cycle, Some(179), "a gap longer than the counter");
+        let wire = self::wire(80, &gap, 0);
+        assert_eq!(
+            (wire.cycle, &wire.load()["lost"]),
+            (Some(179), &json!(80)),
+            "a gap longer than the counter"
+        );
+    }
+
+    #[test]
+    fn sensors_that_were_overtaken_are_late_and_not_lost() {
+        let mut wire = wire(21, &[], 0);
+        go_on(&mut wire, [122, 121, 123, 123, 125, 126, 127, 124]);
+        assert_eq!(wire.cycle, Some(127));
+        assert_eq!(wire.measured()[1].map(|m| (m * 1e3).round()), Some(127.0), "the newest stand");
+        go_on(&mut wire, 128..=130);
+        assert_eq!(wire.take(&tick(130, 0), 0), Some(News::Cycle(130, false)));
+        assert_eq!(wire.load()["lost"], 0);
+        // Told as lost by the tick between, and no reason to overlook the next one.
+        go_on(&mut wire, (131..140).filter(|cycle| *cycle != 138));
+        wire.take(&tick(140, 0), 0);
+        go_on(&mut wire, [138, 140]);
+        wire.take(&tick(140, 0), 0);
+        assert_eq!(wire.load()["lost"], 2);
+        go_on(&mut wire, (141..150).filter(|cycle| *cycle != 145));
+        wire.take(&tick(150, 0), 0);
+        assert_eq!(wire.load()["lost"], 2, "of each axis one is missing still");
+    }
+
+    #[test]
+    fn sensors_of_the_load_are_missed_too() {
+        let mut wire = wire(21, &[], 0);
+        for cycle in 121..=130 {
+            let [drive, load] = sensors(cycle);
+            wire.take(&drive, 0);
+            if cycle != 125 {
+                wire.take(&load, 0);
+            }
+        }
+        wire.take(&tick(130, 0), 0);
+        assert_eq!(wire.load()["lost"], 1);
+    }
+
+    #[test]
+    fn a_tick_after_a_miss_comes_ahead_of_its_sensors() {
+        let mut wire = wire(21, &[], 0);
+        wire.take(&tick(133, 12), 0);
+        go_on(&mut wire, 133..=140);
+        wire.take(&tick(140, 12), 0);
+        assert_eq!((wire.cycle, &wire.load()["lost"]), (Some(140), &json!(0)));
     }
 
     #[test]
@@ -298,19 +421,35 @@ mod tests {
         let mut wire = wire(58, &[], 0);
         assert_eq!(wire.take(&tick(160, 0), 0), Some(News::Cycle(160, false)));
         assert_eq!(wire.take(&tick(0, 0), 0), Some(News::Cycle(0, true)));
-        wire.take(&sensors(0), 0);
+        go_on(&mut wire, 0..=0);
         assert_eq!(wire.cycle, Some(0));
+        let total: u64 = wire.totals().map(|(_, count)| count).sum();
+        assert_eq!(total, 2 * 58 + 6 + 2 + 2, "counts of frames go on");
+    }
+
+    const VALUES: ChainValues = ChainValues {
+        averaged_position_m: 0.1,
+        position_set_point_m: 0.2,
+        force_set_point_n: 100.0,
+        control_error_m: 0.1,
+    };
+
+    #[test]
+    fn what_a_hand_does_not_give_stays_as_the_controller_told_it() {
+        let mut wire = Wire::default();
+        let axis = HandSetPointAxis::Load;
+        assert_eq!(wire.hand_set_point(axis, None, Some(150.0)), None, "nobody knows where it stands");
+        wire.take(&Frame::LoadChainValues(VALUES).encode().unwrap(), 0);
+        let stays_m =
+            wire.hand_set_point(axis, None, Some(150.0)).map(|asked| (asked.position_m * 1e4).round());
+        assert_eq!(stays_m, Some(2000.0), "0.2 m to the step of the wire");
+        let given = wire.hand_set_point(axis, Some(0.3), None).unwrap();
+        assert!(given.position_m == 0.3 && (given.force_n - 100.0).abs() < 0.1, "{given:?}");
     }
 
     #[test]
     fn what_a_late_controller_says_is_of_the_cycle_that_it_answers() {
-        let values = ChainValues {
-            averaged_position_m: 0.1,
-            position_set_point_m: 0.2,
-            force_set_point_n: 0.0,
-            control_error_m: 0.1,
-        };
-        let said = Frame::DriveChainValues(values).encode().unwrap();
+        let said = Frame::DriveChainValues(VALUES).encode().unwrap();
         let mut wire = wire(58, &[], 0);
         assert_eq!(wire.take(&said, 0), None, "nobody knows of which cycle");
         let command = ValveCommand { opening: 0.0, enable: true, alive: 1, echo: 154 };
@@ -336,12 +475,10 @@ mod tests {
     #[test]
     fn a_load_is_that_of_the_last_second() {
         let mut wire = Wire::default();
-        for cycle in 0..1000 {
-            wire.take(&sensors(cycle), cycle);
-        }
+        go_on(&mut wire, (0..1000).map(|cycle| cycle % 500));
         wire.turn(1000);
         let load = wire.load();
         assert_eq!(load["frames_per_s"]["DriveSensors"], 1000.0);
-        assert_eq!(load["load_percent"], f64::from(worst_case_bits(8)) / 10.0);
+        assert_eq!(load["load_percent"], f64::from(2 * worst_case_bits(8)) / 10.0);
     }
 }

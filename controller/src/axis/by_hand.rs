@@ -1,8 +1,9 @@
-//! Set-points that a person gives while an experiment runs, instead of its row where that rests.
+//! Set-points that a person gives while an experiment runs, instead of its row.
 //!
 //! The newest one is approached along a sinoid from where the set-point stands. A way that has begun is gone to its end, since
 //! only there it is at rest; what was asked for meanwhile comes behind it. What is asked for while the row moves waits for its
-//! rest.
+//! rest. From the first way on a hand leads until the experiment ends: what the row still had is left out, since nobody could
+//! tell where it would take over from a hand.
 
 use crate::chains::main::Phase;
 use crate::experiment::ByHandLimits;
@@ -116,6 +117,21 @@ mod tests {
         assert_eq!(hand.end(), Some(0.5), "held, and nobody listens");
         hand.hear(Phase::HoldStart, Some(0.1));
         assert_eq!((hand.at(0.0, ROW), hand.end()), (ROW, None));
+    }
+
+    #[test]
+    fn a_row_that_moves_on_after_a_hand_has_led_is_left_out() {
+        let mut hand = ByHand::new(LIMITS);
+        ask(&mut hand, 0.3);
+        hand.at(0.0, ROW);
+        let row = Moment { value: 0.15, rate: 0.1, moving: true, ..ROW };
+        assert_eq!(hand.at(2.0, row), Moment { value: 0.3, ..ROW }, "held where the hand has led to");
+        ask(&mut hand, 0.2);
+        assert!(
+            hand.at(3.0, row).moving && hand.at(3.5, row).rate < 0.0,
+            "the hand is followed, and not the row"
+        );
+        assert_eq!(hand.at(4.0, Moment { moving: false, ..row }).value, 0.2);
     }
 
     #[test]

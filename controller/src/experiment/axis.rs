@@ -19,8 +19,8 @@
 //! Whether the row is of positions or of forces follows from its laws and their keys (`to_m`, `to_n`); a row that says neither is
 //! of positions for the drive and of forces for the load axis.
 //!
-//! With a largest speed (or rate) by hand, the axis follows the frame `HandSetPoint` while the experiment lasts, where its row
-//! rests.
+//! With a largest speed (or rate) by hand, the first frame `HandSetPoint` that finds the row at rest takes over: from then on the
+//! axis follows these frames while the experiment lasts, and the row no more.
 
 use super::section::{ExperimentError, Section};
 use crate::algorithm::Quantity;

@@ -9,7 +9,7 @@ use super::evidence::{Evidence, EvidenceReport, EvidenceSetup};
 use crate::event::{Event, EventKind};
 use crate::faults::mark;
 use crate::pace::Shared;
-use crate::telemetry::Telemetry;
+use crate::telemetry::{Telemetry, Untold};
 use plant::tables;
 use protocol::candump::{self, FrameRecord};
 use protocol::flight_dump::Log;
@@ -84,6 +84,7 @@ pub struct Writer {
     evidence: Option<Evidence>,
     pending: Vec<FrameRecord>,
     told: HashMap<Discriminant<EventKind>, usize>,
+    untold: Untold,
     report: WriterReport,
 }
 
@@ -119,6 +120,7 @@ impl Writer {
             evidence,
             pending,
             told: HashMap::new(),
+            untold: Untold::default(),
             report,
         })
     }
@@ -199,7 +201,7 @@ impl Writer {
         if let Some(evidence) = &mut self.evidence {
             telemetry.histograms(&evidence.new_lines());
         }
-        telemetry.serve(&self.report.events);
+        telemetry.serve(&self.report.events, self.untold);
     }
 
     fn finish_evidence(&mut self) -> io::Result<()> {
@@ -226,8 +228,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Tells and keeps the event. Each kind has a quota of its own: on a bad machine late wake-ups and stale commands come by thousands,
-    /// and must hide nothing else.
+    /// Tells and keeps the event. Each kind has a quota of its own: on a bad machine late wake-ups and stale commands come by
+    /// thousands, and must hide nothing else.
     fn tell(&mut self, event: Event) -> io::Result<()> {
         self.report.event_count += 1;
         if let Some(telemetry) = &mut self.telemetry {
@@ -245,6 +247,9 @@ impl Writer {
         *told += 1;
         if *told <= EVENTS_KEPT {
             self.report.events.push(event);
+        } else if let EventKind::Skipped { cycles } = event.kind {
+            self.untold.overruns += 1;
+            self.untold.skipped += cycles;
         }
         if *told < most_told {
             eprintln!("emulator: {event}");
@@ -312,5 +317,6 @@ mod tests {
             (writer.report.events.len(), writer.report.events.last()),
             (2 * EVENTS_KEPT + 1, Some(&rare))
         );
+        assert_eq!(writer.untold, Untold { overruns: 10, skipped: 30 }, "counted for who comes late");
     }
 }

@@ -11,10 +11,12 @@
 //! | `rig` | numbers that a drawing needs, in SI, the unit in the name |
 //! | `setup` | linkage and weights at the start |
 //! | `faults` | as `emulator faults --json` lists them |
+//! | `untold` | what [`Untold`] has when the viewer comes: the events that follow are the first ones of each kind |
 
 use crate::cli::RunArguments;
 use crate::faults::listing;
 use crate::inputs::Inputs;
+use crate::telemetry::Untold;
 use plant::{Truth, tables};
 use protocol::run_folder::SCHEMA_VERSION;
 use serde_json::{Value, json};
@@ -83,6 +85,7 @@ pub fn description(run: &Described<'_>) -> Value {
             "added_mass_kg": inputs.scene.added_mass_kg,
         },
         "faults": listing::faults(),
+        "untold": Untold::default(),
     })
 }
 

@@ -35,7 +35,12 @@ const PLACES = {
 };
 const COLUMNS = 3;
 /** States that are reached from any other, or nearly: one arrow says so. */
-const ANYWHERE = { main: ["aborted", "fault"], force: ["fault"], "emergency-stop": ["tripped"] };
+const ANYWHERE = {
+  main: ["aborted", "fault", "waiting-for-rig"],
+  force: ["fault"],
+  matching: ["idle"],
+  "emergency-stop": ["tripped"],
+};
 
 /** Each state's column and row. */
 export function places({ name, states }) {

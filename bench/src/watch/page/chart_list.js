@@ -53,6 +53,7 @@ export const CHARTS = [
     least: 10,
     lines: [
       line("drive_valve_opening", "drive’s command", "wanted"),
+      line("load_valve_opening", "load’s command", "given"),
       line("drive_spool_opening", "drive", "s0"),
       line("load_spool_opening", "load", "s1"),
     ],

@@ -6,6 +6,7 @@ import { byId, element, say, set } from "./dom.js";
 import { FaultForm } from "./fault_form.js";
 import { addMessage } from "./messages.js";
 import { KEPT_S } from "./store.js";
+import { MM } from "./units.js";
 
 const STOP_KEY = "Escape";
 const PAUSE_KEY = "p";
@@ -15,6 +16,7 @@ const DEFAULT_PUSH_N = 40;
 const MOST_PUSH_N = 500;
 const DEFAULT_FORCE_N = 100;
 const MOST_FORCE_N = 1000;
+const MISSING = "Fill in a number first: nothing was asked for.";
 
 export class Controls {
   /** `pause` pauses the charts. */
@@ -48,6 +50,8 @@ export class Controls {
     );
     this.faults.describe(description.faults ?? []);
     set(this.weights, { max: description.rig?.added_mass_limit_kg ?? DEFAULT_WEIGHTS_LIMIT_KG });
+    const stroke_m = description.rig?.stroke_m;
+    if (stroke_m) set(this.place, { max: MM.factor * stroke_m });
   }
 
   show(state) {
@@ -61,9 +65,11 @@ export class Controls {
     if (document.activeElement !== this.weights && !this.isEdited) this.weights.value = state.weights_kg ?? 0;
   }
 
-  async act(command, parameters) {
+  async act(command, parameters = {}) {
     if (!this.allowed) return;
-    const { ok, message } = await send(command, parameters);
+    // A field that holds no number must not be taken for 0.
+    const lacks = Object.values(parameters).some(Number.isNaN);
+    const { ok, message } = lacks ? { ok: false, message: MISSING } : await send(command, parameters);
     set(byId("answer"), { class: ok ? "answer good" : "answer bad" });
     say(byId("answer"), message);
     if (!ok) addMessage({ t_s: null, level: "warning", text: message });
@@ -100,12 +106,12 @@ export class Controls {
       element("option", { value: "carriage" }, "carriage"),
       element("option", { value: "load" }, "load"),
     );
-    const place = number({ id: "place", min: 0, max: 500, step: 10, value: 250 });
+    this.place = number({ id: "place", min: 0, step: 10, value: 250 });
     const force = number({ id: "force", min: 0, max: MOST_FORCE_N, step: 10, value: DEFAULT_FORCE_N });
     const seconds = number({ id: "save-seconds", min: 1, max: KEPT_S, step: 1, value: KEPT_S });
     const setWeights = button("Put on", "weights", () => {
       this.isEdited = false;
-      return { kg: Number(this.weights.value) };
+      return { kg: this.weights.valueAsNumber };
     });
     byId("controls").append(
       group("Run", element("div", { class: "row" }, this.start, button("Abort", "abort"), this.release)),
@@ -124,7 +130,7 @@ export class Controls {
           { class: "row" },
           element("label", {}, "a hand pushes ", on),
           element("label", {}, "with ", push, " N"),
-          button("Push", "hand", () => ({ on: on.value, newton: Number(push.value) })),
+          button("Push", "hand", () => ({ on: on.value, newton: push.valueAsNumber })),
           button("Let go", "hand", () => ({ on: on.value, newton: 0 })),
         ),
       ),
@@ -133,14 +139,14 @@ export class Controls {
         element(
           "div",
           { class: "row" },
-          element("label", {}, "drive to ", place, " mm"),
-          button("Go", "set-point", () => ({ axis: "drive", position_m: Number(place.value) / 1000 })),
+          element("label", {}, "drive to ", this.place, " mm"),
+          button("Go", "set-point", () => ({ axis: "drive", position_m: this.place.valueAsNumber / MM.factor })),
         ),
         element(
           "div",
           { class: "row" },
           element("label", {}, "load with ", force, " N"),
-          button("Press", "set-point", () => ({ axis: "load", force_n: Number(force.value) })),
+          button("Press", "set-point", () => ({ axis: "load", force_n: force.valueAsNumber })),
         ),
         element("p", { class: "small" }, "Obeyed by experiments that allow it, such as by-hand."),
       ),
@@ -151,7 +157,7 @@ export class Controls {
           "div",
           { class: "row" },
           element("label", {}, "the last ", seconds, " s"),
-          button("Save", "save", () => ({ seconds: Number(seconds.value) })),
+          button("Save", "save", () => ({ seconds: seconds.valueAsNumber })),
         ),
       ),
     );

@@ -27,7 +27,6 @@ export class Heartbeat {
     this.overruns = element("b", {}, "0");
     this.skipped = element("span", {}, "–");
     this.seconds = Array.from({ length: SECONDS }, () => element("i", {}));
-    this.perSecond = new Map();
     this.last = null;
     this.load = element("p", { class: "lead" });
     this.frames = element("tbody");
@@ -93,25 +92,21 @@ export class Heartbeat {
     );
   }
 
-  showOverruns(t_s, { overruns = 0, skipped = 0 }) {
+  showOverruns(t_s, { overruns = 0, skipped = 0, overruns_by_second = [] }) {
     say(this.overruns, count(overruns));
     say(this.skipped, count(skipped));
-    const second = Math.floor(t_s ?? 0);
-    if (this.last === null || overruns < this.last.overruns || second < this.last.second) this.perSecond.clear();
-    else if (overruns > this.last.overruns) {
-      this.perSecond.set(second, (this.perSecond.get(second) ?? 0) + overruns - this.last.overruns);
+    if (this.last !== null && overruns > this.last) {
       byId("overruns").animate?.([{ backgroundColor: "var(--mark)" }, { backgroundColor: "transparent" }], 900);
     }
-    if (this.last?.second === second && this.last.overruns === overruns) return;
-    this.last = { overruns, second };
+    this.last = overruns;
+    const first = Math.floor(t_s ?? 0) - SECONDS + 1;
     this.seconds.forEach((bar, place) => {
-      const many = this.perSecond.get(second - SECONDS + 1 + place) ?? 0;
+      const many = overruns_by_second[place] ?? 0;
       // One is seen, ten fill the strip.
       const height = many === 0 ? 0 : Math.min(100, 30 + 70 * Math.log10(many));
       bar.style.height = `${height}%`;
-      set(bar, { title: many ? `${many} in second ${second - SECONDS + 1 + place}` : "" });
+      set(bar, { title: many ? `${many} in second ${first + place}` : "" });
     });
-    for (const known of this.perSecond.keys()) if (known < second - SECONDS) this.perSecond.delete(known);
   }
 
   busTable() {

@@ -23,15 +23,11 @@ export function ruler(at) {
   });
   const line = drawn("path", { class: "edge", d: `M${from} ${y}h${at.stroke}` });
   const wanted = drawn("path", { class: "wanted" });
-  const load = drawn("path", { class: "wanted wanted-load" });
   const show = ({ value }) => {
-    mark(wanted, value("drive_set_point_m"));
-    mark(load, value("load_set_point_m"));
-  };
-  const mark = (shape, position_m) => {
+    const position_m = value("drive_set_point_m");
     const is_there = position_m !== null && position_m !== undefined;
-    set(shape, { visibility: is_there ? "visible" : "hidden" });
-    if (is_there) set(shape, { d: `M${from + position_m * at.perMetre} ${y}l6 11h-12z` });
+    set(wanted, { visibility: is_there ? "visible" : "hidden" });
+    if (is_there) set(wanted, { d: `M${from + position_m * at.perMetre} ${y}l6 11h-12z` });
   };
   const rail = drawn("rect", { class: "rail", x: at.way, y: y - 8, width: at.carriage + at.stroke, height: 4 });
   return { elements: [rail, line, ...ticks, wanted], show };
