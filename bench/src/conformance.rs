@@ -38,7 +38,7 @@ use stand_in::{Disturbance, StandIn};
 use std::io::{self, Write};
 use std::os::unix::fs::DirBuilderExt;
 use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use watch::Watch;
 
@@ -52,7 +52,7 @@ const SETTLING_CYCLES: u64 = 100;
 /// An opening that is no accident, and for how many cycles.
 const OPEN: f64 = 0.02;
 const OPEN_CYCLES: u64 = 10;
-/// Cycles that an emergency stop, and a loss of sensors, lasts; and what is watched after sensors are back.
+/// Cycles that an emergency stop, and a loss of sensors, lasts; and those for which it is watched once sensors are back.
 const STOP_CYCLES: u64 = 500;
 const LOSS_CYCLES: u64 = 200;
 const BACK_CYCLES: u64 = 200;
@@ -108,8 +108,14 @@ impl ConformanceError {
 pub fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
     let interrupt = Interrupt::watch().map_err(ConformanceError::System)?;
     let began = Instant::now();
-    let own = OwnFolder::new().map_err(ConformanceError::System)?;
-    let url = arguments.bus.clone().unwrap_or_else(|| own.url());
+    // The folder goes when the check is over.
+    let (url, _own) = match arguments.bus.clone() {
+        Some(url) => (url, None),
+        None => {
+            let own = OwnFolder::new().map_err(ConformanceError::System)?;
+            (own.url(), Some(own))
+        }
+    };
     let real = arguments.pace == CheckPace::Real;
     let mut cases: Vec<Case> = Vec::new();
     let sessions: [Part; 3] = [regular, emergency_stop, sensor_loss];
@@ -168,7 +174,7 @@ struct Session<'a> {
     arguments: &'a ConformanceArguments,
     interrupt: &'a Interrupt,
     // Before the line: it is asked to end while its bus is there.
-    _controller: Option<Controller>,
+    controller: Option<Controller>,
     line: Line,
     rig: StandIn,
     watch: Watch,
@@ -206,10 +212,7 @@ fn regular(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
         let detail = "simulated time skips nothing: check it with --pace real".into();
         cases.push(case("skipped-cycles", "every-cycle", CheckResult::Skipped, detail));
     }
-    if let Some(broken) = &session.broken {
-        let detail = format!("in cycle {}: {broken:?}", session.cycle);
-        cases.push(case("regular", "to-the-end", CheckResult::Failed, detail));
-    }
+    cases.push(session.about_the_end("regular"));
     Ok(cases)
 }
 
@@ -220,7 +223,9 @@ fn emergency_stop(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceErro
     }
     let from = session.cycle;
     session.cycles(STOP_CYCLES, Disturbance { stopped_since: Some(from), ..Disturbance::default() })?;
-    Ok(judge::emergency_stop(&session.watch.heard, from..from + STOP_CYCLES))
+    let mut cases = judge::emergency_stop(&session.watch.heard, from..session.cycle);
+    cases.push(session.about_the_end("emergency-stop"));
+    Ok(cases)
 }
 
 /// The valve opens, the sensors fall silent, and come back.
@@ -235,8 +240,11 @@ fn sensor_loss(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> 
     }
     let from = session.cycle;
     session.cycles(LOSS_CYCLES, Disturbance { sensors_lost: true, ..Disturbance::default() })?;
+    let back = session.cycle;
     session.cycles(BACK_CYCLES, Disturbance::default())?;
-    Ok(judge::sensor_loss(&session.watch.heard, from..from + LOSS_CYCLES))
+    let mut cases = judge::sensor_loss(&session.watch.heard, from..back, back..session.cycle);
+    cases.push(session.about_the_end("sensor-loss"));
+    Ok(cases)
 }
 
 impl<'a> Session<'a> {
@@ -254,7 +262,7 @@ impl<'a> Session<'a> {
         let mut session = Self {
             arguments,
             interrupt,
-            _controller: controller,
+            controller,
             line,
             rig: StandIn::new(arguments.axis, lockstep),
             watch: Watch::new(arguments.axis, arguments.both_axes),
@@ -281,7 +289,10 @@ impl<'a> Session<'a> {
             let watch = &mut self.watch;
             match self.line.exchange(&self.frames, |frame, stamp_ns| watch.take(frame, stamp_ns)) {
                 Ok(sent) => self.cycles.push((self.cycle, (!sent.disturbed).then_some(sent.stamp_ns))),
-                Err(broken) => self.broken = Some(broken),
+                Err(broken) => {
+                    self.broken = Some(broken);
+                    return Ok(());
+                }
             }
             let opening = if disturbance.stopped_since.is_some() { 0.0 } else { self.watch.opening };
             self.rig.advance(opening);
@@ -332,10 +343,25 @@ impl<'a> Session<'a> {
     fn about_answers(&self) -> String {
         match (&self.broken, self.watch.heard.first()) {
             (_, Some(first)) => format!("the first frame came in cycle {}", first.cycle),
-            (Some(Broken::NobodyThere), _) => "nobody joined the barrier".into(),
-            (Some(Broken::TimedOut(name)), _) => format!("{name} did not answer cycle {}", self.cycle - 1),
+            (Some(Broken::NobodyThere), _) => "nobody is in the barrier".into(),
+            (Some(Broken::TimedOut(name)), _) => format!("{name} did not answer cycle {}", self.cycle),
             (None, None) => format!("nothing came in {} cycles", self.cycle),
         }
+    }
+
+    /// Whether the controller was there all the time. A fault that ends it shuts its valve, too, and must not pass for that.
+    fn about_the_end(&mut self, class: &str) -> Case {
+        let ended = self.controller.as_mut().and_then(Controller::ended);
+        let why = match (&self.broken, ended) {
+            (Some(broken), _) => format!("{broken:?}"),
+            (None, _) if self.watch.babbles() => format!("it babbles, {} frames", self.watch.heard.len()),
+            (None, Some(status)) => format!("its process has ended: {status}"),
+            (None, None) => {
+                let detail = format!("{} cycles", self.cycles.len());
+                return case(class, "to-the-end", CheckResult::Passed, detail);
+            }
+        };
+        case(class, "to-the-end", CheckResult::Failed, format!("in cycle {}: {why}", self.cycle))
     }
 
     fn nothing_to_see(&self, class: &str) -> Case {
@@ -373,11 +399,19 @@ impl Controller {
         })?;
         Ok(Some(Self(child)))
     }
+
+    /// How it ended, if it has.
+    fn ended(&mut self) -> Option<ExitStatus> {
+        self.0.try_wait().ok().flatten()
+    }
 }
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        // One that has ended already is what is wanted.
+        if self.ended().is_some() {
+            // Its number may be another's by now.
+            return;
+        }
         let _ = kill_process(Pid::from_child(&self.0), Signal::TERM);
         let until = Instant::now() + END_PATIENCE;
         while Instant::now() < until {

@@ -113,10 +113,15 @@ pub fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
         gateway.turn().map_err(GatewayError::System)?;
     }
     let report = gateway.close();
+    // Of an embedded bus only its host knows what did not fit the gateway's queue.
+    let dropped = match arguments.bus {
+        BusUrl::Can { .. } => format!(", {} lost at its own queue", report.bus_counters.dropped_on_receive),
+        BusUrl::Unix { .. } => String::new(),
+    };
     // Whoever closed the pipe has read enough.
     let _ = writeln!(
         io::stdout(),
-        "gateway: {} clients, {} frames to them, {} lost, {} frames from them, {} connections refused",
+        "gateway: {} clients, {} frames to them, {} lost, {} frames from them, {} connections refused{dropped}",
         report.connections,
         report.frames_to_clients,
         report.frames_lost,
@@ -140,6 +145,8 @@ struct Gateway {
     began: Instant,
     last_told: Instant,
     refused_told: u64,
+    /// Frames that did not fit the gateway's own queue at the bus.
+    dropped_told: u64,
     /// Frames may be left from the turn before.
     more: bool,
     text: String,
@@ -185,6 +192,7 @@ impl Gateway {
             began: now,
             last_told: now,
             refused_told: 0,
+            dropped_told: 0,
             more: false,
             text: String::with_capacity(LONGEST_FRAME),
             report,
@@ -354,7 +362,7 @@ impl Gateway {
         }
     }
 
-    /// Tells, once a second at most, what was lost and who was refused since.
+    /// Tells, once a second at most, what was lost, at the clients and before them, and who was refused since.
     fn tell(&mut self) {
         if self.last_told.elapsed() < TELL_EVERY {
             return;
@@ -369,6 +377,12 @@ impl Gateway {
             eprintln!(
                 "gateway: {refused} connections refused so far: {} clients are here, --clients N allows more",
                 self.clients.len()
+            );
+        }
+        let dropped = self.bus.counters().dropped_on_receive;
+        if dropped > std::mem::replace(&mut self.dropped_told, dropped) {
+            eprintln!(
+                "gateway: {dropped} frames lost to all clients so far: the gateway's own queue at the bus was full"
             );
         }
     }

@@ -8,7 +8,6 @@ use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
 use crate::points::{Point, Points};
 use crate::shelf::{RigFile, Shelf, Text};
 use controller::program::file::Source;
-use emulator::wire_limits;
 use plant::effects::draw::{Among, Urn};
 use plant::effects::sheet;
 use plant::{Axis, RigParameters, Scene};
@@ -73,8 +72,6 @@ pub fn condition<'s>(
     let rig_toml = edited(&nominal.file, &sorted.rig)?;
     let rig_name = nominal.file.path.display().to_string();
     let rig = RigParameters::from_toml(&rig_toml, &rig_name).map_err(|error| refused(error.to_string()))?;
-    // A rehearsal has no wire; what it shows is to be that of a rig that has.
-    wire_limits::check(&rig).map_err(|misfit| refused(format!("{rig_name}: {misfit}")))?;
     let experiment_toml = edited(experiment, &sorted.experiment)?;
     let file = experiment.path.display().to_string();
     let scene =
@@ -236,17 +233,6 @@ mod tests {
             error.to_string().contains("run 1: rig.toml:") && error.message.contains("sliding_force_n"),
             "{error}"
         );
-    }
-
-    #[test]
-    fn a_rig_that_no_wire_could_carry_is_none() {
-        let (shelf, points) = shelf(
-            "title = \"t\"\nexperiment = \"step\"\n[[vary]]\nrig = \"sensors.position_bits\"\nlist = [16, 12]\n",
-        );
-        let told =
-            [0, 1].map(|run| condition(&shelf, &points, &points.point(run)).map_err(|error| error.message));
-        let [good, bad] = told;
-        assert!(good.is_ok() && bad.is_err_and(|message| message.contains("sensors.position_bits")));
     }
 
     #[test]

@@ -292,7 +292,7 @@ impl At<'_> {
         kind: &Kind,
         factors: &[Factor],
     ) -> Result<Vec<String>, FileError> {
-        let mut taken: Vec<&str> = RESERVED.iter().copied().collect();
+        let mut taken: Vec<&str> = RESERVED.to_vec();
         taken.extend(factors.iter().map(|factor| factor.name.as_str()));
         for name in names {
             check_column(name.as_ref(), &taken)

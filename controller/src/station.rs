@@ -214,10 +214,10 @@ impl Station {
 
     /// Answers what is fresh; tells the cycle that was answered for each axis.
     pub fn answer(&mut self, bus: &mut dyn Bus) -> [Option<u64>; 2] {
-        let mut cycles = [None; 2];
         if self.ending {
-            return cycles;
+            return [None; 2];
         }
+        let mut answered: [Option<(u64, Sensors, ValveCommand)>; 2] = [None; 2];
         self.take_changes();
         for place in 0..self.seats.len() {
             let axis = self.seats[place].controller.axis();
@@ -234,11 +234,8 @@ impl Station {
                     matches!(seat.controller.state(), MainChainState::Aborted | MainChainState::Fault)
                         && !seat.controller.may_restart();
                 seat.stopped_for = if stopped { seat.stopped_for + 1 } else { 0 };
-                if let Some(port) = &mut seat.xcp {
-                    port.observe(&seat.controller, cycle, &sensors, &answer.command);
-                }
                 self.send(place, cycle, &answer, bus);
-                cycles[axis.index()] = Some(cycle);
+                answered[axis.index()] = Some((cycle, sensors, answer.command));
             } else if self.seats[place].silent_ticks >= SILENT_TICKS {
                 self.speak_without_sensors(place, bus);
             }
@@ -246,10 +243,13 @@ impl Station {
         // When all valves have their commands.
         for Seat { controller, xcp, .. } in &mut self.seats {
             if let Some(port) = xcp {
+                if let Some((cycle, sensors, command)) = &answered[controller.axis().index()] {
+                    port.observe(controller, *cycle, sensors, command);
+                }
                 port.serve(controller.program_mut(), bus);
             }
         }
-        cycles
+        answered.map(|answer| answer.map(|(cycle, ..)| cycle))
     }
 
     /// The rig goes on, and own sensors do not come: after each tick the axis says what a fault has to say.

@@ -301,18 +301,18 @@ def whole(client):
     return seen
 
 
-def measure(client, names=("cycle", "position_m", "main_chain")):
+def measure(client, names=("cycle", "position_m", "main_chain"), rows=1000):
     """What needs no key, for a controller among others."""
     seen = {"identity": identity(client)}
     client.close()
-    seen["daq"] = daq(client, names, 1000)
+    seen["daq"] = daq(client, names, rows)
     client.close()
     return seen
 
 
 def watch(client):
-    """The same with one packet a cycle: one that is lost on the way to a slow client takes no other along."""
-    return measure(client, ("cycle", "main_chain"))
+    """The same for 10 s, with one packet a cycle: one that is lost on the way to a slow client takes no other along."""
+    return measure(client, ("cycle", "main_chain"), 10_000)
 
 
 def main():

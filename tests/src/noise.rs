@@ -2,7 +2,11 @@
 //!
 //! Frames are drawn over all identifiers, lengths and data, a quarter of them on the two identifiers of valve commands. Those
 //! that happen to be as `rig.dbc` says are drawn again: a sensor frame or an emergency stop of a stranger is one, since CAN
-//! knows no sender, and what it does is its meaning and not a fault.
+//! knows no sender, and what it does is its meaning and not a fault. Whether a command is one is decided here, from the
+//! contract: a decoder that took wrong ones would otherwise keep them from being sent to it.
+//!
+//! It is not can-utils' cangen that makes the noise: that one speaks SocketCAN alone, holds no rate, counts nothing by kind, and
+//! sends what happens to be an emergency stop. `tests/tests/vm_cards.rs` has it fill a card's queue.
 //!
 //! What was obeyed is judged by what the controllers themselves recorded of their commands, not by what the rig made of the bus.
 
@@ -25,6 +29,10 @@ use std::time::{Duration, Instant};
 const COMMANDS: [u32; 2] = [0x110, 0x111];
 /// Bytes of a valve command.
 const COMMAND_BYTES: usize = 5;
+/// Bits of its fourth byte that no signal covers.
+const RESERVED: u8 = 0xE0;
+/// The one of the 4096 openings on the wire that is none: -2048.
+const NO_OPENING: u16 = 0x800;
 /// Frames are sent in bursts, as far apart.
 const BURST: Duration = Duration::from_millis(1);
 /// A command is stale when it answers a cycle that is so many cycles ago.
@@ -112,6 +120,12 @@ fn wrong_frame(random: &mut Pcg64) -> (CanFrame, bool) {
             9 => CanFrame::from_raw(REMOTE_FLAG | (id % 0x800), &[]),
             _ => CanFrame::from_raw(id % 0x800, &data[..length]),
         };
+        if frame.standard_id().is_some_and(|id| COMMANDS.contains(&u32::from(id))) {
+            if is_command(&frame) {
+                continue;
+            }
+            return (frame, true);
+        }
         match Frame::decode(&frame) {
             Ok(_) => {}
             Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
@@ -120,6 +134,16 @@ fn wrong_frame(random: &mut Pcg64) -> (CanFrame, bool) {
             Err(_) => return (frame, true),
         }
     }
+}
+
+/// Whether a frame on the identifier of a command is one: length, checksum, reserved bits and range, as the contract has them.
+fn is_command(frame: &CanFrame) -> bool {
+    let [a, b, _, d, crc] = *frame.data() else { return false };
+    let [low, high, ..] = frame.raw_id().to_le_bytes();
+    let sum = [low, high].iter().chain(&frame.data()[..4]).fold(0xFF_u8, |sum, byte| {
+        (0..8).fold(sum ^ byte, |sum, _| if sum & 0x80 == 0 { sum << 1 } else { (sum << 1) ^ 0x1D })
+    });
+    crc == sum ^ 0xFF && d & RESERVED == 0 && u16::from_le_bytes([a, b]) & 0xFFF != NO_OPENING
 }
 
 /// What became of a run in real time, with noise or without.
@@ -227,6 +251,25 @@ impl Obeyed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol::checksum;
+
+    /// The first two are golden frames of cantools and crccheck, the others what they become by one mistake each.
+    #[test]
+    fn a_command_is_known_without_the_decoder() {
+        let frame = |data: [u8; 4], crc| CanFrame::new(0x110, &[&data[..], &[crc]].concat());
+        for (frame, expected) in [
+            (frame([0, 0, 0, 0], 0x88), true),
+            (frame([0, 0x74, 0x23, 0x11], 0xB7), true),
+            (frame([0, 0x74, 0x23, 0x11], 0xB6), false),
+            (CanFrame::new(0x111, &[0, 0, 0, 0, 0x88]), false),
+            (CanFrame::new(0x110, &[0, 0, 0, 0]), false),
+            (CanFrame::new(0x110, &[0, 0, 0, 0, 0x88, 0]), false),
+            (frame([0, 0, 0, 0x20], checksum::of(0x110, &[0, 0, 0, 0x20])), false),
+            (frame([0, 8, 0, 0], checksum::of(0x110, &[0, 8, 0, 0])), false),
+        ] {
+            assert_eq!((is_command(&frame), Frame::decode(&frame).is_ok()), (expected, expected), "{frame}");
+        }
+    }
 
     #[test]
     fn no_frame_of_the_noise_is_as_the_contract_says_and_many_look_like_commands() {

@@ -149,7 +149,15 @@ impl LivePage {
         let mut command = Command::new(executable(Program::Bench, Build::Shipped));
         command.args(["watch", "--http", "127.0.0.1:0", "--bus", &scene.url(), "--telemetry"]);
         command.arg(scene.path("telemetry"));
-        let mut running = Running::start("bench watch", command.args(options.split_whitespace()));
+        Self::announced_by(Running::start("bench watch", command.args(options.split_whitespace())))
+    }
+
+    /// The page of a program that is it, or starts it and ends with it.
+    ///
+    /// # Panics
+    /// When it does not tell where it listens.
+    #[must_use]
+    pub fn announced_by(mut running: Running) -> Self {
         running.wait_for("Ctrl-C ends it");
         let said = running.stderr();
         let address =

@@ -7,8 +7,8 @@ use protocol::bus::control::{Control, Kind, Role};
 use protocol::can::CanFrame;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::{
-    AddressFamily, RecvFlags, SendFlags, SocketAddrUnix, SocketFlags, SocketType, connect, recv, send,
-    socket_with,
+    AddressFamily, RecvFlags, SendFlags, Shutdown, SocketAddrUnix, SocketFlags, SocketType, connect, recv,
+    send, shutdown, socket_with,
 };
 use std::os::fd::OwnedFd;
 use std::path::Path;
@@ -59,6 +59,14 @@ impl Peer {
     /// When the host does not take it.
     pub fn send(&self, packet: &[u8]) {
         send(&self.socket, packet, SendFlags::NOSIGNAL).expect("the host takes the packet");
+    }
+
+    /// Goes, as a program does that dies: the host sees the end, and so does the next [`Peer::receive`].
+    ///
+    /// # Panics
+    /// When it is not connected.
+    pub fn leave(&self) {
+        shutdown(&self.socket, Shutdown::Both).expect("it is connected");
     }
 
     /// Sends a packet as it is; `false` when there is no host any more.

@@ -55,7 +55,7 @@ fn that<'a>(results: &'a BTreeMap<String, &'static str>, result: &str) -> Vec<&'
     results.iter().filter(|(_, one)| **one == result).map(|(name, _)| name.as_str()).collect()
 }
 
-const ALL_IN_LOCKSTEP: usize = 17;
+const ALL_IN_LOCKSTEP: usize = 20;
 const ONLY_IN_REAL_TIME: [&str; 3] = ["regular cycle-time", "regular response", "skipped-cycles every-cycle"];
 
 #[test]
@@ -137,6 +137,8 @@ enum Fault {
     ComesBackWhileStopped,
     IgnoresLoss,
     CountsCyclesItself,
+    DiesOfStop,
+    DiesOfLoss,
 }
 
 /// A controller that holds its valve open and breaks the contract in one place.
@@ -164,6 +166,14 @@ impl Breaking {
             self.answered = (cycle % 4096) as u16;
         }
         self.silent_cycles = if sensors { 0 } else { self.silent_cycles + 1 };
+        let dies = match self.fault {
+            Fault::DiesOfStop => self.stopped_since.is_some(),
+            Fault::DiesOfLoss => self.silent_cycles > 0,
+            _ => false,
+        };
+        if dies {
+            return peer.leave();
+        }
         let answers = match self.fault {
             Fault::Misses => sensors && cycle % 500 != 250,
             Fault::IgnoresLoss | Fault::CountsCyclesItself => true,
@@ -226,10 +236,10 @@ impl Breaking {
     }
 }
 
-/// What the check says of a controller with this fault: the failed ones, and all.
-fn broken(fault: Fault) -> (Vec<String>, Ended) {
+/// What the check says of a controller with this fault, when it starts this command beside it: the failed ones, and all.
+fn broken(fault: Fault, command: &[&str]) -> (Vec<String>, Ended) {
     let scene = Scene::new(SHORT);
-    let running = check(&scene, "--pace lockstep --seconds 1", &[]);
+    let running = check(&scene, "--pace lockstep --seconds 1", command);
     std::thread::scope(|scope| {
         let socket = scene.socket();
         let _controller = scope.spawn(move || three_sessions(&socket, fault));
@@ -243,8 +253,11 @@ fn broken(fault: Fault) -> (Vec<String>, Ended) {
 fn three_sessions(socket: &Path, fault: Fault) {
     for _ in 0..3 {
         let mut controller = Breaking::new(fault);
+        let onlooker = Peer::connect(socket);
         Peer::connect(socket)
             .take_part("controller", |peer, cycle, frames| controller.act(peer, cycle, frames));
+        // One that dies is not back before the next session.
+        let _ = onlooker.frames_to_the_end();
     }
 }
 
@@ -253,7 +266,7 @@ fn each_way_of_breaking_the_contract_is_named_with_what_follows_from_it_and_noth
     const EVERY_CYCLE: &str = "regular every-cycle";
     const COUNTER: &str = "regular counter";
     const NOISE: &str = "noise every-cycle";
-    let table: [(Fault, &[&str]); 16] = [
+    let table: [(Fault, &[&str]); 18] = [
         (Fault::None, &[]),
         // What the rig would not take is no answer either, and a gap in the counter.
         (Fault::Checksum, &[NOISE, "regular checksum", COUNTER, EVERY_CYCLE]),
@@ -271,12 +284,25 @@ fn each_way_of_breaking_the_contract_is_named_with_what_follows_from_it_and_noth
         (Fault::ComesBackWhileStopped, &["emergency-stop valve-shut"]),
         (Fault::IgnoresLoss, &["sensor-loss valve-shut"]),
         (Fault::CountsCyclesItself, &["sensor-loss no-invented-echo"]),
+        // Who is dead opens no valve: of a fault that kills a controller no other check would tell.
+        (Fault::DiesOfStop, &["emergency-stop to-the-end"]),
+        (Fault::DiesOfLoss, &["sensor-loss to-the-end"]),
     ];
     for (fault, expected) in table {
-        let (failed, ended) = broken(fault);
+        let (failed, ended) = broken(fault, &[]);
         assert_eq!(failed, expected, "{fault:?}\n{}\n{}", ended.stdout, ended.stderr);
         let _ = ended.expect_code(i32::from(!expected.is_empty()));
     }
+}
+
+/// Nothing of what is left tells a process that has ended from a controller that keeps its valve shut.
+#[test]
+fn a_process_that_has_ended_is_told_in_every_session() {
+    let (failed, ended) = broken(Fault::None, &["true"]);
+    let sessions = ["emergency-stop", "regular", "sensor-loss"];
+    assert_eq!(failed, sessions.map(|session| format!("{session} to-the-end")), "{}", ended.stdout);
+    assert_eq!(ended.stdout.matches("its process has ended: exit status: 0").count(), 3, "{}", ended.stdout);
+    let _ = ended.expect_code(1);
 }
 
 #[test]

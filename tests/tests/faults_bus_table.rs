@@ -232,4 +232,13 @@ fn a_node_that_is_off_the_bus_is_not_heard_and_hears_nothing() {
         .map(|peer| count_of_id(&peer["missed_in_bus_off"], "120"))
         .sum();
     assert_eq!(missed, 100, "what it missed is counted");
+
+    // It does not hear a node that babbles either, whatever the wire.
+    let babble = fault("babbling-node", "bus", "id = 16\nframes_per_ms = 3.0");
+    let faults = fault("bus-off", "rig", "") + &babble.replace("to_s = 0.3", "to_s = 0.25");
+    for wire in ["", "bitrate=1000000"] {
+        let left = run_over(wire, &faults);
+        assert_eq!(left.heard_of(16).iter().map(Vec::len).sum::<usize>(), 150, "others hear it: {wire}");
+        assert_eq!(count(&left.summary, "/frames_ignored/unknown"), 0, "{wire}");
+    }
 }

@@ -201,6 +201,10 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     ]
 }
 
+fn during<'a>(heard: &'a [Heard], window: &'a Range<u64>) -> impl Iterator<Item = &'a Heard> {
+    heard.iter().filter(|heard| window.contains(&heard.cycle))
+}
+
 /// Until when a valve was open after a cycle; `None` when nothing opened it any more.
 fn last_open(heard: &[Heard], window: Range<u64>) -> Option<u64> {
     let open = |heard: &&Heard| {
@@ -225,12 +229,14 @@ pub(super) fn emergency_stop(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
     vec![valve_shut("emergency-stop", heard, window, STOP_WITHIN_CYCLES)]
 }
 
-/// Without sensors the valve is shut, nothing is answered that was not asked, and the others are told.
-pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
+/// Without sensors the valve is shut and the others are told; nothing is answered that was not asked, not either once the
+/// sensors are `back`.
+pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
     let class = "sensor-loss";
-    let during = || heard.iter().filter(|heard| window.contains(&heard.cycle));
-    let invented = during().filter(|heard| matches!(heard.what, What::Command { age: None, .. })).count();
-    let told = during().find(|heard| matches!(&heard.what, What::Stop(stop) if !stop.release));
+    let [without, again] = [&window, &back].map(|window| {
+        during(heard, window).filter(|heard| matches!(heard.what, What::Command { age: None, .. })).count()
+    });
+    let told = during(heard, &window).find(|heard| matches!(&heard.what, What::Stop(stop) if !stop.release));
     let told = match told {
         Some(heard) => (
             CheckResult::Passed,
@@ -248,8 +254,12 @@ pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
         case(
             class,
             "no-invented-echo",
-            kept(invented == 0),
-            format!("{invented} commands echoed a cycle whose sensors were never sent"),
+            kept(without + again == 0),
+            format!(
+                "{} commands echoed a cycle whose sensors were never sent, {again} of them in the {} cycles after the loss",
+                without + again,
+                back.end - back.start
+            ),
         ),
         case(class, "told", told.0, told.1),
     ]

@@ -127,6 +127,8 @@ impl Line {
             match self.bus.receive() {
                 Received::Frame(frame, stamp_ns) => take(&frame, stamp_ns),
                 Received::Barrier(control) => match control.kind {
+                    // Without members it would go on by itself.
+                    Kind::Go { members: 0 } => return Err(Broken::NobodyThere),
                     Kind::Go { .. } if control.cycle == self.barrier_cycle => return Ok(()),
                     Kind::TimedOut => return Err(Broken::TimedOut(control.name())),
                     _ => {}

@@ -181,8 +181,9 @@ impl Daq {
     /// Makes so many entries of an ODT.
     ///
     /// # Errors
-    /// As [`Daq::alloc_odts`].
+    /// As [`Daq::alloc_odts`]; [`Refusal::DaqActive`] while a list runs.
     pub fn alloc_entries(&mut self, list: u16, odt: u8, count: u8) -> Result<(), Refusal> {
+        self.idle()?;
         let odt = self.odt(list, odt)?;
         self.in_order(Made::Odts, Made::Entries, Made::Entries)?;
         if usize::from(count) > ENTRIES {
@@ -332,6 +333,10 @@ impl Daq {
         match mode {
             0 => self.stop(),
             1 => {
+                // Again: mode and entries may have changed since they were selected.
+                for place in (0..self.count).filter(|place| self.lists[*place].selected) {
+                    self.check(place)?;
+                }
                 self.admit(|_, list| list.selected || list.running)?;
                 for place in 0..self.count {
                     if std::mem::take(&mut self.lists[place].selected) {

@@ -1,7 +1,9 @@
 //! What active faults do to plant, sensors and hands: each puts its part into one overlay, which is then set as a whole.
 //!
 //! Several faults of a kind at a place add up where that means something (offsets, leaks, masses), multiply where they are
-//! factors, and otherwise the strongest counts; so the order in which they began does not matter, save for spikes.
+//! factors, and otherwise the strongest counts; so the order in which they began does not matter, save for spikes. Drifts of one
+//! sensor have one error together: it grows by the sum of their rates, and is gone when that sum is 0, not by a part when one of
+//! them ends.
 
 use super::Fault;
 use super::table::{BusKind, Channel, Kind, NODES, put_sensor};

@@ -97,6 +97,8 @@ struct Held {
     due_ns: Option<u64>,
     frame: CanFrame,
     from: PeerId,
+    /// How often it comes beyond once.
+    copies: u32,
 }
 
 /// What the wire does now.
@@ -183,7 +185,9 @@ impl Wire {
     fn let_go(&mut self, fates: &mut Vec<Fate>, which: impl Fn(&Held) -> bool) {
         let deaf = self.deaf(&[]);
         for held in self.held.extract_if(.., |held| which(held)) {
-            fates.push(Fate::Carried { frame: held.frame, from: held.from, deaf: deaf.clone() });
+            for _ in 0..=held.copies {
+                fates.push(Fate::Carried { frame: held.frame, from: held.from, deaf: deaf.clone() });
+            }
         }
     }
 
@@ -277,7 +281,7 @@ impl Wire {
         }
         if let Some((number, due_ns)) = hold {
             fates.push(Fate::Held(*frame));
-            self.held.push(Held { number, due_ns, frame: passing, from });
+            self.held.push(Held { number, due_ns, frame: passing, from, copies });
             return;
         }
         let deaf = self.deaf(deaf);

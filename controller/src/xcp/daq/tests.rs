@@ -95,6 +95,35 @@ fn an_entry_must_fit_its_packet_and_lie_in_memory() {
     assert_eq!(daq.start_stop(1, 0), Ok(0));
 }
 
+/// Selecting looks at what a list is then. A controller once panicked in its cycle over what came between that and the start.
+#[test]
+fn what_changes_between_selection_and_start_is_looked_at_again() {
+    let fills = entry(FORCE, 7);
+    let stamp_behind = |daq: &mut Daq, image: &Image| {
+        daq.point(1, 0, 0).unwrap();
+        daq.write(image, fills).unwrap();
+        daq.start_stop(2, 1).unwrap();
+        daq.set_mode(1, 0, mode(MODE_STAMP, 2)).unwrap();
+    };
+    let bytes_behind = |daq: &mut Daq, image: &Image| {
+        daq.set_mode(1, 0, mode(MODE_STAMP, 2)).unwrap();
+        daq.start_stop(2, 1).unwrap();
+        daq.point(1, 0, 0).unwrap();
+        daq.write(image, fills).unwrap();
+    };
+    for change in [&stamp_behind as &dyn Fn(&mut Daq, &Image), &bytes_behind] {
+        let (mut daq, mut image) = lists(1, &[1, 1]);
+        daq.set_mode(0, 0, mode(0, 2)).unwrap();
+        daq.start_stop(2, 0).unwrap();
+        change(&mut daq, &image);
+        assert_eq!(daq.start_stop_selected(1), Err(Refusal::DaqConfig));
+        assert!(!daq.runs(), "none is started, not even the one that is good");
+        daq.set_mode(1, 0, mode(0, 2)).unwrap();
+        assert_eq!(daq.start_stop_selected(1), Ok(()), "both are still selected");
+        assert_eq!(leaving(&mut daq, &mut image, 4), [[0], [1], [0], [1]]);
+    }
+}
+
 #[test]
 fn a_packet_holds_number_stamp_and_values_of_one_cycle() {
     let (mut daq, mut image) = lists(1, &[1]);
@@ -154,6 +183,7 @@ fn what_runs_is_not_changed() {
     assert_eq!(daq.write(&image, entry(FORCE, 4)), Err(Refusal::DaqActive));
     assert_eq!(daq.point(0, 0, 0), Err(Refusal::DaqActive));
     assert_eq!(daq.set_mode(0, 0, mode(0, 2)), Err(Refusal::DaqActive));
+    assert_eq!(daq.alloc_entries(0, 0, 1), Err(Refusal::DaqActive));
     assert_eq!(daq.mode(0).unwrap().mode & RUNNING, RUNNING);
     daq.free();
     assert!(!daq.runs());

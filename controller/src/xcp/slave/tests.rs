@@ -250,6 +250,28 @@ fn a_list_is_made_read_back_and_sends() {
     assert_eq!(talk.slave.next_daq(), None, "nobody is sent to");
 }
 
+/// Ten packets that no key is needed for: each is right by itself, and the last one once ended the controller a cycle later.
+#[test]
+fn a_list_that_outgrew_its_packet_once_it_was_selected_is_not_started() {
+    const STAMP: &[u8] = &[0xE0, 0x10, 0, 0, 0, 0, 1, 0];
+    const SELECT: &[u8] = &[0xDE, 2, 0, 0];
+    const POINT: &[u8] = &[0xE2, 0, 0, 0, 0, 0];
+    const SEVEN_BYTES: &[u8] = &[0xE1, 0xFF, 7, 0, 0, 0, 0, 0x30];
+    const FIVE_BYTES: &[u8] = &[0xE1, 0xFF, 5, 0, 0, 0, 0, 0x30];
+    for changes in
+        [&[POINT, SEVEN_BYTES, SELECT, STAMP][..], &[POINT, FIVE_BYTES, STAMP, SELECT, POINT, SEVEN_BYTES]]
+    {
+        let mut talk = Talk::connected();
+        for packet in [&[0xD6][..], &[0xD5, 0, 1, 0], &[0xD4, 0, 0, 0, 1], &[0xD3, 0, 0, 0, 0, 1]] {
+            talk.good(packet);
+        }
+        changes.iter().for_each(|packet| _ = talk.good(packet));
+        talk.refused(&[0xDD, 1], Refusal::DaqConfig);
+        talk.slave.cycle(0, &[5.0; COUNT], &[25.0, 1.0, 15.0]);
+        assert_eq!(talk.slave.next_daq(), None);
+    }
+}
+
 /// Commands that mean something, with fields that may not.
 fn packets() -> impl Strategy<Value = Vec<u8>> {
     let any_packet = prop::collection::vec(any::<u8>(), 0..12);

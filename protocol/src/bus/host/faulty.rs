@@ -51,7 +51,10 @@ impl Host {
 
     /// Puts one frame on the wire, which may do something to it.
     pub(super) fn deliver(&mut self, frame: &CanFrame, from: PeerId, deaf: &[PeerId]) {
-        self.wire.note_speaker(frame, from);
+        // A babbling node is none of those whose identifier it uses.
+        if from != BABBLER {
+            self.wire.note_speaker(frame, from);
+        }
         if self.wire.is_plain() {
             self.carry(frame, from, deaf);
         } else {
@@ -97,7 +100,7 @@ impl Host {
         let space_ns = CYCLE_NS / said.len().max(1) as u64;
         for (frame, place) in said.drain(..).zip(0..) {
             let Some(timed) = &mut self.timed else {
-                self.carry(&frame, BABBLER, &[]);
+                self.deliver(&frame, BABBLER, &[]);
                 continue;
             };
             if !timed.knows(BABBLER) {

@@ -94,6 +94,25 @@ fn frames_are_overtaken_by_the_next_of_their_identifier_and_come_more_than_once(
 }
 
 #[test]
+fn a_frame_that_is_held_comes_with_its_copies() {
+    let duplication = WireFault::Duplication { probability: 1.0, copies: 1 };
+    let held = [
+        (WireFault::Delay { delay_ms: 2 }, vec![0, 0, 1, 1]),
+        (WireFault::Reordering { probability: 1.0 }, vec![1, 1, 0, 0, 3, 3, 2, 2]),
+    ];
+    for (fault, expected) in held {
+        for [first, second] in [[fault, duplication], [duplication, fault]] {
+            let mut wire = with(first, Frames::All);
+            let begin = WireOrder::Begin { number: 10, fault: second, frames: Frames::All, seed: 6 };
+            assert!(wire.orders().give(begin));
+            wire.take_orders(0, &mut Vec::new());
+            assert_eq!(counters(&out(&mut wire, 4)), expected, "{first:?}, then {second:?}");
+            assert_eq!(wire.met()["bus-duplication"].by_name()["120"], 4);
+        }
+    }
+}
+
+#[test]
 fn a_corrupted_frame_is_one_that_the_checksum_finds_and_a_wrong_counter_is_not() {
     let command = ValveCommand { opening: 1.0, alive: 15, echo: 7, enable: true };
     let frame = Frame::DriveValveCommand(command).encode().unwrap();
