@@ -126,16 +126,17 @@ impl Writer {
         let mut failure: Option<String> = None;
         let mut watch = Stuck::default();
         loop {
-            let finished = loop {
+            let mut finished = false;
+            // No more than wait: where rows come faster than they are written, news are not to wait for their end.
+            for _ in 0..=records.len() {
                 match records.try_recv() {
                     Ok(record) if failure.is_none() => {
                         failure = tables.write(&record).err().map(|error| error.to_string());
                     }
                     Ok(_) => {}
-                    Err(TryRecvError::Empty) => break false,
-                    Err(TryRecvError::Disconnected) => break true,
+                    Err(gone) => finished = gone == TryRecvError::Disconnected,
                 }
-            };
+            }
             if let Some(watcher) = &mut watcher {
                 watcher.look();
             }

@@ -85,6 +85,22 @@ impl Records {
     fn senders_gone(&self) -> bool {
         self.sender_alive.strong_count() == 0
     }
+
+    /// Whether all that came was taken.
+    fn are_taken(&self) -> bool {
+        let Self { cycles, frames, events, timings, round_trips, .. } = self;
+        cycles.is_empty()
+            && frames.is_empty()
+            && events.is_empty()
+            && timings.is_empty()
+            && round_trips.is_empty()
+    }
+}
+
+/// What waits in a queue, a quarter of its room at most: a writer slower than the rig would never see the end of one queue,
+/// and the others would run over.
+fn a_turn<T>(queue: &Receiver<T>) -> impl Iterator<Item = T> {
+    queue.try_iter().take(queue.len().min(queue.capacity().map_or(usize::MAX, |room| room / 4)))
 }
 
 impl Recorder {

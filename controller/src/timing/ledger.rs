@@ -205,10 +205,13 @@ impl Ledger {
     }
 
     fn empty_queues(&mut self) -> io::Result<()> {
-        while let Ok(passed) = self.frames.try_recv() {
+        // No more than wait, so that no queue is emptied for ever while the other runs over.
+        for _ in 0..self.frames.len() {
+            let Ok(passed) = self.frames.try_recv() else { break };
             self.take_frame(passed);
         }
-        while let Ok(measured) = self.measured.try_recv() {
+        for _ in 0..self.measured.len() {
+            let Ok(measured) = self.measured.try_recv() else { break };
             match measured {
                 Measured::Waited { arrived_ns, woke_ns } => {
                     self.waiting.push(Wait { arrived_ns, woke_ns });

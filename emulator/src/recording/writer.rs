@@ -4,8 +4,8 @@
 //! process that is killed leaves files that read to their last line. When a write fails (a full disk, a folder that
 //! went away), the run is asked to end, and what was written stays.
 
-use super::Records;
 use super::evidence::{Evidence, EvidenceReport, EvidenceSetup};
+use super::{Records, a_turn};
 use crate::event::{Event, EventKind};
 use crate::faults::mark;
 use crate::pace::Shared;
@@ -130,9 +130,10 @@ impl Writer {
     pub fn run(mut self, records: &Records, shared: &Shared) -> WriterReport {
         let mut last_flush = Instant::now();
         loop {
-            // Asked before draining: what was sent before the ends went is drained below.
-            let finished = records.senders_gone();
+            // Asked before draining: what was sent before the ends went is drained below, and in the next rounds.
+            let gone = records.senders_gone();
             let mut drained = self.drain(records).and_then(|()| self.judge(records, shared));
+            let finished = gone && records.are_taken();
             if finished {
                 drained = drained.and_then(|()| self.write_frames(0));
             }
@@ -154,12 +155,14 @@ impl Writer {
             if finished {
                 return self.report;
             }
-            std::thread::sleep(POLL_PERIOD);
+            if !gone {
+                std::thread::sleep(POLL_PERIOD);
+            }
         }
     }
 
     fn drain(&mut self, records: &Records) -> io::Result<()> {
-        for record in records.cycles.try_iter() {
+        for record in a_turn(&records.cycles) {
             if let Some(telemetry) = &mut self.telemetry {
                 telemetry.cycle(&record);
             }
@@ -169,14 +172,14 @@ impl Writer {
             self.measurement.write_when_full()?;
             self.truth.write_when_full()?;
         }
-        for record in records.frames.try_iter() {
+        for record in a_turn(&records.frames) {
             if let Some(evidence) = &mut self.evidence {
                 evidence.frame(&record);
             }
             self.pending.push(record);
         }
         self.write_frames(FRAME_DELAY_NS)?;
-        for event in records.events.try_iter() {
+        for event in a_turn(&records.events) {
             self.tell(event)?;
         }
         Ok(())
@@ -186,12 +189,12 @@ impl Writer {
     fn judge(&mut self, records: &Records, shared: &Shared) -> io::Result<()> {
         let asked = shared.freeze.take();
         let Some(evidence) = &mut self.evidence else { return Ok(()) };
-        for record in records.timings.try_iter() {
+        for record in a_turn(&records.timings) {
             // Those of a cycle were handed over before its row.
-            records.round_trips.try_iter().for_each(|round_trip| evidence.round_trip(round_trip));
+            a_turn(&records.round_trips).for_each(|round_trip| evidence.round_trip(round_trip));
             evidence.timing(&record)?;
         }
-        records.round_trips.try_iter().for_each(|round_trip| evidence.round_trip(round_trip));
+        a_turn(&records.round_trips).for_each(|round_trip| evidence.round_trip(round_trip));
         evidence.poll(MonotonicClock.now(), asked)
     }
 
@@ -287,13 +290,14 @@ impl Writer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use plant::Axis;
+    use crate::recording::queues;
+    use plant::tables::CycleRecord;
+    use plant::{Axis, Inputs, Plant, RigParameters, Scene, Sensors};
+    use std::path::Path;
 
-    #[test]
-    fn however_often_one_kind_comes_it_hides_no_other() {
-        let folder = tempfile::tempdir().unwrap();
+    fn writer_into(folder: &Path) -> Writer {
         let setup = WriterSetup {
-            folder: folder.path().to_owned(),
+            folder: folder.to_owned(),
             interface: "can0".to_owned(),
             epoch_offset_ns: 0,
             linked: false,
@@ -303,7 +307,49 @@ mod tests {
             evidence: None,
             telemetry: None,
         };
-        let mut writer = Writer::create(setup).unwrap();
+        Writer::create(setup).unwrap()
+    }
+
+    #[test]
+    fn a_rig_faster_than_the_disk_does_not_keep_its_events_waiting() {
+        const MOST: u64 = 200_000;
+        let rig = RigParameters::baseline();
+        let plant = Plant::new(&rig, &Scene::default().setup()).unwrap();
+        let inputs = Inputs::default();
+        let record = CycleRecord {
+            cycle: 0,
+            valve: inputs.valve,
+            readings: Sensors::new(&rig, 1).sample(&plant, &inputs),
+            truth: plant.truth(&inputs),
+            terms: plant.terms(&inputs),
+        };
+        let (mut recorder, records) = queues(false);
+        let news = recorder.events.clone();
+        recorder.event(Event { cycle: 0, kind: EventKind::BusLost });
+        let mut taken = 0;
+        while !recorder.is_full() {
+            recorder.cycle(record.clone());
+            taken += 1;
+        }
+        let rig = std::thread::spawn(move || {
+            while taken < MOST && !news.is_empty() {
+                let lost = recorder.dropped();
+                recorder.cycle(record.clone());
+                taken += 1 - (recorder.dropped() - lost);
+            }
+            taken
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let written = writer_into(folder.path()).run(&records, &Shared::default());
+        let taken = rig.join().unwrap();
+        assert!(taken < MOST, "{taken} cycles were written before the event");
+        assert_eq!((written.rows, written.event_count), (taken, 1), "and all that came is written");
+    }
+
+    #[test]
+    fn however_often_one_kind_comes_it_hides_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = writer_into(folder.path());
         let often = EVENTS_KEPT as u64 + 10;
         for cycle in 0..often {
             for kind in [EventKind::Skipped { cycles: 3 }, EventKind::CommandStale(Axis::Drive)] {
