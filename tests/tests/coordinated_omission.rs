@@ -69,7 +69,12 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     assert_eq!((cycles, count(&summary, "/records_dropped")), (4000, 0));
     let table = rows(&scene.path("emulator/emulator-timing.csv"));
     assert_eq!(table.len() as u64 + skipped, cycles, "rows and skipped cycles");
-    let stall = table.iter().max_by_key(|row| row.skipped).expect("a row");
+    // A busy machine may stall the rig for longer at another time; this stall ends with the continuation, whose handler may run
+    // on another thread, a moment later.
+    let told = table.iter().find(|row| row.vitals.continued > 0).expect("no row tells of the continuation");
+    let before =
+        table.iter().filter(|row| (told.cycle.saturating_sub(1000)..=told.cycle).contains(&row.cycle));
+    let stall = before.max_by_key(|row| row.skipped).expect("a row");
     // The system may take its time to go on, but not less than was slept.
     assert!(stall.skipped >= 49, "{stall:?}");
 
@@ -106,10 +111,10 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     let event = json(&dump.join("event.json"));
     assert_eq!((&event["trigger"], &event["process"]), (&"overrun".into(), &"emulator".into()));
     assert_eq!((count(&event, "/cycle"), count(&event, "/late_ns")), (stall.cycle, late_ns));
-    // The handler of SIGCONT may run on another thread, a moment later.
     let around = rows(&dump.join("timing.csv"));
-    let continued = around.iter().filter(|row| row.cycle.abs_diff(stall.cycle) <= 100);
-    assert!(continued.map(|row| row.vitals.continued).sum::<u64>() > 0, "no row tells of the continuation");
+    // The dump ends 0.3 s after the stall.
+    let told_late = told.cycle > stall.cycle + 250;
+    assert!(told_late || around.iter().any(|row| row.vitals.continued > 0), "{told:?} is not in the dump");
     assert!(count(&summary, "/vitals/continued") > 0);
     assert!(around.len() > 1000, "a second before, and something after: {} rows", around.len());
     assert!(bus_log(&dump.join("bus.log")).len() > 4000, "four frames in a cycle at least");

@@ -2,7 +2,8 @@
 //!
 //! A frame of sensors is of that cycle, out of those with its low bits, that the stamps come closest to; they may be off by 8 ms
 //! from one frame to the next before that is wrong, so that another computer's clock or a hole of a minute does no harm. The
-//! first tick gives all numbers before it their full value, each later one confirms them.
+//! first tick gives all numbers before it their full value, each later one confirms them: no sensors before it are of a later
+//! cycle, however late a busy computer stamped them.
 //!
 //! ```text
 //!   sensors ..7   ..8   tick 8   ..9   ..A         tick 8 says that ..8 is cycle 8, and so is the shift of all before
@@ -42,6 +43,7 @@ pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
     let mut known: Option<(i64, u64)> = None;
     let mut anchored = false;
     let mut skipped = SkippedCycles::default();
+    let next_ticks = next_ticks(log);
     for (place, logged) in log.iter().enumerate() {
         let expected = known.map(|(cycle, stamp_ns)| {
             let passed_ns = logged.stamp_ns.cast_signed() - stamp_ns.cast_signed();
@@ -50,18 +52,23 @@ pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
         match logged.frame {
             Frame::DriveSensors(sensors) | Frame::LoadSensors(sensors) => {
                 let low = i64::from(sensors.alive);
-                let cycle = expected.map_or(low, |expected| nearest(expected, low));
+                let mut cycle = expected.map_or(low, |expected| nearest(expected, low));
+                if let (true, Some((newest, _)), Some(tick)) = (anchored, known, next_ticks[place]) {
+                    let latest = wrapped(newest, tick);
+                    let in_time = latest - (latest - low).rem_euclid(ROUND);
+                    if cycle > latest && in_time >= newest {
+                        cycle = in_time;
+                    }
+                }
                 numbers[place] = Some(cycle);
                 if known.is_none_or(|(newest, _)| cycle >= newest) {
                     known = Some((cycle, logged.stamp_ns));
                 }
             }
             Frame::Tick(tick) => {
-                let wrapped =
-                    |near: i64| near + i64::from(tick.cycle.wrapping_sub(near as u32).cast_signed());
                 let cycle = match known {
                     Some((newest, _)) if anchored => {
-                        let cycle = wrapped(newest);
+                        let cycle = wrapped(newest, tick.cycle);
                         if cycle < newest - ROUND {
                             return Err(ReadError::Restarted {
                                 file: file.into(),
@@ -91,6 +98,29 @@ pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
     // Before cycle 0 there is none; only a log without a tick could say so.
     let of = numbers.into_iter().map(|number| number.map(|cycle| cycle.max(0).cast_unsigned())).collect();
     Ok(Cycles { of, skipped: skipped.cycles, guessed: !anchored })
+}
+
+/// For each frame, the cycle of the first tick after it.
+fn next_ticks(log: &[Logged]) -> Vec<Option<u32>> {
+    let mut next = None;
+    let mut ticks: Vec<_> = log
+        .iter()
+        .rev()
+        .map(|logged| {
+            let before = next;
+            if let Frame::Tick(tick) = logged.frame {
+                next = Some(tick.cycle);
+            }
+            before
+        })
+        .collect();
+    ticks.reverse();
+    ticks
+}
+
+/// The full number of a tick's cycle, which wraps at 32 bits, near another number.
+fn wrapped(near: i64, cycle: u32) -> i64 {
+    near + i64::from(cycle.wrapping_sub(near as u32).cast_signed())
 }
 
 /// The number with these low bits that is nearest to `expected`.
@@ -167,6 +197,22 @@ mod tests {
         let mut log = vec![sensors(0, stamp(0)), tick(0, 0, stamp(0))];
         log.extend([1, 2, 60_003, 60_004, 60_020].map(|cycle| sensors(cycle, stamp(cycle))));
         assert_eq!(found(&log), [0, 1, 2, 60_003, 60_004, 60_020]);
+    }
+
+    #[test]
+    fn frames_that_were_held_up_and_stamped_together_keep_their_cycles() {
+        for held_up in [9, 12, 30, 47] {
+            // Stamped when they came through, all those of the time in which they were held up at its end.
+            let stamp = |cycle: u64| if (20..20 + held_up).contains(&cycle) { 20 + held_up } else { cycle };
+            let log: Vec<_> = (0..100)
+                .flat_map(|cycle| {
+                    let stamp_ns = stamp(cycle) * 1_000_000;
+                    let tick = (cycle % 10 == 0).then(|| tick(cycle, 0, stamp_ns));
+                    std::iter::once(sensors(cycle, stamp_ns)).chain(tick)
+                })
+                .collect();
+            assert_eq!(found(&log), (0..100).collect::<Vec<_>>(), "{held_up} ms");
+        }
     }
 
     #[test]
