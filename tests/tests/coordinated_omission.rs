@@ -112,9 +112,7 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     assert_eq!((&event["trigger"], &event["process"]), (&"overrun".into(), &"emulator".into()));
     assert_eq!((count(&event, "/cycle"), count(&event, "/late_ns")), (stall.cycle, late_ns));
     let around = rows(&dump.join("timing.csv"));
-    // The dump ends 0.3 s after the stall.
-    let told_late = told.cycle > stall.cycle + 250;
-    assert!(told_late || around.iter().any(|row| row.vitals.continued > 0), "{told:?} is not in the dump");
+    assert!(around.iter().any(|row| row.vitals.continued > 0), "{told:?} is not in the dump");
     assert!(count(&summary, "/vitals/continued") > 0);
     assert!(around.len() > 1000, "a second before, and something after: {} rows", around.len());
     assert!(bus_log(&dump.join("bus.log")).len() > 4000, "four frames in a cycle at least");

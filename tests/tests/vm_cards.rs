@@ -3,8 +3,8 @@
 //! frames; cyclictest beside our own figures; PREEMPT_RT and what it grants.
 //!
 //! One machine for each kernel does it all (`scripts/vm/job-*`). QEMU's cards take no wire time and go neither passive nor
-//! bus-off; but their receive FIFO of 64 bytes runs over in earnest, and that is where frames go that are accounted for here.
-//! Accounts are asserted, never times.
+//! bus-off; their receive FIFO of 64 bytes runs over in earnest where the guest is late, which it hardly is here (`--even`).
+//! What is lost and accounted for goes with the interfaces that go down. Accounts are asserted, never times.
 
 use protocol::frames::{self, Frame};
 use serde_json::Value;
