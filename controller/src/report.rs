@@ -29,7 +29,7 @@ pub struct Report {
     pub ended_well: bool,
     /// Why it ended.
     pub ended_because: String,
-    /// Cycles answered by the axis that answered most.
+    /// Cycles that an axis of the process answered, each once: rows of the timing table.
     pub cycles_answered: u64,
     /// Cycles that the rig says it skipped.
     pub rig_cycles_skipped: u64,

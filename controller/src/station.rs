@@ -140,6 +140,9 @@ pub struct Station {
     ignored: IgnoredFrames,
     records_dropped: u64,
     ending: bool,
+    /// Cycles that an axis answered, each once.
+    answered: u64,
+    newest_answered: Option<u64>,
 }
 
 impl Station {
@@ -161,6 +164,8 @@ impl Station {
             ignored: IgnoredFrames::default(),
             records_dropped: 0,
             ending: false,
+            answered: 0,
+            newest_answered: None,
         }
     }
 
@@ -189,6 +194,7 @@ impl Station {
                 TickNews::Ending => self.ending = true,
                 TickNews::Restarted => {
                     self.ending = false;
+                    self.newest_answered = None;
                     self.seats.iter_mut().for_each(|seat| {
                         seat.controller.restart();
                         seat.mail.0.clear();
@@ -249,7 +255,20 @@ impl Station {
                 port.serve(controller.program_mut(), bus);
             }
         }
-        answered.map(|answer| answer.map(|(cycle, ..)| cycle))
+        let cycles = answered.map(|answer| answer.map(|(cycle, ..)| cycle));
+        self.count(cycles);
+        cycles
+    }
+
+    /// One axis may answer a cycle whose sensors of the other were overtaken: it counts, and once if both answer it.
+    fn count(&mut self, mut cycles: [Option<u64>; 2]) {
+        cycles.sort_unstable();
+        for cycle in cycles.into_iter().flatten() {
+            if self.newest_answered.is_none_or(|newest| cycle > newest) {
+                self.newest_answered = Some(cycle);
+                self.answered += 1;
+            }
+        }
     }
 
     /// The rig goes on, and own sensors do not come: after each tick the axis says what a fault has to say.
@@ -360,10 +379,10 @@ impl Station {
         self.ignored
     }
 
-    /// Cycles answered by the axis that answered most.
+    /// Cycles that an axis answered, each once.
     #[must_use]
     pub fn answered(&self) -> u64 {
-        self.seats.iter().map(|seat| seat.answered).max().unwrap_or(0)
+        self.answered
     }
 
     /// Cycles answered by `axis`; 0 where it is none of ours.

@@ -29,6 +29,12 @@ fn samples(path: &Path) -> BTreeMap<String, u64> {
     samples
 }
 
+/// Whether the cycle was due when sensors arrived that are not of the axis that wakes the process.
+fn begun_by_the_other(row: &CycleTiming, waking_axis: &str) -> bool {
+    let (waking, other) = if waking_axis == "drive" { (row.drive, row.load) } else { (row.load, row.drive) };
+    waking.sensors_ns == 0 || (row.due_ns == other.sensors_ns && row.due_ns != waking.sensors_ns)
+}
+
 /// Holds table, histograms and report of a controller against each other.
 fn expect_one_account(scene: &Scene, name: &str, waking_axis: &str) -> Vec<CycleTiming> {
     let at = |file: String| scene.path("controller").join(file);
@@ -44,10 +50,13 @@ fn expect_one_account(scene: &Scene, name: &str, waking_axis: &str) -> Vec<Cycle
     let of_axis = |key| count(&report, &format!("/axes/{waking_axis}/{key}"));
     assert_eq!(of_axis("sensors_lost"), 0, "{name}: nothing was lost on the way");
     let waited = of_axis("sensors_received") - count(&report, "/sensors_before_start");
+    // Where a stall let the waking axis's sensors be overtaken and not the other's, those begin the row.
+    let others = rows.iter().filter(|row| begun_by_the_other(row, waking_axis)).count() as u64;
+    let waits = waited + others;
     let samples = samples(&at(format!("{name}.hlog")));
-    assert_eq!(samples[&format!("{name}-wakeup")], waited, "{name}: every frame that waited is a sample");
-    assert_eq!(samples[&format!("{name}-completion")], waited, "{name}: and is late until it is answered");
-    assert_eq!(count(&report, "/completion_ns/count"), waited, "{name}");
+    assert_eq!(samples[&format!("{name}-wakeup")], waits, "{name}: every frame that waited is a sample");
+    assert_eq!(samples[&format!("{name}-completion")], waits, "{name}: and is late until it is answered");
+    assert_eq!(count(&report, "/completion_ns/count"), waits, "{name}");
     for stage in ["receive", "step", "send", "execution"] {
         assert_eq!(samples[&format!("{name}-{stage}")], rows.len() as u64, "{name}-{stage}");
         let key = format!("/{}_ns/count", stage);

@@ -1,10 +1,14 @@
 //! Rows and waits of wake-ups played on a clock that belongs to the test.
 
 use super::*;
+use crate::cli::{Cli, Command};
+use crate::setup::{Inputs, Mode};
+use crate::station::{self, Station};
+use clap::Parser;
 use crossbeam_channel::{Receiver, bounded};
 use protocol::bus::control::Role;
 use protocol::bus::{BusCounters, BusError, Received, SendError};
-use protocol::frames::{Frame, Sensors, ValveCommand};
+use protocol::frames::{Frame, Sensors, Tick, ValveCommand};
 use realtime::Instant;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -334,4 +338,68 @@ fn what_finds_no_room_is_counted() {
     }
     // 40 rows; 40 frames each way, 16 too many.
     assert_eq!(bench.stopwatch.finish(), StopwatchAccount { dropped: 16, before_start: 0 });
+}
+
+/// The controllers of both axes on a bus.
+fn both_axes() -> Station {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = |name: &str| root.join(name).display().to_string();
+    let [rig, experiment] = [path("../plant/rig.toml"), path("experiments/load-step.toml")];
+    let line = ["controller", "rehearse", "--rig", &rig, "--experiment", &experiment];
+    let Command::Rehearse(arguments) = Cli::parse_from(line).command else {
+        unreachable!("the line above asks for a rehearsal")
+    };
+    let inputs = Inputs::read(&arguments.files).unwrap();
+    let mode = Mode { partner_needed: true, real_time: true, forever: true };
+    let controllers = Axis::ALL.map(|axis| inputs.controller(axis, mode).unwrap());
+    let (records, _) = bounded(64);
+    let (news, _) = bounded(64);
+    let (_, changes) = bounded(1);
+    Station::new(controllers.into(), station::Outlets { records, news, changes, waits: false })
+}
+
+#[test]
+fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
+    use Axis::{Drive, Load};
+    let mut bench = Bench::new(&Axis::ALL);
+    let mut station = both_axes();
+    let tick = Frame::Tick(Tick { cycle: 0, ..Tick::default() }).encode().unwrap();
+    assert_eq!(station.take(&tick), None);
+    let wake_ups: [&[(Axis, u8)]; 7] = [
+        &[(Drive, 0), (Load, 0)],
+        &[(Drive, 1)],
+        &[(Load, 1), (Drive, 2), (Load, 2)], // the load's of 1 are overtaken
+        &[(Drive, 3), (Load, 3)],
+        &[(Drive, 4), (Load, 4), (Drive, 5)], // and the drive's of 4
+        &[(Load, 5)],
+        &[(Drive, 6), (Load, 6)],
+    ];
+    for arrived in wake_ups {
+        bench.stopwatch.woke();
+        for (axis, alive) in arrived {
+            let sensors = Sensors { alive: *alive, ..Sensors::default() };
+            let frame =
+                if *axis == Drive { Frame::DriveSensors(sensors) } else { Frame::LoadSensors(sensors) };
+            let frame = frame.encode().unwrap();
+            let whose = station.take(&frame);
+            bench.stopwatch.took(&frame, bench.now(), whose);
+            bench.clock.pass(1);
+        }
+        bench.stopwatch.took_all();
+        let cycles = station.answer(&mut bench.stopwatch.bus(&mut bench.wire));
+        bench.stopwatch.answered(cycles, Vitals::default);
+    }
+    let rows: Vec<_> = bench
+        .rows()
+        .iter()
+        .map(|row| (row.cycle, row.drive.sensors_ns != 0, row.load.sensors_ns != 0))
+        .collect();
+    let both = |cycle| (cycle, true, true);
+    assert_eq!(
+        rows,
+        [both(0), (1, true, false), both(2), both(3), (4, false, true), both(5), both(6)],
+        "cycles with the axes that answered them"
+    );
+    assert_eq!(Axis::ALL.map(|axis| station.answered_by(axis)), [6, 6]);
+    assert_eq!(station.answered(), rows.len() as u64);
 }
