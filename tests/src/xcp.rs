@@ -131,7 +131,7 @@ impl Foreign {
     /// When it failed, with what it said.
     #[must_use]
     pub fn wait(self) -> Value {
-        let Ended { code, stderr, stdout, .. } = self.running.wait_within(5 * PATIENCE);
+        let Ended { code, stderr, stdout, .. } = self.running.wait_within(PATIENCE);
         assert_eq!(code, Some(0), "pyXCP failed:\n{stdout}\n{stderr}");
         json(&self.seen)
     }

@@ -12,7 +12,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 use system_tests::binaries::{Build, Program, executable, workspace};
 use system_tests::launch::Pace;
-use system_tests::process::{Ended, Running};
+use system_tests::process::{Ended, PATIENCE, Running};
 use system_tests::record_maker::{Experiment, Hidden, Recipe, simulate, write};
 use system_tests::records::json;
 use system_tests::scene::{SHORT, Scene};
@@ -66,7 +66,7 @@ fn rig() -> PathBuf {
 fn discrepancy(arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Ended {
     let mut command = Command::new(executable(Program::Discrepancy, Build::Shipped));
     command.args(arguments.iter().map(|argument| argument.as_ref()));
-    Running::start("discrepancy", &mut command).wait_within(std::time::Duration::from_secs(120))
+    Running::start("discrepancy", &mut command).wait_within(2 * PATIENCE)
 }
 
 /// A step on a training record.

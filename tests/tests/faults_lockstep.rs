@@ -1,15 +1,12 @@
 //! Faults of the lockstep barrier: nobody hangs, the culprit is named, the exit code says which kind it was.
 
 use rustix::process::Signal;
-use std::time::Duration;
 use system_tests::launch::Pace;
 use system_tests::records::{Table, count, expect_whole_lines, json};
 use system_tests::scene::{RESTLESS, SHORT, Scene};
 
 const BUS_FAILED: i32 = 3;
 const LOCKSTEP_TIMEOUT: i32 = 4;
-/// The barrier waits for 5 s of wall time; this is no more than a protection against hanging.
-const LIMIT: Duration = Duration::from_secs(30);
 
 fn expect_complete(scene: &Scene) {
     let measurement = Table::read(&scene.path("emulator/measurement.csv"));
@@ -25,12 +22,12 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
     scene.wait_for_rows("emulator", 600);
     controller.signal(Signal::STOP);
     let _ = emulator
-        .wait_within(LIMIT)
+        .wait()
         .expect_code(LOCKSTEP_TIMEOUT)
         .expect_said(&["lockstep: 'controller' was not done within 5 s of wall time"]);
     expect_complete(&scene);
     controller.signal(Signal::CONT);
-    let code = controller.wait_within(LIMIT).code;
+    let code = controller.wait().code;
     assert!(matches!(code, Some(BUS_FAILED | LOCKSTEP_TIMEOUT)), "the controller ends too, with {code:?}");
     let _ = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
 }
@@ -39,10 +36,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
 fn a_barrier_that_nobody_joins_is_given_up() {
     let scene = Scene::new(SHORT);
     let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 0.3").start();
-    let _ = emulator
-        .wait_within(LIMIT)
-        .expect_code(BUS_FAILED)
-        .expect_said(&["not all members joined", "--members"]);
+    let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined", "--members"]);
     assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/cycles"), 0);
 }
 
@@ -51,8 +45,8 @@ fn a_barrier_that_one_of_two_joins_is_given_up_and_the_one_ends_too() {
     let scene = Scene::new(SHORT);
     let emulator = scene.emulator(Pace::Lockstep).with("--members 2 --join-timeout 0.5").start();
     let controller = scene.controller(Pace::Lockstep).start();
-    let _ = emulator.wait_within(LIMIT).expect_code(BUS_FAILED).expect_said(&["not all members joined"]);
-    let _ = controller.wait_within(LIMIT).expect_code(BUS_FAILED);
+    let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined"]);
+    let _ = controller.wait().expect_code(BUS_FAILED);
 }
 
 #[test]
@@ -62,8 +56,7 @@ fn a_member_that_is_killed_ends_the_run_and_what_was_recorded_stays() {
     let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
     scene.wait_for_rows("emulator", 600);
     let _ = controller.kill();
-    let _ =
-        emulator.wait_within(LIMIT).expect_code(BUS_FAILED).expect_said(&["all members left the barrier"]);
+    let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["all members left the barrier"]);
     expect_complete(&scene);
 }
 
@@ -74,7 +67,7 @@ fn an_emulator_that_is_killed_ends_the_member() {
     let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
     scene.wait_for_rows("emulator", 600);
     let _ = emulator.kill();
-    let _ = controller.wait_within(LIMIT).expect_code(BUS_FAILED);
+    let _ = controller.wait().expect_code(BUS_FAILED);
     let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));
     assert_eq!(count(&json(&scene.path("controller/controller.json")), "/cycles_answered"), rows as u64);
 }
@@ -85,8 +78,8 @@ fn a_bus_without_a_barrier_is_given_up() {
     let host = scene.bus_host("");
     let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 0.3").start();
     let controller = scene.controller(Pace::Lockstep).with("--bus-grace 0.5").start();
-    let _ = emulator.wait_within(LIMIT).expect_code(BUS_FAILED);
-    let _ = controller.wait_within(LIMIT).expect_code(BUS_FAILED);
+    let _ = emulator.wait().expect_code(BUS_FAILED);
+    let _ = controller.wait().expect_code(BUS_FAILED);
     drop(host);
 }
 
@@ -99,9 +92,9 @@ fn a_second_emulator_on_the_bus_does_not_take_the_first_ones_place() {
     let mut controller = scene.controller(Pace::Lockstep).with("--repeat").start();
     controller.wait_for(": drive experiment");
     let second = scene.emulator(Pace::Lockstep).out(&scene.path("second")).with("--join-timeout 1").start();
-    let second = second.wait_within(LIMIT);
+    let second = second.wait();
     assert_eq!(second.code, Some(BUS_FAILED), "the second is refused; it said:\n{}", second.stderr);
-    let _ = emulator.wait_within(LIMIT).expect_code(0);
-    let _ = controller.wait_within(LIMIT).expect_code(0);
+    let _ = emulator.wait().expect_code(0);
+    let _ = controller.wait().expect_code(0);
     assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/cycles"), 60_000);
 }

@@ -4,9 +4,8 @@
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
 use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::process::{Ended, Running};
+use system_tests::process::{Ended, PATIENCE, Running};
 use system_tests::records::json;
 
 /// Draws a leakage of 5.9 Nl/min across the load's piston: far above its detection limit.
@@ -17,7 +16,7 @@ fn find_effect(arguments: &[&str]) -> Ended {
     let bench = executable(Program::Bench, Build::Shipped);
     let mut command = Command::new(workspace().join("scripts/find-effect"));
     command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
-    Running::start("scripts/find-effect", &mut command).wait_within(Duration::from_secs(300))
+    Running::start("scripts/find-effect", &mut command).wait_within(6 * PATIENCE)
 }
 
 /// A program in place of the workflow's: finds nothing and leaves the rig as it is, or what `said` says.

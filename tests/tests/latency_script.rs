@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::process::{Ended, Running};
+use system_tests::process::{Ended, PATIENCE, Running};
 use system_tests::records::json;
 use system_tests::skip;
 
@@ -11,7 +11,7 @@ fn latency(arguments: &[&str]) -> Ended {
     let bench = executable(Program::Bench, Build::Shipped);
     let mut command = Command::new(workspace().join("scripts/latency"));
     command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
-    Running::start("scripts/latency", &mut command).wait_within(std::time::Duration::from_secs(300))
+    Running::start("scripts/latency", &mut command).wait_within(2 * PATIENCE)
 }
 
 #[test]
