@@ -8,7 +8,8 @@
 //! A row is a cycle that was answered. One process for both axes may wake twice for it, since the load's sensors follow the
 //! drive's. Then the lengths of both wake-ups add up in one row, and `done` stands where it would be without the wait in between,
 //! which is the rig's and no work of ours; `command_ns` of the load tells when it was really answered. So receive, step and send
-//! are the whole of `done - woke`.
+//! are the whole of `done - woke`. Two cycles that were answered in one wake-up, the load's and after a stall the drive's next, each
+//! took all of it.
 //!
 //! Sensors that were overtaken by newer ones before anybody woke are in no row, save as its `skipped`. So that a stall shows
 //! with everything that waited, the waiting of each such frame of the axis that wakes us is handed over by itself.
@@ -173,23 +174,31 @@ impl<C: Clock + Send> Stopwatch<C> {
         let done_ns = self.now_ns();
         // After a stall the drive may be a cycle ahead of the load.
         let ahead = matches!(cycles, [Some(drive), Some(load)] if load < drive);
+        let mut worked_for = None;
         for axis in if ahead { [Axis::Load, Axis::Drive] } else { Axis::ALL } {
             if let Some(cycle) = cycles[axis.index()] {
                 self.put_into_row(axis, cycle);
+                self.work_for_row(done_ns, &mut worked_for);
             }
         }
-        let WakeUp { woke_ns, received_ns, send_ns, .. } = self.wake_up;
         if let Some(row) = &mut self.pending {
-            row.receive_ns += received_ns.saturating_sub(woke_ns);
-            row.send_ns += send_ns;
-            row.step_ns += done_ns.saturating_sub(received_ns).saturating_sub(send_ns);
-            row.done_ns = row.woke_ns + row.receive_ns + row.step_ns + row.send_ns;
             let missing = [row.drive, row.load].map(|exchange| exchange.sensors_ns == 0);
             if self.own.iter().zip(missing).all(|(own, missing)| !own || !missing) {
                 row.vitals = vitals();
                 self.flush();
             }
         }
+    }
+
+    /// Adds the wake-up to the row, once.
+    fn work_for_row(&mut self, done_ns: u64, worked_for: &mut Option<u64>) {
+        let WakeUp { woke_ns, received_ns, send_ns, .. } = self.wake_up;
+        let Some(row) = self.pending.as_mut().filter(|row| *worked_for != Some(row.cycle)) else { return };
+        *worked_for = Some(row.cycle);
+        row.receive_ns += received_ns.saturating_sub(woke_ns);
+        row.send_ns += send_ns;
+        row.step_ns += done_ns.saturating_sub(received_ns).saturating_sub(send_ns);
+        row.done_ns = row.woke_ns + row.receive_ns + row.step_ns + row.send_ns;
     }
 
     fn put_into_row(&mut self, axis: Axis, cycle: u64) {

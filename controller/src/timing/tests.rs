@@ -389,14 +389,16 @@ fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
         let cycles = station.answer(&mut bench.stopwatch.bus(&mut bench.wire));
         bench.stopwatch.answered(cycles, Vitals::default);
     }
-    let rows: Vec<_> = bench
-        .rows()
-        .iter()
-        .map(|row| (row.cycle, row.drive.sensors_ns != 0, row.load.sensors_ns != 0))
-        .collect();
+    let rows = bench.rows();
+    for row in &rows {
+        assert!(row.due_ns <= row.woke_ns && row.woke_ns < row.done_ns, "{row:?}");
+        assert_eq!(row.receive_ns + row.step_ns + row.send_ns, row.done_ns - row.woke_ns, "{row:?}");
+    }
+    let answered: Vec<_> =
+        rows.iter().map(|row| (row.cycle, row.drive.sensors_ns != 0, row.load.sensors_ns != 0)).collect();
     let both = |cycle| (cycle, true, true);
     assert_eq!(
-        rows,
+        answered,
         [both(0), (1, true, false), both(2), both(3), (4, false, true), both(5), both(6)],
         "cycles with the axes that answered them"
     );
