@@ -8,8 +8,8 @@
 //! A row is a cycle that was answered. One process for both axes may wake twice for it, since the load's sensors follow the
 //! drive's. Then the lengths of both wake-ups add up in one row, and `done` stands where it would be without the wait in between,
 //! which is the rig's and no work of ours; `command_ns` of the load tells when it was really answered. So receive, step and send
-//! are the whole of `done - woke`. Two cycles that were answered in one wake-up, the load's and after a stall the drive's next, each
-//! took all of it.
+//! are the whole of `done - woke`. Two cycles that were answered in one wake-up, the load's and after a stall the drive's next,
+//! each took all of it.
 //!
 //! Sensors that were overtaken by newer ones before anybody woke are in no row, save as its `skipped`. So that a stall shows
 //! with everything that waited, the waiting of each such frame of the axis that wakes us is handed over by itself.
