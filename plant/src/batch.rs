@@ -215,8 +215,8 @@ impl Group {
         for (lane, plant) in plants.iter().enumerate() {
             if self.in_lanes[lane] && to.corner(lane) {
                 let (lanes, held): ((Lanes<Pair>, f64), _) = (from.get(lane), self.fixed.held(lane));
-                let ((lanes, supply_pa), ()) =
-                    plant.integrator().in_parts(&Baseline, lanes, held, substep, ());
+                let (lanes, supply_pa) =
+                    plant.integrator().in_parts(&Baseline, lanes, held, substep, &mut ());
                 to.set(lane, &lanes, supply_pa);
             }
         }

@@ -177,17 +177,15 @@ impl Integrator {
         let mut lanes = Lanes::load(state);
         let mut supply_pa = state.supply_pressure_pa;
         for substep in 0..self.substeps {
-            let carried = laws.carried();
-            let (next, handed_on, corner) = self.substep(laws, (&lanes, supply_pa), held, substep, carried);
-            if corner {
-                let handed_on;
-                ((lanes, supply_pa), handed_on) =
-                    self.in_parts(laws, (lanes, supply_pa), held, substep, carried);
-                laws.keep(self, held, &lanes, handed_on);
+            let mut carried = laws.carried();
+            let (next, corner) = self.substep(laws, (&lanes, supply_pa), held, substep, &mut carried);
+            (lanes, supply_pa) = if corner {
+                carried = laws.carried();
+                self.in_parts(laws, (lanes, supply_pa), held, substep, &mut carried)
             } else {
-                (lanes, supply_pa) = next;
-                laws.keep(self, held, &lanes, handed_on);
-            }
+                next
+            };
+            laws.keep(self, held, &lanes, &carried);
         }
         lanes.store(state);
         state.supply_pressure_pa = supply_pa;
@@ -201,15 +199,15 @@ impl Integrator {
         (mut lanes, mut supply_pa): (Lanes, f64),
         held: Held,
         substep: u32,
-        mut carried: L::Carried,
-    ) -> ((Lanes, f64), L::Carried) {
+        carried: &mut L::Carried,
+    ) -> (Lanes, f64) {
         for part in 0..PARTS {
             let node = self.node(&self.fine, supply_pa, held.stopped);
             let at = At { of: self, span: &self.fine, from: &lanes, node, held, substep, part };
-            (lanes, carried) = self.careful(laws, at, carried);
+            lanes = self.careful(laws, at, carried);
             supply_pa = node.end_pa;
         }
-        ((lanes, supply_pa), carried)
+        (lanes, supply_pa)
     }
 
     /// Substeps in a period.
@@ -239,18 +237,18 @@ impl Integrator {
 
     /// A short step that may meet any corner.
     #[cold]
-    fn careful<L: Laws>(&self, laws: &L, at: At<'_>, mut carried: L::Carried) -> (Lanes, L::Carried) {
+    fn careful<L: Laws>(&self, laws: &L, at: At<'_>, carried: &mut L::Carried) -> Lanes {
         let (span, node, held) = (at.span, at.node, at.held);
         let from = at.from.with_check_valves(node.shut);
         let at = At { from: &from, ..at };
-        let middle = laws.middle(at, &mut carried);
+        let middle = laws.middle(at, carried);
         let zero = Pair::both(0.0);
         let moving = laws.moving(at);
         let hand = laws.outside(at, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
             hand,
-            sliding_friction: laws.sliding(at, &middle, &carried, middle.pneumatic + hand, moving),
+            sliding_friction: laws.sliding(at, &middle, carried, middle.pneumatic + hand, moving),
             contact: zero,
         };
         if held.linked {
@@ -268,7 +266,7 @@ impl Integrator {
             }
         }
         let force = forces.pneumatic + forces.hand + forces.contact;
-        let mut place = |axis: usize| laws.advance(at, &middle, &mut carried, axis, force.to_array()[axis]);
+        let mut place = |axis: usize| laws.advance(at, &middle, carried, axis, force.to_array()[axis]);
         let (drive, load) = (place(0), place(1));
         let extension = Pair::new(drive.extension, load.extension);
         let velocity = Pair::new(drive.velocity, load.velocity);
@@ -281,12 +279,12 @@ impl Integrator {
         let mut next = Lanes {
             extension,
             velocity,
-            spool: laws.spool(at, &carried),
+            spool: laws.spool(at, carried),
             air_a: bounded(from.air_a, middle.edge_flow[0], Chambers::volume_a),
             air_b: bounded(from.air_b, middle.edge_flow[1], Chambers::volume_b),
         };
-        laws.air(at, &mut next, &middle, &mut carried);
-        (next, carried)
+        laws.air(at, &mut next, &middle, carried);
+        next
     }
 
     fn contact(&self, approach: Approach) -> f64 {

@@ -102,8 +102,8 @@ fn all_lanes(like: &Integrator, fixed: &Fixed, from: &Moving, to: &mut Moving) {
     for lane in 0..WIDTH {
         let of = fixed.laws(lane, like);
         let (lanes, supply_pa) = from.get(lane);
-        let ((next, end_pa), (), corner) =
-            of.substep(&Baseline, (&lanes, supply_pa), fixed.held(lane), 0, ());
+        let ((next, end_pa), corner) =
+            of.substep(&Baseline, (&lanes, supply_pa), fixed.held(lane), 0, &mut ());
         to.set(lane, &next, end_pa);
         to.set_corner(lane, corner);
     }

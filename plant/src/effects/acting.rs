@@ -422,9 +422,9 @@ impl Laws for Effects {
         Pair::new(spool(0), spool(1))
     }
 
-    fn keep(&mut self, of: &Integrator, held: Held, lanes: &Lanes, carried: Moving) {
+    fn keep(&mut self, of: &Integrator, held: Held, lanes: &Lanes, carried: &Moving) {
         let span_s = self.substep_s;
-        self.memory.moving = carried;
+        self.memory.moving = *carried;
         for axis in 0..2 {
             let lane = |pair: Pair| pair.to_array()[axis];
             // Bristles never come to rest to the bit.

@@ -128,7 +128,7 @@ pub(crate) trait Laws<P: Axes = Pair> {
     fn spool(&self, at: At<'_, P>, carried: &Self::Carried) -> P;
 
     /// A substep counts: what it handed on is kept.
-    fn keep(&mut self, of: &Integrator<P>, held: Held<P>, to: &Lanes<P>, carried: Self::Carried);
+    fn keep(&mut self, of: &Integrator<P>, held: Held<P>, to: &Lanes<P>, carried: &Self::Carried);
 }
 
 /// The laws of rig-model.md.
@@ -200,7 +200,7 @@ impl<P: Axes> Laws<P> for Baseline {
     }
 
     #[inline(always)]
-    fn keep(&mut self, _: &Integrator<P>, _: Held<P>, _: &Lanes<P>, (): ()) {}
+    fn keep(&mut self, _: &Integrator<P>, _: Held<P>, _: &Lanes<P>, (): &()) {}
 }
 
 /// Air of both chambers in one place, for laws that treat them alike.

@@ -36,37 +36,32 @@ impl<P: Axes> Integrator<P> {
         (from, supply_pa): (&Lanes<P>, f64),
         held: Held<P>,
         substep: u32,
-        carried: L::Carried,
-    ) -> ((Lanes<P>, f64), L::Carried, bool) {
+        carried: &mut L::Carried,
+    ) -> ((Lanes<P>, f64), bool) {
         let span = &self.coarse;
         let node = self.node(span, supply_pa, held.stopped);
         let at = At { of: self, span, from, node, held, substep, part: 0 };
-        let (next, handed_on, corner) = self.smooth(laws, at, carried);
+        let (next, corner) = self.smooth(laws, at, carried);
         let valves_move =
             self.supply.check_valves_shut(supply_pa) != self.supply.check_valves_shut(node.end_pa);
-        ((next, node.end_pa), handed_on, corner | valves_move)
+        ((next, node.end_pa), corner | valves_move)
     }
 
     /// A step that assumes no corner; the flag says that there may be one, and then the step counts for nothing.
     #[inline(always)]
-    fn smooth<L: Laws<P>>(
-        &self,
-        laws: &L,
-        at: At<'_, P>,
-        mut carried: L::Carried,
-    ) -> (Lanes<P>, L::Carried, bool) {
+    fn smooth<L: Laws<P>>(&self, laws: &L, at: At<'_, P>, carried: &mut L::Carried) -> (Lanes<P>, bool) {
         let (span, node, held) = (at.span, at.node, at.held);
         let from = at.from.with_check_valves(node.shut);
         let at = At { from: &from, ..at };
         let zero = P::both(0.0);
-        let middle = laws.middle(at, &mut carried);
+        let middle = laws.middle(at, carried);
 
         let moving = laws.moving(at);
         let hand = laws.outside(at, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
             hand,
-            sliding_friction: laws.sliding(at, &middle, &carried, middle.pneumatic + hand, moving),
+            sliding_friction: laws.sliding(at, &middle, carried, middle.pneumatic + hand, moving),
             contact: zero,
         };
         let [to_middle, way] = laws.ways(at);
@@ -90,7 +85,7 @@ impl<P: Axes> Integrator<P> {
                 }
                 laws.advance(at, &middle, carried, axis, unresisted.to_array()[axis])
             };
-            let (drive, load) = (place(0, &mut carried), place(1, &mut carried));
+            let (drive, load) = (place(0, carried), place(1, carried));
             extension = P::new(drive.extension, load.extension);
             velocity = P::new(drive.velocity, load.velocity);
             sticks = Some(P::Mask::new(laws.on_bristles().map(|on| !on)));
@@ -112,9 +107,9 @@ impl<P: Axes> Integrator<P> {
             |air: Air<P>, edge_flow: P, volume: P| limits.stop(air, span.lag.advance(air, edge_flow), volume);
         let (air_a, fills_a) = stop(from.air_a, middle.edge_flow[0], self.chambers.volume_a(extension));
         let (air_b, fills_b) = stop(from.air_b, middle.edge_flow[1], self.chambers.volume_b(extension));
-        let mut next = Lanes { extension, velocity, spool: laws.spool(at, &carried), air_a, air_b };
-        laws.air(at, &mut next, &middle, &mut carried);
-        (next, carried, (leaves | turns | overruns | fills_a | fills_b).any() | touches)
+        let mut next = Lanes { extension, velocity, spool: laws.spool(at, carried), air_a, air_b };
+        laws.air(at, &mut next, &middle, carried);
+        (next, (leaves | turns | overruns | fills_a | fills_b).any() | touches)
     }
 
     /// The extensions at a step's midpoint, kept within the stroke: a step that overruns the end is discarded, but must not
