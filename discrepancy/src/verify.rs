@@ -121,7 +121,7 @@ pub(crate) struct Model<'a> {
 impl<'a> Model<'a> {
     /// Each model has the freedom of its own windows' starts.
     fn new(course: &'a Course, rig: &RigParameters) -> Self {
-        let windows = Windows::new(course, rig).settled();
+        let windows = Windows::with_starts_met_best(course, rig);
         let simulated = windows.simulate(rig);
         let residual = windows.residual(&simulated);
         Model { windows, simulated, residual }

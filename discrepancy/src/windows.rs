@@ -21,7 +21,7 @@ mod whiten;
 use crate::course::{CHANNELS, Course, Point};
 use crate::seats::Seats;
 use plant::{Batch, Inputs, Plant, RigParameters};
-use starts::orthonormal;
+use starts::SETTLING;
 pub(crate) use starts::{first_state, seat, seated};
 use whiten::drift;
 
@@ -56,6 +56,19 @@ impl<'a> Windows<'a> {
     /// The windows of a course, their starts' sensitivities under a baseline rig.
     #[must_use]
     pub fn new(course: &'a Course, rig: &RigParameters) -> Self {
+        Self::unsettled(course, rig).settled(0)
+    }
+
+    /// The same with starts where the readings are met best.
+    ///
+    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
+    /// window: where the points are far off, as those of a sensor that lags, both need the start itself.
+    #[must_use]
+    pub fn with_starts_met_best(course: &'a Course, rig: &RigParameters) -> Self {
+        Self::unsettled(course, rig).settled(SETTLING)
+    }
+
+    fn unsettled(course: &'a Course, rig: &RigParameters) -> Self {
         let measured = (0..2).filter(|axis| course.measured[*axis]);
         let lanes: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
         // The first window fills lags and memories, and is not judged [rig-model.md: a record is judged after 0.1 s].
@@ -79,23 +92,8 @@ impl<'a> Windows<'a> {
         for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
             drifts.extend(lanes.iter().map(|(axis, channel)| drift(course, at, *axis, *channel)));
         }
-        let mut windows = Windows {
-            course,
-            rig: rig.clone(),
-            starts,
-            points,
-            lanes,
-            readings,
-            valid,
-            drifts,
-            bases: Vec::new(),
-        };
-        windows.bases = windows.sensitivities().into_iter().map(orthonormal).collect();
-        // A micrometre of the eye in its gap is two newtons: where the rods are linked, the record's points are too coarse.
-        if course.linked {
-            windows.settle_linked();
-        }
-        windows
+        let (rig, bases) = (rig.clone(), Vec::new());
+        Windows { course, rig, starts, points, lanes, readings, valid, drifts, bases }
     }
 
     /// The baseline rig.
@@ -190,9 +188,16 @@ impl<'a> Windows<'a> {
     /// What is left of the readings beside a simulation: without single jumps of the force and what the starts explain.
     #[must_use]
     pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
+        let mut left = self.raw_residual(simulated);
+        self.project_windows(&mut left);
+        left
+    }
+
+    /// The same with what the starts explain.
+    fn raw_residual(&self, simulated: &[f64]) -> Vec<f64> {
         let mut left: Vec<f64> =
             self.readings.iter().zip(simulated).map(|(reading, own)| reading - own).collect();
-        self.reduce(&mut left);
+        self.clean(&mut left);
         left
     }
 
@@ -205,14 +210,23 @@ impl<'a> Windows<'a> {
     }
 
     fn reduce(&self, values: &mut [f64]) {
+        self.clean(values);
+        self.project_windows(values);
+    }
+
+    fn project_windows(&self, values: &mut [f64]) {
+        let windows = values.chunks_exact_mut(self.rows());
+        windows.zip(&self.bases).for_each(|(window, basis)| project(window, basis));
+    }
+
+    /// Without what was not read and single jumps of the force, whitened.
+    fn clean(&self, values: &mut [f64]) {
         for (value, _) in values.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
             *value = 0.0;
         }
-        let rows = self.rows();
-        for (at, (window, basis)) in values.chunks_exact_mut(rows).zip(&self.bases).enumerate() {
+        for (at, window) in values.chunks_exact_mut(self.rows()).enumerate() {
             self.flatten_spikes(window);
             self.whiten(at, window);
-            project(window, basis);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Where windows begin: what a start explains, and starts that are moved to where their readings are met best.
 
 use super::whiten::SPIKE_REACH;
-use super::{FORCE, WINDOW, Windows, dot, project};
+use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, dot, project};
 use crate::course::{Course, Point};
 use nalgebra::{DMatrix, DVector};
 use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
@@ -17,7 +17,7 @@ const LINKED_PASSES: usize = 3;
 /// Shifts of the pistons against each other that are searched, either way: as far as two sensors' noise, then nearer.
 const SHIFTS_M: [[f64; 3]; 2] = [[30e-6, 70e-6, 120e-6], [5e-6, 12e-6, 25e-6]];
 /// The same of others, where it is asked for.
-const SETTLING: usize = 2;
+pub(super) const SETTLING: usize = 2;
 /// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
 const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
 /// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
@@ -27,27 +27,54 @@ const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 const LEAST_PA: f64 = 1e4;
 
 impl Windows<'_> {
-    /// Moves each window's start to where its readings say that it was, and takes its sensitivities anew.
-    fn settle(&mut self) {
-        self.settle_by(&vec![1.0; self.starts.len()]);
+    /// Starts where the readings are met best after so many passes, as linked ones have them anyway, and what they explain.
+    pub(super) fn settled(mut self, passes: usize) -> Self {
+        if self.course.linked {
+            // A micrometre of the eye in its gap is two newtons: the record's points are too coarse. First the side of the gap
+            // on which each window is met best, then from there.
+            for shifts_m in SHIFTS_M {
+                self.shift_linked(&shifts_m);
+                self.settle(LINKED_PASSES);
+            }
+        } else {
+            self.settle(passes);
+        }
         self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
+        self
     }
 
-    /// Moves them by shares of the way, one for each window.
-    fn settle_by(&mut self, shares: &[f64]) {
-        let rows = self.rows();
-        let all = self.sensitivities();
-        let simulated = self.simulate(&self.rig);
-        let mut left: Vec<f64> =
-            self.readings.iter().zip(&simulated).map(|(reading, own)| reading - own).collect();
-        for (value, _) in left.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
-            *value = 0.0;
+    /// Moves each window's start to where its readings say that it was; steps that meet them worse, as around a break-away, are
+    /// taken back and made shorter.
+    fn settle(&mut self, passes: usize) {
+        if passes == 0 {
+            return;
         }
+        let rows = self.rows();
+        let mut left = self.raw_residual(&self.simulate(&self.rig));
+        let mut shares = vec![1.0; self.starts.len()];
+        for _ in 0..passes {
+            let points = self.points.clone();
+            self.move_starts(&left, &shares);
+            let new = self.raw_residual(&self.simulate(&self.rig));
+            let windows = left.chunks_exact_mut(rows).zip(new.chunks_exact(rows));
+            for ((left, new), (start, share)) in windows.zip(self.starts.iter().zip(&mut shares)) {
+                if dot(new, new) > dot(left, left) {
+                    self.points[start / WINDOW] = points[start / WINDOW];
+                    *share *= SHORTER;
+                } else {
+                    left.copy_from_slice(new);
+                    *share = 1.0;
+                }
+            }
+        }
+    }
+
+    /// Moves them by shares of the way, one for each window, given what is left of the readings.
+    fn move_starts(&mut self, left: &[f64], shares: &[f64]) {
+        let rows = self.rows();
         let measured: Vec<usize> = (0..2).filter(|axis| self.course.measured[*axis]).collect();
-        for (at, columns) in all.iter().enumerate() {
-            let own = &mut left[at * rows..][..rows];
-            self.flatten_spikes(own);
-            self.whiten(at, own);
+        for (at, columns) in self.sensitivities().iter().enumerate() {
+            let own = &left[at * rows..][..rows];
             let count = columns.len();
             // What is known of a start beforehand, in units of its doubt.
             let mut matrix = DMatrix::<f64>::identity(count, count);
@@ -75,35 +102,11 @@ impl Windows<'_> {
         }
     }
 
-    /// Settles all starts of a linked record: first on the side of the gap where each window is met best, then from there; steps
-    /// that meet a window's readings worse are taken back and made shorter.
-    pub(super) fn settle_linked(&mut self) {
-        let mut squares = self.raw_squares();
-        for shifts in SHIFTS_M {
-            self.shift_linked(&shifts, &mut squares);
-            let mut shares = vec![1.0; self.starts.len()];
-            for _ in 0..LINKED_PASSES {
-                let points = self.points.clone();
-                self.settle_by(&shares);
-                let new = self.raw_squares();
-                for (at, start) in self.starts.iter().enumerate() {
-                    if new[at] > squares[at] {
-                        self.points[start / WINDOW] = points[start / WINDOW];
-                        shares[at] *= SHORTER;
-                    } else {
-                        squares[at] = new[at];
-                        shares[at] = 1.0;
-                    }
-                }
-            }
-        }
-        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
-    }
-
     /// Moves the pistons of each window's start towards each other or apart, by that of some shifts from which its readings are
     /// met best: on the wrong side of the gap no step is short enough.
-    fn shift_linked(&mut self, shifts_m: &[f64], squares: &mut [f64]) {
+    fn shift_linked(&mut self, shifts_m: &[f64]) {
         let points = self.points.clone();
+        let mut squares = self.raw_squares();
         let mut best = vec![0.0; self.starts.len()];
         for shift_m in shifts_m.iter().flat_map(|own| [-own, *own]) {
             for (own, from) in self.points.iter_mut().zip(&points) {
@@ -111,7 +114,7 @@ impl Windows<'_> {
                     own[axis].extension_m = from[axis].extension_m + 0.5 * shift_m;
                 }
             }
-            for ((best, least), new) in best.iter_mut().zip(squares.iter_mut()).zip(self.raw_squares()) {
+            for ((best, least), new) in best.iter_mut().zip(&mut squares).zip(self.raw_squares()) {
                 if new < *least {
                     (*best, *least) = (shift_m, new);
                 }
@@ -127,40 +130,8 @@ impl Windows<'_> {
 
     /// Squares of what each window leaves, starts as they are.
     fn raw_squares(&self) -> Vec<f64> {
-        let rows = self.rows();
-        let simulated = self.simulate(&self.rig);
-        let mut left: Vec<f64> =
-            self.readings.iter().zip(&simulated).map(|(reading, own)| reading - own).collect();
-        for (value, _) in left.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
-            *value = 0.0;
-        }
-        left.chunks_exact_mut(rows)
-            .enumerate()
-            .map(|(at, own)| {
-                self.flatten_spikes(own);
-                self.whiten(at, own);
-                dot(own, own)
-            })
-            .collect()
-    }
-
-    /// The same windows with starts where the readings are met best, as linked ones have them anyway.
-    ///
-    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
-    /// window: where the points are far off, as those of a sensor that lags, both need the start itself.
-    #[must_use]
-    pub fn settled(mut self) -> Self {
-        for _ in 0..if self.course.linked { 0 } else { SETTLING } {
-            let (points, squares) = (self.points.clone(), self.squares());
-            self.settle();
-            // A start from which readings are met worse, as around a break-away, stays where it was.
-            let worse: Vec<bool> = self.squares().iter().zip(&squares).map(|(new, old)| new > old).collect();
-            for (start, _) in self.starts.iter().zip(&worse).filter(|(_, worse)| **worse) {
-                self.points[start / WINDOW] = points[start / WINDOW];
-            }
-        }
-        self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
-        self
+        let left = self.raw_residual(&self.simulate(&self.rig));
+        left.chunks_exact(self.rows()).map(|own| dot(own, own)).collect()
     }
 
     /// The same windows of a record that this rig would have left, with noise: it began where these windows begin, of which the
@@ -170,7 +141,7 @@ impl Windows<'_> {
         let noise = self.raw_noise(random);
         let readings = simulated.iter().zip(&noise).map(|(own, noise)| own + noise).collect();
         let points = (0..self.points.len()).map(|window| self.course.points[window * WINDOW]).collect();
-        let mut windows = Windows {
+        let windows = Windows {
             course: self.course,
             rig: self.rig.clone(),
             starts: self.starts.clone(),
@@ -181,17 +152,7 @@ impl Windows<'_> {
             drifts: self.drifts.clone(),
             bases: Vec::new(),
         };
-        windows.bases = windows.sensitivities().into_iter().map(orthonormal).collect();
-        if self.course.linked {
-            windows.settle_linked();
-        }
-        windows.settled()
-    }
-
-    /// Squares of what each window leaves under the baseline rig.
-    pub(super) fn squares(&self) -> Vec<f64> {
-        let left = self.residual(&self.simulate(&self.rig));
-        left.chunks_exact(self.rows().max(1)).map(|own| dot(own, own)).collect()
+        windows.settled(SETTLING)
     }
 
     /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
@@ -211,7 +172,7 @@ impl Windows<'_> {
 
     /// What a change of each number of a window's start changes, by as much as it is doubted.
     pub(super) fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
-        let mut plant = self.plant(&self.rig);
+        let mut plant = self.plant(&self.rig).with_substeps(COARSE_SUBSTEPS);
         let rows = self.rows();
         let nudges: Vec<(usize, usize)> = (0..2)
             .filter(|axis| self.course.measured[*axis])
