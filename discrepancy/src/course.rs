@@ -8,7 +8,8 @@
 //! A window that lacks more than a few commands in a row is not simulated ([`Course::gaps`]).
 //!
 //! The points are where windows start; what is left of their noise is estimated with each window. A piston is at rest where its
-//! parabola's speed is within three standard errors of zero for all of a while: there the speed is zero and nothing else.
+//! parabola's speed is within three standard errors of zero for all of a while: there the speed is zero and nothing else. Where it
+//! goes evenly one way for longer than that, it creeps: what rests needs the break-away force to go on, what creeps does not.
 //!
 //! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
 
@@ -29,6 +30,9 @@ const POSITION_REACH: usize = 10;
 const PRESSURE_REACH: usize = 5;
 /// Periods that a piston must seem at rest around an instant to be at rest in it.
 const REST_REACH: usize = 12;
+/// Halves of the stretches that tell whether it creeps, periods, and the fastest that is called creeping.
+const CREEP_REACHES: [usize; 2] = [50, 100];
+const CREEP_FASTEST_M_PER_S: f64 = 0.01;
 /// Differences that a channel's memory is told from at a time, and how many such blocks at rest it takes.
 const MEMORY_BLOCK: usize = 25;
 const FEWEST_AT_REST: usize = 10;
@@ -231,15 +235,26 @@ impl Course {
             |at: usize| -> Vec<Option<f64>> { self.samples.iter().map(|sample| sample[i][at]).collect() };
         let position = parabolas(&column(0), POSITION_REACH);
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
-        let rests = rests(&position, &column(0), self.noise[i][0]);
+        let mut rests = rests(&position, &column(0), self.noise[i][0]);
+        let resting = |rests: &[Option<f64>]| -> Vec<bool> { rests.iter().map(Option::is_some).collect() };
+        // Means of noise that lasts are less sure than those of as many readings on their own.
+        let share = memory(&column(0), &resting(&rests), self.noise[i][0]);
+        let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
+        if share > 0.0 {
+            rests = self::rests(&position, &column(0), lasting_m);
+        }
+        let creeps = creeps(&rests, &column(0), lasting_m);
         for place in 0..self.len() {
             let [Some(x), Some(a), Some(b)] = [position[place], pressures[0][place], pressures[1][place]]
             else {
                 self.gaps[place] = true;
                 continue;
             };
-            let rest_m = rests[place];
-            let (x_m, v_m_per_s) = rest_m.map_or((x.value, x.slope / PERIOD_S), |rest_m| (rest_m, 0.0));
+            let (x_m, v_m_per_s) = match (rests[place], creeps[place]) {
+                (_, Some(creep_m_per_s)) => (x.value, creep_m_per_s),
+                (Some(rest_m), None) => (rest_m, 0.0),
+                (None, None) => (x.value, x.slope / PERIOD_S),
+            };
             let (extension_m, rate) =
                 if axis == Axis::Load { (stroke_m - x_m, -v_m_per_s) } else { (x_m, v_m_per_s) };
             self.points[place][i] = Point {
@@ -248,7 +263,7 @@ impl Course {
                 pressures_pa: [a.value, b.value],
             };
         }
-        let resting: Vec<bool> = rests.iter().map(Option::is_some).collect();
+        let resting = resting(&rests);
         for at in 0..CHANNELS {
             self.memory[i][at] = memory(&column(at), &resting, self.noise[i][at]);
         }
@@ -420,9 +435,49 @@ fn rests(parabolas: &[Option<Parabola>], positions: &[Option<f64>], noise_m: f64
         .collect()
 }
 
+/// The speed where what seems to rest creeps: the same way before, around and after, m/s.
+fn creeps(rests: &[Option<f64>], positions: &[Option<f64>], noise_m: f64) -> Vec<Option<f64>> {
+    let creep = |place: usize, reach: usize| {
+        if place < 2 * reach || place + 2 * reach > positions.len() {
+            return None;
+        }
+        // Between two means, four standard errors.
+        let least_m = 4.0 * noise_m * (2.0 / reach as f64).sqrt();
+        let most_m = CREEP_FASTEST_M_PER_S * reach as f64 * PERIOD_S;
+        let mean = |from: usize| {
+            let near = || positions[from..from + reach].iter().flatten();
+            near().sum::<f64>() / near().count() as f64
+        };
+        let means: [f64; 4] = std::array::from_fn(|at| mean(place + at * reach - 2 * reach));
+        let [before, around, after] = std::array::from_fn(|at| means[at + 1] - means[at]);
+        let evenly = [before, around, after]
+            .iter()
+            .all(|way| way.signum() == around.signum() && (least_m..most_m).contains(&way.abs()));
+        evenly.then(|| around / (reach as f64 * PERIOD_S))
+    };
+    let creep = |place| CREEP_REACHES.iter().find_map(|reach| creep(place, *reach));
+    rests.iter().enumerate().map(|(place, rest)| rest.and_then(|_| creep(place))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_goes_evenly_one_way_creeps_and_a_rest_between_two_moves_does_not() {
+        // Micrometres of scatter, as a wide sensor's: 20 um rms.
+        let scatter = |at: usize| 28e-6 * (0.9 * at as f64).sin();
+        let told = |way: &dyn Fn(usize) -> f64| {
+            let positions: Vec<_> = (0..600).map(|at| Some(way(at) + scatter(at))).collect();
+            let rests = rests(&parabolas(&positions, POSITION_REACH), &positions, 20e-6);
+            (rests[300].is_some(), creeps(&rests, &positions, 20e-6)[300])
+        };
+        let (rests, creeps) = told(&|at| 1e-6 * at as f64);
+        assert!(rests && (creeps.unwrap() - 1e-3).abs() < 1e-4, "{creeps:?}");
+        assert_eq!(told(&|_| 0.2), (true, None));
+        let moves = |at: usize| 1e-4 * (at.saturating_sub(340) as f64 - 260_usize.saturating_sub(at) as f64);
+        assert_eq!(told(&moves), (true, None));
+    }
 
     #[test]
     fn a_parabola_is_its_own_parabola_holes_and_all() {

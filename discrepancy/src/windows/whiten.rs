@@ -92,12 +92,18 @@ impl Windows<'_> {
     }
 }
 
-/// Rate of a reading times the error of the sampling instant, over its noise; nobody knows that of the force.
+/// Rate of a reading times the error of the sampling instant, over its noise.
 pub(super) fn drift(course: &Course, at: usize, axis: usize, channel: usize) -> f64 {
-    if course.jitter_s == 0.0 || channel == FORCE {
+    if course.jitter_s == 0.0 {
         return 0.0;
     }
     let (before, after) = (at.saturating_sub(1), (at + 1).min(course.len() - 1));
+    if channel == FORCE {
+        // No parabola follows it; its readings' own noise is a few hundredths of what counts here.
+        let [before, after] = [before, after].map(|at| course.samples[at][axis][FORCE]);
+        let change = after.zip(before).map_or(0.0, |(after, before)| after - before);
+        return change / (2.0 * PERIOD_S) * course.jitter_s / course.noise[axis][FORCE];
+    }
     let [before, own, after] = [before, at, after].map(|at| course.points[at][axis]);
     let rate = match channel {
         0 if axis == 0 => own.rod_velocity_m_per_s,
