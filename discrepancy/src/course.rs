@@ -7,15 +7,17 @@
 //! Rows are put on the grid by their nearest millisecond; a period without a row has no samples, and its command is that before.
 //! A window that lacks more than a few commands in a row is not simulated ([`Course::gaps`]).
 //!
-//! The points are where windows start; what is left of their noise is estimated with each window. A piston is at rest where its
-//! parabola's speed is within three standard errors of zero for all of a while: there the speed is zero and nothing else. Where it
-//! goes evenly one way for longer than that, it creeps: what rests needs the break-away force to go on, what creeps does not.
+//! The points are where windows start; what is left of their noise is estimated with each window. At rest the speed is zero and
+//! nothing else (`course/still.rs`).
 //!
 //! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
+
+mod still;
 
 use crate::check::Checked;
 use crate::records::{Channel, Record, Signal};
 use plant::{Axis, Inputs, RigParameters, quantise_valve};
+use still::{Rate, Still};
 
 /// Channels of an axis that are simulated: position, force, pressures a and b.
 pub const CHANNELS: usize = 4;
@@ -28,11 +30,6 @@ pub const PERIOD_S: f64 = 1e-3;
 const POSITION_REACH: usize = 10;
 /// The same of a pressure.
 const PRESSURE_REACH: usize = 5;
-/// Periods that a piston must seem at rest around an instant to be at rest in it.
-const REST_REACH: usize = 12;
-/// Halves of the stretches that tell whether it creeps, periods, and the fastest that is called creeping.
-const CREEP_REACHES: [usize; 2] = [50, 100];
-const CREEP_FASTEST_M_PER_S: f64 = 0.01;
 /// Differences that a channel's memory is told from at a time, and how many such blocks at rest it takes.
 const MEMORY_BLOCK: usize = 25;
 const FEWEST_AT_REST: usize = 10;
@@ -79,6 +76,8 @@ pub struct Point {
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 at rest.
     pub rod_velocity_m_per_s: f64,
+    /// The rate that a record cannot tell from it: of creeping for what seems at rest, 0 for what is slow.
+    pub or_else_m_per_s: Option<f64>,
     /// Absolute pressures of the chambers a and b, Pa.
     pub pressures_pa: [f64; 2],
 }
@@ -233,41 +232,37 @@ impl Course {
         }
         let column =
             |at: usize| -> Vec<Option<f64>> { self.samples.iter().map(|sample| sample[i][at]).collect() };
-        let position = parabolas(&column(0), POSITION_REACH);
+        let positions = column(0);
+        let position = parabolas(&positions, POSITION_REACH);
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
-        let mut rests = rests(&position, &column(0), self.noise[i][0]);
-        let resting = |rests: &[Option<f64>]| -> Vec<bool> { rests.iter().map(Option::is_some).collect() };
+        let mut still = Still::new(&position, &positions, self.noise[i][0]);
         // Means of noise that lasts are less sure than those of as many readings on their own.
-        let share = memory(&column(0), &resting(&rests), self.noise[i][0]);
-        let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
+        let share = memory(&positions, &still.resting(), self.noise[i][0]);
         if share > 0.0 {
-            rests = self::rests(&position, &column(0), lasting_m);
+            let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
+            still = Still::new(&position, &positions, lasting_m);
         }
-        let creeps = creeps(&rests, &column(0), lasting_m);
         for place in 0..self.len() {
-            let [Some(x), Some(a), Some(b)] = [position[place], pressures[0][place], pressures[1][place]]
-            else {
+            let pressures = pressures.each_ref().map(|own| own[place].map(|own| own.value));
+            let (Some(rate), [Some(a), Some(b)]) = (still.rate(place), pressures) else {
                 self.gaps[place] = true;
                 continue;
             };
-            let (x_m, v_m_per_s) = match (rests[place], creeps[place]) {
-                (_, Some(creep_m_per_s)) => (x.value, creep_m_per_s),
-                (Some(rest_m), None) => (rest_m, 0.0),
-                (None, None) => (x.value, x.slope / PERIOD_S),
-            };
-            let (extension_m, rate) =
-                if axis == Axis::Load { (stroke_m - x_m, -v_m_per_s) } else { (x_m, v_m_per_s) };
+            let Rate { position_m, rate_m_per_s, or_else_m_per_s } = rate;
+            let (out_m, out) =
+                if axis == Axis::Load { (stroke_m - position_m, -1.0) } else { (position_m, 1.0) };
             self.points[place][i] = Point {
-                extension_m: extension_m.clamp(0.0, stroke_m),
-                rod_velocity_m_per_s: rate,
-                pressures_pa: [a.value, b.value],
+                extension_m: out_m.clamp(0.0, stroke_m),
+                rod_velocity_m_per_s: out * rate_m_per_s,
+                or_else_m_per_s: or_else_m_per_s.map(|rate| out * rate),
+                pressures_pa: [a, b],
             };
         }
-        let resting = resting(&rests);
+        let resting = still.resting();
         for at in 0..CHANNELS {
             self.memory[i][at] = memory(&column(at), &resting, self.noise[i][at]);
         }
-        self.jitter_s = self.jitter_s.max(jitter_s(&position, &column(0), &resting));
+        self.jitter_s = self.jitter_s.max(jitter_s(&position, &positions, &resting));
     }
 }
 
@@ -408,76 +403,9 @@ fn solve(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
     Some([rows[0][3] / rows[0][0], rows[1][3] / rows[1][1], rows[2][3] / rows[2][2]])
 }
 
-/// The resting position where a piston is at rest, over all of [`REST_REACH`] to each side.
-fn rests(parabolas: &[Option<Parabola>], positions: &[Option<f64>], noise_m: f64) -> Vec<Option<f64>> {
-    // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
-    let n = POSITION_REACH as f64;
-    let slope_error = noise_m * (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt();
-    let slow: Vec<bool> = parabolas
-        .iter()
-        .map(|parabola| parabola.is_some_and(|parabola| parabola.slope.abs() < 3.5 * slope_error))
-        .collect();
-    (0..slow.len())
-        .map(|place| {
-            let from = place.saturating_sub(REST_REACH);
-            let to = (place + REST_REACH + 1).min(slow.len());
-            if !slow[from..to].iter().all(|slow| *slow) {
-                return None;
-            }
-            let near: Vec<f64> = positions[from..to].iter().flatten().copied().collect();
-            let mean_m = near.iter().sum::<f64>() / near.len() as f64;
-            let half = near.len() / 2;
-            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-            let creep_m = (mean(&near[half..]) - mean(&near[..half])).abs();
-            // Two means of a dozen samples each, four standard errors.
-            (creep_m < 4.0 * noise_m * (2.0 / half as f64).sqrt()).then_some(mean_m)
-        })
-        .collect()
-}
-
-/// The speed where what seems to rest creeps: the same way before, around and after, m/s.
-fn creeps(rests: &[Option<f64>], positions: &[Option<f64>], noise_m: f64) -> Vec<Option<f64>> {
-    let creep = |place: usize, reach: usize| {
-        if place < 2 * reach || place + 2 * reach > positions.len() {
-            return None;
-        }
-        // Between two means, four standard errors.
-        let least_m = 4.0 * noise_m * (2.0 / reach as f64).sqrt();
-        let most_m = CREEP_FASTEST_M_PER_S * reach as f64 * PERIOD_S;
-        let mean = |from: usize| {
-            let near = || positions[from..from + reach].iter().flatten();
-            near().sum::<f64>() / near().count() as f64
-        };
-        let means: [f64; 4] = std::array::from_fn(|at| mean(place + at * reach - 2 * reach));
-        let [before, around, after] = std::array::from_fn(|at| means[at + 1] - means[at]);
-        let evenly = [before, around, after]
-            .iter()
-            .all(|way| way.signum() == around.signum() && (least_m..most_m).contains(&way.abs()));
-        evenly.then(|| around / (reach as f64 * PERIOD_S))
-    };
-    let creep = |place| CREEP_REACHES.iter().find_map(|reach| creep(place, *reach));
-    rests.iter().enumerate().map(|(place, rest)| rest.and_then(|_| creep(place))).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_goes_evenly_one_way_creeps_and_a_rest_between_two_moves_does_not() {
-        // Micrometres of scatter, as a wide sensor's: 20 um rms.
-        let scatter = |at: usize| 28e-6 * (0.9 * at as f64).sin();
-        let told = |way: &dyn Fn(usize) -> f64| {
-            let positions: Vec<_> = (0..600).map(|at| Some(way(at) + scatter(at))).collect();
-            let rests = rests(&parabolas(&positions, POSITION_REACH), &positions, 20e-6);
-            (rests[300].is_some(), creeps(&rests, &positions, 20e-6)[300])
-        };
-        let (rests, creeps) = told(&|at| 1e-6 * at as f64);
-        assert!(rests && (creeps.unwrap() - 1e-3).abs() < 1e-4, "{creeps:?}");
-        assert_eq!(told(&|_| 0.2), (true, None));
-        let moves = |at: usize| 1e-4 * (at.saturating_sub(340) as f64 - 260_usize.saturating_sub(at) as f64);
-        assert_eq!(told(&moves), (true, None));
-    }
 
     #[test]
     fn a_parabola_is_its_own_parabola_holes_and_all() {

@@ -45,6 +45,7 @@ fn course(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> Course {
         let point = Point {
             extension_m: axis.position_m,
             rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
+            or_else_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         };
         course.points.push([point, Point::default()]);

@@ -12,6 +12,10 @@ use std::iter::once;
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
 /// Share of a step that is tried next when the whole met the readings worse.
 const SHORTER: f64 = 0.3;
+/// Rates at which a piston that seems at rest may slide, m/s: too slow to be seen, and yet it needs no break-away to go on.
+const SLIDES_M_PER_S: [f64; 2] = [1e-4, -1e-4];
+/// By how many squares of the noise another rate must meet a window's readings better.
+const MET_BETTER: f64 = 10.0;
 /// How often the starts of a linked record are moved after each search.
 const LINKED_PASSES: usize = 3;
 /// Shifts of the pistons against each other that are searched, either way: as far as two sensors' noise, then nearer.
@@ -29,6 +33,7 @@ const LEAST_PA: f64 = 1e4;
 impl Windows<'_> {
     /// Starts where the readings are met best after so many passes, as linked ones have them anyway, and what they explain.
     pub(super) fn settled(mut self, passes: usize) -> Self {
+        self.choose_rates();
         if self.course.linked {
             // A micrometre of the eye in its gap is two newtons: the record's points are too coarse. First the side of the gap
             // on which each window is met best, then from there.
@@ -41,6 +46,35 @@ impl Windows<'_> {
         }
         self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
         self
+    }
+
+    /// Takes rates that the record cannot tell from those of its points, where the readings are met better by them.
+    fn choose_rates(&mut self) {
+        let mut squares: Option<Vec<f64>> = None;
+        for slide_m_per_s in SLIDES_M_PER_S {
+            let points = self.points.clone();
+            for start in &self.starts {
+                for point in &mut self.points[start / WINDOW] {
+                    let rests = point.rod_velocity_m_per_s == 0.0;
+                    let other = point.or_else_m_per_s.or(rests.then_some(slide_m_per_s));
+                    point.rod_velocity_m_per_s = other.unwrap_or(point.rod_velocity_m_per_s);
+                }
+            }
+            if self.points == points {
+                return;
+            }
+            let tried = std::mem::replace(&mut self.points, points);
+            let squares = squares.get_or_insert_with(|| self.squares_of(&self.simulate_coarsely(&self.rig)));
+            let points = std::mem::replace(&mut self.points, tried);
+            let all_new = self.squares_of(&self.simulate_coarsely(&self.rig));
+            for ((start, old), new) in self.starts.iter().zip(squares).zip(all_new) {
+                if new < *old - MET_BETTER {
+                    *old = new;
+                } else {
+                    self.points[start / WINDOW] = points[start / WINDOW];
+                }
+            }
+        }
     }
 
     /// Moves each window's start to where its readings say that it was; steps that meet them worse, as around a break-away, are
@@ -130,8 +164,11 @@ impl Windows<'_> {
 
     /// Squares of what each window leaves, starts as they are.
     fn raw_squares(&self) -> Vec<f64> {
-        let left = self.raw_residual(&self.simulate(&self.rig));
-        left.chunks_exact(self.rows()).map(|own| dot(own, own)).collect()
+        self.squares_of(&self.simulate(&self.rig))
+    }
+
+    fn squares_of(&self, simulated: &[f64]) -> Vec<f64> {
+        self.raw_residual(simulated).chunks_exact(self.rows()).map(|own| dot(own, own)).collect()
     }
 
     /// The same windows of a record that this rig would have left, with noise: it began where these windows begin, of which the

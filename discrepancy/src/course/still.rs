@@ -1,0 +1,164 @@
+//! Where a piston rests, where it creeps, and where the record does not tell.
+//!
+//! What rests needs the break-away force to go on, what creeps does not; and a parabola of a score of samples cannot tell a
+//! millimetre per second from none. So rest is what is slow for a while, creeping what then goes evenly one way for longer, and
+//! where neither is sure the other rate stands beside: a simulation finds out which of them meets the readings.
+
+use super::{PERIOD_S, POSITION_REACH, Parabola};
+
+/// Periods that a piston must seem at rest around an instant to be at rest in it.
+const REST_REACH: usize = 12;
+/// Standard errors of a parabola's slope below which it is slow.
+const SLOW_ERRORS: f64 = 3.5;
+/// Halves of the stretches that tell whether it creeps, periods, and the fastest that is called creeping.
+const CREEP_REACHES: [usize; 2] = [50, 100];
+const CREEP_FASTEST_M_PER_S: f64 = 0.01;
+/// Standard errors by which two means differ that are not of a piston at rest.
+const CREEP_ERRORS: f64 = 4.0;
+
+/// A channel of positions, looked at for rest.
+pub(super) struct Still<'a> {
+    parabolas: &'a [Option<Parabola>],
+    positions: &'a [Option<f64>],
+    noise_m: f64,
+    slow: Vec<bool>,
+    /// The resting position where it seems at rest, over all of [`REST_REACH`] to each side.
+    rests: Vec<Option<f64>>,
+}
+
+/// Where a piston was and how fast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Rate {
+    pub(super) position_m: f64,
+    pub(super) rate_m_per_s: f64,
+    /// What the record cannot tell from it.
+    pub(super) or_else_m_per_s: Option<f64>,
+}
+
+impl<'a> Still<'a> {
+    /// `noise_m` is what makes means unsure: that of readings on their own, or more where noise lasts.
+    pub(super) fn new(parabolas: &'a [Option<Parabola>], positions: &'a [Option<f64>], noise_m: f64) -> Self {
+        // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
+        let n = POSITION_REACH as f64;
+        let slope_error = noise_m * (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt();
+        let slow = |own: &Parabola| own.slope.abs() < SLOW_ERRORS * slope_error;
+        let slow: Vec<bool> = parabolas.iter().map(|own| own.as_ref().is_some_and(slow)).collect();
+        let mut still = Still { parabolas, positions, noise_m, slow, rests: Vec::new() };
+        still.rests = (0..positions.len()).map(|place| still.rest(place)).collect();
+        still
+    }
+
+    /// Whether it seems at rest.
+    pub(super) fn resting(&self) -> Vec<bool> {
+        self.rests.iter().map(Option::is_some).collect()
+    }
+
+    /// Position and rate; `None` where no parabola is.
+    pub(super) fn rate(&self, place: usize) -> Option<Rate> {
+        let Parabola { value, slope } = self.parabolas[place]?;
+        let told = |position_m: f64, rate_m_per_s: f64, or_else_m_per_s: Option<f64>| {
+            Some(Rate { position_m, rate_m_per_s, or_else_m_per_s })
+        };
+        let Some(rest_m) = self.rests[place] else {
+            return told(value, slope / PERIOD_S, self.slow[place].then_some(0.0));
+        };
+        match CREEP_REACHES.into_iter().find_map(|reach| self.creep_evenly(place, reach)) {
+            Some(creep_m_per_s) => told(value, creep_m_per_s, Some(0.0)),
+            None => told(rest_m, 0.0, self.creep(place)),
+        }
+    }
+
+    fn rest(&self, place: usize) -> Option<f64> {
+        let from = place.saturating_sub(REST_REACH);
+        let to = (place + REST_REACH + 1).min(self.slow.len());
+        if !self.slow[from..to].iter().all(|slow| *slow) {
+            return None;
+        }
+        let near: Vec<f64> = self.positions[from..to].iter().flatten().copied().collect();
+        let half = near.len() / 2;
+        let creep_m = (mean(&near[half..]) - mean(&near[..half])).abs();
+        (creep_m < self.least_m(half)).then(|| mean(&near))
+    }
+
+    /// The speed where it goes the same way before, around and after, m/s.
+    fn creep_evenly(&self, place: usize, reach: usize) -> Option<f64> {
+        let most_m = CREEP_FASTEST_M_PER_S * reach as f64 * PERIOD_S;
+        let ways = [
+            self.way(place.checked_sub(reach)?, reach)?,
+            self.way(place, reach)?,
+            self.way(place + reach, reach)?,
+        ];
+        let evenly = ways.iter().all(|way| {
+            way.signum() == ways[1].signum() && (self.least_m(reach)..most_m).contains(&way.abs())
+        });
+        evenly.then(|| ways[1] / (reach as f64 * PERIOD_S))
+    }
+
+    /// The speed where it may creep: over the shortest stretch around, m/s.
+    fn creep(&self, place: usize) -> Option<f64> {
+        let [reach, _] = CREEP_REACHES;
+        let way = self.way(place, reach)?;
+        (way.abs() > self.least_m(reach)).then(|| way / (reach as f64 * PERIOD_S))
+    }
+
+    /// How much further it was in the stretch after a place than in that before, on average; `None` at the record's ends.
+    fn way(&self, place: usize, reach: usize) -> Option<f64> {
+        let stretch = |from: usize| {
+            let near: Vec<f64> = self.positions.get(from..from + reach)?.iter().flatten().copied().collect();
+            (!near.is_empty()).then(|| mean(&near))
+        };
+        Some(stretch(place)? - stretch(place.checked_sub(reach)?)?)
+    }
+
+    /// What two means of so many readings differ by when it is not at rest.
+    fn least_m(&self, count: usize) -> f64 {
+        CREEP_ERRORS * self.noise_m * (2.0 / count as f64).sqrt()
+    }
+}
+
+fn mean(part: &[f64]) -> f64 {
+    part.iter().sum::<f64>() / part.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parabolas;
+    use super::*;
+
+    /// What is told of the middle of a course.
+    fn told(way: &dyn Fn(f64) -> f64) -> Rate {
+        // Micrometres of scatter, as a wide sensor's: 20 um rms.
+        let scatter = |at: f64| 28e-6 * (0.9 * at).sin();
+        let positions: Vec<_> =
+            (0..600).map(f64::from).map(|at| Some(way(at - 300.0) + scatter(at))).collect();
+        let parabolas = parabolas(&positions, POSITION_REACH);
+        Still::new(&parabolas, &positions, 20e-6).rate(300).unwrap()
+    }
+
+    #[test]
+    fn what_goes_evenly_one_way_creeps_and_may_yet_rest() {
+        let own = told(&|t| 1e-6 * t);
+        assert!((own.rate_m_per_s - 1e-3).abs() < 1e-4 && own.or_else_m_per_s == Some(0.0), "{own:?}");
+    }
+
+    #[test]
+    fn what_stands_rests_for_sure() {
+        let own = told(&|_| 0.2);
+        assert_eq!((own.rate_m_per_s, own.or_else_m_per_s), (0.0, None));
+        let moves = told(&|t| 1e-4 * ((t - 60.0).max(0.0) + (t + 60.0).min(0.0)));
+        assert_eq!((moves.rate_m_per_s, moves.or_else_m_per_s), (0.0, None));
+    }
+
+    #[test]
+    fn what_seems_at_rest_but_is_soon_under_way_may_creep() {
+        let own = told(&|t| 1e-7 * (t - 15.0).max(0.0).powi(2));
+        assert_eq!(own.rate_m_per_s, 0.0);
+        assert!(own.or_else_m_per_s.unwrap() > 2e-4, "{own:?}");
+    }
+
+    #[test]
+    fn what_is_slow_beside_a_motion_may_rest() {
+        let own = told(&|t| 3e-5 * (t - 8.0).max(0.0));
+        assert!(own.rate_m_per_s.abs() < 5e-3 && own.or_else_m_per_s == Some(0.0), "{own:?}");
+    }
+}
