@@ -61,23 +61,29 @@ impl Plant {
 
     /// Goes on in another state, as in the next window of a record; what effects remember stays.
     ///
-    /// Delays, lags, plays, bristles and times at rest go on from the state before. A chamber keeps its temperature, so that
-    /// its mass follows the new pressure and volume.
+    /// Delays, lags, plays, bristles and times at rest go on from the state before; what sensors saw until now moves along by what
+    /// they see otherwise now, so that none shows the jump later. A chamber keeps its temperature, so that its mass follows the
+    /// new pressure and volume.
     ///
     /// # Errors
     /// [`SetupError`] if the state is none that the rig can be in; the plant is as before.
     pub fn go_on_in(&mut self, state: &State) -> Result<(), SetupError> {
         check_state(&self.rig, state)?;
+        let before = self.effects.is_some().then(|| seen(&self.truth(&Inputs::default())));
         if let Some(effects) = &mut self.effects {
             effects.memory.keep_temperatures(&self.state, state);
         }
         let added_mass_kg = self.state.added_mass_kg;
         self.state = State { added_mass_kg, ..*state };
-        if added_mass_kg == state.added_mass_kg {
-            Ok(())
-        } else {
-            self.set_added_mass_kg(state.added_mass_kg)
+        if added_mass_kg != state.added_mass_kg {
+            self.set_added_mass_kg(state.added_mass_kg)?;
         }
+        if let Some(before) = before {
+            let now = seen(&self.truth(&Inputs::default()));
+            let effects = self.effects.as_mut().expect("there were some before");
+            effects.memory.move_seen(before, now);
+        }
+        Ok(())
     }
 
     /// The same plant with another number of substeps in a period, 1 to 1000: for studies of accuracy.
@@ -162,9 +168,7 @@ impl Plant {
     /// What the sensors would show at this instant without noise and steps: position, force, pressure a, pressure b of each axis.
     pub fn shown(&self, truth: &Truth) -> [[f64; 4]; 2] {
         let Some(effects) = &self.effects else {
-            return truth
-                .axes
-                .map(|axis| [axis.position_m, axis.sensor_force_n, axis.pressure_a_pa, axis.pressure_b_pa]);
+            return seen(truth);
         };
         std::array::from_fn(|i| {
             let axis = &truth.axes[i];
@@ -313,4 +317,9 @@ impl Plant {
         }
         Ok(())
     }
+}
+
+/// What flawless sensors see: position, force, pressure a, pressure b of each axis.
+fn seen(truth: &Truth) -> [[f64; 4]; 2] {
+    truth.axes.map(|axis| [axis.position_m, axis.sensor_force_n, axis.pressure_a_pa, axis.pressure_b_pa])
 }

@@ -163,6 +163,25 @@ fn going_on_in_the_state_that_it_is_in_changes_nothing() {
 }
 
 #[test]
+fn sensors_that_are_late_see_no_jump_when_a_plant_goes_on_in_another_state() {
+    let late = [("time-skew", "delay_ms", 4.0), ("pressure-sensor-lag", "time_constant_ms", 8.0)];
+    for (effect, key, value) in late {
+        let rig = RigParameters::baseline().with_effect(effect, "drive.a", &[(key, value)]).unwrap();
+        let mut plant = Plant::new(&rig, &Setup::default()).unwrap();
+        let mut state = *plant.state();
+        state.axes[0].stored_air_a_j *= 1.5;
+        plant.go_on_in(&state).unwrap();
+        for _ in 0..10 {
+            let truth = plant.truth(&Inputs::default());
+            let off_pa = plant.shown(&truth)[0][2] - truth.axes[0].pressure_a_pa;
+            // The chamber itself moves on, but by little; the jump was a bar and a half.
+            assert!(off_pa.abs() < 2e4, "{effect}: {off_pa} Pa");
+            plant.step(&Inputs::default());
+        }
+    }
+}
+
+#[test]
 fn a_chamber_that_goes_on_at_another_pressure_keeps_its_temperature() {
     let rig = RigParameters::baseline();
     let rig = rig.with_effect("heat-exchange", "drive", &[("coefficient_w_per_m2_k", 10.0)]).unwrap();

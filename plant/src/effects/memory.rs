@@ -85,6 +85,11 @@ impl History {
         History { values: vec![value; steps.ceil() as usize + 2], newest: 0 }
     }
 
+    /// Moves all that is remembered.
+    fn shift(&mut self, by: f64) {
+        self.values.iter_mut().for_each(|value| *value += by);
+    }
+
     /// Forgets all for one value.
     pub(crate) fn fill(&mut self, value: f64) {
         self.values.fill(value);
@@ -163,6 +168,21 @@ impl Memory {
         });
         let commands = [0, 1].map(|i: usize| Commands::new(axes[i].spool));
         Memory { moving: Moving { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 }, commands, lines, channels }
+    }
+
+    /// What sensors saw (position, force, pressures of each axis), moved along with what they see now.
+    pub(crate) fn move_seen(&mut self, before: [[f64; 4]; 2], now: [[f64; 4]; 2]) {
+        for (axis, own) in self.moving.axes.iter_mut().enumerate() {
+            let by: [f64; 4] = std::array::from_fn(|channel| now[axis][channel] - before[axis][channel]);
+            let [position, _, a, b] = by;
+            for (i, by) in [position, a, b].into_iter().enumerate() {
+                own.shown[i] += by;
+                own.seen[i] += by;
+            }
+            for (history, by) in self.channels[axis].iter_mut().zip(by) {
+                history.iter_mut().for_each(|history| history.shift(by));
+            }
+        }
     }
 
     /// The masses that have, in the new state, the temperatures of the old one.
