@@ -99,6 +99,10 @@ pub(super) fn drift(course: &Course, at: usize, axis: usize, channel: usize) -> 
     }
     let (before, after) = (at.saturating_sub(1), (at + 1).min(course.len() - 1));
     if channel == FORCE {
+        // Contacts of linked rods are shorter than a period: their difference is no rate.
+        if course.linked {
+            return 0.0;
+        }
         // No parabola follows it; its readings' own noise is a few hundredths of what counts here.
         let [before, after] = [before, after].map(|at| course.samples[at][axis][FORCE]);
         let change = after.zip(before).map_or(0.0, |(after, before)| after - before);
