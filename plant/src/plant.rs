@@ -61,9 +61,9 @@ impl Plant {
 
     /// Goes on in another state, as in the next window of a record; what effects remember stays.
     ///
-    /// Delays, lags, plays, bristles and times at rest go on from the state before; what sensors saw until now moves along by what
-    /// they see otherwise now, so that none shows the jump later. A chamber keeps its temperature, so that its mass follows the
-    /// new pressure and volume.
+    /// Delays, lags, plays, bristles and times at rest go on from the state before; what sensors saw until now moves along by
+    /// what they see otherwise now, so that none shows the jump later. A chamber keeps its temperature, so that its mass follows
+    /// the new pressure and volume.
     ///
     /// # Errors
     /// [`SetupError`] if the state is none that the rig can be in; the plant is as before.
