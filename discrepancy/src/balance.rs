@@ -36,7 +36,7 @@ pub use filter::LowPass;
 pub use model::{Kind, Model};
 
 use crate::records::{self, ReadError, ReadOptions, Record};
-use crate::report::Report;
+use crate::report::{Report, Verdict};
 use fit::{Columns, Cut, Fit, Rows, rms};
 use plant::RigParameters;
 use runs::Run;
@@ -126,6 +126,29 @@ pub enum BalanceError {
         /// How many there are.
         rows: usize,
     },
+    /// A held-out record that would mislead.
+    #[error("{why}")]
+    Unusable {
+        /// The finding, with file and line.
+        why: String,
+    },
+    /// A time stamp beyond all others.
+    #[error(
+        "{file}:{line}: {time_s} s: {rows} rows cannot reach as far at a period of {period_s} s: mend the time, or \
+             processing.period_s of the model"
+    )]
+    Far {
+        /// The record.
+        file: String,
+        /// Line from 1.
+        line: u64,
+        /// The stamp, s.
+        time_s: f64,
+        /// Rows of the record.
+        rows: usize,
+        /// The model's period, s.
+        period_s: f64,
+    },
     /// No training record.
     #[error("a balance needs one training record at least")]
     NoRecord,
@@ -154,9 +177,18 @@ pub fn close(
     train: &[PathBuf],
     test: Option<&Path>,
     progress: &mut dyn FnMut(&str),
-) -> Result<Report, BalanceError> {
+) -> Result<Closed, BalanceError> {
     let tests: Vec<&Path> = test.into_iter().collect();
     close_on(model_file, train, &tests, progress)
+}
+
+/// What came out, and why held-out records were not judged, where they were given and were not.
+#[derive(Clone, Debug)]
+pub struct Closed {
+    /// What was found.
+    pub report: Report,
+    /// Why nothing was judged.
+    pub not_judged: Option<String>,
 }
 
 /// As [`close`], with any number of held-out records: the residuals are those over all of them.
@@ -168,18 +200,12 @@ pub fn close_on(
     train: &[PathBuf],
     tests: &[&Path],
     progress: &mut dyn FnMut(&str),
-) -> Result<Report, BalanceError> {
+) -> Result<Closed, BalanceError> {
     let study = Study::of(model_file, train, progress)?;
     let mut report = study.report(model_file);
-    let mut held_out = Vec::new();
-    for test in tests {
-        progress(&format!("held out: {}", test.display()));
-        held_out.push(read(&study.model, study.rig.as_ref(), test)?.1);
-    }
-    if !held_out.is_empty() {
-        study.verify(&held_out, &mut report)?;
-    }
-    Ok(report)
+    // What was found stays, whatever the held-out records are like.
+    let judged = study.judge(tests, &mut report, progress);
+    Ok(Closed { report, not_judged: judged.err().map(|error| error.to_string()) })
 }
 
 /// The training records with all that was found in them.
@@ -258,6 +284,29 @@ impl Study {
         }
         let own_fit = rows.fit(&own).unwrap_or_else(|| base_fit.clone());
         Ok(Self { model, rig, records, runs, rows, base, base_fit, time, families, found, own, own_fit })
+    }
+
+    /// Opens the held-out records, and compares both models on them.
+    fn judge(
+        &self,
+        tests: &[&Path],
+        report: &mut Report,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<(), BalanceError> {
+        if report.verdict == Verdict::BadData {
+            return Ok(());
+        }
+        let mut held_out = Vec::new();
+        for test in tests {
+            progress(&format!("held out: {}", test.display()));
+            let (record, run) = read(&self.model, self.rig.as_ref(), test)?;
+            let checked = self.check(&record);
+            if let Some(fatal) = checked.findings.iter().find(|finding| finding.fatal) {
+                return Err(BalanceError::Unusable { why: fatal.text.clone() });
+            }
+            held_out.push(run);
+        }
+        if held_out.is_empty() { Ok(()) } else { self.verify(&held_out, report) }
     }
 
     /// rms of the residual of baseline and extended model on the training records, ends included.

@@ -25,7 +25,7 @@ mod time;
 mod units;
 
 use crate::records::{Channel, Record, Signal};
-use crate::report::{ChannelCheck, RecordCheck};
+use crate::report::{ChannelCheck, Finding, RecordCheck};
 use grid::Grid;
 use notes::Notes;
 use plant::{Axis, RigParameters};
@@ -50,6 +50,26 @@ impl Checked {
         !self.unusable[channel.index()].get(row).copied().unwrap_or(false)
     }
 
+    /// What makes it unusable, a line for each finding.
+    #[must_use]
+    pub fn why_not(&self) -> String {
+        let fatal = self.report.findings.iter().filter(|finding| finding.fatal);
+        fatal.map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("\n")
+    }
+
+    /// A record that can be read and still cannot be simulated.
+    pub fn refuse(&mut self, column: Option<&str>, text: String) {
+        self.report.usable = false;
+        let column = column.map(str::to_owned);
+        self.report.findings.push(Finding {
+            kind: "not-simulated".into(),
+            column,
+            line: None,
+            fatal: true,
+            text,
+        });
+    }
+
     /// Standard deviation of a channel's noise, its rounding included; `None` when the record does not tell.
     #[must_use]
     pub fn noise(&self, channel: Channel) -> Option<f64> {
@@ -71,6 +91,15 @@ impl Checked {
 #[must_use]
 pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     let mut notes = Notes::new(record);
+    for warning in record.warnings() {
+        notes.findings.push(Finding {
+            kind: "reader".into(),
+            column: None,
+            line: warning.line,
+            fatal: false,
+            text: warning.text.clone(),
+        });
+    }
     time::check(&mut notes);
     let grid = Grid::of(record, &notes);
     units::check(&mut notes, rig);

@@ -17,7 +17,7 @@ pub struct Cli {
 /// The workflow and its steps.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The whole workflow: report.json, report.html, the extended rig.toml, and next.toml where an experiment is proposed.
+    /// The whole workflow: report.json, report.html, the extended rig.toml, and next-NAME.toml where an experiment is proposed.
     Close(CloseArguments),
     /// Whether records can be used, and their noise.
     Check(RecordArguments),
@@ -26,7 +26,7 @@ pub enum Command {
     /// Which balance disagrees, in which regime, over which variables.
     Locate(RecordArguments),
     /// Names what is missing: a close without a held-out record.
-    Name(RecordArguments),
+    Name(NameArguments),
     /// Writes the rig file with what a report names.
     Extend(ExtendArguments),
     /// Judges an extended rig file on a record that it was not fitted on.
@@ -38,14 +38,14 @@ pub enum Command {
 /// Records and the model.
 #[derive(Args, Clone, Debug)]
 pub struct RecordArguments {
-    /// Rig file: the model. Or a model file of one balance alone.
+    /// Rig file: the model. For close and name also a model file of one balance alone.
     #[arg(long)]
     pub rig: PathBuf,
     /// Training records: measurement.csv, bus.log, or any CSV with --mapping.
     #[arg(long, required = true, num_args = 1..)]
     pub train: Vec<PathBuf>,
-    /// Folder for the results, made if missing. Where none is given, close and name write into this folder: discrepancy; the
-    /// other steps write no files.
+    /// Folder for the results, made if missing. Where none is given, close and name write into this folder: discrepancy-results;
+    /// the other steps write no files.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Mapping file of foreign CSV records.
@@ -54,9 +54,6 @@ pub struct RecordArguments {
     /// Refuse records with columns that the measurement file does not know.
     #[arg(long)]
     pub strict: bool,
-    /// An effect that is no candidate; may be given several times.
-    #[arg(long, value_name = "EFFECT")]
-    pub without: Vec<String>,
     /// Threads; the results do not depend on them. Default: all cores.
     #[arg(long)]
     pub threads: Option<usize>,
@@ -66,17 +63,40 @@ impl RecordArguments {
     /// How the records are read.
     #[must_use]
     pub fn options(&self) -> ReadOptions {
-        let unknown = if self.strict { Unknown::Refused } else { Unknown::Ignored };
-        ReadOptions { unknown, mapping: self.mapping.clone(), ..ReadOptions::default() }
+        options(self.strict, self.mapping.as_ref())
     }
+}
+
+impl VerifyArguments {
+    /// How the record is read.
+    #[must_use]
+    pub fn options(&self) -> ReadOptions {
+        options(self.strict, self.mapping.as_ref())
+    }
+}
+
+fn options(strict: bool, mapping: Option<&PathBuf>) -> ReadOptions {
+    let unknown = if strict { Unknown::Refused } else { Unknown::Ignored };
+    ReadOptions { unknown, mapping: mapping.cloned(), ..ReadOptions::default() }
+}
+
+/// What naming is given.
+#[derive(Args, Clone, Debug)]
+pub struct NameArguments {
+    /// Model and training records.
+    #[command(flatten)]
+    pub records: RecordArguments,
+    /// An effect that is no candidate; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub without: Vec<String>,
 }
 
 /// What the whole workflow is given.
 #[derive(Args, Clone, Debug)]
 pub struct CloseArguments {
-    /// Model and training records.
+    /// What naming is given.
     #[command(flatten)]
-    pub records: RecordArguments,
+    pub name: NameArguments,
     /// The record that the model never sees before it is judged on it; a model of one balance takes several.
     #[arg(long, num_args = 1..)]
     pub test: Vec<PathBuf>,
@@ -111,6 +131,12 @@ pub struct VerifyArguments {
     /// Mapping file of a foreign CSV record.
     #[arg(long)]
     pub mapping: Option<PathBuf>,
+    /// Refuse a record with columns that the measurement file does not know.
+    #[arg(long)]
+    pub strict: bool,
+    /// Folder for verification.json, made if missing; without it nothing is written.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
 }
 
 /// What is to be told apart.

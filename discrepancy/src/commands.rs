@@ -1,24 +1,27 @@
 //! What each command does: reads, runs the steps, writes the files and says in a few lines what came out.
 //!
 //! Results go to files and standard output; progress goes to standard error. A record that cannot be used leaves a report with
-//! the verdict `bad-data`, and the exit code for bad input.
+//! the verdict `bad-data`, and the exit code for bad input. What was found is printed before it is written, so that a full disk
+//! takes the files alone.
 
 use crate::calibrate::calibrate;
 use crate::cli::{
-    Cli, CloseArguments, Command, ExtendArguments, NextArguments, RecordArguments, VerifyArguments,
+    Cli, Command, ExtendArguments, NameArguments, NextArguments, RecordArguments, VerifyArguments,
 };
 use crate::engine::Engine;
+use crate::folder::{self, Folder, FolderError};
 use crate::parameters::COUNT;
 use crate::refit::Around;
-use crate::report::{NamedEffect, Quantity, Report, Verdict, Verification};
+use crate::report::{Gap, NamedEffect, Quantity, Report, Verdict, Verification};
 use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
 use crate::{balance, locate, page, verify};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
-use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::thread;
 use std::time::Instant;
 
 /// Why a command did not do what it should.
@@ -30,7 +33,10 @@ pub enum CommandError {
     /// A model of one balance.
     #[error(transparent)]
     Balance(#[from] balance::BalanceError),
-    /// A file that cannot be written or read.
+    /// A result cannot be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file that cannot be read, or standard output that takes nothing.
     #[error("{file}: {why}")]
     File {
         /// The file.
@@ -73,14 +79,8 @@ impl CommandError {
 /// [`CommandError`] with file, line, key and what to do.
 pub fn run(cli: &Cli) -> Result<Exit, CommandError> {
     match &cli.command {
-        Command::Close(arguments) => {
-            threads(arguments.records.threads);
-            close_command(arguments)
-        }
-        Command::Name(arguments) => {
-            threads(arguments.threads);
-            close_command(&CloseArguments { records: arguments.clone(), test: Vec::new() })
-        }
+        Command::Close(arguments) => close_command(&arguments.name, &arguments.test),
+        Command::Name(arguments) => close_command(arguments, &[]),
         Command::Check(arguments) => check_command(arguments),
         Command::Calibrate(arguments) => {
             threads(arguments.threads);
@@ -110,48 +110,99 @@ fn progress() -> impl FnMut(&str) {
     move |text: &str| eprintln!("discrepancy: {:5.1} s: {text}", began.elapsed().as_secs_f64())
 }
 
-fn close_command(arguments: &CloseArguments) -> Result<Exit, CommandError> {
-    let records = &arguments.records;
-    let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy"));
-    known_effects(&records.without)?;
-    arguments.test.iter().try_for_each(|test| is_there(test))?;
-    std::fs::create_dir_all(&out).map_err(|why| CommandError::File { file: out.clone(), why })?;
-    let mut progress = progress();
+fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, CommandError> {
+    let NameArguments { records, without } = arguments;
+    threads(records.threads);
+    known_effects(without)?;
+    tests.iter().try_for_each(|test| is_there(test))?;
+    never_seen(&records.train, tests)?;
     let text = std::fs::read_to_string(&records.rig)
         .map_err(|why| CommandError::File { file: records.rig.clone(), why })?;
-    let outcome = if balance::is_model_file(&text) {
-        let tests: Vec<&Path> = arguments.test.iter().map(PathBuf::as_path).collect();
-        let report = balance::close_on(&records.rig, &records.train, &tests, &mut progress)?;
-        let extended = balance::extended_model_text(&records.rig, &report).ok();
-        Outcome { report, extended, pictures: page::Pictures::default(), experiment: None, not_judged: None }
+    let one_balance = balance::is_model_file(&text);
+    let model = match records.rig.file_name() {
+        Some(name) if one_balance => PathBuf::from(name),
+        _ => PathBuf::from("rig.toml"),
+    };
+    let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
+    let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests).chain(&records.mapping);
+    let out = Folder::open(&out, inputs)?;
+    // Told before a minute of work.
+    for name in [Path::new("report.json"), Path::new("report.html"), &model] {
+        out.file(name)?;
+    }
+    let mut progress = progress();
+    let outcome = if one_balance {
+        nothing_for_one_balance(arguments)?;
+        one_balance_outcome(records, tests, &mut progress)?
     } else {
         let task = Task {
             rig: records.rig.clone(),
             train: records.train.clone(),
-            test: one_test(arguments)?,
+            test: one_test(tests)?,
             options: records.options(),
-            without: records.without.clone(),
+            without: without.clone(),
         };
         close(&task, &mut progress)?
     };
     let Outcome { report, extended, pictures, experiment, not_judged } = &outcome;
-    write_json(&out.join("report.json"), report)?;
-    write(&out.join("report.html"), &page::page(report, pictures))?;
-    let model = records.rig.file_name().map_or_else(|| PathBuf::from("rig.toml"), PathBuf::from);
+    print(&in_words(report))?;
+    if let Some(why) = not_judged {
+        print(&format!("The model was not judged on the held-out record: {why}\n"))?;
+    }
+    out.clear(&model)?;
+    out.write_json("report.json", report)?;
+    out.write("report.html", &page::page(report, pictures))?;
     if let Some(extended) = extended {
-        write(&out.join(model), extended)?;
+        out.write(&model, extended)?;
     }
     let proposed = report.next.as_ref().and_then(|next| next.experiment.as_ref());
     if let Some((name, experiment)) = proposed.zip(experiment.as_ref()) {
-        write(&out.join(name), experiment)?;
+        out.write(name, experiment)?;
     }
-    progress(&format!("{} and report.html are in {}", "report.json", out.display()));
-    print(&in_words(report));
-    if let Some(why) = not_judged {
-        print(&format!("The model was not judged on the held-out record: {why}\n"));
-    }
+    progress(&format!("report.json and report.html are in {}", out.path().display()));
     let is_good = report.verdict != Verdict::BadData && not_judged.is_none();
     Ok(if is_good { Exit::Good } else { Exit::BadInput })
+}
+
+fn one_balance_outcome(
+    records: &RecordArguments,
+    tests: &[PathBuf],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Outcome, CommandError> {
+    let tests: Vec<&Path> = tests.iter().map(PathBuf::as_path).collect();
+    let balance::Closed { report, not_judged } =
+        balance::close_on(&records.rig, &records.train, &tests, progress)?;
+    let is_model = report.verdict != Verdict::BadData;
+    let extended = is_model.then(|| balance::extended_model_text(&records.rig, &report).ok()).flatten();
+    Ok(Outcome { report, extended, pictures: page::Pictures::default(), experiment: None, not_judged })
+}
+
+/// A model of one balance says itself how its records are read, and which terms it has.
+fn nothing_for_one_balance(arguments: &NameArguments) -> Result<(), CommandError> {
+    let given = [
+        ("--mapping", arguments.records.mapping.is_some(), "mapping = \"…\" in the model file"),
+        ("--strict", arguments.records.strict, "it reads the columns under [channels] alone"),
+        ("--without", !arguments.without.is_empty(), "[[term]] and [selection] of the model file"),
+    ];
+    let Some((option, _, instead)) = given.iter().find(|(_, given, _)| *given) else { return Ok(()) };
+    Err(CommandError::BadData(format!("{option}: not for a model of one balance: {instead}")))
+}
+
+/// No record is given twice, and none is held out that was trained on. Only names are looked at: nothing is opened.
+fn never_seen(train: &[PathBuf], tests: &[PathBuf]) -> Result<(), CommandError> {
+    let own = |file: &PathBuf| std::fs::canonicalize(file).unwrap_or_else(|_| file.clone());
+    let mut seen = BTreeSet::new();
+    if let Some(twice) = train.iter().find(|file| !seen.insert(own(file))) {
+        let twice = twice.display();
+        return Err(CommandError::BadData(format!(
+            "--train {twice}: given twice: the same noise would count as two measurements"
+        )));
+    }
+    let Some(test) = tests.iter().find(|file| seen.contains(&own(file))) else { return Ok(()) };
+    let test = test.display();
+    Err(CommandError::BadData(format!(
+        "--test {test}: a training record as well: a model is judged on a record that it never saw"
+    )))
 }
 
 /// An effect that is not left out because its name was mistyped would be found.
@@ -168,8 +219,8 @@ fn is_there(file: &Path) -> Result<(), CommandError> {
 }
 
 /// The held-out record of a rig: one at a time.
-fn one_test(arguments: &CloseArguments) -> Result<Option<PathBuf>, CommandError> {
-    match arguments.test.as_slice() {
+fn one_test(tests: &[PathBuf]) -> Result<Option<PathBuf>, CommandError> {
+    match tests {
         [] => Ok(None),
         [one] => Ok(Some(one.clone())),
         many => Err(CommandError::BadData(format!(
@@ -184,8 +235,7 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let mut all = Vec::new();
     let mut text = String::new();
     for path in &arguments.train {
-        let record = crate::records::read(path, &arguments.options()).map_err(WorkflowError::from)?;
-        let report = crate::check::check(&record, &rig).report;
+        let report = open(path, &arguments.options(), &rig)?.checked.report;
         let fit = if report.usable { "can be used" } else { "cannot be used" };
         let _ = writeln!(text, "{}: {} rows, {:.3} s: {fit}", report.file, report.rows, report.length_s);
         for finding in &report.findings {
@@ -202,10 +252,9 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
         }
         all.push(report);
     }
-    print(&text);
-    if let Some(out) = &arguments.out {
-        std::fs::create_dir_all(out).map_err(|why| CommandError::File { file: out.clone(), why })?;
-        write_json(&out.join("checks.json"), &all)?;
+    print(&text)?;
+    if let Some(out) = folder(arguments)? {
+        out.write_json("checks.json", &all)?;
     }
     Ok(if all.iter().all(|report| report.usable) { Exit::Good } else { Exit::BadInput })
 }
@@ -224,16 +273,15 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
             (None, _) => writeln!(text, "{}: these records cannot tell", own.name),
         };
     }
-    print(&text);
-    if let Some(out) = &arguments.out {
-        std::fs::create_dir_all(out).map_err(|why| CommandError::File { file: out.clone(), why })?;
-        write_json(&out.join("parameters.json"), &quantities)?;
+    print(&text)?;
+    if let Some(out) = folder(arguments)? {
+        out.write_json("parameters.json", &quantities)?;
         let known: Vec<Quantity> =
             quantities.into_iter().filter(|own| own.standard_error.is_some()).collect();
         let records: Vec<String> = arguments.train.iter().map(|path| path.display().to_string()).collect();
         let text = crate::extend::extend(&rig_file.text, &rig_file.file, &[], &known, &records)
             .map_err(WorkflowError::from)?;
-        write(&out.join("rig.toml"), &text)?;
+        out.write("rig.toml", &text)?;
     }
     Ok(Exit::Good)
 }
@@ -250,10 +298,9 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
             bar.balance, bar.over_noise, bar.rms, bar.unit
         );
     }
-    print(&text);
-    if let Some(out) = &arguments.out {
-        std::fs::create_dir_all(out).map_err(|why| CommandError::File { file: out.clone(), why })?;
-        write_json(&out.join("location.json"), &located.location)?;
+    print(&text)?;
+    if let Some(out) = folder(arguments)? {
+        out.write_json("location.json", &located.location)?;
     }
     Ok(Exit::Good)
 }
@@ -262,17 +309,15 @@ fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
     let rig_file = RigFile::read(&arguments.rig)?;
     let report = read_report(&arguments.report)?;
     let text = workflow::extended(&rig_file, &report).map_err(WorkflowError::from)?;
-    write(&arguments.out, &text)?;
+    spare(&arguments.out, &[&arguments.rig, &arguments.report])?;
+    folder::write(&arguments.out, &text)?;
     Ok(Exit::Good)
 }
 
 fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     let [before, after] = [RigFile::read(&arguments.rig)?.rig, RigFile::read(&arguments.extended)?.rig];
-    let options = crate::records::ReadOptions { mapping: arguments.mapping.clone(), ..Default::default() };
-    let opened = open(&arguments.test, &options, &before)?;
-    let Some(course) = opened.course else {
-        return Err(CommandError::BadData(format!("{} cannot be used: see check", arguments.test.display())));
-    };
+    let opened = open(&arguments.test, &arguments.options(), &before)?;
+    let Some(course) = opened.course else { return Err(CommandError::BadData(opened.checked.why_not())) };
     let verified = verify::verify(&before, &after, &course, &mut progress());
     let mut text = String::new();
     for (signal, gap) in &verified.gap {
@@ -291,21 +336,40 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
         chi2_null[1],
         if *confirmed { "confirmed" } else { "not confirmed" }
     );
-    print(&text);
+    for (signal, error) in &verified.verification.free_run_nrmse_percent {
+        let _ = writeln!(text, "{signal}: free run {:.2} % before, {:.2} % after", error.before, error.after);
+    }
+    verified.verification.physical.iter().for_each(|unphysical| text.push_str(&format!("{unphysical}\n")));
+    print(&text)?;
+    if let Some(out) = &arguments.out {
+        let inputs = [&arguments.rig, &arguments.extended, &arguments.test];
+        let told = VerifiedFile { gap: &verified.gap, verification: &verified.verification };
+        Folder::open(out, inputs)?.write_json("verification.json", &told)?;
+    }
     Ok(if *confirmed { Exit::Good } else { Exit::BoundBroken })
+}
+
+/// `verification.json`: what a report has under the same names.
+#[derive(serde::Serialize)]
+struct VerifiedFile<'a> {
+    gap: &'a std::collections::BTreeMap<String, Gap>,
+    verification: &'a Verification,
 }
 
 fn next_command(arguments: &NextArguments) -> Result<Exit, CommandError> {
     let rig_file = RigFile::read(&arguments.rig)?;
     let report = read_report(&arguments.report)?;
     let Some(proposal) = workflow::proposal(&rig_file, &report, &mut progress()) else {
-        print("The report names nothing that cannot be told apart.\n");
+        print("The report names nothing that cannot be told apart.\n")?;
         return Ok(Exit::Good);
     };
-    print(&format!("{}\n", proposal.next.reason));
+    print(&format!("{}\n", proposal.next.reason))?;
     match (&proposal.experiment_toml, &proposal.next.otherwise) {
-        (Some(experiment), _) => write(&arguments.out, experiment)?,
-        (None, Some(otherwise)) => print(&format!("{otherwise}\n")),
+        (Some(experiment), _) => {
+            spare(&arguments.out, &[&arguments.rig, &arguments.report])?;
+            folder::write(&arguments.out, experiment)?;
+        }
+        (None, Some(otherwise)) => print(&format!("{otherwise}\n"))?,
         (None, None) => {}
     }
     Ok(Exit::Good)
@@ -316,12 +380,7 @@ fn courses(arguments: &RecordArguments) -> Result<(RigFile, Vec<crate::course::C
     let mut courses = Vec::new();
     for path in &arguments.train {
         let opened = open(path, &arguments.options(), &rig_file.rig)?;
-        let Some(course) = opened.course else {
-            let fatal = opened.checked.report.findings.into_iter().filter(|finding| finding.fatal);
-            return Err(CommandError::BadData(
-                fatal.map(|finding| finding.text).collect::<Vec<_>>().join("\n"),
-            ));
-        };
+        let Some(course) = opened.course else { return Err(CommandError::BadData(opened.checked.why_not())) };
         courses.push(course);
     }
     Ok((rig_file, courses))
@@ -332,19 +391,40 @@ fn read_report(path: &Path) -> Result<workflow::Told, CommandError> {
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }
 
-fn write(file: &Path, text: &str) -> Result<(), CommandError> {
-    std::fs::write(file, text).map_err(|why| CommandError::File { file: file.to_owned(), why })
+/// The folder that a step is told to write into.
+fn folder(arguments: &RecordArguments) -> Result<Option<Folder>, CommandError> {
+    let inputs = || [&arguments.rig].into_iter().chain(&arguments.train).chain(&arguments.mapping);
+    Ok(arguments.out.as_ref().map(|out| Folder::open(out, inputs())).transpose()?)
 }
 
-fn write_json(file: &Path, value: &impl Serialize) -> Result<(), CommandError> {
-    let mut text = serde_json::to_string_pretty(value).expect("reports hold nothing that JSON does not");
-    text.push('\n');
-    write(file, &text)
+/// A file to be written that is none of those that are read.
+fn spare(out: &Path, inputs: &[&PathBuf]) -> Result<(), CommandError> {
+    let own = std::fs::canonicalize(out).ok();
+    let is_input = own.is_some() && inputs.iter().any(|file| std::fs::canonicalize(file).ok() == own);
+    if is_input { Err(FolderError::Input { file: out.to_owned() }.into()) } else { Ok(()) }
 }
 
 /// Standard output; a reader that has gone is no matter.
-fn print(text: &str) {
-    let _ = io::stdout().write_all(text.as_bytes());
+fn print(text: &str) -> Result<(), CommandError> {
+    match io::stdout().write_all(text.as_bytes()).and_then(|()| io::stdout().flush()) {
+        Err(why) if why.kind() != io::ErrorKind::BrokenPipe => {
+            Err(CommandError::File { file: "standard output".into(), why })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Says on Ctrl-C and SIGTERM that nothing is written yet, and ends: what is written is written at the end, whole.
+pub fn end_when_asked() {
+    let asked = [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM];
+    // Without a thread for it the signals end the program without a word, as they did before.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(asked) else { return };
+    let _ = thread::Builder::new().name("signals".into()).spawn(move || {
+        if signals.forever().next().is_some() {
+            eprintln!("discrepancy: interrupted; results are written at the end, so that there are none");
+            std::process::exit(Exit::Interrupted as i32);
+        }
+    });
 }
 
 /// The verdict and the names in a few lines.

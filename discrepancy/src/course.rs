@@ -13,11 +13,13 @@
 //! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
 
 mod still;
+mod thinned;
 
 use crate::check::Checked;
 use crate::records::{Channel, Record, Signal};
 use plant::{Axis, Inputs, RigParameters, quantise_valve};
 use still::{Rate, Still};
+pub use thinned::{SEARCHED_S, searched_share};
 
 /// Channels of an axis that are simulated: position, force, pressures a and b.
 pub const CHANNELS: usize = 4;
@@ -113,6 +115,17 @@ pub enum CourseError {
     },
 }
 
+impl CourseError {
+    /// The column that it is about.
+    #[must_use]
+    pub fn column(&self) -> Option<&str> {
+        match self {
+            CourseError::Missing { column, .. } => Some(column),
+            CourseError::NoAxis { .. } | CourseError::Short { .. } => None,
+        }
+    }
+}
+
 /// Shortest record, periods.
 const SHORTEST: usize = 1000;
 
@@ -139,7 +152,7 @@ impl Course {
                 }
             }
         }
-        let places = places(record);
+        let places = places(record, checked);
         let length = places.last().map_or(0, |last| last + 1);
         if length < SHORTEST {
             return Err(CourseError::Short { file, length_ms: length, least_ms: SHORTEST });
@@ -320,14 +333,21 @@ fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: 
 }
 
 /// The grid's place of each row; rows whose time jumps back share the place of the one before.
-fn places(record: &Record) -> Vec<usize> {
+///
+/// A row whose time cannot be stays where the row before is: none of its samples counts.
+fn places(record: &Record, checked: &Checked) -> Vec<usize> {
     let times = record.time_s();
-    let first = times.first().copied().unwrap_or(0.0);
+    let is_good = |row: usize| record.channels().any(|channel| checked.is_usable(channel, row));
+    let good: Vec<bool> = (0..times.len()).map(is_good).collect();
+    let first = times.iter().zip(&good).find(|(_, good)| **good).map_or(0.0, |(time, _)| *time);
     let mut last = 0;
     times
         .iter()
-        .map(|time| {
-            last = last.max(((time - first) / PERIOD_S).round().max(0.0) as usize);
+        .zip(good)
+        .map(|(time, good)| {
+            if good {
+                last = last.max(((time - first) / PERIOD_S).round().max(0.0) as usize);
+            }
             last
         })
         .collect()

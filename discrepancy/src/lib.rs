@@ -37,6 +37,7 @@ pub mod course;
 pub mod engine;
 pub mod extend;
 pub mod fit;
+pub mod folder;
 pub mod locate;
 pub mod name;
 pub mod next;

@@ -5,7 +5,9 @@ use discrepancy::cli::Cli;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let exit = discrepancy::commands::run(&Cli::parse()).unwrap_or_else(|error| {
+    let cli = Cli::parse();
+    discrepancy::commands::end_when_asked();
+    let exit = discrepancy::commands::run(&cli).unwrap_or_else(|error| {
         eprintln!("discrepancy: {error}");
         error.exit()
     });

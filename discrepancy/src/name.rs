@@ -14,8 +14,10 @@
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
 mod home;
+mod joined;
 mod needed;
 mod nothing;
+mod pitch;
 mod settle;
 
 use crate::calibrate::{Calibrated, calibrate};
@@ -25,9 +27,12 @@ use crate::parameters::COUNT;
 use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
 use crate::screen::{Columns, Screened};
 use home::{Placement, at_home, gap_start};
+use joined::{alternatives, drop_unneeded, same, shares, swap};
 use needed::with_needed;
 use nothing::Nothing;
+use pitch::at_best_pitch;
 use rayon::prelude::*;
+use settle::{grounded, settled};
 
 /// Effects at most.
 const MOST: usize = 3;
@@ -55,12 +60,8 @@ const LOOKED_FOR: f64 = 0.5;
 const CONTENDS: f64 = 0.35;
 /// What each number of an effect costs: it must be worth more than one more candidate tried.
 const NUMBER_COSTS: f64 = 8.0;
-/// What came close in a round, that is tried again when another effect has joined.
-const SWAPPED: usize = 3;
-/// Multiple of the threshold of nothing that is asked of the first effect and of every further one, since a model is never exact,
-/// least of all one with another effect fitted in it.
+/// Multiple of the threshold of nothing that is asked of the first effect.
 const SAFETY: f64 = 2.0;
-const SAFETY_BESIDE: f64 = 3.0;
 /// Share of what the parameters leave that the first effect must take.
 const TAKES_FIRST: f64 = 0.1;
 /// Share of what a model leaves that one more effect must take.
@@ -78,10 +79,6 @@ const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backla
 /// What stands between linked rods: screening sees little of it, since starts were moved to where the rig without it meets the
 /// readings.
 const BACKLASH: &str = "coupling-backlash";
-/// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart.
-const ALIKE: f64 = 20.0;
-/// The same as a share of what the effect takes.
-const ALIKE_SHARE: f64 = 0.02;
 
 /// What naming found.
 #[derive(Debug)]
@@ -171,8 +168,10 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         let gain = own_nothing - best.loss;
         let near =
             refits.iter().take(REFINED).filter(|own| own_nothing - own.loss >= 0.5 * gain).count().max(1);
-        let mut refined: Vec<Placement> =
-            refits[..near].par_iter().map(|own| at_home(here, &refine(here, own), NUMBER_COSTS)).collect();
+        let mut refined: Vec<Placement> = refits[..near]
+            .par_iter()
+            .map(|own| at_home(here, &refine(here, &at_best_pitch(here, own)), NUMBER_COSTS))
+            .collect();
         refits.splice(..near, refined.iter().map(|own| own.fit.clone()));
         let least = refits.iter().map(|own| own.loss).fold(model.loss, f64::min);
         if let Some(gap) = gap
@@ -207,11 +206,13 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         if !takes(&model, best) {
             break;
         }
+        refits[0].factors = grounded(there, best);
+        let best = &refits[0];
         threshold = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
         rounds.push((model.placed.clone(), refits.clone()));
         model = best.clone();
         if round > 0 {
-            swap(there, &mut model, &rounds, progress);
+            swap(there, &mut model, &calibrated, &mut rounds, progress);
         }
         home = best_home.or(home);
     }
@@ -219,7 +220,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     drop_unneeded(here, &calibrated, &columns, &mut model, &mut rounds);
     let left = Nothing::new(here, &columns, &around_of(here, &model), &model);
     threshold = left.threshold();
-    let limits = left.limits(columns.candidates.len(), threshold);
+    let limits = limits_of(&left, &columns, threshold);
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
     let freedom = here.freedom().iter().sum::<f64>();
     let level = model.loss / freedom;
@@ -248,6 +249,16 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         nothing,
         limits,
         inadequate,
+    }
+}
+
+/// Takes what is told of a part of the records to all of them: its numbers, fitted there, with their errors there.
+pub fn on_all(engine: &Engine<'_>, found: &mut Found) {
+    let Some(rig) = rig_of(engine.rig(), &found.told.placed, &found.told.factors) else { return };
+    let home = engine.is_linked().then(|| engine.settled_at(&rig));
+    let needed = found.told.factors.map(|factor| factor != 1.0);
+    if let Some(told) = settled(home.as_ref().unwrap_or(engine), &found.told, &needed) {
+        found.told = told;
     }
 }
 
@@ -313,13 +324,26 @@ fn takes(before: &Refit, after: &Refit) -> bool {
 pub fn is_large(placed: &Placed) -> bool {
     let candidate = &placed.candidate;
     let keys = if DEFINED_BY_FIRST.contains(&candidate.sheet.name) { 1 } else { placed.coordinates.len() };
-    (0..keys).filter(|key| !candidate.is_shape(*key)).any(|key| {
-        let sheet_key = &candidate.sheet.keys[key];
-        let ends = sheet_key.drawn.map(|number| candidate.coordinate(key, number));
-        // A range that holds the neutral value has no smallest change.
-        let least = if ends[0] * ends[1] < 0.0 { 0.05 } else { FLOOR * ends[0].abs().min(ends[1].abs()) };
-        placed.coordinates[key].abs() >= least
-    })
+    (0..keys)
+        .filter(|key| !candidate.is_shape(*key))
+        .any(|key| placed.coordinates[key].abs() >= least_coordinate(candidate, key))
+}
+
+/// The smallest coordinate of an amplitude that counts as an effect.
+fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
+    let ends = candidate.sheet.keys[key].drawn.map(|number| candidate.coordinate(key, number));
+    // A range that holds the neutral value has no smallest change.
+    if ends[0] * ends[1] < 0.0 { 0.05 } else { FLOOR * ends[0].abs().min(ends[1].abs()) }
+}
+
+/// From which coordinate of its amplitude on a candidate would have been named: it must stand out of nothing, be worth a fit, and be
+/// no smaller than what counts as an effect.
+fn limits_of(left: &Nothing, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
+    let told = left.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
+    let floored = |(limit, candidate): (Option<f64>, &Candidate)| {
+        limit.map(|limit: f64| limit.max(least_coordinate(candidate, 0)))
+    };
+    told.into_iter().zip(&columns.candidates).map(floored).collect()
 }
 
 /// Screens all candidates against what a model leaves, its own derivatives beside.
@@ -341,120 +365,4 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
         })
         .collect();
     columns.screen(engine, &around, &residual, &beside)
-}
-
-/// Puts what came close in an earlier round in the place of what won it: beside the effects that joined since, it may win.
-fn swap(
-    engine: &Engine<'_>,
-    model: &mut Refit,
-    rounds: &[(Vec<Placed>, Vec<Refit>)],
-    progress: &mut dyn FnMut(&str),
-) {
-    let point = around_of(engine, model);
-    let mut tried = Vec::new();
-    for (at, (_, refits)) in rounds.iter().enumerate().take(model.placed.len() - 1) {
-        for other in refits.iter().skip(1).take(SWAPPED).filter_map(|own| own.placed.last()) {
-            let mut placed = model.placed.clone();
-            placed[at] = other.clone();
-            tried.push(placed);
-        }
-    }
-    progress(&format!("trying {} other combinations", tried.len()));
-    let best = tried
-        .par_iter()
-        .filter_map(|placed| refit_steps(engine, &point, placed, NUMBER_COSTS, STEPS))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .min_by(|left, right| left.loss.total_cmp(&right.loss));
-    if let Some(best) = best.filter(|best| best.loss < model.loss) {
-        *model = refine(engine, &best);
-    }
-}
-
-/// Takes out effects that are not missed: by more than what nothing gains beside the whole model.
-fn drop_unneeded<'a>(
-    engine: &Engine<'a>,
-    calibrated: &Calibrated,
-    columns: &Columns,
-    model: &mut Refit,
-    rounds: &mut Vec<(Vec<Placed>, Vec<Refit>)>,
-) {
-    while !model.placed.is_empty() {
-        let around = around_of(engine, model);
-        let threshold = Nothing::new(engine, columns, &around, model).threshold();
-        let without: Vec<Option<Refit>> = (0..model.placed.len())
-            .into_par_iter()
-            .map(|at| {
-                let mut placed = model.placed.clone();
-                placed.remove(at);
-                if placed.is_empty() {
-                    return Some(calibrated.fit.clone());
-                }
-                refit_steps(engine, &around, &placed, NUMBER_COSTS, 4)
-            })
-            .collect();
-        let least = without
-            .into_iter()
-            .enumerate()
-            .filter_map(|(at, own)| Some((at, own?)))
-            .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
-        let Some((at, own)) = least else { break };
-        let missed = own.loss - model.loss;
-        let safety = if own.placed.is_empty() { SAFETY } else { SAFETY_BESIDE };
-        let share = missed / (calibrated.fit.loss - model.loss).max(1e-9);
-        if missed > safety * threshold && share > 0.002 {
-            break;
-        }
-        rounds.remove(at.min(rounds.len() - 1));
-        *model = own;
-    }
-}
-
-/// Whether two are the same effect at the same place.
-fn same(left: &Placed, right: &Placed) -> bool {
-    left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
-}
-
-/// What takes the place of an effect of the model just as well.
-fn alternatives(
-    placed: &Placed,
-    calibrated: &Calibrated,
-    rounds: &[(Vec<Placed>, Vec<Refit>)],
-) -> Vec<Refit> {
-    // The round in which it joined.
-    let Some((_, refits)) = rounds.iter().find(|(_, refits)| {
-        refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
-    }) else {
-        return Vec::new();
-    };
-    let best = &refits[0];
-    let gain = calibrated.fit.loss - best.loss;
-    refits[1..]
-        .iter()
-        .filter(|own| own.loss - best.loss < (ALIKE * best.inflation).max(ALIKE_SHARE * gain))
-        .cloned()
-        .collect()
-}
-
-/// Share of the excess that goes with each effect: of one alone all, of several what is missed without it.
-fn shares(
-    model: &Refit,
-    rounds: &[(Vec<Placed>, Vec<Refit>)],
-    calibrated: &Calibrated,
-    excess: f64,
-) -> Vec<f64> {
-    let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
-    let mut before = calibrated.fit.loss;
-    model
-        .placed
-        .iter()
-        .enumerate()
-        .map(|(at, _)| {
-            let after =
-                rounds.get(at).and_then(|(_, refits)| refits.first()).map_or(model.loss, |own| own.loss);
-            let share = (before - after) / excess * whole;
-            before = after;
-            share.clamp(0.0, 1.0)
-        })
-        .collect()
 }

@@ -117,7 +117,8 @@ pub fn propose(
     Proposal { next, experiment_toml, table }
 }
 
-/// T of all ordered pairs in an entry; `None` when it cannot be rehearsed with one of the rigs.
+/// T of all ordered pairs in an entry; `None` when it cannot be rehearsed with one of the rigs, does not end with it or comes near
+/// an end of its stroke.
 #[must_use]
 pub fn judge(
     entry: &Entry,
@@ -132,6 +133,7 @@ pub fn judge(
         .into_par_iter()
         .map(|own| {
             let driven = drive(entry, baseline, &explanations[own].rig).ok()?;
+            let driven = Some(driven).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
             let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != own).collect();
             let rigs: Vec<_> = [own].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
             let values = divergences(&driven, baseline, &rigs, &numbers, axes_measured);
@@ -188,7 +190,7 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
          ({WANTED} are wanted){rest}",
         entry.name, entry.serves
     );
-    let experiment = Some(format!("next-{}.toml", entry.name));
+    let experiment = Some(entry.file());
     (Next { reason, experiment, divergence: Some(total), otherwise }, Some(text(entry, times)))
 }
 

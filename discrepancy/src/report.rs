@@ -66,12 +66,28 @@ pub struct Report {
 }
 
 /// Files of a run of the workflow.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct InputFiles {
     /// The rig file.
     pub rig: String,
     /// Training records.
     pub train: Vec<String>,
+    /// Axes that all of them show, drive or load; empty for a model of one balance and for records that cannot be used.
+    #[serde(default)]
+    pub axes: Vec<String>,
+    /// Share of them that was searched; the numbers of what was found are those of all.
+    #[serde(default = "all")]
+    pub searched_share: f64,
+}
+
+fn all() -> f64 {
+    1.0
+}
+
+impl Default for InputFiles {
+    fn default() -> Self {
+        InputFiles { rig: String::new(), train: Vec::new(), axes: Vec::new(), searched_share: all() }
+    }
 }
 
 /// Where an effect is.

@@ -28,7 +28,7 @@ mod nothing;
 mod power;
 mod traces;
 
-use crate::course::{CHANNELS, Course, SIGNALS};
+use crate::course::{CHANNELS, Course, SIGNALS, searched_share};
 use crate::page::Trace;
 use crate::records::Channel;
 use crate::report::{BeforeAfter, Gap, Verification};
@@ -68,7 +68,9 @@ pub fn verify(
     progress("held-out record in windows, before and after");
     let (before, after) = rayon::join(|| Model::new(course, before), || Model::new(course, after));
     progress("held-out record: what noise alone would show");
-    let nothing = Nothing::new(&after.windows, &after.simulated);
+    let part = course.thinned(searched_share(std::slice::from_ref(course)));
+    let part = part.as_ref().map(|part| Model::new(part, after.windows.rig()));
+    let nothing = Nothing::new(&after, part.as_ref());
     progress("held-out record: free run");
     let (run_before, run_after) = rayon::join(
         || free_run::free_run(course, before.windows.rig()),

@@ -12,11 +12,11 @@ mod telling;
 use crate::balance::is_model_file;
 use crate::candidates::Candidate;
 use crate::check::{Checked, check};
-use crate::course::{Course, CourseError};
+use crate::course::{Course, searched_share};
 use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, extend};
 use crate::locate::locate;
-use crate::name::name;
+use crate::name::{name, on_all};
 use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
@@ -24,10 +24,11 @@ use crate::records::{self, ReadError, ReadOptions};
 use crate::report::{self, InputFiles, NamedEffect, Quantity, Report, TableTerm, Verdict};
 use crate::tabulate::{tables, tabulate};
 use crate::verify::verify;
-use plant::{ParameterError, RigParameters};
+use plant::{Axis, ParameterError, RigParameters};
 use std::path::{Path, PathBuf};
+pub(crate) use telling::empty;
 pub use telling::place_name;
-use telling::{empty, report_of, summary};
+use telling::{report_of, summary};
 
 /// What the workflow is asked.
 #[derive(Clone, Debug, Default)]
@@ -84,9 +85,6 @@ pub enum WorkflowError {
     /// A record cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A record cannot be simulated.
-    #[error(transparent)]
-    Course(#[from] CourseError),
     /// The held-out record cannot be used.
     #[error("{file}: cannot be used: {why}")]
     Unusable {
@@ -151,11 +149,20 @@ pub struct Opened {
 /// Reads and checks a record.
 ///
 /// # Errors
-/// [`WorkflowError`] when it cannot be read or simulated at all.
+/// [`WorkflowError`] when it cannot be read.
 pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<Opened, WorkflowError> {
     let record = records::read(path, options)?;
-    let checked = check(&record, rig);
-    let course = if checked.report.usable { Some(Course::of(&record, &checked, rig)?) } else { None };
+    let mut checked = check(&record, rig);
+    if !checked.report.usable {
+        return Ok(Opened { checked, course: None });
+    }
+    let course = match Course::of(&record, &checked, rig) {
+        Ok(course) => Some(course),
+        Err(why) => {
+            checked.refuse(why.column(), why.to_string());
+            None
+        }
+    };
     Ok(Opened { checked, course })
 }
 
@@ -168,20 +175,33 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     let rig = &rig_file.rig;
     let opened = open_all(task, rig, progress)?;
     let checks = opened.iter().map(|opened| opened.checked.report.clone()).collect();
-    let inputs = InputFiles {
+    let mut inputs = InputFiles {
         rig: rig_file.file.clone(),
         train: task.train.iter().map(|path| path.display().to_string()).collect(),
+        ..InputFiles::default()
     };
     let mut courses: Vec<Course> = opened.into_iter().filter_map(|opened| opened.course).collect();
     if courses.len() < task.train.len() {
         return Ok(bad_data(inputs, checks));
     }
     on_shared_axes(&mut courses)?;
+    let shown = Axis::ALL.into_iter().filter(|axis| courses[0].measured[axis.index()]);
+    inputs.axes = shown.map(|axis| axis.name().to_owned()).collect();
 
-    let engine = Engine::new(&courses, rig);
+    inputs.searched_share = searched_share(&courses);
+    let part: Option<Vec<Course>> =
+        (inputs.searched_share < 1.0).then(|| parts(&courses, inputs.searched_share));
+    if part.is_some() {
+        progress(&format!("searching {:.0} % of the records", 1e2 * inputs.searched_share));
+    }
+    let engine = Engine::new(part.as_ref().unwrap_or(&courses), rig);
     let linked = courses.iter().any(|course| course.linked);
     let candidates = Candidate::all(courses[0].measured, linked, &task.without);
-    let found = name(&engine, candidates, progress);
+    let mut found = name(&engine, candidates, progress);
+    if part.is_some() {
+        progress("fitting what was found on all of the records");
+        on_all(&Engine::new(&courses, rig), &mut found);
+    }
     let mut report = report_of(&engine, &found);
     report.inputs = inputs;
     report.checks = checks;
@@ -230,6 +250,11 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     Ok(Outcome { report, extended: Some(text), pictures, experiment, not_judged })
 }
 
+/// About this share of each record.
+fn parts(courses: &[Course], share: f64) -> Vec<Course> {
+    courses.iter().map(|course| course.thinned(share).unwrap_or_else(|| course.clone())).collect()
+}
+
 /// Judges the extended model on the held-out record, which is opened here and nowhere else; without one, draws the
 /// training record.
 fn held_out(
@@ -252,10 +277,26 @@ fn held_out(
             why: fatal(std::slice::from_ref(&opened.checked.report)),
         });
     };
+    if let Some(train) = task.train.iter().find(|train| is_copy(train, test)) {
+        return Err(WorkflowError::Unusable {
+            file: test.display().to_string(),
+            why: format!(
+                "it is a copy of {}: a model is judged on a record that it never saw",
+                train.display()
+            ),
+        });
+    }
     let verified = verify(rig, after, &course, progress);
     report.gap = verified.gap;
     report.verification = Some(verified.verification);
     Ok(Pictures { record: course.name.clone(), held_out: true, traces: verified.traces })
+}
+
+/// Whether two files have the same bytes.
+fn is_copy(one: &Path, other: &Path) -> bool {
+    let length = |file: &Path| std::fs::metadata(file).map(|own| own.len()).ok();
+    length(one) == length(other)
+        && matches!((std::fs::read(one), std::fs::read(other)), (Ok(one), Ok(other)) if one == other)
 }
 
 /// What a report says of effects and parameters, as other steps need it.
@@ -298,9 +339,8 @@ pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> 
 /// The experiment that tells apart what a report could not; `None` when there is nothing to tell apart.
 #[must_use]
 pub fn proposal(rig_file: &RigFile, told: &Told, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
-    let on = |axis: &str| told.named.iter().any(|own| own.place.axis == axis);
-    let both = on("linkage") || on("supply");
-    proposal_for(rig_file, told, [both || on("drive"), both || on("load")], progress)
+    let measured = Axis::ALL.map(|axis| told.inputs.axes.iter().any(|own| own == axis.name()));
+    proposal_for(rig_file, told, measured, progress)
 }
 
 fn proposal_for(

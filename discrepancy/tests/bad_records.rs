@@ -3,6 +3,7 @@
 //! The records are the rig's own, simulated and then spoiled.
 
 use discrepancy::check::{Checked, check};
+use discrepancy::course::Course;
 use discrepancy::records::{Channel, ReadOptions, Record, Signal, read};
 use plant::tables::{CycleRecord, write_measurement, write_measurement_head};
 use plant::{Axis, Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
@@ -91,6 +92,12 @@ impl Sheet {
     fn changed(mut self, column: &str, change: impl Fn(usize, f64) -> f64) -> Sheet {
         let place = self.place(column);
         self.rows.iter_mut().enumerate().for_each(|(at, row)| row[place] = change(at, row[place]));
+        self
+    }
+
+    fn with_column(mut self, column: &str, values: &[f64]) -> Sheet {
+        self.columns.push(column.to_owned());
+        self.rows.iter_mut().zip(values).for_each(|(row, value)| row.push(*value));
         self
     }
 
@@ -325,6 +332,57 @@ fn time_that_repeats_is_survived_and_time_that_jumps_is_named() {
     assert!(!jumping.report.usable && kinds(&jumping).contains(&"jumping-time"), "{}", texts(&jumping));
     let leaping = drive().changed("time_s", |row, time| if row == 70 { 1e6 } else { time }).checked();
     assert!(texts(&leaping).contains("measurement.csv:73: time jumps"), "{}", texts(&leaping));
+}
+
+#[test]
+fn one_stamp_that_cannot_be_is_left_out_wherever_it_is() {
+    let rig = RigParameters::baseline();
+    for wrong in [0, 70, 7999] {
+        let sheet =
+            drive().changed("time_s", |row, time| if row == wrong { time + 1e6 } else { time }).read();
+        let checked = check(&sheet, &rig);
+        assert!(checked.report.usable, "row {wrong}: {}", texts(&checked));
+        assert!(kinds(&checked).contains(&"jumping-time"), "row {wrong}: {}", texts(&checked));
+        assert!(!checked.is_usable(FORCE, wrong) && unusable(&checked, FORCE) == 1, "row {wrong}");
+        let course = Course::of(&sheet, &checked, &rig).unwrap();
+        assert!((7999..=8000).contains(&course.len()), "row {wrong}: {}", course.len());
+    }
+}
+
+#[test]
+fn a_pause_longer_than_the_record_is_a_hole_and_no_more() {
+    let paused =
+        drive().changed("time_s", |row, time| if row >= 4000 { time + 30.0 } else { time }).checked();
+    is_survived(&paused, "gap", 4000);
+    assert!(texts(&paused).contains("a hole of 30000.0 ms before 34.000 s: nothing is simulated"));
+    assert_eq!(unusable(&paused, FORCE), 0);
+}
+
+#[test]
+fn rests_that_a_coarse_encoder_shows_as_one_value_are_no_stuck_sensor() {
+    let coarse = drive().changed("drive_position_m", |_, position| (position / 1e-4).round() * 1e-4);
+    let checked = coarse.clone().checked();
+    assert!(kinds(&checked).is_empty(), "{}", texts(&checked));
+    // One that stands while the piston goes on is.
+    let place = coarse.place("drive_position_m");
+    let moved = |row: usize| (coarse.rows[row + 200][place] - coarse.rows[row][place]).abs();
+    let goes = |row: &usize| coarse.rows[row - 1][place] != coarse.rows[*row][place] && moved(*row) > 0.02;
+    let from = (500..7000).find(goes).expect("the drive moves");
+    let level = coarse.rows[from][place];
+    let stuck = coarse.clone().changed("drive_position_m", |row, position| {
+        if (from..from + 200).contains(&row) { level } else { position }
+    });
+    is_survived(&stuck.checked(), "stuck", from);
+}
+
+#[test]
+fn a_supply_that_stands_still_is_no_clipped_sensor() {
+    let sheet = drive();
+    // Constant for most of the time, its largest value too.
+    let level = |row: usize| if row % 1000 < 300 { 7e5 - (row % 1000) as f64 * 100.0 } else { 7e5 };
+    let levels: Vec<f64> = (0..sheet.rows.len()).map(level).collect();
+    let checked = sheet.with_column("supply_pressure_Pa", &levels).checked();
+    assert!(checked.report.usable && kinds(&checked).is_empty(), "{}", texts(&checked));
 }
 
 #[test]

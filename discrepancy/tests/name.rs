@@ -67,6 +67,24 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     }
     let moved = found.told.factors.iter().filter(|factor| **factor != 1.0).count();
     assert!(moved <= 2, "what is told moves parameters that nobody misses: {:?}", found.told.factors);
+
+    // A limit is what its name says: half as much again is named, be it noise that set the limit or the least that counts.
+    for (effect, place, key) in
+        [("rod-leakage", "drive.b", "leakage_nl_per_min"), ("inclination", "drive", "force_n")]
+    {
+        let amount = 1.5 * limit(&found, &format!("{effect} {place}"));
+        let found = self::found(&with(&[(effect, place, &[(key, amount)])]), &[]);
+        assert_eq!(names(&found), [format!("{effect} {place}")], "{amount}");
+    }
+}
+
+/// Amplitude from which on a candidate would have been named.
+fn limit(found: &Found, name: &str) -> f64 {
+    let at = found.columns.candidates.iter().position(|own| own.name() == name).expect("a candidate");
+    let candidate = &found.columns.candidates[at];
+    let mut coordinates = candidate.origin();
+    coordinates[0] = found.limits[at].expect("it is excited");
+    candidate.numbers(&coordinates)[0]
 }
 
 #[test]

@@ -16,7 +16,9 @@ fn model(name: &str) -> PathBuf {
 
 fn closed(model: &Path, train: &[PathBuf], tests: &[PathBuf]) -> Report {
     let tests: Vec<&Path> = tests.iter().map(PathBuf::as_path).collect();
-    close_on(model, train, &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    let closed = close_on(model, train, &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(closed.not_judged, None);
+    closed.report
 }
 
 /// The residuals of a model file as it is, its terms fitted: training and held out.

@@ -5,7 +5,9 @@
 //! The record is the record maker's, whose integrator and laws are not the plant's.
 
 use plant::RigParameters;
+use rustix::process::Signal;
 use serde_json::Value;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,6 +22,7 @@ use tempfile::TempDir;
 
 const GOOD: i32 = 0;
 const BAD_INPUT: i32 = 2;
+const INTERRUPTED: i32 = 130;
 
 /// A constant force: some 14 degrees at 5 kg.
 const EFFECT: &str = "inclination";
@@ -63,7 +66,7 @@ fn rig() -> PathBuf {
     workspace().join("plant/rig.toml")
 }
 
-fn discrepancy(arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Ended {
+fn discrepancy(arguments: &[&dyn AsRef<OsStr>]) -> Ended {
     let mut command = Command::new(executable(Program::Discrepancy, Build::Shipped));
     command.args(arguments.iter().map(|argument| argument.as_ref()));
     Running::start("discrepancy", &mut command).wait_within(2 * PATIENCE)
@@ -72,9 +75,9 @@ fn discrepancy(arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Ended {
 /// A step on a training record.
 fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> Ended {
     let rig = rig();
-    let mut all: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&step, &"--rig", &rig, &"--train", &record];
-    all.extend([&"--out" as &dyn AsRef<std::ffi::OsStr>, &out]);
-    all.extend(more.iter().map(|own| own as &dyn AsRef<std::ffi::OsStr>));
+    let mut all: Vec<&dyn AsRef<OsStr>> = vec![&step, &"--rig", &rig, &"--train", &record];
+    all.extend([&"--out" as &dyn AsRef<OsStr>, &out]);
+    all.extend(more.iter().map(|own| own as &dyn AsRef<OsStr>));
     discrepancy(&all)
 }
 
@@ -139,6 +142,7 @@ fn a_hidden_effect_is_named_in_the_same_bytes_whatever_the_threads_and_the_held_
     // `name` is a close without a held-out record.
     on("name", &own.train, &out("name"), &["--threads", "2"]).expect_code(GOOD);
     let without = json(&out("name/report.json"));
+    the_held_out_record_changes_two_fields_alone(&out("one"), &out("name"));
     assert!(
         report["gap"].as_object().is_some_and(|gap| gap.contains_key("drive_position_m")),
         "{}",
@@ -153,6 +157,28 @@ fn a_hidden_effect_is_named_in_the_same_bytes_whatever_the_threads_and_the_held_
 
     the_extended_rig_is_one(&out("one/rig.toml"));
     the_steps_after_a_report(&out("one"));
+}
+
+/// The bytes of both results, but for the values of `gap` and `verification` and the pictures of the page.
+fn the_held_out_record_changes_two_fields_alone(with: &Path, without: &Path) {
+    let text = |folder: &Path, name: &str| fs::read_to_string(folder.join(name)).expect("a file of a close");
+    assert_eq!(text(with, "rig.toml"), text(without, "rig.toml"));
+    // Fields of the report stand two spaces in; the value of one ends where the next begins.
+    let rest = |report: &str| {
+        let mut skipped = false;
+        let is_kept = |line: &&str| {
+            if line.starts_with("  \"") {
+                skipped = line.starts_with("  \"gap\"") || line.starts_with("  \"verification\"");
+            }
+            !skipped
+        };
+        report.lines().filter(is_kept).collect::<Vec<_>>().join("\n")
+    };
+    let [with, without] = [with, without].map(|folder| rest(&text(folder, "report.json")));
+    assert!(
+        with.len() > 1000 && with == without,
+        "the held-out record changed more than gap and verification"
+    );
 }
 
 /// Rehearsal and emulator take the extended rig as it is.
@@ -172,13 +198,18 @@ fn the_steps_after_a_report(closed: &Path) {
     let read = |path: &Path| fs::read_to_string(path).expect("a rig file");
     assert_eq!(read(&extended), read(&closed.join("rig.toml")));
 
+    let (test, out) = (&records().test, closed.join("verified"));
     let verified =
-        discrepancy(&[&"verify", &"--rig", &rig, &"--extended", &extended, &"--test", &records().test]);
+        discrepancy(&[&"verify", &"--rig", &rig, &"--extended", &extended, &"--test", test, &"--out", &out]);
     let confirmed = json(&report)["verification"]["confirmed"].as_bool().expect("a verification");
     let verified = verified.expect_code(i32::from(!confirmed));
     for part in ["drive_position_m: before", "chi2", if confirmed { ": confirmed" } else { "not confirmed" }]
     {
         assert!(verified.stdout.contains(part), "'{part}' is missing in: {}", verified.stdout);
+    }
+    let alone = json(&out.join("verification.json"));
+    for field in ["gap", "verification"] {
+        assert_eq!(alone[field], json(&report)[field], "{field} of verify alone is that of close");
     }
 
     let next =
@@ -290,6 +321,58 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
 }
 
 #[test]
+fn what_is_read_is_never_written_over_and_no_record_is_both_trained_on_and_held_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (train, own) = (&records().train, folder.path().join("rig.toml"));
+    fs::copy(rig(), &own).expect("a folder that can be written");
+    let close = |more: &[&dyn AsRef<OsStr>]| {
+        let out = folder.path();
+        let mut all: Vec<&dyn AsRef<OsStr>> =
+            vec![&"close", &"--rig", &own, &"--out", &out, &"--train", train];
+        all.extend(more);
+        discrepancy(&all).expect_code(BAD_INPUT)
+    };
+    let _ = close(&[]).expect_said(&["rig.toml", "would be written over", "another --out"]);
+    assert_eq!(fs::read(&own).expect("the rig file"), fs::read(rig()).expect("the rig file"));
+    let _ = close(&[&train]).expect_said(&["--train", "given twice"]);
+    let _ = close(&[&"--test", &train]).expect_said(&["--test", "a training record as well"]);
+    assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "only the rig file");
+}
+
+#[test]
+fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves_none() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    fs::create_dir(&out).expect("a folder");
+    for name in ["report.json", "rig.toml", "next-chirps.toml", "notes.txt"] {
+        fs::write(out.join(name), "{}").expect("a folder that can be written");
+    }
+    // Without a column that the simulation needs: told as any other defect, with a report.
+    let record = folder.path().join("narrow.csv");
+    let text = fs::read_to_string(&records().train).expect("the record");
+    fs::write(&record, text.replace("drive_pressure_b_Pa", "drive_presure_b_Pa")).expect("room");
+    let check = on("check", &record, &out, &[]).expect_code(BAD_INPUT);
+    for part in ["cannot be used", "column drive_presure_b_Pa", "no column drive_pressure_b_Pa"] {
+        assert!(check.stdout.contains(part), "'{part}' is missing in: {}", check.stdout);
+    }
+    let _ = on("close", &record, &out, &[]).expect_code(BAD_INPUT);
+    assert_eq!(json(&out.join("report.json"))["verdict"], "bad-data");
+    assert!(!out.join("rig.toml").exists() && !out.join("next-chirps.toml").exists());
+    assert!(out.join("notes.txt").exists(), "foreign files stay");
+
+    let empty = folder.path().join("empty");
+    let mut command = Command::new(executable(Program::Discrepancy, Build::Shipped));
+    command.args([OsStr::new("close"), OsStr::new("--rig"), rig().as_os_str(), OsStr::new("--train")]);
+    command.args([records().train.as_os_str(), OsStr::new("--out"), empty.as_os_str()]);
+    let mut running = Running::start("discrepancy", &mut command);
+    running.wait_for("screening");
+    running.signal(Signal::INT);
+    let ended = running.wait().expect_code(INTERRUPTED);
+    assert!(ended.stderr.contains("interrupted"), "{}", ended.stderr);
+    assert_eq!(fs::read_dir(&empty).expect("the folder").count(), 0);
+}
+
+#[test]
 fn what_cannot_be_read_is_refused_with_file_and_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
@@ -369,7 +452,7 @@ fn help_tells_every_step_every_option_and_the_exit_codes() {
                 "--mapping",
                 "--without",
                 "--threads",
-                "this folder: discrepancy",
+                "this folder: discrepancy-results",
             ][..],
         ),
         ("check", &["--rig", "--train", "--out", "--mapping"]),

@@ -222,7 +222,7 @@ impl Model {
             read.processing;
         let nyquist_hz = 0.5 / period_s;
         let asked: [(bool, &str, String, &str); 8] = [
-            (period_s > 0.0 && period_s.is_finite(), "period_s", period_s.to_string(), "more than 0"),
+            ((1e-6..=10.0).contains(&period_s), "period_s", period_s.to_string(), "1e-6 to 10 s"),
             (
                 (0.0..nyquist_hz).contains(&low_pass_hz),
                 "low_pass_hz",
@@ -252,6 +252,14 @@ impl Model {
         if !(3..=1000).contains(&read.selection.blocks) || !(3..=1000).contains(&read.selection.bands) {
             let value = format!("{}, {}", read.selection.blocks, read.selection.bands);
             return Err(refuse("selection.blocks, bands", value, "3 to 1000"));
+        }
+        let share = read.selection.share_floor;
+        if !(0.0..=1.0).contains(&share) {
+            return Err(refuse("selection.share_floor", share.to_string(), "0 to 1"));
+        }
+        let ends_s = read.processing.ends_s;
+        if !(0.0..=1e6).contains(&ends_s) {
+            return Err(refuse("processing.ends_s", ends_s.to_string(), "0 or more"));
         }
         let folder = file.parent().unwrap_or(Path::new(""));
         let names = needed(read.kind);

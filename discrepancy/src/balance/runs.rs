@@ -153,6 +153,9 @@ impl Run {
     }
 }
 
+/// Samples of the grid for each row of a record, at most.
+const SPARSEST: usize = 20;
+
 /// An even grid of a record's time.
 struct Grid {
     time_s: Vec<f64>,
@@ -173,8 +176,18 @@ impl Grid {
         let time_s = if as_is {
             times.to_vec()
         } else {
-            let samples = ((last - first) / period_s).ceil() as usize;
-            (0..samples).map(|at| first + at as f64 * period_s).collect()
+            let samples = ((last - first) / period_s).ceil();
+            // Finite they are: times are, and grow.
+            if samples > (SPARSEST * times.len()) as f64 {
+                return Err(BalanceError::Far {
+                    file: name.into(),
+                    line: record.line(times.len() - 1),
+                    time_s: *last,
+                    rows: times.len(),
+                    period_s,
+                });
+            }
+            (0..samples as usize).map(|at| first + at as f64 * period_s).collect()
         };
         Ok(Self { time_s, as_is })
     }

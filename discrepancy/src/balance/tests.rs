@@ -52,10 +52,10 @@ fn closed(rig: &RigParameters) -> (Report, String) {
         file
     });
     let model = model(folder.path());
-    let report = close(&model, &files[..1], Some(&files[1]), &mut |_| {}).unwrap();
+    let report = close(&model, &files[..1], Some(&files[1]), &mut |_| {}).unwrap().report;
     let extended = extended_model_text(&model, &report).unwrap();
     std::fs::write(folder.path().join("extended.toml"), &extended).unwrap();
-    let again = close(&folder.path().join("extended.toml"), &files[..1], None, &mut |_| {}).unwrap();
+    let again = close(&folder.path().join("extended.toml"), &files[..1], None, &mut |_| {}).unwrap().report;
     assert!(again.named.is_empty(), "the extended model lacks {:?}", again.named);
     (report, extended)
 }
@@ -122,4 +122,82 @@ fn a_file_that_makes_no_sense_is_refused_with_key_and_value() {
     ] {
         assert!(refused(text).contains(part), "{}", refused(text));
     }
+}
+
+/// Strokes of 1.6 kg under a force, 6 s, to a mapping and a model.
+fn mass(folder: &Path, change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> (PathBuf, PathBuf) {
+    let mut text = String::from("t,x,f\n");
+    for k in 0..6000 {
+        let t = k as f64 * 1e-3;
+        // Noise of a few parts in ten thousand, by a hash of the row.
+        let noise = ((k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f64 / 8_388_608.0 - 1.0;
+        // Two frequencies: with one the acceleration is a spring's force.
+        let tones = [(2.0 * std::f64::consts::PI * 0.7, 0.1), (2.0 * std::f64::consts::PI * 3.1, 0.02)];
+        let sum =
+            |of: &dyn Fn(f64, f64) -> f64| tones.iter().map(|(w, size)| size * of(*w, w * t)).sum::<f64>();
+        let x = sum(&|_, phase| phase.sin());
+        let v = sum(&|w, phase| w * phase.cos());
+        let a = sum(&|w, phase| -w * w * phase.sin());
+        let force = 1.6 * a + 8.0 * v + 3.0 * v.signum() + 0.01 * noise;
+        let [t, x, f] = change(k, [t, x + 1e-6 * noise, force]);
+        writeln!(text, "{t},{x},{f}").unwrap();
+    }
+    let [csv, mapping, model] = ["mass.csv", "mapping.toml", "mass.toml"].map(|name| folder.join(name));
+    std::fs::write(&csv, text).unwrap();
+    let channels = "[time]\ncolumn = \"t\"\nunit = \"s\"\n[channels.drive_position_m]\ncolumn = \"x\"\nunit = \"m\"\n\
+                    [channels.drive_applied_force_N]\ncolumn = \"f\"\nunit = \"N\"\n";
+    std::fs::write(&mapping, channels).unwrap();
+    let text = "kind = \"mass\"\nmapping = \"mapping.toml\"\n[channels]\nforce = \"drive_applied_force_N\"\n\
+                [processing]\nlow_pass_hz = 50.0\nends_s = 0.1\n";
+    std::fs::write(&model, text).unwrap();
+    (model, csv)
+}
+
+/// Whether the mass that a report tells is this, within a hundredth.
+fn is_near(report: &Report, mass_kg: f64) -> bool {
+    let told = report.summary.split("mass ").nth(1).and_then(|rest| rest.split(' ').next());
+    let told: f64 =
+        told.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{}", report.summary));
+    (told / mass_kg - 1.0).abs() < 0.01
+}
+
+#[test]
+fn a_record_of_one_balance_is_checked_before_it_is_believed() {
+    let good = tempfile::tempdir().unwrap();
+    let (model, train) = mass(good.path(), |_, row| row);
+    let closed = close(&model, std::slice::from_ref(&train), None, &mut |_| {}).unwrap();
+    assert_ne!(closed.report.verdict, Verdict::BadData, "{}", closed.report.summary);
+    assert!(is_near(&closed.report, 1.6), "{}", closed.report.summary);
+
+    let turned = tempfile::tempdir().unwrap();
+    let (turned_model, turned_train) = mass(turned.path(), |_, [t, x, f]| [t, x, -f]);
+    let report = close(&turned_model, &[turned_train], None, &mut |_| {}).unwrap().report;
+    assert_eq!((report.verdict, report.named.len()), (Verdict::BadData, 0), "{}", report.summary);
+    assert!(report.summary.contains("a mass of -1."), "{}", report.summary);
+
+    let stuck = tempfile::tempdir().unwrap();
+    let (stuck_model, stuck_train) =
+        mass(stuck.path(), |k, [t, x, f]| if k < 3500 { [t, 0.05, f] } else { [t, x, f] });
+    let report = close(&stuck_model, &[stuck_train], None, &mut |_| {}).unwrap().report;
+    assert_eq!(report.verdict, Verdict::BadData, "{}", report.summary);
+    assert!(report.summary.contains("mass.csv:2: drive_position_m: stuck"), "{}", report.summary);
+}
+
+#[test]
+fn a_held_out_record_of_one_balance_that_cannot_be_used_takes_nothing_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, train) = mass(folder.path(), |_, row| row);
+    let test = folder.path().join("short.csv");
+    std::fs::write(&test, "t,x,f\n0,0,0\n0.001,0,0\n").unwrap();
+    let closed = close(&model, &[train], Some(&test), &mut |_| {}).unwrap();
+    assert!(closed.not_judged.is_some_and(|why| why.contains("short.csv")));
+    assert!(closed.report.verification.is_none() && is_near(&closed.report, 1.6));
+}
+
+#[test]
+fn a_stamp_far_beyond_is_refused_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, train) = mass(folder.path(), |k, [t, x, f]| [if k == 5999 { 1e12 } else { t }, x, f]);
+    let error = close(&model, &[train], None, &mut |_| {}).unwrap_err().to_string();
+    assert!(error.contains("mass.csv:6001: 1000000000000 s: 6000 rows"), "{error}");
 }

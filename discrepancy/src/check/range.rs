@@ -9,7 +9,8 @@
 use super::PARKED;
 use super::grid::Grid;
 use super::notes::{Notes, Subject};
-use super::stuck::{by_chance, runs};
+use super::quantum;
+use super::stuck::{by_chance, is_rest, runs};
 use crate::records::{Channel, Quantity, Signal};
 use plant::RigParameters;
 
@@ -23,7 +24,8 @@ const PARKED_M: f64 = 1e-3;
 pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
     let channels = notes.open_channels();
     for channel in channels {
-        if matches!(channel, Channel::Of(_, Signal::Valve | Signal::AppliedForce)) {
+        // Nothing is simulated from the supply's reading, and that of a good regulator stands still.
+        if matches!(channel, Channel::Of(_, Signal::Valve | Signal::AppliedForce) | Channel::SupplyPressure) {
             continue;
         }
         let values = grid.series(notes, channel);
@@ -77,11 +79,7 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
 
 /// Limits of a channel's sensor, the lower one marked; none of foreign sensors.
 fn limits(channel: Channel, rig: &RigParameters, notes: &Notes) -> Vec<(f64, bool)> {
-    let of_rig = match channel {
-        Channel::Of(axis, _) => notes.is_of_rig(axis),
-        Channel::SupplyPressure => false,
-    };
-    if !of_rig {
+    if !matches!(channel, Channel::Of(axis, _) if notes.is_of_rig(axis)) {
         return Vec::new();
     }
     let sensors = rig.sensors();
@@ -108,8 +106,12 @@ fn at_extremes(values: &[Option<f64>], bad: &mut [bool]) {
     let least = values.iter().flatten().copied().fold(f64::MAX, f64::min);
     let inner: Vec<_> =
         values.iter().map(|value| value.filter(|value| *value < most && *value > least)).collect();
-    // A channel of few values has its extremes often.
+    // A channel of few values has its extremes often, and so has one that rests at them as it rests elsewhere.
     let Some(longest) = by_chance(&inner) else { return };
+    let step = quantum::of(&values.iter().flatten().copied().collect::<Vec<_>>());
+    if runs(&inner).iter().any(|run| run.samples > longest && is_rest(&inner, run, step)) {
+        return;
+    }
     for extreme in [least, most] {
         let found = runs(values)
             .into_iter()

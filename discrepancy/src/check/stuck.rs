@@ -2,11 +2,12 @@
 //!
 //! Where a share f of neighbours are equal by chance, a run of n equal samples comes N f^(n-1) times in a record of N; a run
 //! that would come less than once in a hundred thousand records did not come by chance. A channel whose rounding is coarser
-//! than its noise stands still by itself and tells nothing here, but one that never moves while its sensor should make noise is
-//! dead.
+//! than its noise stands still by itself and tells nothing here, nor does a rest that such a channel shows as one value; but one
+//! that never moves while its sensor should make noise is dead.
 
 use super::grid::Grid;
 use super::notes::{Notes, Subject};
+use super::quantum;
 use crate::records::{Channel, Quantity, Signal};
 use plant::RigParameters;
 use std::ops::Range;
@@ -39,7 +40,10 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
         let stuck: Vec<Run> = match by_chance(&values) {
             _ if constant && notes.is_of_rig(axis) && is_noisy(channel, rig) => all,
             _ if constant => continue,
-            Some(longest) => all.into_iter().filter(|run| run.samples > longest).collect(),
+            Some(longest) => {
+                let step = quantum::of(&values.iter().flatten().copied().collect::<Vec<_>>());
+                all.into_iter().filter(|run| run.samples > longest && !is_rest(&values, run, step)).collect()
+            }
             None => continue,
         };
         tell(notes, grid, channel, &values, &stuck);
@@ -65,6 +69,17 @@ fn tell(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>]
         }
         grid.rows[run.places.clone()].iter().flatten().for_each(|row| notes.leave_out(channel, *row));
     }
+}
+
+/// Whether a run is a rest that rounding shows as one value: it begins and ends with a single step, where a sensor that stuck
+/// jumps to what went on meanwhile.
+pub(super) fn is_rest(values: &[Option<f64>], run: &Run, step: Option<f64>) -> bool {
+    let (Some(step), Some(level)) = (step, values[run.places.start]) else { return false };
+    let near = |other: Option<f64>| other.is_none_or(|other| (other - level).abs() < 1.5 * step);
+    let before = values[..run.places.start].iter().rev().flatten().next();
+    let after = values[run.places.end..].iter().flatten().next();
+    // A run that is all there is says nothing of a rest.
+    (before.is_some() || after.is_some()) && near(before.copied()) && near(after.copied())
 }
 
 /// Whether the sensor's noise is larger than its rounding, so that its reading cannot stand still.

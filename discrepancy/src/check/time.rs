@@ -23,6 +23,10 @@ const HOLES_TOLD: usize = 20;
 const SAME: f64 = 0.01;
 /// Share of lost rows beyond which nothing is left to use.
 const MOST_LOST: f64 = 0.5;
+/// Share of rows with a time that cannot be, beyond which it is the clock and no single stamp.
+const MOST_JUMPING: f64 = 0.01;
+/// Holes, in units of the rows that there are, that no record has: the stamp beyond is wrong.
+const FARTHEST: f64 = 19.0;
 /// Spread of sampling instants around their grid, in periods, that is told, and that spoils speeds.
 const JITTER: [f64; 2] = [0.02, 0.25];
 
@@ -36,7 +40,7 @@ pub(super) fn check(notes: &mut Notes) {
     let Some(period) = period_s(times) else {
         return notes.tell_time("too-short", Some(0), true, "time never grows: record again");
     };
-    order(notes, SAME * period);
+    order(notes, period);
     let nominal = record.nominal_period_s().or(of_rig.then_some(PERIOD_S)).unwrap_or(period);
     let ratio = period / nominal;
     if !(0.9..=1.1).contains(&ratio) && unit_of_time(notes, ratio) {
@@ -81,9 +85,11 @@ fn unit_of_time(notes: &mut Notes, ratio: f64) -> bool {
 }
 
 /// Rows whose time repeats or goes back.
-fn order(notes: &mut Notes, same_s: f64) {
+fn order(notes: &mut Notes, period_s: f64) {
+    let same_s = SAME * period_s;
     let times = notes.record.time_s();
-    let kept = growing(times, same_s);
+    let mut kept = growing(times, same_s);
+    leave_far_ends_out(times, &mut kept, FARTHEST * times.len() as f64 * period_s);
     let mut repeated = Vec::new();
     let mut jumping = Vec::new();
     for row in 0..times.len() {
@@ -106,12 +112,27 @@ fn order(notes: &mut Notes, same_s: f64) {
         notes.tell_time("repeated-time", Some(*first), repeated.len() * 2 > times.len(), &text);
     }
     if let Some(first) = jumping.first() {
+        let fatal = jumping.len() as f64 > MOST_JUMPING * times.len() as f64;
         let text = format!(
-            "time jumps: {:.6} s is not between its neighbours, {} rows in all: cut the file there, or mend their time",
+            "time jumps: {:.6} s is not between its neighbours, {} rows in all: {}",
             times[*first],
-            jumping.len()
+            jumping.len(),
+            if fatal { "cut the file there, or mend their time" } else { "they are left out" }
         );
-        notes.tell_time("jumping-time", Some(*first), true, &text);
+        notes.tell_time("jumping-time", Some(*first), fatal, &text);
+    }
+}
+
+/// Takes rows out of a growing chain that lie beyond a hole longer than any record has, at its end or its beginning.
+fn leave_far_ends_out(times: &[f64], kept: &mut [bool], farthest_s: f64) {
+    let rows: Vec<usize> = (0..times.len()).filter(|row| kept[*row]).collect();
+    let hole = |pair: &[usize]| times[pair[1]] - times[pair[0]] > farthest_s;
+    let most = (MOST_JUMPING * times.len() as f64) as usize;
+    let Some(at) = rows.windows(2).position(hole) else { return };
+    if rows.len() - at - 1 <= most.max(1) {
+        rows[at + 1..].iter().for_each(|row| kept[*row] = false);
+    } else if at < most.max(1) {
+        rows[..=at].iter().for_each(|row| kept[*row] = false);
     }
 }
 
@@ -152,13 +173,13 @@ fn lost(notes: &mut Notes, period_s: f64) {
             holes.push((pair[1], gone));
         }
     }
-    let all = rows.len() + missing;
-    let share = missing as f64 / all.max(1) as f64;
-    let fatal = share > MOST_LOST;
+    let all = rows.len() + singles;
+    let share = singles as f64 / all.max(1) as f64;
     if let Some(first) = first {
+        let fatal = share > MOST_LOST;
         let text = format!(
             "{singles} rows of {all} ({:.2} %) are lost one by one: {}",
-            1e2 * singles as f64 / all as f64,
+            1e2 * share,
             if fatal {
                 "too many, record again"
             } else {
@@ -167,11 +188,14 @@ fn lost(notes: &mut Notes, period_s: f64) {
         );
         notes.tell_time("lost-samples", Some(first), fatal, &text);
     }
+    // A record with a pause is as good as its parts.
+    let fatal = missing as f64 > FARTHEST * rows.len() as f64;
     for (row, gone) in holes.iter().take(HOLES_TOLD) {
         let text = format!(
-            "a hole of {:.1} ms before {:.3} s: nothing is simulated across it",
+            "a hole of {:.1} ms before {:.3} s: {}",
             1e3 * period_s * *gone as f64,
-            times[*row]
+            times[*row],
+            if fatal { "mend the time, or cut the file there" } else { "nothing is simulated across it" }
         );
         notes.tell_time("gap", Some(*row), fatal, &text);
     }

@@ -2,7 +2,6 @@
 //!
 //! Source: discrepancy-notes.md, 4 (thresholds from this very record) and pipeline 1.
 
-use super::SAFETY;
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -11,7 +10,7 @@ use crate::screen::Columns;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Simulated records of nothing for the threshold.
+/// Draws of nothing for the threshold.
 const NULLS: usize = 300;
 /// Share of them that stays below it.
 const NULL_SHARE: f64 = 0.99;
@@ -70,11 +69,11 @@ impl Nothing {
         most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
     }
 
-    /// Smallest coordinate of each candidate's amplitude whose gain would have been accepted.
-    pub(super) fn limits(&self, candidates: usize, threshold: f64) -> Vec<Option<f64>> {
+    /// Smallest coordinate of each candidate's amplitude that gains so much.
+    pub(super) fn limits(&self, candidates: usize, gain: f64) -> Vec<Option<f64>> {
         let mut limits: Vec<Option<f64>> = vec![None; candidates];
         for (at, z, _, information) in self.probes.iter().filter(|(_, z, _, _)| *z != 0.0) {
-            let limit = z.abs() * (SAFETY * threshold / information).sqrt();
+            let limit = z.abs() * (gain / information).sqrt();
             if limit.is_finite() && limits[*at].is_none_or(|own| limit < own) {
                 limits[*at] = Some(limit);
             }

@@ -13,6 +13,7 @@ use crate::fit::{Fit, Products};
 use crate::parameters::COUNT;
 use crate::refit::{MOST_OFF, Placed, Refit, coordinate_columns, coordinate_ridge, parameter_ridges, rig_of};
 use crate::windows::dot;
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Steps at most, and halvings of one.
@@ -25,6 +26,21 @@ const BROKEN: f64 = 6.0;
 const FAR_OFF: f64 = 3.0;
 /// Fall of the loss below which a fit has settled.
 const SETTLED: f64 = 0.3;
+
+/// Shares of the parameters' way that are tried where straight lines may have led too far.
+const WAYS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
+
+/// The parameters of a model, as far as the simulator goes along with what straight lines promised of them: beside an effect that is
+/// still missing they may be led where nothing is right any more.
+pub(super) fn grounded(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
+    let tried = WAYS.map(|way| model.factors.map(|factor| 1.0 + way * (factor - 1.0)));
+    let loss = |factors: &[f64; COUNT]| {
+        point(engine, model.placed.clone(), *factors).map_or(f64::INFINITY, |point| point.loss)
+    };
+    let losses: Vec<f64> = tried.par_iter().map(loss).collect();
+    let best = (0..WAYS.len()).min_by(|one, other| losses[*one].total_cmp(&losses[*other]));
+    tried[best.expect("one at least")]
+}
 
 /// A model where the simulator was asked.
 struct Point {

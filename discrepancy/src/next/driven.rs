@@ -18,6 +18,10 @@ use protocol::frames::MainChainState;
 
 /// Longest run, periods: what is behind it is not looked at.
 const LONGEST: usize = 30_000;
+/// Range of a rod that rests, m.
+const PARKED_M: f64 = 1e-3;
+/// Nearest to an end of the stroke, m: the menu keeps 5 mm with the baseline, a sensor may be off by 2.
+const NEAR_M: f64 = 2e-3;
 /// Seed of the sensors' noise.
 const SEED: u64 = 1;
 /// The experiment begins when the initial positioning is over, whatever an effect does to standstill and error.
@@ -59,6 +63,21 @@ pub struct Driven {
     pub began: Option<usize>,
     /// Whether the experiment came to its end.
     pub done: bool,
+}
+
+impl Driven {
+    /// Whether the experiment is one for this rig: it begins, it ends, and no rod that it moves comes near an end of its stroke.
+    #[must_use]
+    pub fn ends_well(&self, stroke_m: f64) -> bool {
+        let Some(began) = self.began else { return false };
+        let keeps_away = |axis: usize| {
+            let of = |point: &[Point; 2]| point[axis].extension_m;
+            let least = self.points[began..].iter().map(of).fold(f64::INFINITY, f64::min);
+            let most = self.points[began..].iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+            most - least < PARKED_M || (least > NEAR_M && most < stroke_m - NEAR_M)
+        };
+        self.done && (0..2).all(keeps_away)
+    }
 }
 
 /// Drives `rig` through an experiment; the controllers have the baseline's numbers.

@@ -15,6 +15,12 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// Name of the file in which it is proposed.
+    #[must_use]
+    pub fn file(&self) -> String {
+        format!("next-{}.toml", self.name)
+    }
+
     /// Whether it links the rods.
     #[must_use]
     pub fn is_linked(&self) -> bool {

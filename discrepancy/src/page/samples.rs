@@ -215,6 +215,8 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
         inputs: InputFiles {
             rig: "rig.toml".to_owned(),
             train: vec!["train.csv".to_owned(), "more <&>.csv".to_owned()],
+            axes: vec!["drive".into()],
+            searched_share: 1.0,
         },
         named: Vec::new(),
         parameters: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::mapping::Time;
 use super::table::Table;
-use super::{Form, Mapping, ReadError, Record};
+use super::{Channel, Form, Mapping, ReadError, Record};
 use std::path::Path;
 
 pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> {
@@ -44,12 +44,16 @@ pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> 
             (None, Time::Counted { period_s }) => number as f64 * period_s,
             (None, Time::Column { .. }) => unreachable!("its place was found above"),
         };
-        record.push_row(*line, time_s);
+        let mut present = Vec::new();
         for (mapped, place) in &places {
             if !mapping.absent.iter().any(|text| text == cell(*place)) {
-                record.put(mapped.channel, value(*place)? * mapped.slope + mapped.intercept);
+                present.push((mapped.channel, value(*place)? * mapped.slope + mapped.intercept));
             }
         }
+        if !goes_on(&record, time_s, &present) {
+            record.push_row(*line, time_s);
+        }
+        present.into_iter().for_each(|(channel, value)| record.put(channel, value));
     }
     if let Some(line) = table.cut {
         record.warn(line, "the last line is cut, and left out: its writer was killed");
@@ -57,10 +61,21 @@ pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> 
     Ok(record)
 }
 
+/// Whether a row only has what the row before lacks, within half the period that was meant: recorders that stamp each channel
+/// on its own write such rows.
+fn goes_on(record: &Record, time_s: f64, present: &[(Channel, f64)]) -> bool {
+    let (Some(period_s), Some(before_s)) = (record.nominal_period_s(), record.time_s().last()) else {
+        return false;
+    };
+    let row = record.len() - 1;
+    (0.0..0.5 * period_s).contains(&(time_s - before_s))
+        && present.iter().all(|(channel, _)| record.value(*channel, row).is_none())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::records::{Channel, Signal};
+    use crate::records::Signal;
     use plant::Axis;
 
     const X: Channel = Channel::Of(Axis::Drive, Signal::Position);
@@ -115,6 +130,21 @@ mod tests {
         assert_eq!((record.time_s(), record.nominal_period_s()), (&[0.0, 0.002][..], Some(0.002)));
         assert_eq!(record.channel(X).unwrap(), [Some(0.1), Some(0.2)]);
         assert!(record.warnings()[0].text.contains("column 1 is not in the mapping"));
+    }
+
+    #[test]
+    fn channels_that_were_stamped_one_by_one_are_rows_of_the_period_that_was_meant() {
+        let toml = |meant: &str| {
+            format!(
+                "[time]\ncolumn = \"t\"\n{meant}\n[channels.drive_position_m]\ncolumn = \"x\"\nunit = \"m\"\n\
+                 [channels.drive_pressure_a_Pa]\ncolumn = \"p\"\nunit = \"Pa\"\npressure = \"absolute\"\n"
+            )
+        };
+        let csv = "t,x,p\n0,1,\n0.0001,,5\n0.001,2,\n0.0011,,6\n0.0012,3,\n";
+        let record = mapped(csv, &toml("nominal_period_s = 0.001")).unwrap();
+        assert_eq!(record.time_s(), [0.0, 0.001, 0.0012], "a second reading is a row of its own");
+        assert_eq!(record.channel(P).unwrap(), [Some(5.0), Some(6.0), None]);
+        assert_eq!(mapped(csv, &toml("")).unwrap().len(), 5);
     }
 
     #[test]

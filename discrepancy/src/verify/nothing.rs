@@ -1,5 +1,6 @@
 //! What the windows of a record show of a model that lacks nothing: noise, drawn many times.
 
+use super::Model;
 use super::power::{Power, kept, levels, pooled, sums};
 use crate::windows::Windows;
 use rand_core::SeedableRng;
@@ -29,8 +30,24 @@ pub(super) struct Nothing {
 }
 
 impl Nothing {
-    /// `simulated` is what the windows' rig shows in them.
-    pub(super) fn new(windows: &Windows<'_>, simulated: &[f64]) -> Self {
+    /// Of a model on a record; of a long one, what records that the model left would show is drawn of a `part` of it alone, whose
+    /// spread is larger as it has fewer windows.
+    pub(super) fn new(model: &Model<'_>, part: Option<&Model<'_>>) -> Self {
+        let (mut nothing, of_noise) = Self::of_noise(&model.windows);
+        let (mean, of_records) = match part {
+            None => nothing.of_records(model),
+            Some(part) => {
+                let (mean, deviation) = Self::of_noise(&part.windows).0.of_records(part);
+                (mean, deviation * (part.windows.count() as f64 / model.windows.count() as f64).sqrt())
+            }
+        };
+        let deviation = of_noise.max(of_records) * (1.0 + 1.0 / RECORDS as f64).sqrt();
+        nothing.range = [mean - TWO_SIDED * deviation, mean + TWO_SIDED * deviation];
+        nothing
+    }
+
+    /// Everything but the range, and the deviation of the joint power of noise.
+    fn of_noise(windows: &Windows<'_>) -> (Self, f64) {
         let lanes = windows.lanes().len();
         let draws: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
@@ -55,26 +72,31 @@ impl Nothing {
         nothing.spreads = (0..lanes)
             .map(|lane| spread(&powers.iter().map(|power| of_lane(power, lane)).collect::<Vec<_>>()).1)
             .collect();
-        let joint = |power: &Power| {
-            let own = power.joint();
-            pooled(&own, &kept(&own))
-        };
         let (_, of_noise) = spread(&powers.iter().map(joint).collect::<Vec<_>>());
-        // Around a stop or a break-away a start that is known to some micrometres leaves more than noise, right as the model is.
+        (nothing, of_noise)
+    }
+
+    /// Mean and deviation of the joint power of records that the model would have left: around a stop or a break-away a start that
+    /// is known to some micrometres leaves more than noise, right as the model is.
+    fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
+        let lanes = model.windows.lanes().len();
         let left: Vec<f64> = (0..RECORDS)
             .into_par_iter()
             .map(|draw| {
-                let own = windows.redrawn(simulated, &mut Pcg64::seed_from_u64(SEED ^ (DRAWS + draw)));
+                let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw));
+                let own = model.windows.redrawn(&model.simulated, &mut random);
                 let residual = own.residual(&own.simulate(own.rig()));
-                let power = Power::new(&sums(&residual, lanes), &nothing.expected, lanes);
-                joint(&power.over(&levels(&power, &nothing)))
+                let power = Power::new(&sums(&residual, lanes), &self.expected, lanes);
+                joint(&power.over(&levels(&power, self)))
             })
             .collect();
-        let (mean, of_records) = spread(&left);
-        let deviation = of_noise.max(of_records) * (1.0 + 1.0 / RECORDS as f64).sqrt();
-        nothing.range = [mean - TWO_SIDED * deviation, mean + TWO_SIDED * deviation];
-        nothing
+        spread(&left)
     }
+}
+
+fn joint(power: &Power) -> f64 {
+    let own = power.joint();
+    pooled(&own, &kept(&own))
 }
 
 /// Mean and standard deviation.

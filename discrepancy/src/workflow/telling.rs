@@ -171,7 +171,7 @@ fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
 }
 
 /// A report without anything in it.
-pub(super) fn empty(verdict: Verdict, summary: String) -> Report {
+pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
     Report {
         schema_version: SCHEMA_VERSION,
         verdict,

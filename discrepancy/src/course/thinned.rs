@@ -1,0 +1,99 @@
+//! A part of a long record, for what costs by the second: blocks of windows, spread evenly over it.
+//!
+//! ```text
+//!   |......|lead|judged judged judged judged judged|............|lead|judged ...
+//! ```
+//!
+//! The first window of a block only fills lags and memories, as after a hole, and counts as one ([`Course::gaps`]).
+
+use super::Course;
+use crate::windows::WINDOW;
+
+/// Windows of a block, its first one included.
+const BLOCK: usize = 6;
+
+/// Seconds of measured axes that are searched for what is missing; the numbers of what was found come from all of the records.
+pub const SEARCHED_S: f64 = 20.0;
+
+/// Share of some records that is searched.
+#[must_use]
+pub fn searched_share(courses: &[Course]) -> f64 {
+    let axes = |course: &Course| course.measured.iter().filter(|measured| **measured).count();
+    let all_s: f64 =
+        courses.iter().map(|course| course.len() as f64 * super::PERIOD_S * axes(course) as f64).sum();
+    (SEARCHED_S / all_s).min(1.0)
+}
+
+impl Course {
+    /// About this share of the record; `None` where that is all of it, or where it has too few blocks to choose from.
+    #[must_use]
+    pub fn thinned(&self, share: f64) -> Option<Course> {
+        let blocks = self.len() / (BLOCK * WINDOW);
+        let wanted = (share * blocks as f64).round().max(1.0) as usize;
+        if share >= 1.0 || wanted >= blocks {
+            return None;
+        }
+        let mut part = Course {
+            inputs: Vec::new(),
+            samples: Vec::new(),
+            points: Vec::new(),
+            gaps: Vec::new(),
+            ..self.clone()
+        };
+        for chosen in 0..wanted {
+            // The middle of each of so many equal parts.
+            let block = (2 * chosen + 1) * blocks / (2 * wanted);
+            let places = block * BLOCK * WINDOW..(block + 1) * BLOCK * WINDOW;
+            part.inputs.extend_from_slice(&self.inputs[places.clone()]);
+            part.samples.extend_from_slice(&self.samples[places.clone()]);
+            part.points.extend_from_slice(&self.points[places.clone()]);
+            part.gaps.extend_from_slice(&self.gaps[places]);
+            let began = part.gaps.len() - BLOCK * WINDOW;
+            part.gaps[began..began + WINDOW].fill(true);
+        }
+        Some(part)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::Inputs;
+
+    fn course(periods: usize) -> Course {
+        let inputs = |at: usize| Inputs { valve: [at as f64, 0.0], ..Inputs::default() };
+        Course {
+            name: "a".to_owned(),
+            linked: false,
+            added_mass_kg: 0.0,
+            measured: [true, true],
+            inputs: (0..periods).map(inputs).collect(),
+            samples: vec![[[None; super::super::CHANNELS]; 2]; periods],
+            points: vec![[super::super::Point::default(); 2]; periods],
+            noise: [[1.0; 4]; 2],
+            memory: [[0.0; 4]; 2],
+            jitter_s: 0.0,
+            gaps: vec![false; periods],
+        }
+    }
+
+    #[test]
+    fn a_part_is_whole_blocks_from_everywhere_each_with_a_lead_in() {
+        let all = course(48_000);
+        assert_eq!(searched_share(std::slice::from_ref(&all)), 20.0 / 96.0);
+        let part = all.thinned(0.2).unwrap();
+        assert_eq!(part.len(), 4 * BLOCK * WINDOW);
+        let began: Vec<f64> = part.inputs.iter().step_by(BLOCK * WINDOW).map(|own| own.valve[0]).collect();
+        assert_eq!(began, [4800.0, 16_800.0, 28_800.0, 40_800.0]);
+        let lead_in = part.gaps.iter().filter(|gap| **gap).count();
+        assert_eq!(lead_in, 4 * WINDOW);
+        assert!((0..4).all(|block| part.gaps[block * BLOCK * WINDOW] && !part.gaps[block * BLOCK * WINDOW + WINDOW]));
+    }
+
+    #[test]
+    fn a_short_record_is_taken_whole() {
+        assert!(course(20_000).thinned(1.0).is_none());
+        assert!(course(2_400).thinned(0.5).is_none());
+        assert_eq!(searched_share(&[course(10_000)]), 1.0);
+    }
+}

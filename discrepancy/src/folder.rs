@@ -1,0 +1,167 @@
+//! The folder of results: nothing that was read is written over, a file is there whole or not at all, and nothing of an earlier
+//! result stays beside a new one.
+
+use crate::next::menu::MENU;
+use serde::Serialize;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+/// Why a result cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// The system does not let it be written.
+    #[error("{}: {why}: choose another folder, or make room", file.display())]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        why: io::Error,
+    },
+    /// A result would take the place of a file that is read.
+    #[error("{} is read here and would be written over: choose another --out", file.display())]
+    Input {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+/// A folder that takes the results of one run.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    /// Files that are read, as the file system knows them.
+    inputs: Vec<PathBuf>,
+}
+
+impl Folder {
+    /// Makes the folder if it is missing.
+    ///
+    /// # Errors
+    /// [`FolderError::Write`].
+    pub fn open<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<Self, FolderError> {
+        fs::create_dir_all(path).map_err(|why| FolderError::Write { file: path.to_owned(), why })?;
+        // What is not there is missed by whoever reads it.
+        let inputs = inputs.into_iter().filter_map(|file| fs::canonicalize(file).ok()).collect();
+        Ok(Self { path: path.to_owned(), inputs })
+    }
+
+    /// Its path, as given.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A file of results that may be written.
+    ///
+    /// # Errors
+    /// [`FolderError::Input`] when it is one of those that are read.
+    pub fn file(&self, name: impl AsRef<Path>) -> Result<PathBuf, FolderError> {
+        let file = self.path.join(name);
+        let known = fs::canonicalize(&file).is_ok_and(|own| self.inputs.contains(&own));
+        if known { Err(FolderError::Input { file }) } else { Ok(file) }
+    }
+
+    /// Takes away what an earlier close left, `model` the name of its model; only where there was one.
+    ///
+    /// # Errors
+    /// [`FolderError::Input`] when one of its files is read here, [`FolderError::Write`] when one cannot be taken away.
+    pub fn clear(&self, model: &Path) -> Result<(), FolderError> {
+        if !self.path.join("report.json").exists() {
+            return Ok(());
+        }
+        let proposed = MENU.iter().map(|entry| PathBuf::from(entry.file()));
+        for name in ["report.json", "report.html"].map(PathBuf::from).into_iter().chain(proposed) {
+            self.remove(&name)?;
+        }
+        self.remove(model)
+    }
+
+    fn remove(&self, name: &Path) -> Result<(), FolderError> {
+        let file = self.file(name)?;
+        match fs::remove_file(&file) {
+            Err(why) if why.kind() != io::ErrorKind::NotFound => Err(FolderError::Write { file, why }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Writes a text.
+    ///
+    /// # Errors
+    /// [`FolderError`].
+    pub fn write(&self, name: impl AsRef<Path>, text: &str) -> Result<(), FolderError> {
+        write(&self.file(name)?, text)
+    }
+
+    /// Writes a value as JSON.
+    ///
+    /// # Errors
+    /// [`FolderError`].
+    pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), FolderError> {
+        let mut text = serde_json::to_string_pretty(value).expect("reports hold nothing that JSON does not");
+        text.push('\n');
+        self.write(name, &text)
+    }
+}
+
+/// Writes a file beside its place and then puts it there: whoever reads it never sees half of it.
+///
+/// # Errors
+/// [`FolderError::Write`].
+pub fn write(file: &Path, text: &str) -> Result<(), FolderError> {
+    let mut name = file.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = file.with_file_name(name);
+    let written = fs::File::create(&part)
+        .and_then(|mut own| own.write_all(text.as_bytes()).and_then(|()| own.sync_all()))
+        .and_then(|()| fs::rename(&part, file));
+    written.map_err(|why| {
+        let _ = fs::remove_file(&part);
+        FolderError::Write { file: file.to_owned(), why }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_read_is_not_written_over_under_any_name() {
+        let own = tempfile::tempdir().unwrap();
+        let rig = own.path().join("rig.toml");
+        fs::write(&rig, "a").unwrap();
+        let folder = Folder::open(&own.path().join("."), [&rig]).unwrap();
+        let error = folder.write("rig.toml", "b").unwrap_err();
+        assert!(error.to_string().contains("would be written over"), "{error}");
+        assert_eq!(fs::read_to_string(&rig).unwrap(), "a");
+        folder.write("report.json", "{}").unwrap();
+        assert!(matches!(folder.clear(Path::new("rig.toml")), Err(FolderError::Input { .. })));
+        assert!(rig.exists());
+    }
+
+    #[test]
+    fn an_earlier_result_goes_and_foreign_files_stay() {
+        let own = tempfile::tempdir().unwrap();
+        let folder = Folder::open(own.path(), []).unwrap();
+        folder.write("rig.toml", "of somebody").unwrap();
+        folder.clear(Path::new("rig.toml")).unwrap();
+        assert!(own.path().join("rig.toml").exists(), "no report.json: nothing of ours");
+        for name in ["report.json", "next-chirps.toml", "notes.txt"] {
+            folder.write(name, "x").unwrap();
+        }
+        folder.clear(Path::new("rig.toml")).unwrap();
+        let left: Vec<_> =
+            fs::read_dir(own.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["notes.txt"]);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_leaves_the_one_before() {
+        let own = tempfile::tempdir().unwrap();
+        fs::create_dir(own.path().join("report.json.part")).unwrap();
+        fs::write(own.path().join("report.json"), "before").unwrap();
+        let error = write(&own.path().join("report.json"), "after").unwrap_err().to_string();
+        assert!(error.contains("report.json") && error.contains("choose another folder"), "{error}");
+        assert_eq!(fs::read_to_string(own.path().join("report.json")).unwrap(), "before");
+    }
+}

@@ -1,0 +1,145 @@
+//! What stays of the effects that joined a model, and what would take their place as well.
+
+use super::nothing::Nothing;
+use super::{NUMBER_COSTS, SAFETY, STEPS, around_of, refine};
+use crate::calibrate::Calibrated;
+use crate::engine::Engine;
+use crate::refit::{Placed, Refit, refit_steps};
+use crate::screen::Columns;
+use rayon::prelude::*;
+
+/// What came close in a round, that is tried again when another effect has joined.
+const SWAPPED: usize = 3;
+/// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart.
+const ALIKE: f64 = 20.0;
+/// The same as a share of what the effect takes.
+const ALIKE_SHARE: f64 = 0.02;
+/// Multiple of the threshold of nothing that is asked of every further effect, since a model is never exact, least of all one with
+/// another effect fitted in it.
+const SAFETY_BESIDE: f64 = 3.0;
+
+/// Puts what came close in an earlier round in the place of what won it: beside the effects that joined since, it may win.
+pub(super) fn swap(
+    engine: &Engine<'_>,
+    model: &mut Refit,
+    calibrated: &Calibrated,
+    rounds: &mut [(Vec<Placed>, Vec<Refit>)],
+    progress: &mut dyn FnMut(&str),
+) {
+    let point = around_of(engine, model);
+    let mut tried = Vec::new();
+    for (at, (_, refits)) in rounds.iter().enumerate().take(model.placed.len() - 1) {
+        for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
+            let Some(other) = other.placed.last() else { continue };
+            let mut placed = model.placed.clone();
+            placed[at] = other.clone();
+            tried.push((at, rank, placed));
+        }
+    }
+    progress(&format!("trying {} other combinations", tried.len()));
+    let best = tried
+        .par_iter()
+        .filter_map(|(at, rank, placed)| {
+            Some((*at, *rank, refit_steps(engine, &point, placed, NUMBER_COSTS, STEPS)?))
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+        .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
+    let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
+    let best = refine(engine, &best);
+    // Beside the other effects the one that came in explains more; the one that went stays as an alternative where it is as good.
+    let refits = &mut rounds[at].1;
+    let came = refits.remove(rank);
+    let is_alike = model.loss - best.loss < alike(&best, calibrated);
+    refits.truncate(usize::from(is_alike));
+    refits.insert(0, came);
+    *model = best;
+}
+
+/// By how much the loss of an explanation may be larger for the records not to tell it from the best.
+fn alike(best: &Refit, calibrated: &Calibrated) -> f64 {
+    (ALIKE * best.inflation).max(ALIKE_SHARE * (calibrated.fit.loss - best.loss))
+}
+
+/// Takes out effects that are not missed: by more than what nothing gains beside the whole model.
+pub(super) fn drop_unneeded<'a>(
+    engine: &Engine<'a>,
+    calibrated: &Calibrated,
+    columns: &Columns,
+    model: &mut Refit,
+    rounds: &mut Vec<(Vec<Placed>, Vec<Refit>)>,
+) {
+    while !model.placed.is_empty() {
+        let around = around_of(engine, model);
+        let threshold = Nothing::new(engine, columns, &around, model).threshold();
+        let without: Vec<Option<Refit>> = (0..model.placed.len())
+            .into_par_iter()
+            .map(|at| {
+                let mut placed = model.placed.clone();
+                placed.remove(at);
+                if placed.is_empty() {
+                    return Some(calibrated.fit.clone());
+                }
+                refit_steps(engine, &around, &placed, NUMBER_COSTS, 4)
+            })
+            .collect();
+        let least = without
+            .into_iter()
+            .enumerate()
+            .filter_map(|(at, own)| Some((at, own?)))
+            .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
+        let Some((at, own)) = least else { break };
+        let missed = own.loss - model.loss;
+        let safety = if own.placed.is_empty() { SAFETY } else { SAFETY_BESIDE };
+        let share = missed / (calibrated.fit.loss - model.loss).max(1e-9);
+        if missed > safety * threshold && share > 0.002 {
+            break;
+        }
+        rounds.remove(at.min(rounds.len() - 1));
+        *model = own;
+    }
+}
+
+/// Whether two are the same effect at the same place.
+pub(super) fn same(left: &Placed, right: &Placed) -> bool {
+    left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
+}
+
+/// What takes the place of an effect of the model just as well.
+pub(super) fn alternatives(
+    placed: &Placed,
+    calibrated: &Calibrated,
+    rounds: &[(Vec<Placed>, Vec<Refit>)],
+) -> Vec<Refit> {
+    // The round in which it joined.
+    let Some((_, refits)) = rounds.iter().find(|(_, refits)| {
+        refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
+    }) else {
+        return Vec::new();
+    };
+    let best = &refits[0];
+    refits[1..].iter().filter(|own| own.loss - best.loss < alike(best, calibrated)).cloned().collect()
+}
+
+/// Share of the excess that goes with each effect: of one alone all, of several what is missed without it.
+pub(super) fn shares(
+    model: &Refit,
+    rounds: &[(Vec<Placed>, Vec<Refit>)],
+    calibrated: &Calibrated,
+    excess: f64,
+) -> Vec<f64> {
+    let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
+    let mut before = calibrated.fit.loss;
+    model
+        .placed
+        .iter()
+        .enumerate()
+        .map(|(at, _)| {
+            let after =
+                rounds.get(at).and_then(|(_, refits)| refits.first()).map_or(model.loss, |own| own.loss);
+            let share = (before - after) / excess * whole;
+            before = after;
+            share.clamp(0.0, 1.0)
+        })
+        .collect()
+}

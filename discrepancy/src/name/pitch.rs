@@ -1,0 +1,70 @@
+//! The pitch of a ripple: a fit that begins at another one ends at a side of the peak that is none.
+//!
+//! ```text
+//!   ripple off ──► a column for each of so many pitches ──► the one that explains most, its amplitude by straight lines ──► fitted
+//! ```
+//!
+//! Over a travel D two pitches are alike while D (1/P_1 - 1/P_2) is well below one: pitches are tried evenly in 1/P.
+
+use super::{NUMBER_COSTS, STEPS, around_of};
+use crate::engine::Engine;
+use crate::fit::Products;
+use crate::parameters::COUNT;
+use crate::refit::{Refit, coordinate_columns, coordinate_ridge, parameter_ridges, refit_steps, rig_of};
+use rayon::prelude::*;
+
+/// Pitches that are tried.
+const PITCHES: u32 = 40;
+/// Coordinate of the amplitude at which a ripple is simulated.
+const PROBE: f64 = 0.3;
+
+/// The model with the ripple of its last effect where it explains most, if that explains more; other effects have none.
+pub(super) fn at_best_pitch(engine: &Engine<'_>, own: &Refit) -> Refit {
+    best(engine, own).filter(|other| other.loss < own.loss).unwrap_or_else(|| own.clone())
+}
+
+fn best(engine: &Engine<'_>, own: &Refit) -> Option<Refit> {
+    let candidate = own.placed.last()?.candidate;
+    let key_of = |name: &str| candidate.sheet.keys.iter().position(|key| key.name == name);
+    let (ripple, pitch) = (key_of("ripple_n")?, key_of("pitch_mm")?);
+    let mut plain = own.placed.clone();
+    let last = plain.len() - 1;
+    plain[last].coordinates[ripple] = 0.0;
+    let rig = rig_of(engine.rig(), &plain, &own.factors)?;
+    let [simulated, coarse] = [engine.simulate(&rig), engine.simulate_coarsely(&rig)];
+    let [least, most] = candidate.sheet.keys[pitch].drawn;
+    let step = (1.0 / least - 1.0 / most) / f64::from(PITCHES - 1);
+    let pitches: Vec<f64> = (0..PITCHES).map(|at| 1.0 / (1.0 / most + f64::from(at) * step)).collect();
+    let with = |amplitude: f64, at: f64| {
+        let mut placed = plain.clone();
+        placed[last].coordinates[ripple] = amplitude;
+        placed[last].coordinates[pitch] = candidate.coordinate(pitch, at);
+        placed
+    };
+    let ripples: Vec<Vec<f64>> = pitches
+        .par_iter()
+        .map(|at| {
+            let rig = rig_of(engine.rig(), &with(PROBE, *at), &own.factors)?;
+            Some(engine.difference(&engine.simulate_coarsely(&rig), &coarse))
+        })
+        .collect::<Option<_>>()?;
+    let around = around_of(engine, own);
+    let numbers = coordinate_columns(engine, &own.factors, &plain, &simulated)?;
+    let always = COUNT + numbers.len();
+    let columns: Vec<&[f64]> =
+        around.columns.iter().chain(&numbers).chain(&ripples).map(Vec::as_slice).collect();
+    let products = Products::new(&engine.residual(&simulated), &columns, engine.freedom(), engine.rows());
+    let mut ridges = parameter_ridges();
+    for placed in &plain {
+        ridges.extend((0..placed.coordinates.len()).map(|key| coordinate_ridge(&placed.candidate, key)));
+    }
+    ridges.push(coordinate_ridge(&candidate, ripple));
+    let fits = (0..pitches.len()).map(|at| {
+        let chosen: Vec<usize> = (0..always).chain([always + at]).collect();
+        (at, products.fit(&chosen, &ridges))
+    });
+    let (at, fit) = fits.min_by(|left, right| left.1.loss.total_cmp(&right.1.loss))?;
+    let [smallest, largest] = candidate.reach(ripple);
+    let amplitude = (PROBE * fit.coefficients[always]).clamp(smallest, largest);
+    refit_steps(engine, &around, &with(amplitude, pitches[at]), NUMBER_COSTS, STEPS)
+}
