@@ -17,11 +17,13 @@
 //! | `terms` | columns of baseline, candidates and decoys |
 //! | `fit` | least squares, folds, clustered errors |
 //! | `select` | which terms are taken |
+//! | `checked` | whether the records can be used |
 //! | `tell` | the report |
 //! | `extended` | the model file with what was found |
 //!
 //! Keys, processing and figures on real records: `discrepancy/docs/one-balance.md`.
 
+mod checked;
 mod extended;
 mod filter;
 mod fit;

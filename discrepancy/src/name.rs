@@ -336,8 +336,8 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     if ends[0] * ends[1] < 0.0 { 0.05 } else { FLOOR * ends[0].abs().min(ends[1].abs()) }
 }
 
-/// From which coordinate of its amplitude on a candidate would have been named: it must stand out of nothing, be worth a fit, and be
-/// no smaller than what counts as an effect.
+/// From which coordinate of its amplitude on a candidate would have been named: it must stand out of nothing, be worth a fit, and
+/// be no smaller than what counts as an effect.
 fn limits_of(left: &Nothing, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
     let told = left.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {

@@ -117,8 +117,8 @@ pub fn propose(
     Proposal { next, experiment_toml, table }
 }
 
-/// T of all ordered pairs in an entry; `None` when it cannot be rehearsed with one of the rigs, does not end with it or comes near
-/// an end of its stroke.
+/// T of all ordered pairs in an entry; `None` when it cannot be rehearsed with one of the rigs, does not end with it or comes
+/// near an end of its stroke.
 #[must_use]
 pub fn judge(
     entry: &Entry,

@@ -14,8 +14,8 @@ const SWAPPED: usize = 3;
 const ALIKE: f64 = 20.0;
 /// The same as a share of what the effect takes.
 const ALIKE_SHARE: f64 = 0.02;
-/// Multiple of the threshold of nothing that is asked of every further effect, since a model is never exact, least of all one with
-/// another effect fitted in it.
+/// Multiple of the threshold of nothing that is asked of every further effect, since a model is never exact, least of all one
+/// with another effect fitted in it.
 const SAFETY_BESIDE: f64 = 3.0;
 
 /// Puts what came close in an earlier round in the place of what won it: beside the effects that joined since, it may win.

@@ -1,7 +1,7 @@
 //! The pitch of a ripple: a fit that begins at another one ends at a side of the peak that is none.
 //!
 //! ```text
-//!   ripple off ──► a column for each of so many pitches ──► the one that explains most, its amplitude by straight lines ──► fitted
+//!   ripple off ──► a column for each of so many pitches ──► the one that explains most, its amplitude as it says ──► fitted
 //! ```
 //!
 //! Over a travel D two pitches are alike while D (1/P_1 - 1/P_2) is well below one: pitches are tried evenly in 1/P.

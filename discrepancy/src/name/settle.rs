@@ -30,8 +30,8 @@ const SETTLED: f64 = 0.3;
 /// Shares of the parameters' way that are tried where straight lines may have led too far.
 const WAYS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
-/// The parameters of a model, as far as the simulator goes along with what straight lines promised of them: beside an effect that is
-/// still missing they may be led where nothing is right any more.
+/// The parameters of a model, as far as the simulator goes along with what straight lines promised of them: beside an effect that
+/// is still missing they may be led where nothing is right any more.
 pub(super) fn grounded(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = WAYS.map(|way| model.factors.map(|factor| 1.0 + way * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {

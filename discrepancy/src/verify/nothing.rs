@@ -76,8 +76,8 @@ impl Nothing {
         (nothing, of_noise)
     }
 
-    /// Mean and deviation of the joint power of records that the model would have left: around a stop or a break-away a start that
-    /// is known to some micrometres leaves more than noise, right as the model is.
+    /// Mean and deviation of the joint power of records that the model would have left: around a stop or a break-away a start
+    /// that is known to some micrometres leaves more than noise, right as the model is.
     fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
         let lanes = model.windows.lanes().len();
         let left: Vec<f64> = (0..RECORDS)

@@ -236,6 +236,7 @@ const DIMENSIONLESS: &[&str] = &[
     "spool",                 // position of a valve's spool, -1 to 1
     "velocity_feed_forward", // share
     "loss",                  // probability
+    "searched_share",        // of records
     "error_rate",            // the same
     "median",                // of ratios
     "interval",              // of their median
