@@ -17,7 +17,7 @@ use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
 use crate::{balance, locate, page, verify};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -231,6 +231,7 @@ fn one_test(tests: &[PathBuf]) -> Result<Option<PathBuf>, CommandError> {
 }
 
 fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
+    let out = folder(arguments)?;
     let rig = RigFile::read(&arguments.rig)?.rig;
     let mut all = Vec::new();
     let mut text = String::new();
@@ -253,13 +254,14 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
         all.push(report);
     }
     print(&text)?;
-    if let Some(out) = folder(arguments)? {
+    if let Some(out) = out {
         out.write_json("checks.json", &all)?;
     }
     Ok(if all.iter().all(|report| report.usable) { Exit::Good } else { Exit::BadInput })
 }
 
 fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
+    let out = folder(arguments)?;
     let (rig_file, courses) = courses(arguments)?;
     let engine = Engine::new(&courses, &rig_file.rig);
     let ones = [1.0; COUNT];
@@ -274,7 +276,7 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
         };
     }
     print(&text)?;
-    if let Some(out) = folder(arguments)? {
+    if let Some(out) = out {
         out.write_json("parameters.json", &quantities)?;
         let known: Vec<Quantity> =
             quantities.into_iter().filter(|own| own.standard_error.is_some()).collect();
@@ -287,6 +289,7 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
 }
 
 fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
+    let out = folder(arguments)?;
     let (rig_file, courses) = courses(arguments)?;
     let mut progress = progress();
     let located = locate::locate(&rig_file.rig, &courses, &mut progress);
@@ -299,7 +302,7 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
         );
     }
     print(&text)?;
-    if let Some(out) = folder(arguments)? {
+    if let Some(out) = out {
         out.write_json("location.json", &located.location)?;
     }
     Ok(Exit::Good)
@@ -315,6 +318,8 @@ fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
 }
 
 fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
+    let inputs = [&arguments.rig, &arguments.extended, &arguments.test];
+    let out = arguments.out.as_ref().map(|out| Folder::open(out, inputs)).transpose()?;
     let [before, after] = [RigFile::read(&arguments.rig)?.rig, RigFile::read(&arguments.extended)?.rig];
     let opened = open(&arguments.test, &arguments.options(), &before)?;
     let Some(course) = opened.course else { return Err(CommandError::BadData(opened.checked.why_not())) };
@@ -341,10 +346,9 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     }
     verified.verification.physical.iter().for_each(|unphysical| text.push_str(&format!("{unphysical}\n")));
     print(&text)?;
-    if let Some(out) = &arguments.out {
-        let inputs = [&arguments.rig, &arguments.extended, &arguments.test];
+    if let Some(out) = out {
         let told = VerifiedFile { gap: &verified.gap, verification: &verified.verification };
-        Folder::open(out, inputs)?.write_json("verification.json", &told)?;
+        out.write_json("verification.json", &told)?;
     }
     Ok(if *confirmed { Exit::Good } else { Exit::BoundBroken })
 }
@@ -352,7 +356,7 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
 /// `verification.json`: what a report has under the same names.
 #[derive(serde::Serialize)]
 struct VerifiedFile<'a> {
-    gap: &'a std::collections::BTreeMap<String, Gap>,
+    gap: &'a BTreeMap<String, Gap>,
     verification: &'a Verification,
 }
 
@@ -391,7 +395,7 @@ fn read_report(path: &Path) -> Result<workflow::Told, CommandError> {
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }
 
-/// The folder that a step is told to write into.
+/// The folder that a step is told to write into; opened before the work, so that one that cannot be had costs none.
 fn folder(arguments: &RecordArguments) -> Result<Option<Folder>, CommandError> {
     let inputs = || [&arguments.rig].into_iter().chain(&arguments.train).chain(&arguments.mapping);
     Ok(arguments.out.as_ref().map(|out| Folder::open(out, inputs())).transpose()?)

@@ -2,9 +2,10 @@
 //! result stays beside a new one.
 
 use crate::next::menu::MENU;
+use protocol::run_folder::write_whole;
 use serde::Serialize;
 use std::fs;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Why a result cannot be written.
@@ -104,21 +105,12 @@ impl Folder {
     }
 }
 
-/// Writes a file beside its place and then puts it there: whoever reads it never sees half of it.
+/// Writes a file by [`write_whole`].
 ///
 /// # Errors
 /// [`FolderError::Write`].
 pub fn write(file: &Path, text: &str) -> Result<(), FolderError> {
-    let mut name = file.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let part = file.with_file_name(name);
-    let written = fs::File::create(&part)
-        .and_then(|mut own| own.write_all(text.as_bytes()).and_then(|()| own.sync_all()))
-        .and_then(|()| fs::rename(&part, file));
-    written.map_err(|why| {
-        let _ = fs::remove_file(&part);
-        FolderError::Write { file: file.to_owned(), why }
-    })
+    write_whole(file, text).map_err(|why| FolderError::Write { file: file.to_owned(), why })
 }
 
 #[cfg(test)]
@@ -156,12 +148,10 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_cannot_be_written_leaves_the_one_before() {
+    fn a_file_that_cannot_be_written_is_told_with_what_to_do() {
         let own = tempfile::tempdir().unwrap();
         fs::create_dir(own.path().join("report.json.part")).unwrap();
-        fs::write(own.path().join("report.json"), "before").unwrap();
         let error = write(&own.path().join("report.json"), "after").unwrap_err().to_string();
         assert!(error.contains("report.json") && error.contains("choose another folder"), "{error}");
-        assert_eq!(fs::read_to_string(own.path().join("report.json")).unwrap(), "before");
     }
 }

@@ -18,46 +18,36 @@ mod joined;
 mod needed;
 mod nothing;
 mod pitch;
+mod round;
 mod settle;
 
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::parameters::COUNT;
-use crate::refit::{Around, Placed, Refit, loss_at, refit, refit_steps, rig_of};
+use crate::refit::{Around, Placed, Refit, refit, rig_of};
 use crate::screen::{Columns, Screened};
-use home::{Placement, at_home, gap_start};
-use joined::{alternatives, drop_unneeded, same, shares, swap};
+use home::{Placement, at_home};
+use joined::{alternatives, drop_unneeded, shares, swap};
 use needed::with_needed;
 use nothing::Nothing;
-use pitch::at_best_pitch;
 use rayon::prelude::*;
+use round::{Contenders, Round};
 use settle::{grounded, settled};
 
 /// Effects at most.
 const MOST: usize = 3;
-/// Candidates that are fitted in the simulator at most, in each round.
-const CONTENDERS: usize = 6;
 /// Steps of a candidate's first fit.
 const STEPS: usize = 5;
-/// Share of a screened gain that the simulator may deny before other amplitudes are tried.
-const BELIEVED: f64 = 0.2;
-/// How many contenders are fitted with sensitivities of their own, how often at most, and the fall of the loss that ends it.
-const REFINED: usize = 3;
+/// How often a model is fitted with sensitivities of its own at most, and the fall of the loss that ends it.
 const REFININGS: usize = 4;
 const SETTLED: f64 = 1.0;
-/// Amplitudes that are tried then.
-const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 /// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
 const EXCESS: f64 = 0.08;
 /// The same of linked records, where micrometres decide when the eye meets the carriage: records of nothing leave up to 0.2.
 const EXCESS_LINKED: f64 = 0.3;
 /// Screened gain below which nothing is fitted: the best of some forty candidates gains half of it by chance.
 const WORTH_A_FIT: f64 = 25.0;
-/// Share of the last round's threshold below which no further effect is fitted.
-const LOOKED_FOR: f64 = 0.5;
-/// Share of the best screened gain below which a candidate is not fitted.
-const CONTENDS: f64 = 0.35;
 /// What each number of an effect costs: it must be worth more than one more candidate tried.
 const NUMBER_COSTS: f64 = 8.0;
 /// Multiple of the threshold of nothing that is asked of the first effect.
@@ -76,9 +66,6 @@ const REDUCES: f64 = 1.8;
 /// Effects that are none without their first number: without cracking pressure a check valve is the resistance of a line, and
 /// where rods are linked, damping alone takes up what starts within micrometres leave.
 const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
-/// What stands between linked rods: screening sees little of it, since starts were moved to where the rig without it meets the
-/// readings.
-const BACKLASH: &str = "coupling-backlash";
 
 /// What naming found.
 #[derive(Debug)]
@@ -130,88 +117,33 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
-    let mut rounds: Vec<(Vec<Placed>, Vec<Refit>)> = Vec::new();
-    for round in 0..MOST {
+    // Of each effect that joined, the fits of its round, the best first.
+    let mut rounds: Vec<Vec<Refit>> = Vec::new();
+    for number in 0..MOST {
         let here = home.as_ref().unwrap_or(engine);
-        let (own_nothing, own_screened) =
-            if round == 0 { (nothing, screened.clone()) } else { screen_again(here, &columns, &model) };
-        let taken = |screened: &Screened| model.placed.iter().any(|placed| same(placed, &screened.start));
-        let mut contenders: Vec<Screened> =
-            own_screened.into_iter().filter(|screened| !taken(screened)).collect();
-        contenders.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        let Some(best) = contenders.first() else { break };
-        let most = own_nothing - best.loss;
-        // The threshold before is that of a residual in which much was still missing: it tells when to stop looking, not what to
-        // refuse.
-        if most < WORTH_A_FIT.max(LOOKED_FOR * threshold) {
-            break;
+        let own =
+            if number == 0 { (nothing, screened.clone()) } else { screen_again(here, &columns, &model) };
+        let Some(contenders) = Contenders::of(own, here, &columns, &model, threshold) else { break };
+        progress(&format!("fitting {} candidates, round {}", contenders.count(), number + 1));
+        let point = if number == 0 { around.clone() } else { around_of(here, &model) };
+        let Some(mut round) = Round::fitted(here, &point, &model, &contenders, progress) else { break };
+        if number == 0 {
+            fitted.clone_from(&round.fits);
         }
-        let gap = contenders
-            .iter()
-            .find(|own| here.is_linked() && columns.candidates[own.at].sheet.name == BACKLASH)
-            .cloned();
-        contenders.truncate(CONTENDERS);
-        contenders.retain(|screened| own_nothing - screened.loss > CONTENDS * most);
-        progress(&format!("fitting {} candidates, round {}", contenders.len(), round + 1));
-        let point = if round == 0 { around.clone() } else { around_of(here, &model) };
-        let mut refits: Vec<Refit> = contenders
-            .par_iter()
-            .filter_map(|screened| {
-                let start = best_start(here, &point, &model.placed, screened, own_nothing);
-                refit_steps(here, &point, &start, NUMBER_COSTS, STEPS)
-            })
-            .collect();
-        refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        // Sensitivities of the parameters were those of the model before: the best get their own. What they gain is held against
-        // what the parameters alone reach with the same sensitivities.
-        let Some(best) = refits.first() else { break };
-        let gain = own_nothing - best.loss;
-        let near =
-            refits.iter().take(REFINED).filter(|own| own_nothing - own.loss >= 0.5 * gain).count().max(1);
-        let mut refined: Vec<Placement> = refits[..near]
-            .par_iter()
-            .map(|own| at_home(here, &refine(here, &at_best_pitch(here, own)), NUMBER_COSTS))
-            .collect();
-        refits.splice(..near, refined.iter().map(|own| own.fit.clone()));
-        let least = refits.iter().map(|own| own.loss).fold(model.loss, f64::min);
-        if let Some(gap) = gap
-            && least > EXCESS * here.freedom().iter().sum::<f64>()
-        {
-            progress("trying other gaps");
-            let start = gap_start(here, &point, &model.placed, &gap.start);
-            if let Some(own) = refit_steps(here, &point, &start, NUMBER_COSTS, STEPS) {
-                let own = at_home(here, &refine(here, &own), NUMBER_COSTS);
-                // The one fitted from where screening said is the same effect, and no alternative to it.
-                let is_gap = |other: &Refit| other.placed.last().is_some_and(|own| same(own, &gap.start));
-                if refits.iter().filter(|other| is_gap(other)).all(|other| own.fit.loss < other.loss) {
-                    refits.retain(|other| !is_gap(other));
-                    refits.push(own.fit.clone());
-                    refined.push(own);
-                }
-            }
-        }
-        if round == 0 {
-            fitted = refits.clone();
-            fitted.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        }
-        // What is smaller than what occurs is no explanation, however well it fits.
-        refits.retain(|own| own.placed.last().is_some_and(is_large));
-        refits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        let Some(best) = refits.first() else { break };
-        let best_home =
-            refined.iter_mut().find(|own| own.fit.loss == best.loss).and_then(|own| own.home.take());
+        round.keep_large();
+        let best_home = round.take_home();
         let there = best_home.as_ref().unwrap_or(here);
+        let Some(best) = round.fits.first_mut() else { break };
         // What nothing gains is told by what the best model leaves: what it explains is no noise. What another effect still adds
         // is none either: a model that may be needed beside another one joins, and is taken out at the end if it is not.
         if !takes(&model, best) {
             break;
         }
-        refits[0].factors = grounded(there, best);
-        let best = &refits[0];
+        best.factors = grounded(there, best);
         threshold = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
-        rounds.push((model.placed.clone(), refits.clone()));
         model = best.clone();
-        if round > 0 {
+        rounds.push(round.fits);
+        if number > 0 {
             swap(there, &mut model, &calibrated, &mut rounds, progress);
         }
         home = best_home.or(home);
@@ -260,34 +192,6 @@ pub fn on_all(engine: &Engine<'_>, found: &mut Found) {
     if let Some(told) = settled(home.as_ref().unwrap_or(engine), &found.told, &needed) {
         found.told = told;
     }
-}
-
-/// Where a candidate's fit begins: where screening says, unless the simulator finds it far worse there than screening does; then
-/// at the best of some amplitudes.
-fn best_start(
-    engine: &Engine<'_>,
-    point: &Around,
-    model: &[Placed],
-    screened: &Screened,
-    nothing: f64,
-) -> Vec<Placed> {
-    let with = |amplitude: f64| {
-        let mut placed = model.to_vec();
-        let mut own = screened.start.clone();
-        own.coordinates[0] = amplitude;
-        placed.push(own);
-        placed
-    };
-    let told = screened.start.coordinates[0];
-    let own = loss_at(engine, point, &with(told));
-    if own < screened.loss + BELIEVED * (nothing - screened.loss) {
-        return with(told);
-    }
-    let [least, most] = screened.start.candidate.range(0);
-    let tried = AMPLITUDES.iter().map(|size| size * told.signum()).filter(|z| *z >= least && *z <= most);
-    let losses = tried.map(|z| (loss_at(engine, point, &with(z)), z));
-    let (_, best) = losses.chain([(own, told)]).min_by(|a, b| a.0.total_cmp(&b.0)).expect("one at least");
-    with(best)
 }
 
 /// Sensitivities of the parameters at a model.

@@ -126,16 +126,36 @@ impl LineFile {
     }
 }
 
-/// Writes `value` as pretty JSON under a temporary name and renames it.
+/// Writes `value` as pretty JSON by [`write_whole`].
 ///
 /// # Errors
 /// What the system says, with the file's name.
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> io::Result<()> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    let temporary = path.with_extension("json.part");
-    let written = std::fs::write(&temporary, text).and_then(|()| std::fs::rename(&temporary, path));
-    written.map_err(|error| named(path, &error))
+    write_whole(path, &text).map_err(|error| named(path, &error))
+}
+
+/// Writes a file under a temporary name and renames it; what is no file, such as a terminal, is written as it stands.
+///
+/// # Errors
+/// What the system says; then the file that was there before is as it was.
+pub fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+    // A device in whose place a file is put is gone for the whole machine.
+    if std::fs::metadata(path).is_ok_and(|own| !own.is_file() && !own.is_dir()) {
+        return std::fs::write(path, text);
+    }
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let temporary = path.with_file_name(name);
+    // A name that is on the disk before what it names is that of an empty file after a power cut.
+    let written = File::create(&temporary)
+        .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
+        .and_then(|()| std::fs::rename(&temporary, path));
+    written.inspect_err(|_| {
+        // Half a file is no use; that it cannot be taken away changes nothing of what is told.
+        let _ = std::fs::remove_file(&temporary);
+    })
 }
 
 pub(crate) fn named(path: &Path, error: &io::Error) -> io::Error {
@@ -169,5 +189,20 @@ mod tests {
         std::fs::create_dir(folder.path().join("summary.json")).unwrap();
         let message = clear_results(folder.path()).unwrap_err().to_string();
         assert!(message.contains("summary.json: "), "{message}");
+    }
+
+    #[test]
+    fn a_file_is_written_whole_or_stays_and_a_device_stays_a_device() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        write_whole(&path, "before").unwrap();
+        std::fs::create_dir(folder.path().join("a.json.part")).unwrap();
+        assert!(write_whole(&path, "after").is_err());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "before");
+
+        let device = folder.path().join("out");
+        std::os::unix::fs::symlink("/dev/null", &device).unwrap();
+        write_whole(&device, "x").unwrap();
+        assert!(std::fs::symlink_metadata(&device).unwrap().is_symlink(), "no file took its place");
     }
 }

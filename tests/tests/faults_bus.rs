@@ -214,8 +214,9 @@ fn the_socket_of_a_host_that_was_killed_is_taken_over() {
     let scene = Scene::new(SHORT);
     let _ = scene.bus_host("").kill();
     assert!(scene.socket().exists(), "a killed host leaves its socket");
-    let emulator = scene.emulator(Pace::Real).start();
-    let controller = scene.controller(Pace::Real).start();
+    // In lockstep: a machine that stalls for a second would make the controller stop the rig, and the emulator wait for another.
+    let emulator = scene.emulator(Pace::Lockstep).start();
+    let controller = scene.controller(Pace::Lockstep).start();
     let _ = emulator.wait_within(PATIENCE).expect_code(0);
     let _ = controller.wait().expect_code(0);
     assert!(

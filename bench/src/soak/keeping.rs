@@ -7,7 +7,7 @@ use super::SoakError;
 use super::merged::Merged;
 use super::model::{SOAK_SCHEMA_VERSION, Segment, Settings, Soak, Totals};
 use super::{junit, procfs, verdict};
-use protocol::run_folder::write_json;
+use protocol::run_folder::{write_json, write_whole};
 use rustix::fs::{FlockOperation, flock};
 use std::fs::File;
 use std::io;
@@ -124,12 +124,6 @@ impl Keeping {
         let length = Duration::try_from_secs_f64(soak.elapsed_s).unwrap_or_default();
         self.merged.write(&path, soak.started_unix_s, length).map_err(|error| failed(&path, &error))
     }
-}
-
-fn write_whole(path: &Path, text: &str) -> io::Result<()> {
-    let temporary = path.with_extension("part");
-    std::fs::write(&temporary, text)?;
-    std::fs::rename(&temporary, path)
 }
 
 /// Seconds since 1970.

@@ -23,12 +23,12 @@ pub(super) fn swap(
     engine: &Engine<'_>,
     model: &mut Refit,
     calibrated: &Calibrated,
-    rounds: &mut [(Vec<Placed>, Vec<Refit>)],
+    rounds: &mut [Vec<Refit>],
     progress: &mut dyn FnMut(&str),
 ) {
     let point = around_of(engine, model);
     let mut tried = Vec::new();
-    for (at, (_, refits)) in rounds.iter().enumerate().take(model.placed.len() - 1) {
+    for (at, refits) in rounds.iter().enumerate().take(model.placed.len() - 1) {
         for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
             let Some(other) = other.placed.last() else { continue };
             let mut placed = model.placed.clone();
@@ -48,7 +48,7 @@ pub(super) fn swap(
     let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
     let best = refine(engine, &best);
     // Beside the other effects the one that came in explains more; the one that went stays as an alternative where it is as good.
-    let refits = &mut rounds[at].1;
+    let refits = &mut rounds[at];
     let came = refits.remove(rank);
     let is_alike = model.loss - best.loss < alike(&best, calibrated);
     refits.truncate(usize::from(is_alike));
@@ -67,7 +67,7 @@ pub(super) fn drop_unneeded<'a>(
     calibrated: &Calibrated,
     columns: &Columns,
     model: &mut Refit,
-    rounds: &mut Vec<(Vec<Placed>, Vec<Refit>)>,
+    rounds: &mut Vec<Vec<Refit>>,
 ) {
     while !model.placed.is_empty() {
         let around = around_of(engine, model);
@@ -106,13 +106,9 @@ pub(super) fn same(left: &Placed, right: &Placed) -> bool {
 }
 
 /// What takes the place of an effect of the model just as well.
-pub(super) fn alternatives(
-    placed: &Placed,
-    calibrated: &Calibrated,
-    rounds: &[(Vec<Placed>, Vec<Refit>)],
-) -> Vec<Refit> {
+pub(super) fn alternatives(placed: &Placed, calibrated: &Calibrated, rounds: &[Vec<Refit>]) -> Vec<Refit> {
     // The round in which it joined.
-    let Some((_, refits)) = rounds.iter().find(|(_, refits)| {
+    let Some(refits) = rounds.iter().find(|refits| {
         refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
     }) else {
         return Vec::new();
@@ -122,12 +118,7 @@ pub(super) fn alternatives(
 }
 
 /// Share of the excess that goes with each effect: of one alone all, of several what is missed without it.
-pub(super) fn shares(
-    model: &Refit,
-    rounds: &[(Vec<Placed>, Vec<Refit>)],
-    calibrated: &Calibrated,
-    excess: f64,
-) -> Vec<f64> {
+pub(super) fn shares(model: &Refit, rounds: &[Vec<Refit>], calibrated: &Calibrated, excess: f64) -> Vec<f64> {
     let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
     let mut before = calibrated.fit.loss;
     model
@@ -135,8 +126,7 @@ pub(super) fn shares(
         .iter()
         .enumerate()
         .map(|(at, _)| {
-            let after =
-                rounds.get(at).and_then(|(_, refits)| refits.first()).map_or(model.loss, |own| own.loss);
+            let after = rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |own| own.loss);
             let share = (before - after) / excess * whole;
             before = after;
             share.clamp(0.0, 1.0)

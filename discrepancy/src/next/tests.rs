@@ -71,6 +71,25 @@ fn every_entry_comes_to_its_end_and_stays_away_from_both_ends_of_the_stroke() {
 }
 
 #[test]
+fn a_run_that_does_not_end_or_comes_near_an_end_of_the_stroke_is_none_for_this_rig() {
+    let rig = RigParameters::baseline();
+    let stroke_m = rig.cylinder().stroke_m;
+    let good = drive(&MENU[0], &rig, &rig).expect("it can be rehearsed");
+    assert!(good.ends_well(stroke_m));
+    let changed = |change: &dyn Fn(&mut driven::Driven)| {
+        let mut run = good.clone();
+        change(&mut run);
+        run.ends_well(stroke_m)
+    };
+    assert!(!changed(&|run| run.done = false));
+    assert!(!changed(&|run| run.began = None));
+    let last = good.points.len() - 1;
+    assert!(!changed(&|run| run.points[last][0].extension_m = stroke_m));
+    // On its way from the end at which it begins it is near it, as on the rig.
+    assert!(changed(&|run| run.points[0][0].extension_m = 0.0));
+}
+
+#[test]
 fn an_explanation_does_not_differ_from_itself_and_differs_from_another() {
     let entry = MENU.iter().find(|entry| entry.name == "slow-reversals").expect("an entry");
     let one = explained(&[("inclination", "drive", &[("force_n", 5.0)])]);

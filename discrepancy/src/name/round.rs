@@ -1,0 +1,178 @@
+//! One round of the search: which candidate would join the model.
+//!
+//! ```text
+//!   screened ──► the few that gain most ──► each fitted beside the model ──► the best of them again, with sensitivities of
+//!                                                                            their own, at their pitch, from their own home
+//! ```
+
+use super::home::{Placement, at_home, gap_start};
+use super::joined::same;
+use super::pitch::at_best_pitch;
+use super::{EXCESS, NUMBER_COSTS, STEPS, WORTH_A_FIT, is_large, refine};
+use crate::engine::Engine;
+use crate::refit::{Around, Placed, Refit, loss_at, refit_steps};
+use crate::screen::{Columns, Screened};
+use rayon::prelude::*;
+
+/// Candidates that are fitted in the simulator at most, in each round.
+const CONTENDERS: usize = 6;
+/// Share of the best screened gain below which a candidate is not fitted.
+const CONTENDS: f64 = 0.35;
+/// Share of the last round's threshold below which no further effect is fitted.
+const LOOKED_FOR: f64 = 0.5;
+/// Share of a screened gain that the simulator may deny before other amplitudes are tried.
+const BELIEVED: f64 = 0.2;
+/// Amplitudes that are tried then.
+const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
+/// How many contenders are fitted with sensitivities of their own.
+const REFINED: usize = 3;
+/// What stands between linked rods: screening sees little of it, since starts were moved to where the rig without it meets the
+/// readings.
+const BACKLASH: &str = "coupling-backlash";
+
+/// Candidates that are worth a fit.
+pub(super) struct Contenders {
+    /// Loss of the model without any of them, as screening sees it.
+    nothing: f64,
+    /// The one that gains most first.
+    best: Vec<Screened>,
+    /// A gap between linked rods, however little screening sees of it.
+    gap: Option<Screened>,
+}
+
+impl Contenders {
+    /// Of all candidates those that are not in the model yet and gain much; `None` where none gains enough.
+    ///
+    /// The last round's threshold is that of a residual in which much was still missing: it tells when to stop looking, not what
+    /// to refuse.
+    pub(super) fn of(
+        (nothing, screened): (f64, Vec<Screened>),
+        engine: &Engine<'_>,
+        columns: &Columns,
+        model: &Refit,
+        threshold: f64,
+    ) -> Option<Self> {
+        let taken = |screened: &Screened| model.placed.iter().any(|placed| same(placed, &screened.start));
+        let mut best: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
+        best.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+        let most = nothing - best.first()?.loss;
+        if most < WORTH_A_FIT.max(LOOKED_FOR * threshold) {
+            return None;
+        }
+        let is_gap = |own: &&Screened| columns.candidates[own.at].sheet.name == BACKLASH;
+        let gap = if engine.is_linked() { best.iter().find(is_gap).cloned() } else { None };
+        best.truncate(CONTENDERS);
+        best.retain(|screened| nothing - screened.loss > CONTENDS * most);
+        Some(Self { nothing, best, gap })
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.best.len()
+    }
+}
+
+/// Models with one effect more.
+pub(super) struct Round<'a> {
+    /// The best first.
+    pub(super) fits: Vec<Refit>,
+    /// Those of them that were fitted again, each with its home.
+    at_home: Vec<Placement<'a>>,
+}
+
+impl<'a> Round<'a> {
+    /// Fits a model with each of the contenders, `point` the parameters' sensitivities at the model; `None` where none can be
+    /// fitted.
+    pub(super) fn fitted(
+        engine: &Engine<'a>,
+        point: &Around,
+        model: &Refit,
+        contenders: &Contenders,
+        progress: &mut dyn FnMut(&str),
+    ) -> Option<Self> {
+        let Contenders { nothing, best, gap } = contenders;
+        let mut fits: Vec<Refit> = best
+            .par_iter()
+            .filter_map(|screened| {
+                let start = best_start(engine, point, &model.placed, screened, *nothing);
+                refit_steps(engine, point, &start, NUMBER_COSTS, STEPS)
+            })
+            .collect();
+        sort(&mut fits);
+        // Sensitivities of the parameters were those of the model before: the best get their own. What they gain is held against
+        // what the parameters alone reach with the same sensitivities.
+        let gain = nothing - fits.first()?.loss;
+        let near = fits.iter().take(REFINED).filter(|own| nothing - own.loss >= 0.5 * gain).count().max(1);
+        let at_home = fits[..near]
+            .par_iter()
+            .map(|own| at_home(engine, &refine(engine, &at_best_pitch(engine, own)), NUMBER_COSTS))
+            .collect();
+        let mut round = Self { fits, at_home };
+        round.fits.splice(..near, round.at_home.iter().map(|own| own.fit.clone()));
+        let least = round.fits.iter().map(|own| own.loss).fold(model.loss, f64::min);
+        if let Some(gap) = gap
+            && least > EXCESS * engine.freedom().iter().sum::<f64>()
+        {
+            progress("trying other gaps");
+            round.with_gap(engine, point, model, gap);
+        }
+        sort(&mut round.fits);
+        Some(round)
+    }
+
+    /// Fits a gap from another width than the one that screening says.
+    fn with_gap(&mut self, engine: &Engine<'a>, point: &Around, model: &Refit, gap: &Screened) {
+        let start = gap_start(engine, point, &model.placed, &gap.start);
+        let Some(own) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
+        let own = at_home(engine, &refine(engine, &own), NUMBER_COSTS);
+        // The one fitted from where screening said is the same effect, and no alternative to it.
+        let is_gap = |other: &Refit| other.placed.last().is_some_and(|own| same(own, &gap.start));
+        if self.fits.iter().filter(|other| is_gap(other)).all(|other| own.fit.loss < other.loss) {
+            self.fits.retain(|other| !is_gap(other));
+            self.fits.push(own.fit.clone());
+            self.at_home.push(own);
+        }
+    }
+
+    /// What is smaller than what occurs is no explanation, however well it fits.
+    pub(super) fn keep_large(&mut self) {
+        self.fits.retain(|own| own.placed.last().is_some_and(is_large));
+    }
+
+    /// The records as the best model meets them, where it has a home of its own.
+    pub(super) fn take_home(&mut self) -> Option<Engine<'a>> {
+        let best = self.fits.first()?;
+        self.at_home.iter_mut().find(|own| own.fit.loss == best.loss).and_then(|own| own.home.take())
+    }
+}
+
+fn sort(fits: &mut [Refit]) {
+    fits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
+}
+
+/// Where a candidate's fit begins: where screening says, unless the simulator finds it far worse there than screening does; then
+/// at the best of some amplitudes.
+fn best_start(
+    engine: &Engine<'_>,
+    point: &Around,
+    model: &[Placed],
+    screened: &Screened,
+    nothing: f64,
+) -> Vec<Placed> {
+    let with = |amplitude: f64| {
+        let mut placed = model.to_vec();
+        let mut own = screened.start.clone();
+        own.coordinates[0] = amplitude;
+        placed.push(own);
+        placed
+    };
+    let told = screened.start.coordinates[0];
+    let own = loss_at(engine, point, &with(told));
+    if own < screened.loss + BELIEVED * (nothing - screened.loss) {
+        return with(told);
+    }
+    let [least, most] = screened.start.candidate.range(0);
+    let tried = AMPLITUDES.iter().map(|size| size * told.signum()).filter(|z| *z >= least && *z <= most);
+    let losses = tried.map(|z| (loss_at(engine, point, &with(z)), z));
+    let (_, best) = losses.chain([(own, told)]).min_by(|a, b| a.0.total_cmp(&b.0)).expect("one at least");
+    with(best)
+}
