@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   e(z) = readings - simulation with the effects at z       columns: N (parameters), d simulation / d z_i
-//!   fit of the columns to e(z) -> step of z, halved until the loss falls; parameters start from 0 each time
+//!   fit of the columns to e(z) -> step of z, halved until the loss falls; ridges hold how far all of it is from the file
 //! ```
 //!
 //! Derivatives are differences of a twentieth of the coordinate's unit, never exact ones: through stick and slip those of
@@ -67,6 +67,14 @@ pub struct Around {
     pub factors: [f64; COUNT],
 }
 
+impl Around {
+    /// How far each parameter is from what is believed of it.
+    #[must_use]
+    pub fn off(&self) -> Vec<f64> {
+        self.factors.iter().map(|factor| factor - 1.0).collect()
+    }
+}
+
 /// The rig with some effects and factors; `None` where the numbers do not fit together.
 #[must_use]
 pub fn rig_of(rig: &RigParameters, placed: &[Placed], factors: &[f64; COUNT]) -> Option<RigParameters> {
@@ -75,7 +83,7 @@ pub fn rig_of(rig: &RigParameters, placed: &[Placed], factors: &[f64; COUNT]) ->
     })
 }
 
-/// Ridges of the parameters, for changes from `factors` of what is believed to be 1.
+/// Ridges of the parameters, for how far their factors are from 1.
 pub(crate) fn parameter_ridges() -> Vec<f64> {
     PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect()
 }
@@ -107,7 +115,7 @@ pub fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
     let residual = engine.residual(&engine.simulate_coarsely(&rig));
     let columns: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).collect();
     let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
-    products.fit(&(0..COUNT).collect::<Vec<_>>(), &parameter_ridges()).loss
+    products.fit_from(&(0..COUNT).collect::<Vec<_>>(), &parameter_ridges(), &around.off()).loss
 }
 
 /// A point of a fit: where, and what is left there.
@@ -136,7 +144,7 @@ pub fn refit_steps(
     steps: usize,
 ) -> Option<Refit> {
     let parameters: Vec<usize> = (0..COUNT).collect();
-    let ridges = parameter_ridges();
+    let (ridges, off) = (parameter_ridges(), around.off());
     let moved = moved(start);
     let parameter_columns: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).collect();
     let mut parameter_products: Option<Products> = None;
@@ -152,7 +160,7 @@ pub fn refit_steps(
                 none.insert(Products::new(&residual, &parameter_columns, engine.freedom(), engine.rows()))
             }
         };
-        let fit = products.fit(&parameters, &ridges);
+        let fit = products.fit_from(&parameters, &ridges, &off);
         Some(Point { placed, simulated, residual, fit })
     };
     let prior = |placed: &[Placed]| -> f64 {
@@ -173,7 +181,9 @@ pub fn refit_steps(
         let chosen: Vec<usize> = (0..all.len()).collect();
         let mut all_ridges = ridges.clone();
         all_ridges.extend(moved.iter().map(|(at, key)| coordinate_ridge(&point.placed[*at].candidate, *key)));
-        let joint = products.fit(&chosen, &all_ridges);
+        let places = moved.iter().map(|(at, key)| point.placed[*at].coordinates[*key]);
+        let from: Vec<f64> = off.iter().copied().chain(places).collect();
+        let joint = products.fit_from(&chosen, &all_ridges, &from);
         let before = point.fit.loss + prior(&point.placed);
         last = Some((products, all_ridges, chosen));
         if step == steps {

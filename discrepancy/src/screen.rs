@@ -6,8 +6,8 @@
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::fit::Products;
-use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{Around, Placed};
+use crate::parameters::COUNT;
+use crate::refit::{Around, Placed, parameter_ridges};
 use rayon::prelude::*;
 
 /// All columns of a screening.
@@ -78,13 +78,14 @@ impl Columns {
         let all: Vec<&[f64]> =
             around.columns.iter().chain(beside).chain(&self.columns).map(Vec::as_slice).collect();
         let products = Products::new(residual, &all, engine.freedom(), engine.rows());
-        let mut ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
+        let (mut ridges, mut from) = (parameter_ridges(), around.off());
         ridges.resize(always, 1e-2);
+        from.resize(always, 0.0);
         let basic: Vec<usize> = (0..always).collect();
-        let nothing = products.fit(&basic, &ridges).loss;
+        let nothing = products.fit_from(&basic, &ridges, &from).loss;
         let screened = (0..self.candidates.len())
             .into_par_iter()
-            .filter_map(|at| self.screen_one(&products, at, always, &basic, &ridges))
+            .filter_map(|at| self.screen_one(&products, at, &basic, &ridges, &from))
             .collect();
         (nothing, screened)
     }
@@ -93,10 +94,11 @@ impl Columns {
         &self,
         products: &Products,
         at: usize,
-        always: usize,
         basic: &[usize],
         ridges: &[f64],
+        from: &[f64],
     ) -> Option<Screened> {
+        let always = basic.len();
         let candidate = self.candidates[at];
         // Probes of the amplitude lead, each alone; those of further keys that go over into the baseline join.
         let (leading, joining): (Vec<_>, Vec<_>) =
@@ -110,7 +112,9 @@ impl Columns {
                 chosen.push(always + place);
                 chosen.extend(with.iter().map(|(_, place)| always + place));
                 own_ridges.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
-                let fit = products.fit(&chosen, &own_ridges);
+                let mut own_from = from.to_vec();
+                own_from.resize(chosen.len(), 0.0);
+                let fit = products.fit_from(&chosen, &own_ridges, &own_from);
                 let mut coordinates = probe.clone();
                 let [least, most] = candidate.range(0);
                 let coefficient = fit.coefficients[always];

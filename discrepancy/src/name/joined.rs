@@ -71,7 +71,8 @@ pub(super) fn drop_unneeded<'a>(
 ) {
     while !model.placed.is_empty() {
         let around = around_of(engine, model);
-        let threshold = Nothing::new(engine, columns, &around, model).threshold();
+        let left = Nothing::new(engine, columns, &around, model);
+        let threshold = left.threshold();
         let without: Vec<Option<Refit>> = (0..model.placed.len())
             .into_par_iter()
             .map(|at| {
@@ -89,7 +90,7 @@ pub(super) fn drop_unneeded<'a>(
             .filter_map(|(at, own)| Some((at, own?)))
             .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
         let Some((at, own)) = least else { break };
-        let missed = own.loss - model.loss;
+        let missed = left.missed(engine, &own, model);
         let safety = if own.placed.is_empty() { SAFETY } else { SAFETY_BESIDE };
         let share = missed / (calibrated.fit.loss - model.loss).max(1e-9);
         if missed > safety * threshold && share > 0.002 {

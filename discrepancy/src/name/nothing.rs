@@ -4,9 +4,10 @@
 
 use crate::engine::Engine;
 use crate::fit::Products;
-use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{Around, Refit, rig_of};
+use crate::parameters::COUNT;
+use crate::refit::{Around, Refit, parameter_ridges, rig_of};
 use crate::screen::Columns;
+use crate::windows::dot;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -17,8 +18,15 @@ const NULL_SHARE: f64 = 0.99;
 /// A generator's seed: the threshold is part of the result, and has the same bits each run.
 const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
 
+/// Chi2 per degree of freedom from which on a window is far off, and the share of the windows that may be: of a model that
+/// leaves the others within their noise, these few say that a break-away came at another moment, and nothing of the model.
+const FAR_OFF: f64 = 3.0;
+const FEW: f64 = 0.05;
+
 /// What a model leaves, against all candidates, window by window.
 pub(super) struct Nothing {
+    /// Windows that are far off, where they are few: they count neither here nor for what is missed.
+    far: Vec<usize>,
     /// Of each probe: candidate, coordinate of the amplitude, scores of the windows, information.
     probes: Vec<(usize, f64, Vec<f64>, f64)>,
 }
@@ -38,13 +46,29 @@ impl Nothing {
         let all: Vec<&[f64]> =
             parameter_columns.chain(of.iter().map(|(_, _, place)| columns.column(*place))).collect();
         let products = Products::new(&residual, &all, engine.freedom(), engine.rows());
-        let ridges: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect();
+        let ridges = parameter_ridges();
         let parameters: Vec<usize> = (0..COUNT).collect();
-        let weights = &products.fit(&parameters, &ridges).weights;
+        let weights = &products.fit_from(&parameters, &ridges, &around.off()).weights;
         let scores = products.cleared_scores(&parameters, weights, &ridges);
-        let probes =
-            of.into_iter().zip(scores).map(|((at, z, _), (scores, own))| (at, z, scores, own)).collect();
-        Nothing { probes }
+        let far = far_off(engine, &residual);
+        let probes = of
+            .into_iter()
+            .zip(scores)
+            .map(|((at, z, _), (mut scores, own))| {
+                far.iter().for_each(|window| scores[*window] = 0.0);
+                (at, z, scores, own)
+            })
+            .collect();
+        Nothing { far, probes }
+    }
+
+    /// By how much a fit that lacks something is worse, windows that are far off left out.
+    pub(super) fn missed(&self, engine: &Engine<'_>, without: &Refit, model: &Refit) -> f64 {
+        let of = |window: &usize| {
+            let [without, own] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
+            engine.freedom()[*window] * (without / own).ln()
+        };
+        without.loss - model.loss - self.far.iter().map(of).sum::<f64>()
     }
 
     /// The gain that a share of records of nothing stays below: random signs of the windows keep what hangs together within each,
@@ -80,4 +104,13 @@ impl Nothing {
         }
         limits
     }
+}
+
+fn far_off(engine: &Engine<'_>, residual: &[f64]) -> Vec<usize> {
+    let squares = residual.chunks_exact(engine.rows()).map(|own| dot(own, own));
+    let off = squares.zip(engine.freedom()).enumerate();
+    let far: Vec<usize> =
+        off.filter(|(_, (square, freedom))| square > &(FAR_OFF * **freedom)).map(|(at, _)| at).collect();
+    let most = (FEW * engine.freedom().len() as f64).max(1.0);
+    if far.len() as f64 <= most { far } else { Vec::new() }
 }

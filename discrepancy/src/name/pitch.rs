@@ -59,9 +59,11 @@ fn best(engine: &Engine<'_>, own: &Refit) -> Option<Refit> {
         ridges.extend((0..placed.coordinates.len()).map(|key| coordinate_ridge(&placed.candidate, key)));
     }
     ridges.push(coordinate_ridge(&candidate, ripple));
+    let places = plain.iter().flat_map(|placed| placed.coordinates.iter().copied());
+    let from: Vec<f64> = around.off().into_iter().chain(places).chain([0.0]).collect();
     let fits = (0..pitches.len()).map(|at| {
         let chosen: Vec<usize> = (0..always).chain([always + at]).collect();
-        (at, products.fit(&chosen, &ridges))
+        (at, products.fit_from(&chosen, &ridges, &from))
     });
     let (at, fit) = fits.min_by(|left, right| left.1.loss.total_cmp(&right.1.loss))?;
     let [smallest, largest] = candidate.reach(ripple);

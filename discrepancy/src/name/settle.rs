@@ -4,9 +4,8 @@
 //!   effects and needed parameters ──► Gauss-Newton on all of them ──► accepted only when the simulator leaves less
 //! ```
 //!
-//! Naming moves the parameters by straight lines and never goes back to what is believed of them: good enough to compare models
-//! that have them in common. Where two parameters hang together it wanders off along what neither shows, and what a straight line
-//! promised is not what the simulator leaves.
+//! Naming moves the parameters by straight lines: good enough to compare models that have them in common, but what a straight
+//! line promised is not what the simulator leaves.
 
 use crate::engine::Engine;
 use crate::fit::{Fit, Products};
