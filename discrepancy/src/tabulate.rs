@@ -24,7 +24,7 @@ use crate::locate::{UnknownSeries, VARIABLE_UNITS, VARIABLES};
 use crate::parameters::COUNT;
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
-use fit::{Model, Point, Tied};
+use fit::{Beside, Lines, Model, Point, Tied};
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};
 
@@ -79,10 +79,10 @@ pub fn tabulate(
     let seek = Seek { engine, axis, balance, unknowns };
 
     progress("a table for what is missing");
-    let (first, used) = seek.best(&nothing.model, None).ok_or("no rig can have its curve")?;
+    let (first, used) = seek.best(&nothing, None).ok_or("no rig can have its curve")?;
     let mut best = seek.finer(first);
     progress("a table over a second variable");
-    if let Some((second, _)) = seek.best(&best.model, Some(used))
+    if let Some((second, _)) = seek.best(&best, Some(used))
         && best.loss - second.loss > TAKES_MORE * best.loss.abs()
     {
         best = fit::fit(engine, second, STEPS);
@@ -102,9 +102,11 @@ pub fn tabulate(
 
 /// The model with the parameters that it needs beside its tables, and which; the others are what the file says.
 fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
+    let all = Model { free: [true; COUNT], ..best.model.clone() };
     let held = Point::of(engine, best.model.clone().held([false; COUNT]));
-    let Some(bare) = held.map(|start| fit::fit(engine, start, STEPS)) else { return (best, [true; COUNT]) };
-    let needed = fit::needed(engine, &bare, NEEDED);
+    let Some((lines, held)) = Lines::of(engine, all).zip(held) else { return (best, [true; COUNT]) };
+    let bare = fit::steps(engine, held, &lines.with(&[])[COUNT..]);
+    let needed = fit::needed(engine, &bare, &lines.with(&[]), NEEDED);
     let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
         return (bare, [false; COUNT]);
     };
@@ -136,24 +138,45 @@ struct Seek<'a> {
 impl Seek<'_> {
     /// The best model with one more variable but `used`, and which; `None` where no rig can have any. All are screened by
     /// straight lines, the best are fitted.
-    fn best(&self, model: &Model, used: Option<Over>) -> Option<(Point, Over)> {
+    fn best(&self, from: &Point, used: Option<Over>) -> Option<(Point, Over)> {
         let sets: &[&[Balance]] = match self.balance {
             Balance::Force => &[&[Balance::Force]],
             Balance::FlowA => &[&[Balance::FlowA], &[Balance::FlowA, Balance::FlowB]],
             Balance::FlowB => &[&[Balance::FlowB], &[Balance::FlowA, Balance::FlowB]],
         };
+        let lines = Lines::of(self.engine, from.model.clone())?;
         let all = Variable::ALL.into_iter().map(Over::Variable).chain([Over::Constant]);
-        let mut screened: Vec<(f64, Over, &[Balance])> = all
+        // Each balance's lines once, however many sets it is in.
+        let flat = |over: Over, balance: Balance| {
+            let mut own = self.table(over, balance)?;
+            own.table.value.fill(0.0);
+            lines.beside(self.engine, own)
+        };
+        let flats: Vec<(Over, Vec<Beside>)> = all
             .filter(|over| Some(*over) != used)
-            .flat_map(|over| sets.iter().map(move |balances| (over, *balances)))
-            .filter_map(|(over, balances)| {
-                let flat = Point::of(self.engine, self.with(model, over, balances, true)?)?;
-                Some((fit::promised(self.engine, &flat)?, over, balances))
-            })
+            .map(|over| (over, sets[sets.len() - 1].iter().filter_map(|own| flat(over, *own)).collect()))
             .collect();
+        let mut screened: Vec<(f64, Over, Vec<&Beside>)> = Vec::new();
+        for (over, own) in &flats {
+            for balances in sets {
+                let beside: Vec<&Beside> =
+                    own.iter().filter(|own| balances.contains(&own.balance())).collect();
+                if beside.len() == balances.len() {
+                    screened.push((lines.promised(self.engine, from, &beside), *over, beside));
+                }
+            }
+        }
         screened.sort_by(|left, right| left.0.total_cmp(&right.0));
-        let fitted = screened.iter().take(TRIED).filter_map(|(_, over, balances)| {
-            Some((fit::fit(self.engine, self.start(model, *over, balances)?, FIRST_STEPS), *over))
+        let fitted = screened.iter().take(TRIED).filter_map(|(_, over, beside)| {
+            let balances: Vec<Balance> = beside.iter().map(|own| own.balance()).collect();
+            let start = self.start(&from.model, *over, &balances)?;
+            // Beside a table with many points, which is fitted well already, the lines of the screening do.
+            let own = if from.model.tables.is_empty() {
+                fit::fit(self.engine, start, FIRST_STEPS)
+            } else {
+                fit::steps(self.engine, start, &lines.with(beside))
+            };
+            Some((own, *over))
         });
         fitted.min_by(|left, right| left.0.loss.total_cmp(&right.0.loss))
     }
@@ -226,7 +249,7 @@ impl Seek<'_> {
                 own.table.at = at;
             }
             let Some(point) = Point::of(self.engine, model) else { break };
-            let tried = fit::fit(self.engine, point, STEPS);
+            let tried = fit::fit(self.engine, point, FIRST_STEPS);
             if tried.loss >= best.loss {
                 break;
             }

@@ -1,7 +1,7 @@
 //! The values of tables and the factors of parameters, fitted in the simulator by Gauss-Newton.
 //!
 //! ```text
-//!   e(z) = readings - simulation at z      columns: d simulation / d z_i, all coordinates alike, new at each step
+//!   e(z) = readings - simulation at z      columns: d simulation / d z_i, all coordinates alike, new every few steps
 //!   step of z, shortened until the loss falls
 //! ```
 //!
@@ -29,6 +29,8 @@ const FORCE_TOLERANCE_N: f64 = 200.0;
 const FLOW_TOLERANCE_NL_PER_MIN: f64 = 200.0;
 /// By how much a parameter may be off at most, as in [`crate::refit`].
 const MOST_OFF: f64 = 0.3;
+/// Steps that are taken with the same derivatives: those of a table with many points cost many times a step.
+const ALONG: usize = 3;
 /// Shortened steps that are tried.
 const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 /// Fall of the loss below which a fit has settled.
@@ -51,7 +53,7 @@ pub(super) struct Tied {
 pub(super) struct Model {
     pub(super) factors: [f64; COUNT],
     /// Which of them are moved.
-    free: [bool; COUNT],
+    pub(super) free: [bool; COUNT],
     pub(super) tables: Vec<Tied>,
 }
 
@@ -168,17 +170,7 @@ impl Point {
 
     /// Derivatives of the simulation by each coordinate.
     fn columns(&self, engine: &Engine<'_>, moved: &[Coordinate]) -> Option<Vec<Vec<f64>>> {
-        let from = engine.simulate_coarsely(&self.model.rig(engine)?);
-        moved
-            .par_iter()
-            .map(|coordinate| {
-                let change = self.model.change(*coordinate);
-                let rig = self.model.moved_by(*coordinate, change).rig(engine)?;
-                let mut column = engine.difference(&engine.simulate_coarsely(&rig), &from);
-                column.iter_mut().for_each(|own| *own /= change);
-                Some(column)
-            })
-            .collect()
+        columns(engine, &self.model, moved, &engine.simulate_coarsely(&self.model.rig(engine)?))
     }
 
     /// The parameters of the model with their errors, as a fit of no effect.
@@ -204,32 +196,86 @@ impl Point {
     }
 }
 
-/// The loss that straight lines promise of a model's coordinates.
-pub(super) fn promised(engine: &Engine<'_>, point: &Point) -> Option<f64> {
-    let moved = point.model.moved();
-    let columns = point.columns(engine, &moved)?;
-    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-    let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
-    let ridges: Vec<f64> = moved.iter().map(|own| point.model.ridge(*own)).collect();
-    Some(products.fit(&(0..moved.len()).collect::<Vec<_>>(), &ridges).loss + point.model.costs())
+/// Derivatives of a model by some coordinates; `from` is what it shows, in longer steps.
+fn columns(engine: &Engine<'_>, model: &Model, moved: &[Coordinate], from: &[f64]) -> Option<Vec<Vec<f64>>> {
+    moved
+        .par_iter()
+        .map(|coordinate| {
+            let change = model.change(*coordinate);
+            let rig = model.moved_by(*coordinate, change).rig(engine)?;
+            let mut column = engine.difference(&engine.simulate_coarsely(&rig), from);
+            column.iter_mut().for_each(|own| *own /= change);
+            Some(column)
+        })
+        .collect()
 }
 
-/// Parameters that a model needs beside its tables, one after the other while the loss falls by `gain`, by straight lines.
-pub(super) fn needed(engine: &Engine<'_>, point: &Point, gain: f64) -> [bool; COUNT] {
+/// Straight lines around a model: what each of its coordinates changes.
+pub(super) struct Lines {
+    model: Model,
+    from: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+}
+
+/// A table of zeros, which changes nothing yet, and what each of its values would change.
+pub(super) struct Beside {
+    own: Tied,
+    columns: Vec<Vec<f64>>,
+}
+
+impl Beside {
+    pub(super) fn balance(&self) -> Balance {
+        self.own.table.balance
+    }
+}
+
+impl Lines {
+    /// The lines of a model; `None` where no rig can be so.
+    pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
+        let from = engine.simulate_coarsely(&model.rig(engine)?);
+        let columns = columns(engine, &model, &model.moved(), &from)?;
+        Some(Lines { model, from, columns })
+    }
+
+    /// Those of the model and of some tables more.
+    pub(super) fn with<'a>(&'a self, tables: &[&'a Beside]) -> Vec<&'a [f64]> {
+        let more = tables.iter().flat_map(|beside| &beside.columns);
+        self.columns.iter().chain(more).map(Vec::as_slice).collect()
+    }
+
+    /// The lines of one more table, all zeros; `None` where no rig can have it.
+    pub(super) fn beside(&self, engine: &Engine<'_>, own: Tied) -> Option<Beside> {
+        let mut model = self.model.clone();
+        model.tables.push(own.clone());
+        let moved = model.moved().split_off(self.columns.len());
+        Some(Beside { own, columns: columns(engine, &model, &moved, &self.from)? })
+    }
+
+    /// The loss that the lines promise of the model, `point`, with some tables more.
+    pub(super) fn promised(&self, engine: &Engine<'_>, point: &Point, tables: &[&Beside]) -> f64 {
+        let mut model = self.model.clone();
+        model.tables.extend(tables.iter().map(|beside| beside.own.clone()));
+        let columns = self.with(tables);
+        let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
+        let ridges: Vec<f64> = model.moved().iter().map(|own| model.ridge(*own)).collect();
+        products.fit(&(0..columns.len()).collect::<Vec<_>>(), &ridges).loss + model.costs()
+    }
+}
+
+/// Parameters that a model needs beside its tables, one after the other while the loss falls by `gain`, by the straight lines of
+/// all parameters and tables.
+pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain: f64) -> [bool; COUNT] {
     let mut needed = [false; COUNT];
     let model = Model { free: [true; COUNT], ..point.model.clone() };
     let moved = model.moved();
-    let open = Point { model, ..point.clone() };
-    let Some(columns) = open.columns(engine, &moved) else { return needed };
-    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-    let products = Products::new(&open.residual, &columns, engine.freedom(), engine.rows());
+    let products = Products::new(&point.residual, lines, engine.freedom(), engine.rows());
     let loss_with = |needed: &[bool; COUNT]| {
         let is_in = |at: &usize| match moved[*at] {
             Coordinate::Factor(factor) => needed[factor],
             Coordinate::Value(..) => true,
         };
         let chosen: Vec<usize> = (0..moved.len()).filter(is_in).collect();
-        let ridges: Vec<f64> = chosen.iter().map(|at| open.model.ridge(moved[*at])).collect();
+        let ridges: Vec<f64> = chosen.iter().map(|at| model.ridge(moved[*at])).collect();
         products.fit(&chosen, &ridges).loss
     };
     let mut loss = loss_with(&needed);
@@ -254,21 +300,46 @@ pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
         let moved = point.model.moved();
         let Some(columns) = point.columns(engine, &moved) else { break };
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
-        let ridges: Vec<f64> = moved.iter().map(|own| point.model.ridge(*own)).collect();
-        let joint = products.fit(&(0..moved.len()).collect::<Vec<_>>(), &ridges);
-        let tried = SHARES.iter().find_map(|share| {
-            let changes = moved.iter().zip(&joint.coefficients);
-            let model = changes
-                .fold(point.model.clone(), |model, (own, change)| model.moved_by(*own, share * change));
-            Point::of(engine, model).filter(|tried| tried.loss < point.loss)
-        });
-        let Some(tried) = tried else { break };
+        let before = point.loss;
+        point = self::steps(engine, point, &columns);
+        if before - point.loss < SETTLED {
+            break;
+        }
+    }
+    point
+}
+
+/// Some steps along the same straight lines, one for each coordinate that the model moves.
+pub(super) fn steps(engine: &Engine<'_>, start: Point, lines: &[&[f64]]) -> Point {
+    let moved = start.model.moved();
+    let ridges: Vec<f64> = moved.iter().map(|own| start.model.ridge(*own)).collect();
+    let mut products = Products::new(&start.residual, lines, engine.freedom(), engine.rows());
+    let mut point = start;
+    for _ in 0..ALONG {
+        let Some(tried) = along(engine, &point, &moved, &products, &ridges) else { break };
         let settled = point.loss - tried.loss < SETTLED;
         point = tried;
         if settled {
             break;
         }
+        products.set_residual(&point.residual, lines, engine.rows());
     }
     point
+}
+
+/// The longest step along straight lines that is a better one.
+fn along(
+    engine: &Engine<'_>,
+    point: &Point,
+    moved: &[Coordinate],
+    products: &Products,
+    ridges: &[f64],
+) -> Option<Point> {
+    let joint = products.fit(&(0..moved.len()).collect::<Vec<_>>(), ridges);
+    SHARES.iter().find_map(|share| {
+        let changes = moved.iter().zip(&joint.coefficients);
+        let model =
+            changes.fold(point.model.clone(), |model, (own, change)| model.moved_by(*own, share * change));
+        Point::of(engine, model).filter(|tried| tried.loss < point.loss)
+    })
 }
