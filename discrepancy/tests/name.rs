@@ -130,3 +130,13 @@ fn what_is_no_candidate_is_outside_the_catalogue() {
     let found = found(&hidden, &["position-dependent-force"]);
     assert!(found.inadequate, "named {:?}", names(&found));
 }
+
+#[test]
+fn a_smaller_dead_volume_is_no_larger_machine() {
+    // All else larger by as much as the volume is smaller shows the same: only what is believed of masses and areas tells.
+    let found = found(&with(&[("dead-volume", "drive", &[("volume_cm3", 16.4)])]), &[]);
+    assert_eq!(names(&found), ["dead-volume drive"]);
+    for (at, (factor, _)) in factors(&found).into_iter().enumerate() {
+        assert!((factor - 1.0).abs() < 0.05, "parameter {at}: {factor}");
+    }
+}

@@ -50,7 +50,7 @@ impl Nothing {
         let parameters: Vec<usize> = (0..COUNT).collect();
         let weights = &products.fit_from(&parameters, &ridges, &around.off()).weights;
         let scores = products.cleared_scores(&parameters, weights, &ridges);
-        let far = far_off(engine, &residual);
+        let far = far_off(&residual, engine.rows(), engine.freedom());
         let probes = of
             .into_iter()
             .zip(scores)
@@ -106,11 +106,30 @@ impl Nothing {
     }
 }
 
-fn far_off(engine: &Engine<'_>, residual: &[f64]) -> Vec<usize> {
-    let squares = residual.chunks_exact(engine.rows()).map(|own| dot(own, own));
-    let off = squares.zip(engine.freedom()).enumerate();
+/// Windows that are far off, where they are few.
+fn far_off(residual: &[f64], rows: usize, freedom: &[f64]) -> Vec<usize> {
+    let squares = residual.chunks_exact(rows).map(|own| dot(own, own));
+    let off = squares.zip(freedom).enumerate();
     let far: Vec<usize> =
         off.filter(|(_, (square, freedom))| square > &(FAR_OFF * **freedom)).map(|(at, _)| at).collect();
-    let most = (FEW * engine.freedom().len() as f64).max(1.0);
+    let most = (FEW * freedom.len() as f64).max(1.0);
     if far.len() as f64 <= most { far } else { Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::far_off;
+
+    #[test]
+    fn windows_that_are_far_off_are_left_out_only_where_they_are_few() {
+        let (rows, windows) = (10, 40);
+        let made = |off: usize| -> Vec<f64> {
+            (0..rows * windows).map(|at| if at / rows < off { 2.0 } else { 1.0 }).collect()
+        };
+        let far = |off: usize| far_off(&made(off), rows, &vec![10.0; windows]);
+        assert_eq!(far(0), Vec::<usize>::new());
+        assert_eq!(far(2), [0, 1]);
+        // A model that leaves so many is wrong in them.
+        assert_eq!(far(3), Vec::<usize>::new());
+    }
 }
