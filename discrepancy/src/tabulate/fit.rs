@@ -12,7 +12,7 @@ use super::{POINT_COSTS, with_tables};
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::Refit;
+use crate::refit::{MOST_OFF, Refit};
 use crate::windows::dot;
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
@@ -27,8 +27,6 @@ const CHANGE_SHARE: f64 = 0.05;
 /// Standard deviations of values before anything is measured: beyond what occurs.
 const FORCE_TOLERANCE_N: f64 = 200.0;
 const FLOW_TOLERANCE_NL_PER_MIN: f64 = 200.0;
-/// By how much a parameter may be off at most, as in [`crate::refit`].
-const MOST_OFF: f64 = 0.3;
 /// Steps that are taken with the same derivatives: those of a table with many points cost many times a step.
 const ALONG: usize = 3;
 /// Shortened steps that are tried.
