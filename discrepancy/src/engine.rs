@@ -11,7 +11,7 @@
 
 use crate::course::Course;
 use crate::parameters::{COUNT, with_factors};
-use crate::windows::{Windows, dot};
+use crate::windows::{Passage, Reach, Windows, dot};
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -113,6 +113,24 @@ impl<'a> Engine<'a> {
     #[must_use]
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.windows.iter().flat_map(|windows| windows.simulate_coarsely(rig)).collect()
+    }
+
+    /// The same, kept with where each window went, for [`Engine::simulate_where`].
+    #[must_use]
+    pub fn pass(&self, rig: &RigParameters) -> Vec<Passage> {
+        self.windows.par_iter().map(|windows| windows.pass(rig)).collect()
+    }
+
+    /// What a neighbour of the rig that passed shows, which differs in some windows alone: [`Windows::simulate_where`].
+    #[must_use]
+    pub fn simulate_where(
+        &self,
+        rig: &RigParameters,
+        passed: &[Passage],
+        differs: impl Fn(&Reach) -> bool,
+    ) -> Vec<f64> {
+        let windows = self.windows.iter().zip(passed);
+        windows.flat_map(|(windows, passed)| windows.simulate_where(rig, passed, &differs)).collect()
     }
 
     /// The same of several rigs that differ in numbers of the baseline: on all cores, and side by side where that pays.

@@ -105,12 +105,16 @@ fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
     let all = Model { free: [true; COUNT], ..best.model.clone() };
     let held = Point::of(engine, best.model.clone().held([false; COUNT]));
     let Some((lines, held)) = Lines::of(engine, all).zip(held) else { return (best, [true; COUNT]) };
-    let bare = fit::steps(engine, held, &lines.with(&[])[COUNT..]);
-    let needed = fit::needed(engine, &bare, &lines.with(&[]), NEEDED);
+    let lines = lines.with(&[]);
+    let bare = fit::steps(engine, held, &lines[COUNT..]);
+    let needed = fit::needed(engine, &bare, &lines, NEEDED);
     let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
         return (bare, [false; COUNT]);
     };
-    (fit::fit(engine, start, STEPS), needed)
+    // Far from where the tables were fitted, the lines that are known do for the first steps.
+    let is_in = |at: &usize| needed.get(*at).is_none_or(|needed| *needed);
+    let own: Vec<&[f64]> = (0..lines.len()).filter(is_in).map(|at| lines[at]).collect();
+    (fit::fit(engine, fit::steps(engine, start, &own), STEPS), needed)
 }
 
 /// What a table can be over: a variable, or nothing.

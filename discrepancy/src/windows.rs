@@ -15,11 +15,13 @@
 //!
 //! Source: discrepancy-notes.md, 1 (naming over the length of windows: as good from 100 ms to 2 s), 6.
 
+mod passage;
 mod starts;
 mod whiten;
 
 use crate::course::{CHANNELS, Course, Point};
 use crate::seats::Seats;
+pub use passage::{Passage, Reach};
 use plant::{Batch, Inputs, Plant, RigParameters};
 use starts::SETTLING;
 pub(crate) use starts::{first_state, seat, seated};

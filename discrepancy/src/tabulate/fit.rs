@@ -13,7 +13,7 @@ use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
-use crate::windows::dot;
+use crate::windows::{Passage, Reach, dot};
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
@@ -44,6 +44,16 @@ pub(super) struct Tied {
     pub(super) is_constant: bool,
     /// What its variable was in the windows, sorted.
     pub(super) seen: Vec<f64>,
+}
+
+impl Tied {
+    /// Whether one of its values is anything to a window.
+    fn acts(&self, point: usize, reach: &Reach) -> bool {
+        let Tabulated { axis, variable, at, .. } = &self.table;
+        let before = point.checked_sub(1).map_or(f64::NEG_INFINITY, |before| at[before]);
+        let after = at.get(point + 1).copied().unwrap_or(f64::INFINITY);
+        self.is_constant || reach.meets(*axis, *variable, [before, after])
+    }
 }
 
 /// Tables and parameters.
@@ -168,7 +178,7 @@ impl Point {
 
     /// Derivatives of the simulation by each coordinate.
     fn columns(&self, engine: &Engine<'_>, moved: &[Coordinate]) -> Option<Vec<Vec<f64>>> {
-        columns(engine, &self.model, moved, &engine.simulate_coarsely(&self.model.rig(engine)?))
+        columns(engine, &self.model, moved, &engine.pass(&self.model.rig(engine)?))
     }
 
     /// The parameters of the model with their errors, as a fit of no effect.
@@ -194,14 +204,27 @@ impl Point {
     }
 }
 
-/// Derivatives of a model by some coordinates; `from` is what it shows, in longer steps.
-fn columns(engine: &Engine<'_>, model: &Model, moved: &[Coordinate], from: &[f64]) -> Option<Vec<Vec<f64>>> {
+/// Derivatives of a model by some coordinates; `passed` is what it shows.
+fn columns(
+    engine: &Engine<'_>,
+    model: &Model,
+    moved: &[Coordinate],
+    passed: &[Passage],
+) -> Option<Vec<Vec<f64>>> {
+    let from: Vec<f64> = passed.iter().flat_map(|own| &own.simulated).copied().collect();
     moved
         .par_iter()
         .map(|coordinate| {
             let change = model.change(*coordinate);
             let rig = model.moved_by(*coordinate, change).rig(engine)?;
-            let mut column = engine.difference(&engine.simulate_coarsely(&rig), from);
+            let simulated = match coordinate {
+                Coordinate::Factor(_) => engine.simulate_coarsely(&rig),
+                Coordinate::Value(at, point) => {
+                    let own = &model.tables[*at];
+                    engine.simulate_where(&rig, passed, |reach| own.acts(*point, reach))
+                }
+            };
+            let mut column = engine.difference(&simulated, &from);
             column.iter_mut().for_each(|own| *own /= change);
             Some(column)
         })
@@ -211,7 +234,7 @@ fn columns(engine: &Engine<'_>, model: &Model, moved: &[Coordinate], from: &[f64
 /// Straight lines around a model: what each of its coordinates changes.
 pub(super) struct Lines {
     model: Model,
-    from: Vec<f64>,
+    passed: Vec<Passage>,
     columns: Vec<Vec<f64>>,
 }
 
@@ -230,9 +253,9 @@ impl Beside {
 impl Lines {
     /// The lines of a model; `None` where no rig can be so.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
-        let from = engine.simulate_coarsely(&model.rig(engine)?);
-        let columns = columns(engine, &model, &model.moved(), &from)?;
-        Some(Lines { model, from, columns })
+        let passed = engine.pass(&model.rig(engine)?);
+        let columns = columns(engine, &model, &model.moved(), &passed)?;
+        Some(Lines { model, passed, columns })
     }
 
     /// Those of the model and of some tables more.
@@ -246,7 +269,7 @@ impl Lines {
         let mut model = self.model.clone();
         model.tables.push(own.clone());
         let moved = model.moved().split_off(self.columns.len());
-        Some(Beside { own, columns: columns(engine, &model, &moved, &self.from)? })
+        Some(Beside { own, columns: columns(engine, &model, &moved, &self.passed)? })
     }
 
     /// The loss that the lines promise of the model, `point`, with some tables more.

@@ -23,8 +23,8 @@ use crate::integrator::Lanes;
 use crate::lanes::Axes;
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
-use crate::state::Axis;
-use crate::truth::AirAt;
+use crate::state::{Axis, AxisState};
+use crate::truth::{AirAt, AxisTruth};
 use std::fmt::Write as _;
 
 /// Fewest and most points of a table.
@@ -127,6 +127,17 @@ impl Variable {
             Variable::PressureB => "p_b",
             Variable::PressureDifference => "p_a-p_b",
         }
+    }
+
+    /// What it is at an instant of an axis, in SI.
+    #[must_use]
+    pub fn value(self, state: &AxisState, truth: &AxisTruth) -> f64 {
+        self.of(&Seen {
+            extension_m: state.extension_m,
+            velocity_m_per_s: state.rod_velocity_m_per_s,
+            spool: state.spool,
+            pressure_pa: [truth.pressure_a_pa, truth.pressure_b_pa],
+        })
     }
 
     fn of(self, at: &Seen) -> f64 {

@@ -1,0 +1,119 @@
+//! One simulation kept with where it went, so that a neighbour of its rig is simulated only in the windows where they differ.
+//!
+//! ```text
+//!   rig ──► passage: readings, the state that each window begins in, how far each variable reaches in it
+//!   rig with one point of a table moved ──► windows that reach the point anew, each from its state; the others are known
+//! ```
+//!
+//! The point of a table acts between its neighbours alone, so that half of the windows and more show nothing of it. All that a
+//! rig without effects knows of what went before is its state.
+
+use super::{COARSE_SUBSTEPS, WINDOW, Windows};
+use crate::seats::Seats;
+use plant::effects::tabulated::Variable;
+use plant::{Axis, Plant, RigParameters, State};
+
+/// What a rig shows in the windows of a record, and where it went.
+#[derive(Clone, Debug)]
+pub struct Passage {
+    /// As [`Windows::simulate_coarsely`].
+    pub simulated: Vec<f64>,
+    /// The state that each judged window begins in; empty where states do not tell all, as with effects that remember.
+    states: Vec<State>,
+    reaches: Vec<Reach>,
+}
+
+/// Least and largest value of each variable of a table in a window.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach([[[f64; 2]; Variable::ALL.len()]; 2]);
+
+impl Reach {
+    const NOTHING: Reach = Reach([[[f64::INFINITY, f64::NEG_INFINITY]; Variable::ALL.len()]; 2]);
+
+    fn add(&mut self, plant: &Plant) {
+        let truth = plant.truth(&plant::Inputs::default());
+        for axis in Axis::ALL {
+            let (state, truth) = (plant.state().axis(axis), &truth.axes[axis.index()]);
+            for (variable, [least, most]) in Variable::ALL.iter().zip(&mut self.0[axis.index()]) {
+                let value = variable.value(state, truth);
+                (*least, *most) = (least.min(value), most.max(value));
+            }
+        }
+    }
+
+    /// Whether a variable of an axis is anywhere between two values.
+    #[must_use]
+    pub fn meets(&self, axis: Axis, variable: Variable, between: [f64; 2]) -> bool {
+        let place = Variable::ALL.iter().position(|own| *own == variable).expect("all of them");
+        let [least, most] = self.0[axis.index()][place];
+        least < between[1] && most > between[0]
+    }
+}
+
+impl Windows<'_> {
+    /// Simulates a rig in longer steps and keeps where it went.
+    #[must_use]
+    pub fn pass(&self, rig: &RigParameters) -> Passage {
+        let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
+        let seats = Seats::of(rig);
+        let remembers = !rig.effects().is_empty();
+        let mut passage = Passage {
+            simulated: Vec::with_capacity(self.readings.len()),
+            states: Vec::new(),
+            reaches: Vec::new(),
+        };
+        for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
+            let points = seats.points(self.course, start, &self.points[start / WINDOW]);
+            super::seat(&mut plant, self.course, &points);
+            let judged = self.starts.get(passage.reaches.len()) == Some(&start);
+            let state = *plant.state();
+            let mut reach = Reach::NOTHING;
+            for inputs in &self.course.inputs[start..start + WINDOW] {
+                if judged {
+                    self.read(&plant, inputs, &mut passage.simulated);
+                    reach.add(&plant);
+                }
+                plant.step(inputs);
+            }
+            if judged {
+                reach.add(&plant);
+                passage.reaches.push(reach);
+                if !remembers {
+                    passage.states.push(state);
+                }
+            }
+        }
+        passage
+    }
+
+    /// What a neighbour of the rig that passed shows: it differs in windows of which `differs` is true alone, and in nothing that
+    /// a window's start depends on.
+    #[must_use]
+    pub fn simulate_where(
+        &self,
+        rig: &RigParameters,
+        passage: &Passage,
+        differs: impl Fn(&Reach) -> bool,
+    ) -> Vec<f64> {
+        if passage.states.is_empty() {
+            return self.simulate_coarsely(rig);
+        }
+        let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
+        let mut simulated = Vec::with_capacity(passage.simulated.len());
+        let known = passage.simulated.chunks_exact(self.rows());
+        for ((start, known), (state, reach)) in
+            self.starts.iter().zip(known).zip(passage.states.iter().zip(&passage.reaches))
+        {
+            if !differs(reach) {
+                simulated.extend_from_slice(known);
+                continue;
+            }
+            plant.go_on_in(state).expect("a state of a rig is one of its neighbour's");
+            for inputs in &self.course.inputs[*start..start + WINDOW] {
+                self.read(&plant, inputs, &mut simulated);
+                plant.step(inputs);
+            }
+        }
+        simulated
+    }
+}
