@@ -4,8 +4,12 @@
 //! Gauss-Newton over all factors at once, sensitivities taken anew at each point. A record cannot tell a parameter whose
 //! error is not clearly below its tolerance, nor two whose errors hang together.
 //!
+//! [`finer`] goes on from there to the numbers behind them, which the command `calibrate` tells as well.
+//!
 //! Source: Neugebauer 2011, section 3.2 (identification of the model's parameters); effects.md, Parameters that may
 //! merely be wrong.
+
+pub mod finer;
 
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
@@ -54,12 +58,6 @@ impl Calibrated {
     #[must_use]
     pub fn rig(&self, rig: &RigParameters) -> RigParameters {
         with_factors(rig, &self.fit.factors)
-    }
-
-    /// All parameters with their errors; those that the records cannot tell have none.
-    #[must_use]
-    pub fn quantities(&self, engine: &Engine<'_>) -> Vec<Quantity> {
-        (0..COUNT).map(|at| quantity(engine, at, &self.fit)).collect()
     }
 }
 

@@ -5,6 +5,7 @@
 //! takes the files alone.
 
 use crate::calibrate::calibrate;
+use crate::calibrate::finer::finer;
 use crate::cli::{
     Cli, Command, ExtendArguments, NameArguments, NextArguments, RecordArguments, VerifyArguments,
 };
@@ -266,7 +267,11 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     let engine = Engine::new(&courses, &rig_file.rig);
     let ones = [1.0; COUNT];
     let around = Around { columns: engine.parameter_columns(&rig_file.rig, &ones), factors: ones };
-    let quantities = calibrate(&engine, &around).quantities(&engine);
+    let calibrated = calibrate(&engine, &around);
+    let finer = finer(&engine, &calibrated).ok_or_else(|| {
+        CommandError::BadData("what fits these records best is out of the rig file's ranges".to_owned())
+    })?;
+    let quantities = finer.told;
     let mut text = String::new();
     for own in &quantities {
         let _ = match (own.standard_error, own.before) {
@@ -278,10 +283,8 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     print(&text)?;
     if let Some(out) = out {
         out.write_json("parameters.json", &quantities)?;
-        let known: Vec<Quantity> =
-            quantities.into_iter().filter(|own| own.standard_error.is_some()).collect();
         let records: Vec<String> = arguments.train.iter().map(|path| path.display().to_string()).collect();
-        let text = crate::extend::extend(&rig_file.text, &rig_file.file, &[], &known, &records)
+        let text = crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, &records)
             .map_err(WorkflowError::from)?;
         out.write("rig.toml", &text)?;
     }

@@ -150,6 +150,19 @@ impl<'a> Engine<'a> {
         rigs.par_chunks(at_once).flat_map_iter(simulate).collect()
     }
 
+    /// What each rig of the first half shows more than its fellow of the second half, over what they differ by.
+    #[must_use]
+    pub(crate) fn differences(&self, rigs: &[RigParameters], change: f64) -> Vec<Vec<f64>> {
+        let simulated = self.simulate_side_by_side(rigs);
+        let (up, down) = simulated.split_at(rigs.len() / 2);
+        let difference = |(up, down): (&Vec<f64>, &Vec<f64>)| {
+            let mut column = self.difference(up, down);
+            column.iter_mut().for_each(|own| *own /= change);
+            column
+        };
+        up.par_iter().zip(down).map(difference).collect()
+    }
+
     /// What is left of the readings beside a simulation.
     #[must_use]
     pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
@@ -198,17 +211,7 @@ impl<'a> Engine<'a> {
             .into_iter()
             .flat_map(|change| (0..COUNT).map(move |at| around(at, change)))
             .collect();
-        let simulated = self.simulate_side_by_side(&rigs);
-        let (up, down) = simulated.split_at(COUNT);
-        let columns: Vec<Vec<f64>> = up
-            .par_iter()
-            .zip(down)
-            .map(|(up, down)| {
-                let mut column = self.difference(up, down);
-                column.iter_mut().for_each(|own| *own /= 2.0 * FACTOR_CHANGE);
-                column
-            })
-            .collect();
+        let columns = self.differences(&rigs, 2.0 * FACTOR_CHANGE);
         let mut kept = kept();
         if kept.len() == KEPT {
             kept.remove(0);

@@ -1,4 +1,4 @@
-//! `parameter:` names and the keys of the rig file that they scale.
+//! `parameter:` names and the keys of the rig file that they scale; numbers of the file by their own keys.
 
 use super::edits::Edits;
 use super::{ExtendError, told, written};
@@ -65,6 +65,15 @@ fn scaling(
     Ok((keys, factor))
 }
 
+/// `valve.kv_supply_m3_per_h[2]`, `cylinder.dead_volume_cm3`: key and place in its list; `None` for what is no number of a rig file.
+fn number_of_file(name: &str) -> Option<(&str, usize)> {
+    let (path, place) = match name.strip_suffix(']').and_then(|name| name.split_once('[')) {
+        Some((path, place)) => (path, place.parse().ok()?),
+        None => (name, 0),
+    };
+    KEYS.iter().any(|key| key.path() == path && place < key.count).then_some((path, place))
+}
+
 /// The text with all changed parameters.
 pub(super) fn change(
     text: &str,
@@ -82,9 +91,33 @@ pub(super) fn change(
         _ => None,
     };
     for quantity in changed {
+        if let Some((path, place)) = number_of_file(&quantity.name) {
+            if !quantity.value.is_finite() {
+                let (what, value) = (quantity.name.clone(), quantity.value.to_string());
+                return Err(ExtendError::NotFinite { what, value });
+            }
+            let wanted = KEYS.iter().find(|key| key.path() == path).map_or("", |key| key.unit.name());
+            if quantity.unit != wanted {
+                let (name, unit, wanted) = (quantity.name.clone(), quantity.unit.clone(), wanted.to_owned());
+                return Err(ExtendError::Unit { name, unit, wanted });
+            }
+            if done.contains(&path) || done.contains(&quantity.name.as_str()) {
+                return Err(ExtendError::Twice { what: quantity.name.clone() });
+            }
+            done.push(&quantity.name);
+            let Some(spots) = spots(&document, path) else { continue };
+            let Some(span) = spots.values.get(place) else { continue };
+            let told = told(quantity.value, quantity.standard_error, &quantity.unit);
+            edits.comment_above(
+                spots.key.start,
+                &format!("was {}; {told}, by {}{from}", &text[span.clone()], quantity.name),
+            );
+            edits.replace(span.clone(), written(quantity.value));
+            continue;
+        }
         let (keys, factor) = scaling(rig, quantity, number_of)?;
         for (at, path) in keys.into_iter().enumerate() {
-            if done.contains(&path) {
+            if done.iter().any(|own| own.split('[').next() == Some(path)) {
                 return Err(ExtendError::Twice { what: path.to_owned() });
             }
             done.push(path);

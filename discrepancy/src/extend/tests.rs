@@ -324,3 +324,44 @@ fn tables_stand_at_the_end_with_their_source_and_the_line_ends_of_the_file() {
     let error = add_tables(&inline, "rig.toml", &[table], &[]).unwrap_err().to_string();
     assert!(error.contains("rig.toml") && error.contains("a table"), "{error}");
 }
+
+#[test]
+fn a_number_of_the_file_is_changed_where_it_stands_and_its_neighbours_stay() {
+    let text = RigParameters::BASELINE_TOML;
+    let changed = [
+        quantity("cylinder.dead_volume_cm3", 24.5, "cm^3", Some(20.0)),
+        quantity("valve.kv_supply_m3_per_h[2]", 0.125, "m^3/h", Some(0.115)),
+        quantity("valve.kv_supply_m3_per_h[4]", 0.61, "m^3/h", Some(0.6)),
+    ];
+    let new = extend(text, "rig.toml", &[], &changed, &records()).unwrap();
+    let rig = RigParameters::from_toml(&new, "rig.toml").unwrap();
+    assert_eq!(rig.numbers("valve.kv_supply_m3_per_h"), [0.0, 0.0, 0.125, 0.36, 0.61, 0.66]);
+    assert_eq!(rig.numbers("cylinder.dead_volume_cm3"), [24.5]);
+    assert!(
+        new.contains("# was 0.115; 0.1250 +- 0.0013 m^3/h, by valve.kv_supply_m3_per_h[2] from a.csv, b.csv"),
+        "{new}"
+    );
+    assert_eq!(new_lines(text, &new).len(), 5);
+}
+
+#[test]
+fn a_number_of_the_file_is_refused_where_it_is_none() {
+    let refused = |changed: &[Quantity]| {
+        extend(RigParameters::BASELINE_TOML, "rig.toml", &[], changed, &records()).unwrap_err().to_string()
+    };
+    let volume = quantity("cylinder.dead_volume_cm3", 24.5, "cm^3", Some(20.0));
+    assert!(refused(&[volume.clone(), volume.clone()]).contains("changed twice"));
+    assert!(refused(&[Quantity { unit: "l".to_owned(), ..volume.clone() }]).contains("\"cm^3\""));
+    assert!(refused(&[Quantity { value: f64::NAN, ..volume.clone() }]).contains("no finite number"));
+    assert!(refused(&[Quantity { value: 500.0, ..volume }]).contains("refused"));
+    let point = quantity("valve.kv_supply_m3_per_h[2]", 0.125, "m^3/h", Some(0.115));
+    for (name, what) in
+        [("valve.kv_supply_m3_per_h[6]", "unknown parameter"), ("valve.no_key", "unknown parameter")]
+    {
+        assert!(refused(&[Quantity { name: name.to_owned(), ..point.clone() }]).contains(what), "{name}");
+    }
+    let scale = Quantity { unit: String::new(), ..quantity("parameter:kv-scale", 1.02, "", Some(1.0)) };
+    for both in [[point.clone(), scale.clone()], [scale, point]] {
+        assert!(refused(&both).contains("changed twice"));
+    }
+}

@@ -1,0 +1,173 @@
+//! The numbers of the rig file behind the parameters: the dead volume, and each point of the valve's tables.
+//!
+//! ```text
+//!   number = the file's x factor of the parameter that scales it x its own factor       one Gauss-Newton fit of all factors
+//! ```
+//!
+//! A parameter holds what all points of a table have in common: a point that no record reaches goes along with it.
+//! Naming does without these numbers: a dead volume that is off is an effect of the catalogue.
+//!
+//! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
+
+use super::{Calibrated, POINTS, SETTLED, UNTOLD};
+use crate::engine::Engine;
+use crate::fit::{Fit, Products};
+use crate::parameters::{COUNT, PARAMETERS, with_factors};
+use crate::refit::{MOST_OFF, Refit, parameter_ridges};
+use crate::report::Quantity;
+use plant::RigParameters;
+use plant::parameters::table::KEYS;
+
+/// Keys with the standard deviation of each of their numbers' factors, before anything is measured.
+const FINER: [(&str, f64); 3] = [
+    ("cylinder.dead_volume_cm3", 0.3),
+    ("valve.kv_supply_m3_per_h", 0.05),
+    ("valve.kv_exhaust_m3_per_h", 0.05),
+];
+/// The parameter that scales the tables.
+const KV_SCALE: &str = "parameter:kv-scale";
+/// Change of a factor by which the sensitivity to it is taken, either way.
+const CHANGE: f64 = 0.01;
+/// Shares of a step that are tried, until a rig can be so.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
+
+/// One number of a key that can be off: the place in the key's list.
+#[derive(Clone, Copy, Debug)]
+struct Number {
+    key: &'static str,
+    place: usize,
+    tolerance: f64,
+}
+
+/// What the records say of every number.
+#[derive(Clone, Debug)]
+pub struct Finer {
+    /// The parameters, then the numbers, as people read them.
+    pub told: Vec<Quantity>,
+    /// The same as a rig file takes them: points of tables with what they have in common.
+    pub changed: Vec<Quantity>,
+}
+
+/// Fits the numbers beside the parameters; `None` when no rig can have what fits best.
+#[must_use]
+pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
+    let rig = engine.rig();
+    let scale = PARAMETERS.iter().position(|own| own.name == KV_SCALE).expect("one of them");
+    let numbers = numbers(rig);
+    let mut ridges = parameter_ridges();
+    ridges.extend(numbers.iter().map(|number| number.tolerance.powi(-2)));
+    let all: Vec<usize> = (0..ridges.len()).collect();
+
+    let mut factors: Vec<f64> = calibrated.fit.factors.to_vec();
+    factors.resize(ridges.len(), 1.0);
+    let mut best: Option<(Vec<f64>, Products, Fit)> = None;
+    for _ in 0..POINTS {
+        let residual = engine.residual(&engine.simulate(&with(rig, &numbers, &factors)?));
+        let columns = columns(engine, &numbers, &factors)?;
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
+        let off: Vec<f64> = factors.iter().map(|factor| factor - 1.0).collect();
+        let fit = products.fit_from(&all, &ridges, &off);
+        let before = best.as_ref().map_or(f64::INFINITY, |(.., fit)| fit.loss);
+        if fit.loss < before {
+            let next = moved(rig, &numbers, &factors, &fit.coefficients)?;
+            let at = std::mem::replace(&mut factors, next);
+            best = Some((at, products, fit.clone()));
+        }
+        if fit.loss > before - SETTLED {
+            break;
+        }
+    }
+    let (at, products, fit) = best?;
+    let covariance = products.covariance(&all, &fit, &ridges)?;
+    let factors = moved(rig, &numbers, &at, &fit.coefficients)?;
+    let variance = |left: usize, right: usize| covariance[(left, right)];
+    let error = |at: usize| variance(at, at).max(0.0).sqrt();
+
+    let mut own = [1.0; COUNT];
+    own.copy_from_slice(&factors[..COUNT]);
+    let errors = (0..COUNT).map(error).collect();
+    let refit = Refit { factors: own, errors, ..calibrated.fit.clone() };
+    let parameters: Vec<Quantity> = (0..COUNT).map(|at| super::quantity(engine, at, &refit)).collect();
+    let mut told = parameters.clone();
+    let mut changed: Vec<Quantity> =
+        parameters.into_iter().enumerate().filter(|(at, _)| *at != scale).map(|(_, own)| own).collect();
+    changed.retain(|own| own.standard_error.is_some());
+    let is_scaled = told[scale].standard_error.is_some();
+    for (at, number) in (COUNT..).zip(&numbers) {
+        let list = rig.numbers(number.key);
+        let before = list[number.place];
+        let key = KEYS.iter().find(|key| key.path() == number.key)?;
+        let (mut factor, mut square) = (factors[at], variance(at, at));
+        let of_table = list.len() > 1;
+        if of_table {
+            factor *= factors[scale];
+            square += variance(scale, scale) + 2.0 * variance(at, scale);
+        }
+        let is_told = error(at) < UNTOLD * number.tolerance;
+        let quantity = Quantity {
+            name: if of_table { format!("{}[{}]", number.key, number.place) } else { number.key.to_owned() },
+            value: before * factor,
+            unit: key.unit.name().to_owned(),
+            standard_error: is_told.then_some(before * square.max(0.0).sqrt()),
+            before: Some(before),
+        };
+        if is_told || (of_table && is_scaled) {
+            changed.push(quantity.clone());
+        }
+        told.push(quantity);
+    }
+    Some(Finer { told, changed })
+}
+
+/// Those that are not 0: at a spool opening without flow, the dead zone says it.
+fn numbers(rig: &RigParameters) -> Vec<Number> {
+    let of_key = |(key, tolerance): (&'static str, f64)| {
+        let list = rig.numbers(key);
+        (0..list.len()).filter(|place| list[*place] > 0.0).map(move |place| Number { key, place, tolerance })
+    };
+    FINER.into_iter().flat_map(of_key).collect::<Vec<_>>()
+}
+
+/// The rig with all factors; `None` where one leaves its range, or a table would fall.
+fn with(rig: &RigParameters, numbers: &[Number], factors: &[f64]) -> Option<RigParameters> {
+    let mut own = [1.0; COUNT];
+    own.copy_from_slice(&factors[..COUNT]);
+    let rig = with_factors(rig, &own);
+    let lists: Vec<(&str, Vec<f64>)> = FINER
+        .iter()
+        .map(|(key, _)| {
+            let mut list = rig.numbers(key).to_vec();
+            for (number, factor) in numbers.iter().zip(&factors[COUNT..]).filter(|(own, _)| own.key == *key) {
+                list[number.place] *= factor;
+            }
+            (*key, list)
+        })
+        .collect();
+    rig.with_all(lists.iter().map(|(key, list)| (*key, list.as_slice()))).ok()
+}
+
+/// The factors after a step, or as much of it as a rig can have.
+fn moved(rig: &RigParameters, numbers: &[Number], factors: &[f64], step: &[f64]) -> Option<Vec<f64>> {
+    SHARES.iter().find_map(|share| {
+        let moved: Vec<f64> = factors
+            .iter()
+            .zip(step)
+            .map(|(factor, step)| (factor + share * step).clamp(1.0 - 2.0 * MOST_OFF, 1.0 + 2.0 * MOST_OFF))
+            .collect();
+        with(rig, numbers, &moved).map(|_| moved)
+    })
+}
+
+/// Sensitivities of the readings to all factors.
+fn columns(engine: &Engine<'_>, numbers: &[Number], factors: &[f64]) -> Option<Vec<Vec<f64>>> {
+    let around = |change: f64| {
+        (0..factors.len()).map(move |at| {
+            let mut factors = factors.to_vec();
+            factors[at] += change;
+            with(engine.rig(), numbers, &factors)
+        })
+    };
+    let rigs = around(CHANGE).chain(around(-CHANGE)).collect::<Option<Vec<_>>>()?;
+    Some(engine.differences(&rigs, 2.0 * CHANGE))
+}

@@ -1,0 +1,58 @@
+//! A record tells the numbers of a rig that nothing is missing from: its volumes and the points of its valve's tables too.
+
+#[path = "common/record.rs"]
+mod record;
+
+use discrepancy::calibrate::{calibrate, finer::finer};
+use discrepancy::engine::Engine;
+use discrepancy::extend::extend;
+use discrepancy::parameters::COUNT;
+use discrepancy::refit::Around;
+use discrepancy::workflow::{Task, open};
+use plant::RigParameters;
+use record::{STROKES_RAD_PER_S, measurement};
+
+const KV_SUPPLY: [f64; 6] = [0.0, 0.0, 0.123, 0.36, 0.57, 0.66];
+
+#[test]
+fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
+    let hidden = RigParameters::baseline()
+        .with("cylinder.dead_volume_cm3", &[26.0])
+        .and_then(|rig| rig.with("valve.kv_supply_m3_per_h", &KV_SUPPLY))
+        .and_then(|rig| rig.with("friction.viscous_n_per_mm_per_s", &[1.25]))
+        .expect("numbers of a rig");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("train.csv");
+    std::fs::write(&path, measurement(&hidden, 11, STROKES_RAD_PER_S)).expect("the folder is ours");
+    let rig = RigParameters::baseline();
+    let course =
+        open(&path, &Task::default().options, &rig).expect("readable").course.expect("a good record");
+    let courses = [course];
+    let engine = Engine::new(&courses, &rig);
+    let ones = [1.0; COUNT];
+    let around = Around { columns: engine.parameter_columns(&rig, &ones), factors: ones };
+    let found = finer(&engine, &calibrate(&engine, &around)).expect("a rig");
+
+    let of = |name: &str| found.told.iter().find(|own| own.name == name).expect("it is told of");
+    for (name, truth) in [
+        ("cylinder.dead_volume_cm3", 26.0),
+        ("valve.kv_supply_m3_per_h[2]", 0.123),
+        ("valve.kv_supply_m3_per_h[3]", 0.36),
+        ("valve.kv_exhaust_m3_per_h[2]", 0.095),
+        ("parameter:viscous-friction", 1.25),
+        ("parameter:mass", 5.0),
+    ] {
+        let own = of(name);
+        let error = own.standard_error.expect("these strokes tell it");
+        assert!((own.value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{own:?}, in truth {truth}");
+    }
+    // As a file it is the rig that left the record, as far as the record tells.
+    let text =
+        extend(RigParameters::BASELINE_TOML, "rig.toml", &[], &found.changed, &[]).expect("a rig file");
+    let after = RigParameters::from_toml(&text, "rig.toml").expect("it was read once");
+    let chi2 = |rig: &RigParameters| {
+        let left = engine.residual(&engine.simulate(rig));
+        left.iter().map(|own| own * own).sum::<f64>() / engine.freedom().iter().sum::<f64>()
+    };
+    assert!(chi2(&after) < 1.1 && chi2(&rig) > 10.0, "{} {}", chi2(&rig), chi2(&after));
+}
