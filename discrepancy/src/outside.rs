@@ -8,7 +8,8 @@
 //! Nothing is said of a balance whose windows are within their noise and follow no variable.
 //!
 //! Of variables that do nearly as well the simplest is told first; where two together do much better than any alone, as in a
-//! friction over position, both lead the list. A constant is told as the variable `constant`.
+//! friction over position, both lead the list, and a surface over both stands beside the curve. A constant is told as the variable
+//! `constant`.
 //!
 //! Source: discrepancy-notes.md, 9 and Pipeline 8.
 
@@ -16,7 +17,7 @@ pub mod dependence;
 pub mod formula;
 
 use crate::course::Course;
-use crate::locate::maps::map;
+use crate::locate::maps::{map, surface};
 use crate::locate::{UnknownSeries, VARIABLES};
 use crate::report::{Curve, Dependence, Outside};
 use dependence::{Bins, SHIFTS, Sample};
@@ -77,7 +78,7 @@ pub fn outside(
 
 impl Found<'_> {
     fn told(&self) -> Outside {
-        let order = self.order();
+        let (order, pair) = self.order();
         let constant = self.sample.constant_share();
         let explained = order.first().map_or(0.0, |first| self.tests[*first].0);
         let mut variables: Vec<Dependence> = order
@@ -98,6 +99,7 @@ impl Found<'_> {
         Outside {
             balance: self.series.balance.clone(),
             curve: order.first().map(|first| smooth(map(self.series, *first), VARIABLES[*first])),
+            surface: pair.map(|pair| surface(self.series, pair)),
             formula,
             variables,
             added: false,
@@ -107,23 +109,22 @@ impl Found<'_> {
         }
     }
 
-    /// Variables that explain something, the strongest first, the simplest first among those nearly as strong.
-    fn order(&self) -> Vec<usize> {
+    /// Variables that explain something, the strongest first, the simplest first among those nearly as strong; and the first two
+    /// of them where they do much better together.
+    fn order(&self) -> (Vec<usize>, Option<[usize; 2]>) {
         let r2 = |variable: &usize| self.tests[*variable].0;
         let mut order: Vec<usize> = (0..VARIABLES.len()).filter(|variable| r2(variable) > 0.0).collect();
         order.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
-        let Some(most) = order.first().map(r2) else { return order };
+        let Some(most) = order.first().map(r2) else { return (order, None) };
         let near = order.iter().take_while(|variable| r2(variable) >= NEARLY * most).count();
         order[..near].sort_by_key(|variable| COSTS[*variable]);
-        if let Some((pair, together)) = self.pair()
-            && together > most + PAIR
-        {
-            let mut pair = pair;
-            pair.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
-            order.retain(|variable| !pair.contains(variable));
-            order.splice(0..0, pair);
-        }
-        order
+        let Some((mut pair, _)) = self.pair().filter(|(_, together)| *together > most + PAIR) else {
+            return (order, None);
+        };
+        pair.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
+        order.retain(|variable| !pair.contains(variable));
+        order.splice(0..0, pair);
+        (order, Some(pair))
     }
 
     /// The pair of variables that explains most, time left out: with another it is but a name of each window.

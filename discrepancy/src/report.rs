@@ -195,6 +195,8 @@ pub struct Outside {
     pub variables: Vec<Dependence>,
     /// The missing term over its first variable.
     pub curve: Option<Curve>,
+    /// The same over its first two, where these tell much more together than either alone.
+    pub surface: Option<Surface>,
     /// A short formula, if one fits.
     pub formula: Option<String>,
     /// Whether the extended rig file has it, as the tables.
@@ -250,6 +252,23 @@ pub struct Curve {
     pub value: Vec<f64>,
     /// Two standard errors of it.
     pub band: Vec<f64>,
+}
+
+/// A surface over two variables with a band; null where too few points are.
+#[derive(Clone, Debug, Serialize)]
+pub struct Surface {
+    /// The variables.
+    pub variables: [String; 2],
+    /// Their units.
+    pub variable_units: [String; 2],
+    /// Unit of the term.
+    pub unit: String,
+    /// Values of the first variable, and of the second.
+    pub at: [Vec<f64>; 2],
+    /// The term there: a row for each value of the second variable.
+    pub value: Vec<Vec<Option<f64>>>,
+    /// Two standard errors of it.
+    pub band: Vec<Vec<Option<f64>>>,
 }
 
 /// The gap of a signal of the held-out record, rms over windows, in the signal's unit.

@@ -334,6 +334,7 @@ impl Study {
             balance,
             variables: Vec::new(),
             curve: self.map(),
+            surface: None,
             formula: None,
             added: false,
             why_not: Some("a model of one balance takes no table".to_owned()),

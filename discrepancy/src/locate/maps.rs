@@ -1,12 +1,14 @@
-//! Unknown inputs over the variable that they follow most closely, as means of 20 bins with a band.
+//! Unknown inputs over the variable that they follow most closely, as means of 20 bins with a band; over two as a surface.
 
-use super::{UnknownSeries, VARIABLE_UNITS, VARIABLES};
-use crate::report::Curve;
+use super::{UnknownPoint, UnknownSeries, VARIABLE_UNITS, VARIABLES};
+use crate::report::{Curve, Surface};
 
 /// Bins of a map.
 pub const BINS: usize = 20;
 /// Maps of a balance.
 const MAPS: usize = 2;
+/// Bins of a surface: of its first variable, and of its second.
+const SURFACE: [usize; 2] = [10, 3];
 /// Points that a bin needs to be told.
 const LEAST: usize = 5;
 /// Balances above this are drawn.
@@ -44,21 +46,79 @@ pub fn map(series: &UnknownSeries, variable: usize) -> Curve {
             .filter(|(_, place)| **place == bin)
             .map(|(point, _)| point)
             .collect();
-        if own.len() < LEAST {
-            continue;
-        }
-        let weights: f64 = own.iter().map(|point| point.deviation.powi(-2)).sum();
-        let mean = |of: &dyn Fn(usize) -> f64| {
-            (0..own.len()).map(|at| of(at) * own[at].deviation.powi(-2)).sum::<f64>() / weights
-        };
-        let value = mean(&|at| own[at].value);
-        // The scatter around the mean is more than the noise where other things move the input too.
-        let scatter = mean(&|at| (own[at].value - value).powi(2)) / (own.len() - 1) as f64;
-        curve.at.push(mean(&|at| own[at].variables[variable]));
+        let Some((value, band)) = told(&own) else { continue };
+        curve.at.push(mean(&own, |point| point.variables[variable]));
         curve.value.push(value);
-        curve.band.push(2.0 * scatter.max(1.0 / weights).sqrt());
+        curve.band.push(band);
     }
     curve
+}
+
+/// The surface of a series over two variables.
+#[must_use]
+pub fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
+    let places = [0, 1].map(|side| {
+        let values: Vec<f64> = series.points.iter().map(|point| point.variables[variables[side]]).collect();
+        let mut apart = values.clone();
+        apart.sort_unstable_by(f64::total_cmp);
+        apart.dedup();
+        // A sign has three values, each of which is a bin.
+        let place = |(value, bin): (&f64, usize)| {
+            let own = apart.partition_point(|other| other < value);
+            if apart.len() <= SURFACE[side] { own } else { bin * SURFACE[side] / BINS }
+        };
+        values.iter().zip(bins(&values)).map(place).collect::<Vec<_>>()
+    });
+    let bin = |at: usize, side: usize| places[side][at];
+    let of = |is_in: &dyn Fn(usize) -> bool| -> Vec<&UnknownPoint> {
+        (0..series.points.len()).filter(|at| is_in(*at)).map(|at| &series.points[at]).collect()
+    };
+    // Values that many points share leave bins empty.
+    let kept = [0, 1].map(|side| {
+        let there = |own: &usize| !of(&|at| bin(at, side) == *own).is_empty();
+        (0..SURFACE[side]).filter(there).collect::<Vec<_>>()
+    });
+    let at = [0, 1].map(|side| {
+        let middle =
+            |own: &usize| mean(&of(&|at| bin(at, side) == *own), |point| point.variables[variables[side]]);
+        kept[side].iter().map(middle).collect()
+    });
+    let cells: Vec<Vec<Option<(f64, f64)>>> = kept[1]
+        .iter()
+        .map(|second| {
+            let cell = |first: &usize| told(&of(&|at| bin(at, 0) == *first && bin(at, 1) == *second));
+            kept[0].iter().map(cell).collect()
+        })
+        .collect();
+    let rows = |of: fn((f64, f64)) -> f64| {
+        cells.iter().map(|row| row.iter().map(|own| own.map(of)).collect()).collect()
+    };
+    Surface {
+        variables: variables.map(|variable| VARIABLES[variable].to_owned()),
+        variable_units: variables.map(|variable| VARIABLE_UNITS[variable].to_owned()),
+        unit: series.unit.to_owned(),
+        at,
+        value: rows(|(value, _)| value),
+        band: rows(|(_, band)| band),
+    }
+}
+
+/// Mean of some points, the better known ones counting more.
+fn mean(points: &[&UnknownPoint], of: impl Fn(&UnknownPoint) -> f64) -> f64 {
+    let weights: f64 = points.iter().map(|point| point.deviation.powi(-2)).sum();
+    points.iter().map(|point| of(point) * point.deviation.powi(-2)).sum::<f64>() / weights
+}
+
+/// Their value and two standard errors of it; `None` of too few.
+fn told(points: &[&UnknownPoint]) -> Option<(f64, f64)> {
+    if points.len() < LEAST {
+        return None;
+    }
+    let weights: f64 = points.iter().map(|point| point.deviation.powi(-2)).sum();
+    let value = mean(points, |point| point.value);
+    // The scatter around the mean is more than the noise where other things move the input too.
+    let scatter = mean(points, |point| (point.value - value).powi(2)) / (points.len() - 1) as f64;
+    Some((value, 2.0 * scatter.max(1.0 / weights).sqrt()))
 }
 
 /// The bin of each value: equally many in each as far as equal values allow, since those share one.
@@ -97,4 +157,45 @@ fn between(series: &UnknownSeries, variable: usize) -> f64 {
         .map(|(sum, weight)| sum * sum / weight)
         .sum();
     within - whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::regime::Regimes;
+    use super::*;
+
+    #[test]
+    fn a_surface_tells_what_neither_of_its_variables_does_alone() {
+        // A force over x that turns with the direction; nothing at rest, and no point beyond 0.35 m on the way back.
+        let point = |at: usize| {
+            let (x, direction) = (0.01 * (at % 40) as f64, [-1.0, 0.0, 1.0][(at / 40) % 3]);
+            let mut variables = [0.0; VARIABLES.len()];
+            (variables[0], variables[3]) = (x, direction);
+            let value = 20.0 * x * direction + if at.is_multiple_of(2) { 0.1 } else { -0.1 };
+            let (per_pressure_offset, regimes) = ([0.0; 2], Regimes::default());
+            UnknownPoint {
+                record: 0,
+                window: at,
+                value,
+                deviation: 0.1,
+                variables,
+                per_pressure_offset,
+                regimes,
+            }
+        };
+        let points =
+            (0..1200).map(point).filter(|own| own.variables[3] >= 0.0 || own.variables[0] < 0.35).collect();
+        let series = UnknownSeries { balance: "drive.force".to_owned(), unit: "N", points };
+        let surface = surface(&series, [0, 3]);
+        assert_eq!(surface.variables, ["x", "sign(v)"]);
+        assert_eq!((surface.at[0].len(), surface.at[1].as_slice()), (10, &[-1.0, 0.0, 1.0][..]));
+        for (row, direction) in surface.value.iter().zip([-1.0, 0.0, 1.0]) {
+            for (value, x) in row.iter().zip(&surface.at[0]) {
+                let expected = 20.0 * x * direction;
+                assert!(value.is_none_or(|value| (value - expected).abs() < 0.5), "{value:?} at {x}");
+            }
+        }
+        assert!(surface.value[0][9].is_none() && surface.band[0][9].is_none());
+        assert!(surface.value[2][9].is_some() && surface.band[2][9].is_some_and(|band| band > 0.0));
+    }
 }

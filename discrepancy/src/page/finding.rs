@@ -4,7 +4,7 @@ use super::candidates;
 use super::draw::{Plot, Sample, figure, range};
 use super::markup::{Cell, charts, heading, number, paragraph, table, words as said};
 use super::words;
-use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Verdict};
+use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Surface, Verdict};
 use plant::effects::sheet;
 
 /// What the section is called.
@@ -145,12 +145,13 @@ fn unknown(outside: &Outside) -> String {
         text += &paragraph("No short formula fits.");
     }
     text += &paragraph(&table_added(outside));
-    if let Some(curve) = &outside.curve {
-        text += &charts(&[curve_figure(
-            "outside-curve",
-            &format!("What is missing over {}", curve.variable),
-            curve,
-        )]);
+    let curve = outside.curve.as_ref().map(|curve| {
+        curve_figure("outside-curve", &format!("What is missing over {}", curve.variable), curve)
+    });
+    let pictures: Vec<String> =
+        curve.into_iter().chain(outside.surface.as_ref().map(surface_figure)).collect();
+    if !pictures.is_empty() {
+        text += &charts(&pictures);
     }
     text
 }
@@ -170,6 +171,40 @@ fn table_added(outside: &Outside) -> String {
         format!("; that takes {} of the disagreement of the training records", words::percent(share))
     });
     format!("It is added to the model as a table: {}{share}.", words::listed(&tables, "and"))
+}
+
+/// A surface as a curve for each value of its second variable.
+fn surface_figure(surface: &Surface) -> String {
+    const LINES: [&str; 3] = ["line s0", "line s1", "line s2"];
+    let [first, second] = &surface.variables;
+    let ((x_unit, x_factor), (z_unit, z_factor)) =
+        (words::shown(&surface.variable_units[0]), words::shown(&surface.variable_units[1]));
+    let (y_unit, y_factor) = words::shown_small(&surface.unit);
+    let all = surface.value.iter().flatten().flatten().map(|value| value * y_factor);
+    let at = surface.at[0].iter().map(|at| at * x_factor);
+    let (Some(x), Some(y)) = (range(at.clone()), range(all.chain([0.0]))) else { return String::new() };
+    let mut plot = Plot::new(x, y, &labelled(first, &x_unit), &labelled("unknown input", &y_unit));
+    plot.level(0.0);
+    let mut legend = Vec::new();
+    for ((row, value), line) in surface.value.iter().zip(&surface.at[1]).zip(LINES) {
+        let values = row.iter().map(|value| value.map_or(f64::NAN, |value| value * y_factor));
+        plot.line(line, at.clone().zip(values));
+        legend.push((Sample::Line(line), format!("{second} {} {z_unit}", words::short(value * z_factor))));
+    }
+    let legend: Vec<(Sample, &str)> =
+        legend.iter().map(|(sample, name)| (*sample, name.trim_end())).collect();
+    let caption = format!("What is missing over {first}, by {second}");
+    figure(
+        &caption,
+        "",
+        &legend,
+        &plot.drawn("outside-surface", &caption, &format!("{} curves.", legend.len())),
+    )
+}
+
+/// A name with its unit, where it has one.
+fn labelled(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
 /// A curve with its band.
@@ -193,9 +228,7 @@ pub(super) fn curve_figure(identifier: &str, caption: &str, curve: &Curve) -> St
     else {
         return String::new();
     };
-    let label =
-        |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") };
-    let mut plot = Plot::new(x, y, &label(&curve.variable, &x_unit), &label("unknown input", &y_unit));
+    let mut plot = Plot::new(x, y, &labelled(&curve.variable, &x_unit), &labelled("unknown input", &y_unit));
     plot.band(&at, &low, &high);
     plot.level(0.0);
     plot.line("line s0", at.iter().copied().zip(value.iter().copied()));

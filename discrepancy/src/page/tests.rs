@@ -120,6 +120,7 @@ fn what_is_outside_the_catalogue_has_its_curve_formula_and_significance() {
         assert!(seen.contains(part), "{part}");
     }
     assert!(page.contains("id=\"outside-curve-t\""));
+    assert!(page.contains("id=\"outside-surface-t\"") && seen.contains("sign(v) \u{2212}1.00"));
 }
 
 #[test]
