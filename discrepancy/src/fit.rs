@@ -197,6 +197,26 @@ impl Products {
         Fit { coefficients, loss, squares, weights }
     }
 
+    /// The loss of all windows, those of each of some folds by the coefficients that the others ask for; `ridges` and `from` as in
+    /// [`Products::fit_from`]. Where the residual is the best of the columns already, the difference to [`Products::loss`] is what they
+    /// only learned. Folds are stretches.
+    #[must_use]
+    pub fn unseen_loss(&self, chosen: &[usize], ridges: &[f64], from: &[f64], folds: usize) -> f64 {
+        let all = self.weights(&self.squares);
+        let windows = self.squares.len();
+        let of = |fold: usize| fold * windows / folds..(fold + 1) * windows / folds;
+        let judged = (0..folds).flat_map(|fold| {
+            let mut weights = all.clone();
+            weights[of(fold)].fill(0.0);
+            let (matrix, mut vector) = self.normal(chosen, &weights, ridges);
+            vector.iter_mut().zip(ridges).zip(from).for_each(|((own, ridge), from)| *own -= ridge * from);
+            let own =
+                solve(matrix, &vector).map_or(vec![0.0; chosen.len()], |own| own.iter().copied().collect());
+            self.squares(chosen, &own)[of(fold)].to_vec()
+        });
+        self.loss(&judged.collect::<Vec<_>>())
+    }
+
     /// For each column beyond the first few: its weighted score in each window and its information, the first few taken out.
     #[must_use]
     pub fn cleared_scores(&self, first: &[usize], weights: &[f64], ridges: &[f64]) -> Vec<(Vec<f64>, f64)> {
@@ -348,6 +368,33 @@ mod tests {
             })
             .collect();
         (residual, column)
+    }
+
+    #[test]
+    fn what_was_only_learned_is_seen_on_windows_that_were_left_out() {
+        // Columns that have nothing to do with the residual, and one that is in it.
+        let (residual, column) = made(0.8, false);
+        let mut random = Pcg64::seed_from_u64(7);
+        let chance: Vec<Vec<f64>> = (0..24)
+            .map(|_| (0..500).map(|_| f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5).collect())
+            .collect();
+        let loss = |columns: &[&[f64]]| {
+            let all: Vec<usize> = (0..columns.len()).collect();
+            let ridges = vec![1e-6; columns.len()];
+            let products = Products::new(&residual, columns, &[50.0; 10], 50);
+            let fit = products.fit(&all, &ridges);
+            let mut left = residual.clone();
+            for (column, own) in columns.iter().zip(&fit.coefficients) {
+                left.iter_mut().zip(*column).for_each(|(left, part)| *left -= own * part);
+            }
+            let products = Products::new(&left, columns, &[50.0; 10], 50);
+            (fit.loss, products.unseen_loss(&all, &ridges, &fit.coefficients, 5))
+        };
+        let nothing = loss(&[]).1;
+        let (seen, unseen) = loss(&[&column]);
+        assert!(unseen < nothing - 50.0 && (unseen - seen).abs() < 5.0, "{nothing} {seen} {unseen}");
+        let (seen, unseen) = loss(&chance.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        assert!(seen < nothing - 10.0 && unseen > nothing, "{nothing} {seen} {unseen}");
     }
 
     #[test]

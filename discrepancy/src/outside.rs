@@ -136,7 +136,9 @@ impl Found<'_> {
                 if !is_half(left) || !is_half(right) {
                     continue;
                 }
-                let r2 = self.sample.explained(&Bins::of_pair(&self.sample, left, right), 0);
+                let bins = Bins::of_pair(&self.sample, left, right);
+                let r2 =
+                    bins.iter().map(|bins| self.sample.explained(bins, 0)).fold(f64::NEG_INFINITY, f64::max);
                 if best.is_none_or(|(_, most)| r2 > most) {
                     best = Some(([left, right], r2));
                 }

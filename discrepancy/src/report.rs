@@ -214,7 +214,7 @@ pub struct Outside {
 pub struct TableTerm {
     /// `drive.force`, `drive.flow-a` and so on.
     pub balance: String,
-    /// x, v, |v|, sign(v), u, p_a, p_b or p_a-p_b.
+    /// x, v, |v|, sign(v), u, p_a, p_b, p_a-p_b or x sign(v).
     pub variable: String,
     /// Its unit.
     pub variable_unit: String,

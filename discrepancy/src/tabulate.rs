@@ -8,7 +8,8 @@
 //! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that
 //! know nothing of the next ones, and beside parameters that have taken up a part of it. So it is only where the fit begins.
 //! What is minimised is the loss of naming, over the same windows; each point costs as a number of an effect does. A table that
-//! leaves the training windows no better is not added.
+//! leaves the training windows no better is not added, nor is one that only learned them: each fifth of the windows is judged by the
+//! straight lines of a fit without it.
 //!
 //! The parameters that were off alone are fitted along, since what a table looks for must not be put on them. In the end all go
 //! back to what the file says, and only those that the tables need join again: alone, they took up a part of what was missing.
@@ -20,19 +21,23 @@ mod fit;
 use crate::calibrate::{Calibrated, quantity};
 use crate::engine::Engine;
 use crate::locate::maps::map;
-use crate::locate::{UnknownSeries, VARIABLE_UNITS, VARIABLES};
+use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
 use crate::parameters::COUNT;
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
 use fit::{Beside, Lines, Model, Point, Tied};
-use plant::effects::tabulated::{Balance, Tabulated, Variable};
+use plant::effects::tabulated::{self, Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};
 
 /// What is fitted of all that is screened: a variable that explains an unknown input best need not predict the windows best.
 const TRIED: usize = 3;
-/// Points of a first table, and of finer ones.
+/// Points of a first table: a ripple is lost between few, and a law over the position and the direction has two sides.
 const POINTS: usize = 8;
-const FINER: [usize; 2] = [16, 32];
+const DIRECTED_POINTS: usize = 32;
+/// By how many times finer ones have more.
+const FINER: [usize; 2] = [2, 4];
+/// Most points of a table that a rig can have.
+const MOST_POINTS: usize = tabulated::POINTS[1];
 /// Steps of a first fit, and of one that counts.
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
@@ -92,7 +97,13 @@ pub fn tabulate(
     if best.loss > nothing.loss - TAKES * nothing.loss.abs() {
         return Err("its table leaves the windows of the training records no better".to_owned());
     }
-    let refit = best.as_refit(engine);
+    let lines = Lines::of(engine, best.model.clone()).ok_or("no rig can have its neighbours")?;
+    let bare = Lines::of(engine, nothing.model.clone()).ok_or("no rig can have its neighbours")?;
+    let unseen = bare.unseen_loss(engine, &nothing);
+    if lines.unseen_loss(engine, &best) > unseen - TAKES * unseen.abs() {
+        return Err("its table leaves windows that it was not fitted on no better".to_owned());
+    }
+    let refit = best.as_refit(engine, &lines);
     Ok(Tables {
         terms: best.model.tables.iter().map(|table| term(&table.table)).collect(),
         parameters: (0..COUNT).filter(|at| off[*at]).map(|at| quantity(engine, at, &refit)).collect(),
@@ -208,6 +219,20 @@ impl Seek<'_> {
         }
     }
 
+    /// Where a variable of a table stands among those that unknown inputs are told over; no curve is over the last one.
+    fn place(variable: Variable) -> Option<usize> {
+        VARIABLES.iter().position(|own| *own == variable.name())
+    }
+
+    /// What a variable was in a window.
+    fn value(variable: Variable, point: &UnknownPoint) -> f64 {
+        let of = |variable: Variable| Self::place(variable).map_or(0.0, |place| point.variables[place]);
+        match variable {
+            Variable::DirectedExtension => of(Variable::Extension) * of(Variable::Direction),
+            variable => of(variable),
+        }
+    }
+
     /// The curve of an unknown input as a table.
     fn table(&self, over: Over, balance: Balance) -> Option<Tied> {
         let name = format!("{}.{}", self.axis.name(), balance.name());
@@ -216,25 +241,30 @@ impl Seek<'_> {
             Over::Constant => Variable::Extension,
             Over::Variable(variable) => variable,
         };
-        let place = VARIABLES.iter().position(|own| *own == variable.name())?;
-        let mut seen: Vec<f64> = series.points.iter().map(|point| point.variables[place]).collect();
+        // What turns with the direction is a friction.
+        if variable == Variable::DirectedExtension && balance != Balance::Force {
+            return None;
+        }
+        let mut seen: Vec<f64> = series.points.iter().map(|point| Self::value(variable, point)).collect();
         seen.sort_unstable_by(f64::total_cmp);
-        let curve = map(series, place);
+        let curve = Self::place(variable).map(|place| map(series, place));
         let at = match (over, variable) {
             (Over::Constant, _) => vec![0.0, self.engine.rig().cylinder().stroke_m],
             (_, Variable::Direction) => vec![-1.0, 1.0],
+            (_, Variable::DirectedExtension) => knots(&seen, DIRECTED_POINTS),
             _ => knots(&seen, POINTS),
         };
-        if at.len() < 2 || curve.at.is_empty() {
+        if at.len() < 2 || curve.as_ref().is_some_and(|curve| curve.at.is_empty()) {
             return None;
         }
         let most = balance.most();
-        let value = match over {
-            Over::Constant => {
+        let value = match (over, curve) {
+            (_, None) => vec![0.0; at.len()],
+            (Over::Constant, Some(curve)) => {
                 let mean = curve.value.iter().sum::<f64>() / curve.value.len() as f64;
                 vec![mean.clamp(-most, most); 2]
             }
-            Over::Variable(_) => {
+            (Over::Variable(_), Some(curve)) => {
                 at.iter().map(|x| line(&curve.at, &curve.value, *x).clamp(-most, most)).collect()
             }
         };
@@ -245,10 +275,13 @@ impl Seek<'_> {
     /// The same with more points, as long as they are worth what they cost.
     fn finer(&self, start: Point) -> Point {
         let mut best = fit::fit(self.engine, start, STEPS);
-        for count in FINER {
+        for times in FINER {
             let mut model = best.model.clone();
             for own in model.tables.iter_mut().filter(|own| own.table.at.len() > 2) {
-                let at = knots(&own.seen, count);
+                let is_directed = own.table.variable == Variable::DirectedExtension;
+                let points = if is_directed { DIRECTED_POINTS } else { POINTS };
+                // One more may come at the end.
+                let at = knots(&own.seen, (times * points).min(MOST_POINTS - 1));
                 own.table.value = at.iter().map(|x| line(&own.table.at, &own.table.value, *x)).collect();
                 own.table.at = at;
             }
@@ -297,11 +330,10 @@ fn line(at: &[f64], value: &[f64], x: f64) -> f64 {
 
 /// A table as the report tells it.
 fn term(table: &Tabulated) -> TableTerm {
-    let place = VARIABLES.iter().position(|own| *own == table.variable.name());
     TableTerm {
         balance: format!("{}.{}", table.axis.name(), table.balance.name()),
         variable: table.variable.name().to_owned(),
-        variable_unit: place.map_or("", |at| VARIABLE_UNITS[at]).to_owned(),
+        variable_unit: table.variable.unit().to_owned(),
         unit: if table.balance == Balance::Force { "N" } else { "Nl/min" }.to_owned(),
         at: table.at.clone(),
         value: table.value.clone(),

@@ -59,15 +59,7 @@ pub fn map(series: &UnknownSeries, variable: usize) -> Curve {
 pub fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
     let places = [0, 1].map(|side| {
         let values: Vec<f64> = series.points.iter().map(|point| point.variables[variables[side]]).collect();
-        let mut apart = values.clone();
-        apart.sort_unstable_by(f64::total_cmp);
-        apart.dedup();
-        // A sign has three values, each of which is a bin.
-        let place = |(value, bin): (&f64, usize)| {
-            let own = apart.partition_point(|other| other < value);
-            if apart.len() <= SURFACE[side] { own } else { bin * SURFACE[side] / BINS }
-        };
-        values.iter().zip(bins(&values)).map(place).collect::<Vec<_>>()
+        few_bins(&values, SURFACE[side])
     });
     let bin = |at: usize, side: usize| places[side][at];
     let of = |is_in: &dyn Fn(usize) -> bool| -> Vec<&UnknownPoint> {
@@ -138,6 +130,19 @@ pub fn bins(values: &[f64]) -> Vec<usize> {
         last = Some((values[at], bin));
     }
     places
+}
+
+/// At most so many bins; where there are no more values than that, as of a sign, each has its own.
+#[must_use]
+pub fn few_bins(values: &[f64], most: usize) -> Vec<usize> {
+    let mut apart = values.to_vec();
+    apart.sort_unstable_by(f64::total_cmp);
+    apart.dedup();
+    let place = |(value, bin): (&f64, usize)| {
+        let own = apart.partition_point(|other| other < value);
+        if apart.len() <= most { own } else { bin * most / BINS }
+    };
+    values.iter().zip(bins(values)).map(place).collect()
 }
 
 /// Weighted variance between the bins of a variable over that of the series.

@@ -33,6 +33,8 @@ const ALONG: usize = 3;
 const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 /// Fall of the loss below which a fit has settled.
 const SETTLED: f64 = 1.0;
+/// Parts of the records that are left out in turn, to see what a model only learned.
+const FOLDS: usize = 5;
 /// Smallest power of a window over its noise, as in [`crate::fit`].
 const LEAST: f64 = 1e-3;
 
@@ -147,10 +149,18 @@ impl Model {
         tolerance.powi(-2)
     }
 
+    /// How far a coordinate is from nothing.
+    fn off(&self, coordinate: Coordinate) -> f64 {
+        match coordinate {
+            Coordinate::Factor(at) => self.factors[at] - 1.0,
+            Coordinate::Value(at, point) => self.tables[at].table.value[point],
+        }
+    }
+
     /// What coordinates cost that are far from nothing, and points that there are.
     fn costs(&self) -> f64 {
         let factors: f64 =
-            (0..COUNT).map(|at| ((self.factors[at] - 1.0) / PARAMETERS[at].tolerance).powi(2)).sum();
+            (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].tolerance).powi(2)).sum();
         let points = self.moved().iter().filter(|own| matches!(own, Coordinate::Value(..))).count();
         factors + POINT_COSTS * points as f64
     }
@@ -176,26 +186,18 @@ impl Point {
         loss.is_finite().then_some(Point { model, residual, loss })
     }
 
-    /// Derivatives of the simulation by each coordinate.
-    fn columns(&self, engine: &Engine<'_>, moved: &[Coordinate]) -> Option<Vec<Vec<f64>>> {
-        columns(engine, &self.model, moved, &engine.pass(&self.model.rig(engine)?))
-    }
-
-    /// The parameters of the model with their errors, as a fit of no effect.
-    pub(super) fn as_refit(&self, engine: &Engine<'_>) -> Refit {
+    /// The parameters of the model with their errors, as a fit of no effect; the lines are its own.
+    pub(super) fn as_refit(&self, engine: &Engine<'_>, lines: &Lines) -> Refit {
         let moved = self.model.moved();
         let mut errors = vec![f64::INFINITY; COUNT];
-        if let Some(columns) = self.columns(engine, &moved) {
-            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            let products = Products::new(&self.residual, &columns, engine.freedom(), engine.rows());
-            let ridges: Vec<f64> = moved.iter().map(|own| self.model.ridge(*own)).collect();
-            let chosen: Vec<usize> = (0..moved.len()).collect();
-            let fit = products.fit(&chosen, &ridges);
-            if let Some(covariance) = products.covariance(&chosen, &fit, &ridges) {
-                for (at, coordinate) in moved.iter().enumerate() {
-                    if let Coordinate::Factor(own) = coordinate {
-                        errors[*own] = covariance[(at, at)].max(0.0).sqrt();
-                    }
+        let products = Products::new(&self.residual, &lines.with(&[]), engine.freedom(), engine.rows());
+        let ridges: Vec<f64> = moved.iter().map(|own| self.model.ridge(*own)).collect();
+        let chosen: Vec<usize> = (0..moved.len()).collect();
+        let fit = products.fit(&chosen, &ridges);
+        if let Some(covariance) = products.covariance(&chosen, &fit, &ridges) {
+            for (at, coordinate) in moved.iter().enumerate() {
+                if let Coordinate::Factor(own) = coordinate {
+                    errors[*own] = covariance[(at, at)].max(0.0).sqrt();
                 }
             }
         }
@@ -272,6 +274,16 @@ impl Lines {
         Some(Beside { own, columns: columns(engine, &model, &moved, &self.passed)? })
     }
 
+    /// The loss of the windows of each fold by what the other folds say of the model: what it costs is no part of it.
+    pub(super) fn unseen_loss(&self, engine: &Engine<'_>, point: &Point) -> f64 {
+        let columns = self.with(&[]);
+        let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
+        let moved = self.model.moved();
+        let ridges: Vec<f64> = moved.iter().map(|own| self.model.ridge(*own)).collect();
+        let from: Vec<f64> = moved.iter().map(|own| self.model.off(*own)).collect();
+        products.unseen_loss(&(0..columns.len()).collect::<Vec<_>>(), &ridges, &from, FOLDS)
+    }
+
     /// The loss that the lines promise of the model, `point`, with some tables more.
     pub(super) fn promised(&self, engine: &Engine<'_>, point: &Point, tables: &[&Beside]) -> f64 {
         let mut model = self.model.clone();
@@ -318,11 +330,9 @@ pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain:
 pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
     let mut point = start;
     for _ in 0..steps {
-        let moved = point.model.moved();
-        let Some(columns) = point.columns(engine, &moved) else { break };
-        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let Some(lines) = Lines::of(engine, point.model.clone()) else { break };
         let before = point.loss;
-        point = self::steps(engine, point, &columns);
+        point = self::steps(engine, point, &lines.with(&[]));
         if before - point.loss < SETTLED {
             break;
         }

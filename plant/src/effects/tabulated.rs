@@ -104,14 +104,17 @@ pub enum Variable {
     PressureB,
     /// Pressure of a minus that of b, Pa.
     PressureDifference,
+    /// Extension on the way out, its negative on the way in, 0 at rest, m: a law over the position that knows the direction.
+    DirectedExtension,
 }
 
 impl Variable {
     /// All of them.
     #[rustfmt::skip] // one line
-    pub const ALL: [Variable; 8] = [
+    pub const ALL: [Variable; 9] = [
         Variable::Extension, Variable::Velocity, Variable::Speed, Variable::Direction,
         Variable::Spool, Variable::PressureA, Variable::PressureB, Variable::PressureDifference,
+        Variable::DirectedExtension,
     ];
 
     /// As in a rig file.
@@ -126,6 +129,18 @@ impl Variable {
             Variable::PressureA => "p_a",
             Variable::PressureB => "p_b",
             Variable::PressureDifference => "p_a-p_b",
+            Variable::DirectedExtension => "x sign(v)",
+        }
+    }
+
+    /// Its SI unit; nothing of a plain number.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Variable::Extension | Variable::DirectedExtension => "m",
+            Variable::Velocity | Variable::Speed => "m/s",
+            Variable::Direction | Variable::Spool => "",
+            Variable::PressureA | Variable::PressureB | Variable::PressureDifference => "Pa",
         }
     }
 
@@ -146,14 +161,19 @@ impl Variable {
             Variable::Extension => at.extension_m,
             Variable::Velocity => at.velocity_m_per_s,
             Variable::Speed => at.velocity_m_per_s.abs(),
-            Variable::Direction if at.velocity_m_per_s == 0.0 => 0.0,
-            Variable::Direction => at.velocity_m_per_s.signum(),
+            Variable::Direction => direction(at.velocity_m_per_s),
+            Variable::DirectedExtension => at.extension_m * direction(at.velocity_m_per_s),
             Variable::Spool => at.spool,
             Variable::PressureA => a,
             Variable::PressureB => b,
             Variable::PressureDifference => a - b,
         }
     }
+}
+
+/// -1, 0 at rest, 1.
+fn direction(velocity_m_per_s: f64) -> f64 {
+    if velocity_m_per_s == 0.0 { 0.0 } else { velocity_m_per_s.signum() }
 }
 
 /// A table as a rig file has it.
@@ -321,11 +341,12 @@ mod tests {
 
     #[test]
     fn each_variable_is_what_its_name_says() {
-        let expected = [0.2, -0.5, 0.5, -1.0, 0.25, 4e5, 3e5, 1e5];
+        let expected = [0.2, -0.5, 0.5, -1.0, 0.25, 4e5, 3e5, 1e5, -0.2];
         for (variable, expected) in Variable::ALL.into_iter().zip(expected) {
             assert_eq!(variable.of(&seen(0.2, -0.5)), expected, "{}", variable.name());
         }
         assert_eq!(Variable::Direction.of(&seen(0.2, 0.0)), 0.0);
+        assert_eq!(Variable::DirectedExtension.of(&seen(0.2, 0.0)), 0.0);
     }
 
     #[test]

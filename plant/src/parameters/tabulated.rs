@@ -3,7 +3,7 @@
 //! ```text
 //! [[tabulated]]
 //! balance = "drive.force"      # drive or load; force, flow-a or flow-b
-//! variable = "x"               # x, v, |v|, sign(v), u, p_a, p_b, p_a-p_b of that axis
+//! variable = "x"               # x, v, |v|, sign(v), u, p_a, p_b, p_a-p_b, x sign(v) of that axis
 //! at = [0.0, 0.1, 0.4]         # strictly growing: m, m/s, a plain number, Pa
 //! value_n = [0.0, -4.0, -9.5]  # along the axis' own extension; value_nl_per_min into a chamber
 //! ```
