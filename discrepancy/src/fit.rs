@@ -197,9 +197,9 @@ impl Products {
         Fit { coefficients, loss, squares, weights }
     }
 
-    /// The loss of all windows, those of each of some folds by the coefficients that the others ask for; `ridges` and `from` as in
-    /// [`Products::fit_from`]. Where the residual is the best of the columns already, the difference to [`Products::loss`] is what they
-    /// only learned. Folds are stretches.
+    /// The loss of all windows, those of each of some folds by the coefficients that the others ask for; `ridges` and `from` as
+    /// in [`Products::fit_from`]. Where the residual is the best of the columns already, the difference to [`Products::loss`] is
+    /// what they only learned. Folds are stretches.
     #[must_use]
     pub fn unseen_loss(&self, chosen: &[usize], ridges: &[f64], from: &[f64], folds: usize) -> f64 {
         let all = self.weights(&self.squares);

@@ -8,8 +8,8 @@
 //! Nothing is said of a balance whose windows are within their noise and follow no variable.
 //!
 //! Of variables that do nearly as well the simplest is told first; where two together do much better than any alone, as in a
-//! friction over position, both lead the list, and a surface over both stands beside the curve. A constant is told as the variable
-//! `constant`.
+//! friction over position, both lead the list, and a surface over both stands beside the curve. A constant is told as the
+//! variable `constant`.
 //!
 //! Source: discrepancy-notes.md, 9 and Pipeline 8.
 

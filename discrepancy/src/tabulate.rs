@@ -8,8 +8,8 @@
 //! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that
 //! know nothing of the next ones, and beside parameters that have taken up a part of it. So it is only where the fit begins.
 //! What is minimised is the loss of naming, over the same windows; each point costs as a number of an effect does. A table that
-//! leaves the training windows no better is not added, nor is one that only learned them: each fifth of the windows is judged by the
-//! straight lines of a fit without it.
+//! leaves the training windows no better is not added, nor is one that only learned them: each fifth of the windows is judged
+//! by the straight lines of a fit without it.
 //!
 //! The parameters that were off alone are fitted along, since what a table looks for must not be put on them. In the end all go
 //! back to what the file says, and only those that the tables need join again: alone, they took up a part of what was missing.

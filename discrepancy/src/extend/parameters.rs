@@ -65,7 +65,8 @@ fn scaling(
     Ok((keys, factor))
 }
 
-/// `valve.kv_supply_m3_per_h[2]`, `cylinder.dead_volume_cm3`: key and place in its list; `None` for what is no number of a rig file.
+/// `valve.kv_supply_m3_per_h[2]`, `cylinder.dead_volume_cm3`: key and place in its list; `None` for what is no number of a rig
+/// file.
 fn number_of_file(name: &str) -> Option<(&str, usize)> {
     let (path, place) = match name.strip_suffix(']').and_then(|name| name.split_once('[')) {
         Some((path, place)) => (path, place.parse().ok()?),
