@@ -213,7 +213,7 @@ fn columns(
     moved: &[Coordinate],
     passed: &[Passage],
 ) -> Option<Vec<Vec<f64>>> {
-    let from: Vec<f64> = passed.iter().flat_map(|own| &own.simulated).copied().collect();
+    let from: Vec<f64> = passed.iter().flat_map(Passage::simulated).copied().collect();
     moved
         .par_iter()
         .map(|coordinate| {

@@ -16,11 +16,18 @@ use plant::{Axis, Plant, RigParameters, State};
 /// What a rig shows in the windows of a record, and where it went.
 #[derive(Clone, Debug)]
 pub struct Passage {
-    /// As [`Windows::simulate_coarsely`].
-    pub simulated: Vec<f64>,
+    simulated: Vec<f64>,
     /// The state that each judged window begins in; empty where states do not tell all, as with effects that remember.
     states: Vec<State>,
     reaches: Vec<Reach>,
+}
+
+impl Passage {
+    /// Readings over their noise, as [`Windows::simulate_coarsely`] gives them.
+    #[must_use]
+    pub fn simulated(&self) -> &[f64] {
+        &self.simulated
+    }
 }
 
 /// Least and largest value of each variable of a table in a window.

@@ -12,14 +12,17 @@ from pathlib import Path
 
 
 def without_series(report: bytes) -> bytes:
-    """The report without what only pictures need; one that is no JSON as it is."""
+    """The report without what only pictures and long tables need; one that is no JSON as it is."""
     try:
         own = json.loads(report)
     except ValueError:
         return report
     own["location"] = None
+    own["candidates"] = own.get("candidates", [])[:5]
+    own["detection_limits"] = []
     if own.get("outside"):
         own["outside"]["curve"] = None
+        own["outside"]["surface"] = None
     return json.dumps(own, separators=(",", ":")).encode()
 
 
