@@ -136,9 +136,7 @@ impl Found<'_> {
                 if !is_half(left) || !is_half(right) {
                     continue;
                 }
-                let bins = Bins::of_pair(&self.sample, left, right);
-                let r2 =
-                    bins.iter().map(|bins| self.sample.explained(bins, 0)).fold(f64::NEG_INFINITY, f64::max);
+                let r2 = self.sample.explained(&Bins::of_pair(&self.sample, left, right), 0);
                 if best.is_none_or(|(_, most)| r2 > most) {
                     best = Some(([left, right], r2));
                 }

@@ -1,13 +1,14 @@
 //! A neighbour of a rig is simulated only where it differs, and shows the same as if it were simulated everywhere.
 
+#[path = "common/course.rs"]
+mod course;
 #[path = "common/record.rs"]
 mod record;
 
+use course::course;
 use discrepancy::windows::Windows;
-use discrepancy::workflow::{Task, open};
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};
-use record::{STROKES_RAD_PER_S, measurement};
 use std::cell::Cell;
 
 const AT: [f64; 5] = [0.05, 0.15, 0.25, 0.35, 0.45];
@@ -28,13 +29,9 @@ fn rig(point: usize, more_n: f64) -> RigParameters {
 
 #[test]
 fn a_point_of_a_table_changes_nothing_in_windows_that_do_not_reach_it() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("train.csv");
-    let hidden = RigParameters::baseline();
-    std::fs::write(&path, measurement(&hidden, 11, STROKES_RAD_PER_S)).expect("the folder is ours");
-    let opened = open(&path, &Task::default().options, &hidden).expect("readable");
-    let course = opened.course.expect("a good record");
-    let windows = Windows::new(&course, &hidden);
+    let baseline = RigParameters::baseline();
+    let course = course(&baseline, &baseline);
+    let windows = Windows::new(&course, &baseline);
     let passage = windows.pass(&rig(0, 0.0));
     assert_eq!(passage.simulated(), windows.simulate_coarsely(&rig(0, 0.0)));
 
@@ -61,11 +58,8 @@ fn a_point_of_a_table_changes_nothing_in_windows_that_do_not_reach_it() {
 
 #[test]
 fn what_remembers_is_simulated_everywhere() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("train.csv");
     let baseline = RigParameters::baseline();
-    std::fs::write(&path, measurement(&baseline, 11, STROKES_RAD_PER_S)).expect("the folder is ours");
-    let course = open(&path, &Task::default().options, &baseline).expect("readable").course.expect("good");
+    let course = course(&baseline, &baseline);
     let windows = Windows::new(&course, &baseline);
     let plays = |point: usize, more_n: f64| {
         rig(point, more_n)

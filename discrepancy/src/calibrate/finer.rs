@@ -53,7 +53,7 @@ pub struct Finer {
 pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let rig = engine.rig();
     let scale = PARAMETERS.iter().position(|own| own.name == KV_SCALE).expect("one of them");
-    let numbers = numbers(rig);
+    let numbers = numbers(rig, &calibrated.fit.factors);
     let mut ridges = parameter_ridges();
     ridges.extend(numbers.iter().map(|number| number.tolerance.powi(-2)));
     let all: Vec<usize> = (0..ridges.len()).collect();
@@ -62,8 +62,12 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     factors.resize(ridges.len(), 1.0);
     let mut best: Option<(Vec<f64>, Products, Fit)> = None;
     for _ in 0..POINTS {
-        let residual = engine.residual(&engine.simulate(&with(rig, &numbers, &factors)?));
-        let columns = columns(engine, &numbers, &factors)?;
+        // Where a number came to the end of its range, what was found before stands.
+        let Some((own, columns)) = with(rig, &numbers, &factors).zip(columns(engine, &numbers, &factors))
+        else {
+            break;
+        };
+        let residual = engine.residual(&engine.simulate(&own));
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
         let off: Vec<f64> = factors.iter().map(|factor| factor - 1.0).collect();
@@ -93,7 +97,13 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let mut changed: Vec<Quantity> =
         parameters.into_iter().enumerate().filter(|(at, _)| *at != scale).map(|(_, own)| own).collect();
     changed.retain(|own| own.standard_error.is_some());
-    let is_scaled = told[scale].standard_error.is_some();
+    let is_told = |at: usize| error(COUNT + at) < UNTOLD * numbers[at].tolerance;
+    // Points of a table go together, so that it does not fall where one of them is left behind.
+    let is_changed = |key: &str| {
+        let any = (0..numbers.len()).any(|at| numbers[at].key == key && is_told(at));
+        any || (rig.numbers(key).len() > 1 && told[scale].standard_error.is_some())
+    };
+    let changes: Vec<bool> = numbers.iter().map(|number| is_changed(number.key)).collect();
     for (at, number) in (COUNT..).zip(&numbers) {
         let list = rig.numbers(number.key);
         let before = list[number.place];
@@ -104,15 +114,14 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
             factor *= factors[scale];
             square += variance(scale, scale) + 2.0 * variance(at, scale);
         }
-        let is_told = error(at) < UNTOLD * number.tolerance;
         let quantity = Quantity {
             name: if of_table { format!("{}[{}]", number.key, number.place) } else { number.key.to_owned() },
             value: before * factor,
             unit: key.unit.name().to_owned(),
-            standard_error: is_told.then_some(before * square.max(0.0).sqrt()),
+            standard_error: is_told(at - COUNT).then_some(before * square.max(0.0).sqrt()),
             before: Some(before),
         };
-        if is_told || (of_table && is_scaled) {
+        if changes[at - COUNT] {
             changed.push(quantity.clone());
         }
         told.push(quantity);
@@ -120,13 +129,20 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     Some(Finer { told, changed })
 }
 
-/// Those that are not 0: at a spool opening without flow, the dead zone says it.
-fn numbers(rig: &RigParameters) -> Vec<Number> {
+/// Those that are not 0, since at a spool opening without flow the dead zone says it, and that can be changed either way: of points
+/// of a table that are equal none can, and they go along with the others.
+fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
+    let has_neighbours = |number: &Number| {
+        [CHANGE, -CHANGE].iter().all(|change| {
+            let factors: Vec<f64> = parameters.iter().copied().chain([1.0 + change]).collect();
+            with(rig, std::slice::from_ref(number), &factors).is_some()
+        })
+    };
     let of_key = |(key, tolerance): (&'static str, f64)| {
         let list = rig.numbers(key);
         (0..list.len()).filter(|place| list[*place] > 0.0).map(move |place| Number { key, place, tolerance })
     };
-    FINER.into_iter().flat_map(of_key).collect::<Vec<_>>()
+    FINER.into_iter().flat_map(of_key).filter(has_neighbours).collect()
 }
 
 /// The rig with all factors; `None` where one leaves its range, or a table would fall.

@@ -4,7 +4,7 @@ use super::edits::Edits;
 use super::{ExtendError, told, written};
 use crate::parameters::PARAMETERS;
 use crate::report::Quantity;
-use plant::parameters::table::KEYS;
+use plant::parameters::table::{KEYS, Key};
 use plant::{Axis, RigParameters};
 use std::ops::Range;
 use toml_edit::{Document, Item};
@@ -68,11 +68,10 @@ fn scaling(
 /// `valve.kv_supply_m3_per_h[2]`, `cylinder.dead_volume_cm3`: key and place in its list; `None` for what is no number of a rig
 /// file.
 fn number_of_file(name: &str) -> Option<(&str, usize)> {
-    let (path, place) = match name.strip_suffix(']').and_then(|name| name.split_once('[')) {
-        Some((path, place)) => (path, place.parse().ok()?),
-        None => (name, 0),
-    };
-    KEYS.iter().any(|key| key.path() == path && place < key.count).then_some((path, place))
+    let indexed = name.strip_suffix(']').and_then(|name| name.split_once('['));
+    let (path, place) = indexed.map_or(Some((name, 0)), |(path, place)| Some((path, place.parse().ok()?)))?;
+    let is_named = |key: &Key| (key.count > 1) == indexed.is_some() && place < key.count;
+    KEYS.iter().any(|key| key.path() == path && is_named(key)).then_some((path, place))
 }
 
 /// The text with all changed parameters.

@@ -355,10 +355,14 @@ fn a_number_of_the_file_is_refused_where_it_is_none() {
     assert!(refused(&[Quantity { value: f64::NAN, ..volume.clone() }]).contains("no finite number"));
     assert!(refused(&[Quantity { value: 500.0, ..volume }]).contains("refused"));
     let point = quantity("valve.kv_supply_m3_per_h[2]", 0.125, "m^3/h", Some(0.115));
-    for (name, what) in
-        [("valve.kv_supply_m3_per_h[6]", "unknown parameter"), ("valve.no_key", "unknown parameter")]
-    {
-        assert!(refused(&[Quantity { name: name.to_owned(), ..point.clone() }]).contains(what), "{name}");
+    for name in [
+        "valve.kv_supply_m3_per_h[6]",
+        "valve.kv_supply_m3_per_h",
+        "cylinder.dead_volume_cm3[0]",
+        "valve.no_key",
+    ] {
+        let unknown = Quantity { name: name.to_owned(), ..point.clone() };
+        assert!(refused(&[unknown]).contains("unknown parameter"), "{name}");
     }
     let scale = Quantity { unit: String::new(), ..quantity("parameter:kv-scale", 1.02, "", Some(1.0)) };
     for both in [[point.clone(), scale.clone()], [scale, point]] {

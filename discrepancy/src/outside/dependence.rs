@@ -20,7 +20,7 @@ pub const TIME: usize = 10;
 /// Windows of a block of a fold: 0.2 s, so that both folds see each stroke in all its parts.
 const BLOCK: usize = 10;
 /// Bins to each side of a pair.
-const PAIR_BINS: [[usize; 2]; 3] = [[6, 6], [BINS, 3], [3, BINS]];
+const PAIR_BINS: usize = 6;
 
 /// An unknown input without what is not needed for its law.
 #[derive(Clone, Debug)]
@@ -56,17 +56,17 @@ impl Bins {
         Bins { places: values().map(|value| place(value).min(BINS - 1)).collect(), count: BINS }
     }
 
-    /// Bins of a pair of variables: as many of each, or fine ones of one of them, for what repeats every few centimetres.
+    /// Bins of a pair of variables.
     #[must_use]
-    pub fn of_pair(sample: &Sample, left: usize, right: usize) -> [Self; 3] {
-        let values =
-            |variable: usize| -> Vec<f64> { sample.variables.iter().map(|own| own[variable]).collect() };
-        let (left, right) = (values(left), values(right));
-        PAIR_BINS.map(|[left_most, right_most]| {
-            let both = few_bins(&left, left_most).into_iter().zip(few_bins(&right, right_most));
-            let places = both.map(|(left, right)| left * right_most + right).collect();
-            Bins { places, count: left_most * right_most }
-        })
+    pub fn of_pair(sample: &Sample, left: usize, right: usize) -> Self {
+        let of = |variable: usize| {
+            few_bins(&sample.variables.iter().map(|own| own[variable]).collect::<Vec<_>>(), PAIR_BINS)
+        };
+        let both = of(left).into_iter().zip(of(right));
+        Bins {
+            places: both.map(|(left, right)| left * PAIR_BINS + right).collect(),
+            count: PAIR_BINS * PAIR_BINS,
+        }
     }
 }
 
