@@ -10,9 +10,11 @@ use rayon::prelude::*;
 
 /// What came close in a round, that is tried again when another effect has joined.
 const SWAPPED: usize = 3;
-/// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart.
-const ALIKE: f64 = 20.0;
-/// The same as a share of what the effect takes.
+/// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart: noise alone makes the wrong
+/// one of two better by more in one record of 700 at most, however alike they are.
+const ALIKE: f64 = 9.0;
+/// The same as a share of what the effect takes, or of what it leaves if that is less: where the model is not exact, what is missing
+/// besides may decide between them.
 const ALIKE_SHARE: f64 = 0.02;
 /// Multiple of the threshold of nothing that is asked of every further effect, since a model is never exact, least of all one
 /// with another effect fitted in it.
@@ -58,7 +60,7 @@ pub(super) fn swap(
 
 /// By how much the loss of an explanation may be larger for the records not to tell it from the best.
 fn alike(best: &Refit, calibrated: &Calibrated) -> f64 {
-    (ALIKE * best.inflation).max(ALIKE_SHARE * (calibrated.fit.loss - best.loss))
+    (ALIKE * best.inflation).max(ALIKE_SHARE * best.loss.min(calibrated.fit.loss - best.loss))
 }
 
 /// Takes out effects that are not missed: by more than what nothing gains beside the whole model.
