@@ -129,8 +129,8 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     Some(Finer { told, changed })
 }
 
-/// Those that are not 0, since at a spool opening without flow the dead zone says it, and that can be changed either way: points of a
-/// table that are equal cannot, and go along with the others.
+/// Those that are not 0, since at a spool opening without flow the dead zone says it, and that can be changed either way: points
+/// of a table that are equal cannot, and go along with the others.
 fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
     let has_neighbours = |number: &Number| {
         [CHANGE, -CHANGE].iter().all(|change| {

@@ -13,8 +13,8 @@ const SWAPPED: usize = 3;
 /// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart: noise alone makes the wrong
 /// one of two better by more in one record of 700 at most, however alike they are.
 const ALIKE: f64 = 9.0;
-/// The same as a share of what the effect takes, or of what it leaves if that is less: where the model is not exact, what is missing
-/// besides may decide between them.
+/// The same as a share of what the effect takes, or of what it leaves if that is less: where the model is not exact, what is
+/// missing besides may decide between them.
 const ALIKE_SHARE: f64 = 0.02;
 /// Multiple of the threshold of nothing that is asked of every further effect, since a model is never exact, least of all one
 /// with another effect fitted in it.
