@@ -56,21 +56,23 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!("|---|---|---|---|---|---|---|---|---|");
 
-    let effects = Candidate::all([true, false], false, &[]).into_iter().flat_map(|candidate| {
-        let sizes: &[f64] = match (candidate.is_anchored(), candidate.is_two_sided()) {
-            (false, _) => &[0.7],
-            (true, false) => &[0.5],
-            (true, true) => &[0.5, -0.5],
-        };
-        sizes.iter().map(move |size| {
-            let mut at = candidate.origin();
-            at[0] = *size;
-            let key = &candidate.sheet.keys[0];
-            let amplitude = short(candidate.numbers(&at)[0], key.unit.name());
-            let head = format!("| {} | {} | {amplitude} |", candidate.sheet.name, candidate.place);
-            candidate.rig(quiet, &at).map(|rig| (head, rig))
-        })
-    });
+    let effects = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]).into_iter().flat_map(
+        |candidate| {
+            let sizes: &[f64] = match (candidate.is_anchored(), candidate.is_two_sided()) {
+                (false, _) => &[0.7],
+                (true, false) => &[0.5],
+                (true, true) => &[0.5, -0.5],
+            };
+            sizes.iter().map(move |size| {
+                let mut at = candidate.origin();
+                at[0] = *size;
+                let key = &candidate.sheet.keys[0];
+                let amplitude = short(candidate.numbers(&at)[0], key.unit.name());
+                let head = format!("| {} | {} | {amplitude} |", candidate.sheet.name, candidate.place);
+                candidate.rig(quiet, &at).map(|rig| (head, rig))
+            })
+        },
+    );
     // Numbers that are merely wrong, by twice their tolerance.
     let parameters = PARAMETERS.iter().flat_map(|parameter| {
         [1.0 - 2.0 * parameter.tolerance, 1.0 + 2.0 * parameter.tolerance].map(|factor| {

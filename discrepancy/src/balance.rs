@@ -170,20 +170,6 @@ pub fn is_model_file(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("kind"))
 }
 
-/// Closes a balance: names what it lacks by the training records, and compares both models on the held-out one.
-///
-/// # Errors
-/// [`BalanceError`] for a model or record that cannot be used.
-pub fn close(
-    model_file: &Path,
-    train: &[PathBuf],
-    test: Option<&Path>,
-    progress: &mut dyn FnMut(&str),
-) -> Result<Closed, BalanceError> {
-    let tests: Vec<&Path> = test.into_iter().collect();
-    close_on(model_file, train, &tests, progress)
-}
-
 /// What came out, and why held-out records were not judged, where they were given and were not.
 #[derive(Clone, Debug)]
 pub struct Closed {
@@ -193,11 +179,12 @@ pub struct Closed {
     pub not_judged: Option<String>,
 }
 
-/// As [`close`], with any number of held-out records: the residuals are those over all of them.
+/// Closes a balance: names what it lacks by the training records, and compares both models on the held-out ones, their residuals
+/// those over all of them.
 ///
 /// # Errors
-/// As [`close`].
-pub fn close_on(
+/// [`BalanceError`] for a model or record that cannot be used.
+pub fn close(
     model_file: &Path,
     train: &[PathBuf],
     tests: &[&Path],
@@ -263,7 +250,7 @@ impl Study {
             time: time.clone(),
             position: rows.in_bands("bands of position", &positions, selection.bands),
             speed: speeds_apart(&speeds)
-                .then(|| rows.in_bands("bands of speed", &speeds, selection.bands / 2)),
+                .then(|| rows.in_bands("bands of speed", &speeds, (selection.bands / 2).max(2))),
         };
         let span = positions
             .iter()

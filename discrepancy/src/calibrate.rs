@@ -29,28 +29,25 @@ const UNTOLD: f64 = 0.7;
 pub struct Calibrated {
     /// The fit.
     pub fit: Refit,
-    /// Sensitivities at its point.
-    pub around: Around,
 }
 
 /// Fits all parameters.
 #[must_use]
 pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
-    let mut around = baseline.clone();
-    let mut best = refit(engine, &around, &[], 0.0).expect("the baseline is a rig");
+    let mut best = refit(engine, baseline, &[], 0.0).expect("the baseline is a rig");
     for _ in 1..POINTS {
         let columns = engine.parameter_columns(engine.rig(), &best.factors);
         let next = Around { columns, factors: best.factors };
         let Some(own) = refit(engine, &next, &[], 0.0) else { break };
         let settled = own.loss > best.loss - SETTLED;
         if own.loss < best.loss {
-            (best, around) = (own, next);
+            best = own;
         }
         if settled {
             break;
         }
     }
-    Calibrated { fit: best, around }
+    Calibrated { fit: best }
 }
 
 impl Calibrated {

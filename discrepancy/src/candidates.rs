@@ -8,6 +8,8 @@
 //!   far from neutral     z = ln(a / n) / ln(largest drawn ratio)  (where the range spans decades on both sides)
 //!   shape                z = (a - default) / drawn width          (changes nothing while the amplitude is 0)
 //! ```
+//!
+//! An effect that the rig file has already is the baseline there: its coordinates count from the file's numbers.
 
 use plant::Axis;
 use plant::RigParameters;
@@ -32,6 +34,9 @@ const BENT: [&str; 6] = [
     "silencer-back-pressure",
 ];
 
+/// Keys of a sheet at most.
+const MOST_KEYS: usize = 6;
+
 /// An effect at a place.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
@@ -39,6 +44,8 @@ pub struct Candidate {
     pub sheet: &'static Sheet,
     /// Where.
     pub place: Place,
+    /// Numbers of its keys in the rig file, in the file's units; `None` where it is not on there.
+    present: Option<[f64; MOST_KEYS]>,
 }
 
 /// How a key is moved.
@@ -50,9 +57,10 @@ enum Scale {
 }
 
 impl Scale {
-    fn of(key: &EffectKey) -> Scale {
+    fn of(key: &EffectKey, present: Option<f64>) -> Scale {
         let [least, most] = key.drawn;
-        match key.neutral.or(if key.default.is_none() { Some(f64::INFINITY) } else { None }) {
+        let neutral = key.neutral.or(if key.default.is_none() { Some(f64::INFINITY) } else { None });
+        match present.or(neutral) {
             Some(neutral) if neutral > FAR * most => Scale::Reciprocal { least, neutral },
             Some(neutral) if neutral > 0.0 && most / least > DECADES => {
                 let unit = (most / neutral).ln().abs().max((least / neutral).ln().abs());
@@ -68,7 +76,7 @@ impl Scale {
     fn number(self, z: f64) -> f64 {
         match self {
             Scale::Linear { neutral, unit } => neutral + z * unit,
-            Scale::Reciprocal { least, neutral } => 1.0 / (z.max(1e-9) / least + 1.0 / neutral),
+            Scale::Reciprocal { least, neutral } => 1.0 / (z / least + 1.0 / neutral).max(1e-9 / least),
             Scale::Logarithm { neutral, unit } => neutral * (z * unit).exp(),
         }
     }
@@ -95,9 +103,9 @@ impl Scale {
 }
 
 impl Candidate {
-    /// All candidates that records of these axes can show.
+    /// All candidates that records of these axes can show beside a rig.
     #[must_use]
-    pub fn all(measured: [bool; 2], linked: bool, without: &[String]) -> Vec<Candidate> {
+    pub fn all(rig: &RigParameters, measured: [bool; 2], linked: bool, without: &[String]) -> Vec<Candidate> {
         let shown = |place: &Place| match place.part {
             Part::Drive => measured[Axis::Drive.index()],
             Part::Load => measured[Axis::Load.index()],
@@ -109,9 +117,37 @@ impl Candidate {
             .filter(|sheet| !without.iter().any(|name| name == sheet.name))
             .flat_map(|sheet| {
                 let places = sheet.place.places().iter().copied().filter(move |place| shown(place));
-                places.map(move |place| Candidate { sheet, place })
+                places.map(move |place| Candidate::beside(rig, sheet, place))
             })
             .collect()
+    }
+
+    fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
+        let own = rig.effects().iter().find(|own| own.name == sheet.name && own.place == place);
+        let present = own.map(|own| {
+            let mut numbers = [0.0; MOST_KEYS];
+            numbers[..own.numbers.len()].copy_from_slice(&own.numbers);
+            numbers
+        });
+        Candidate { sheet, place, present }
+    }
+
+    fn scale(&self, key: usize) -> Scale {
+        Scale::of(&self.sheet.keys[key], self.present.map(|numbers| numbers[key]))
+    }
+
+    /// What a key is in the baseline: the rig file's number, or where the effect is not on what changes nothing; `None` for
+    /// shapes and for effects that only their absence makes none.
+    #[must_use]
+    pub fn baseline(&self, key: usize) -> Option<f64> {
+        let neutral = self.sheet.keys[key].neutral.filter(|neutral| neutral.is_finite());
+        self.present.map(|numbers| numbers[key]).or(neutral)
+    }
+
+    /// Whether the rig file has it.
+    #[must_use]
+    pub fn is_present(&self) -> bool {
+        self.present.is_some()
     }
 
     /// Name and place, as `piston-leakage drive`.
@@ -120,29 +156,29 @@ impl Candidate {
         format!("{} {}", self.sheet.name, self.place)
     }
 
-    /// Coordinates of the baseline: amplitudes 0, shapes at their defaults.
+    /// Coordinates of the baseline: amplitudes 0, shapes at their defaults; the rig file's numbers where it has the effect.
     #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         vec![0.0; self.sheet.keys.len()]
     }
 
-    /// Whether a key changes nothing while the amplitudes are none.
+    /// Whether a key changes nothing while the amplitudes are those of the baseline.
     #[must_use]
     pub fn is_shape(&self, key: usize) -> bool {
-        key > 0 && self.sheet.keys[key].neutral.is_none()
+        key > 0 && !self.is_present() && self.sheet.keys[key].neutral.is_none()
     }
 
     /// Whether the effect goes over into the baseline as its amplitude does.
     #[must_use]
     pub fn is_anchored(&self) -> bool {
-        self.sheet.keys[0].neutral.is_some()
+        self.is_present() || self.sheet.keys[0].neutral.is_some()
     }
 
     /// Smallest and largest coordinate of a key.
     #[must_use]
     pub fn range(&self, key: usize) -> [f64; 2] {
         let sheet_key = &self.sheet.keys[key];
-        let scale = Scale::of(sheet_key);
+        let scale = self.scale(key);
         let ends = [scale.coordinate(sheet_key.min), scale.coordinate(sheet_key.max)];
         [ends[0].min(ends[1]), ends[0].max(ends[1])]
     }
@@ -169,20 +205,21 @@ impl Candidate {
             .keys
             .iter()
             .zip(coordinates)
-            .map(|(key, z)| Scale::of(key).number(*z).clamp(key.min, key.max))
+            .enumerate()
+            .map(|(at, (key, z))| self.scale(at).number(*z).clamp(key.min, key.max))
             .collect()
     }
 
     /// d number / d coordinate of a key.
     #[must_use]
     pub fn slope(&self, key: usize, coordinate: f64) -> f64 {
-        Scale::of(&self.sheet.keys[key]).slope(coordinate)
+        self.scale(key).slope(coordinate)
     }
 
     /// The coordinate of a number of a key.
     #[must_use]
     pub fn coordinate(&self, key: usize, number: f64) -> f64 {
-        Scale::of(&self.sheet.keys[key]).coordinate(number)
+        self.scale(key).coordinate(number)
     }
 
     /// The rig with this effect.
@@ -238,7 +275,7 @@ mod tests {
     #[test]
     fn every_probe_of_every_effect_is_a_rig_and_its_coordinates_come_back() {
         let rig = RigParameters::baseline();
-        let all = Candidate::all([true, true], true, &[]);
+        let all = Candidate::all(&rig, [true, true], true, &[]);
         assert!(all.len() > SHEETS.len());
         for candidate in all {
             for probe in candidate.probes() {
@@ -259,8 +296,26 @@ mod tests {
     }
 
     #[test]
+    fn an_effect_that_the_rig_file_has_counts_from_there() {
+        let mut seen = 0;
+        for candidate in Candidate::all(&RigParameters::baseline(), [true, true], true, &[]) {
+            assert!(candidate.sheet.keys.len() <= MOST_KEYS, "{}", candidate.name());
+            let strong = candidate.probes().remove(0);
+            let Ok(rig) = candidate.rig(&RigParameters::baseline(), &strong) else { continue };
+            let here = Candidate::beside(&rig, candidate.sheet, candidate.place);
+            assert_eq!(here.rig(&rig, &here.origin()).unwrap(), rig, "{}", here.name());
+            assert_eq!(here.baseline(0), Some(candidate.numbers(&strong)[0]), "{}", here.name());
+            for probe in here.probes() {
+                assert_ne!(here.rig(&rig, &probe).unwrap(), rig, "{}: {probe:?}", here.name());
+            }
+            seen += 1;
+        }
+        assert!(seen > SHEETS.len());
+    }
+
+    #[test]
     fn the_largest_drawn_change_is_about_one() {
-        for candidate in Candidate::all([true, false], false, &[]) {
+        for candidate in Candidate::all(&RigParameters::baseline(), [true, false], false, &[]) {
             let key = &candidate.sheet.keys[0];
             let ends = key.drawn.map(|number| candidate.coordinate(0, number).abs());
             let most = ends[0].max(ends[1]);

@@ -172,7 +172,7 @@ fn one_balance_outcome(
 ) -> Result<Outcome, CommandError> {
     let tests: Vec<&Path> = tests.iter().map(PathBuf::as_path).collect();
     let balance::Closed { report, not_judged } =
-        balance::close_on(&records.rig, &records.train, &tests, progress)?;
+        balance::close(&records.rig, &records.train, &tests, progress)?;
     let is_model = report.verdict != Verdict::BadData;
     let extended = is_model.then(|| balance::extended_model_text(&records.rig, &report).ok()).flatten();
     Ok(Outcome { report, extended, pictures: page::Pictures::default(), experiment: None, not_judged })
@@ -183,7 +183,7 @@ fn nothing_for_one_balance(arguments: &NameArguments) -> Result<(), CommandError
     let given = [
         ("--mapping", arguments.records.mapping.is_some(), "mapping = \"…\" in the model file"),
         ("--strict", arguments.records.strict, "it reads the columns under [channels] alone"),
-        ("--without", !arguments.without.is_empty(), "[[term]] and [selection] of the model file"),
+        ("--without", !arguments.without.is_empty(), "[[terms]] and [selection] of the model file"),
     ];
     let Some((option, _, instead)) = given.iter().find(|(_, given, _)| *given) else { return Ok(()) };
     Err(CommandError::BadData(format!("{option}: not for a model of one balance: {instead}")))
@@ -284,8 +284,10 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     if let Some(out) = out {
         out.write_json("parameters.json", &quantities)?;
         let records: Vec<String> = arguments.train.iter().map(|path| path.display().to_string()).collect();
-        let text = crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, &records)
-            .map_err(WorkflowError::from)?;
+        let weighed = workflow::weighed(courses[0].measured);
+        let text =
+            crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, weighed, &records)
+                .map_err(WorkflowError::from)?;
         out.write("rig.toml", &text)?;
     }
     Ok(Exit::Good)
@@ -383,6 +385,7 @@ fn next_command(arguments: &NextArguments) -> Result<Exit, CommandError> {
 }
 
 fn courses(arguments: &RecordArguments) -> Result<(RigFile, Vec<crate::course::Course>), CommandError> {
+    never_seen(&arguments.train, &[])?;
     let rig_file = RigFile::read(&arguments.rig)?;
     let mut courses = Vec::new();
     for path in &arguments.train {
@@ -390,6 +393,7 @@ fn courses(arguments: &RecordArguments) -> Result<(RigFile, Vec<crate::course::C
         let Some(course) = opened.course else { return Err(CommandError::BadData(opened.checked.why_not())) };
         courses.push(course);
     }
+    workflow::on_shared_axes(&mut courses)?;
     Ok((rig_file, courses))
 }
 

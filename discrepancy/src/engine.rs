@@ -103,7 +103,7 @@ impl<'a> Engine<'a> {
         &self.freedom
     }
 
-    /// Whitened readings of a rig, all records.
+    /// Readings of a rig over their noise, all records.
     #[must_use]
     pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
         self.windows.iter().flat_map(|windows| windows.simulate(rig)).collect()

@@ -23,7 +23,7 @@ pub use parameters::key_of_parameter;
 use plant::effects::sheet::{EffectKey, Sheet};
 use plant::effects::tabulated::Tabulated;
 use plant::effects::{SHEETS, sheet};
-use plant::{ParameterError, RigParameters};
+use plant::{Axis, ParameterError, RigParameters};
 use toml_edit::Document;
 
 /// An effect to be switched on.
@@ -122,6 +122,8 @@ pub enum ExtendError {
 
 /// The rig file with these effects and parameters, `records` named as where they come from; `file` is only its name for messages.
 ///
+/// `weighed` is the axis that a mass with a unit is the mass of; a mass without one is a factor on all masses.
+///
 /// # Errors
 /// [`ExtendError`] with what is known or allowed, for a file that is no rig, for effects, places, keys and parameters that do not
 /// exist, and for values that a rig file must not hold.
@@ -130,16 +132,17 @@ pub fn extend(
     file: &str,
     additions: &[Addition],
     changed: &[Quantity],
+    weighed: Axis,
     records: &[String],
 ) -> Result<String, ExtendError> {
-    let rig = RigParameters::from_toml(rig_text, file).map_err(ExtendError::Rig)?;
+    RigParameters::from_toml(rig_text, file).map_err(ExtendError::Rig)?;
     let from = source(records);
     let layout = |what: &str, reason: String| ExtendError::Layout {
         file: file.to_owned(),
         what: what.to_owned(),
         reason: reason.lines().last().unwrap_or_default().to_owned(),
     };
-    let mut text = parameters::change(rig_text, &rig, changed, &from, &layout)?;
+    let mut text = parameters::change(rig_text, changed, weighed, &from, &layout)?;
     let mut done: Vec<(&str, &str)> = Vec::new();
     for addition in additions {
         let told = format!("{} at {}", addition.effect, addition.place);

@@ -293,6 +293,19 @@ impl Products {
     /// Student's distribution with as many degrees of freedom as windows tell.
     #[must_use]
     pub fn jackknife(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<Vec<f64>> {
+        let each: Vec<[usize; 1]> = (0..chosen.len()).map(|at| [at]).collect();
+        self.jackknife_of_sums(chosen, fit, ridges, &each)
+    }
+
+    /// The same of sums of coefficients, each given by places in `chosen`.
+    #[must_use]
+    pub fn jackknife_of_sums<S: AsRef<[usize]>>(
+        &self,
+        chosen: &[usize],
+        fit: &Fit,
+        ridges: &[f64],
+        sums: &[S],
+    ) -> Option<Vec<f64>> {
         let (matrix, _) = self.normal(chosen, &fit.weights, ridges);
         let inverse = matrix.clone().try_inverse()?;
         let count = chosen.len();
@@ -314,14 +327,17 @@ impl Products {
             });
             changes.push(solve(&matrix - own, &score)?);
         }
-        let error = |at: usize| {
-            let squares = changes.iter().map(|change| change[at] * change[at]);
+        let error = |places: &[usize]| {
+            let change_of = |change: &DVector<f64>| places.iter().map(|at| change[*at]).sum::<f64>();
+            let squares = changes.iter().map(|change| change_of(change).powi(2));
+            let believed: f64 =
+                places.iter().flat_map(|row| places.iter().map(|at| believed[(*row, *at)])).sum();
             let sum: f64 = squares.clone().sum();
             // Of normal changes the fourth power is three times the variance's square.
             let telling = 3.0 * sum * sum / squares.map(|square| square * square).sum::<f64>().max(1e-300);
-            ((1.0 - 1.0 / windows) * sum * widened(telling).powi(2) + believed[(at, at)].max(0.0)).sqrt()
+            ((1.0 - 1.0 / windows) * sum * widened(telling).powi(2) + believed.max(0.0)).sqrt()
         };
-        Some((0..count).map(error).collect())
+        Some(sums.iter().map(|places| error(places.as_ref())).collect())
     }
 }
 

@@ -25,9 +25,10 @@ use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::parameters::COUNT;
-use crate::refit::{Around, Placed, Refit, refit, rig_of};
+use crate::refit::{Around, Placed, Refit, derivative, refit, rig_of};
 use crate::screen::{Columns, Screened};
 use home::{Placement, at_home};
+pub(crate) use joined::same;
 use joined::{alternatives, drop_unneeded, shares, swap};
 use needed::with_needed;
 use nothing::Nothing;
@@ -67,6 +68,15 @@ const REDUCES: f64 = 1.8;
 /// where rods are linked, damping alone takes up what starts within micrometres leave.
 const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
 
+/// What takes the place of an effect of a model just as well.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// A model with it, last, in the round in which the other one joined.
+    pub fit: Refit,
+    /// Share of the excess that goes with it.
+    pub share: f64,
+}
+
 /// What naming found.
 #[derive(Debug)]
 pub struct Found {
@@ -78,19 +88,17 @@ pub struct Found {
     /// parameters alone.
     pub told: Refit,
     /// What takes the place of each of its effects just as well.
-    pub alternatives: Vec<Vec<Refit>>,
+    pub alternatives: Vec<Vec<Alternative>>,
     /// Share of the excess that goes with each effect.
     pub shares: Vec<f64>,
     /// All candidates as first screened, the best first.
     pub screened: Vec<Screened>,
-    /// Those that were fitted alone.
+    /// Those that were fitted, each as the last effect of its model: first alone, then beside what joined.
     pub fitted: Vec<Refit>,
     /// Loss that nothing may gain.
     pub threshold: f64,
     /// Screening's columns, for limits.
     pub columns: Columns,
-    /// Sensitivities of the parameters at the baseline.
-    pub around: Around,
     /// Loss with the parameters alone, as screening sees it.
     pub nothing: f64,
     /// Smallest coordinate of each candidate's amplitude that would have been accepted; `None` where nothing is seen of it.
@@ -113,7 +121,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
     let Placement { mut home, fit } = at_home(engine, &calibrated.fit, 0.0);
-    let calibrated = Calibrated { fit, around: calibrated.around };
+    let calibrated = Calibrated { fit };
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
@@ -127,9 +135,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         progress(&format!("fitting {} candidates, round {}", contenders.count(), number + 1));
         let point = if number == 0 { around.clone() } else { around_of(here, &model) };
         let Some(mut round) = Round::fitted(here, &point, &model, &contenders, progress) else { break };
-        if number == 0 {
-            fitted.clone_from(&round.fits);
-        }
+        fitted.extend(round.fits.iter().cloned());
         round.keep_large();
         let best_home = round.take_home();
         let there = best_home.as_ref().unwrap_or(here);
@@ -165,8 +171,10 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     } else {
         with_needed(here, &model)
     };
-    let alternatives = model.placed.iter().map(|placed| alternatives(placed, &calibrated, &rounds)).collect();
     let shares = shares(&model, &rounds, &calibrated, excess);
+    let told_alike = model.placed.iter().zip(&shares);
+    let alternatives =
+        told_alike.map(|(own, share)| alternatives(own, *share, &model, &calibrated, &rounds)).collect();
     Found {
         calibrated,
         model,
@@ -177,7 +185,6 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         fitted,
         threshold,
         columns,
-        around,
         nothing,
         limits,
         inadequate,
@@ -236,8 +243,12 @@ pub fn is_large(placed: &Placed) -> bool {
 /// The smallest coordinate of an amplitude that counts as an effect.
 fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     let ends = candidate.sheet.keys[key].drawn.map(|number| candidate.coordinate(key, number));
-    // A range that holds the neutral value has no smallest change.
-    if ends[0] * ends[1] < 0.0 { 0.05 } else { FLOOR * ends[0].abs().min(ends[1].abs()) }
+    // A range that holds the neutral value has no smallest change, and what the rig file has already may be off by little.
+    if candidate.is_present() || ends[0] * ends[1] < 0.0 {
+        0.05
+    } else {
+        FLOOR * ends[0].abs().min(ends[1].abs())
+    }
 }
 
 /// From which coordinate of its amplitude on a candidate would have been named: it must stand out of nothing, be worth a fit, and
@@ -258,15 +269,7 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
     let residual = engine.residual(&simulated);
     let beside: Vec<Vec<f64>> = (0..model.placed.len())
         .into_par_iter()
-        .filter_map(|at| {
-            let mut placed = model.placed.clone();
-            let change = 0.02_f64.max(0.05 * placed[at].coordinates[0].abs());
-            placed[at].coordinates[0] += change;
-            let rig = rig_of(engine.rig(), &placed, &model.factors)?;
-            let mut column = engine.difference(&engine.simulate(&rig), &simulated);
-            column.iter_mut().for_each(|own| *own /= change);
-            Some(column)
-        })
+        .filter_map(|at| derivative(engine, &model.factors, &model.placed, &simulated, at, 0))
         .collect();
     columns.screen(engine, &around, &residual, &beside)
 }

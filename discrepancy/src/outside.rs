@@ -16,12 +16,11 @@
 pub mod dependence;
 pub mod formula;
 
-use crate::course::Course;
 use crate::locate::maps::{map, surface};
 use crate::locate::{UnknownSeries, VARIABLES};
 use crate::report::{Curve, Dependence, Outside};
-use dependence::{Bins, SHIFTS, Sample};
-use plant::RigParameters;
+pub(crate) use dependence::SHIFTS;
+use dependence::{Bins, Sample};
 
 /// How much a variable costs: of those nearly as good the cheapest is told first.
 const COSTS: [usize; VARIABLES.len()] = [0, 0, 1, 0, 0, 0, 1, 0, 2, 1, 3, 2];
@@ -52,12 +51,7 @@ struct Found<'a> {
 }
 
 /// What is missing that the catalogue does not have; `None` where nothing is.
-pub fn outside(
-    _rig: &RigParameters,
-    _courses: &[Course],
-    unknowns: &[UnknownSeries],
-    progress: &mut dyn FnMut(&str),
-) -> Option<Outside> {
+pub fn outside(unknowns: &[UnknownSeries], progress: &mut dyn FnMut(&str)) -> Option<Outside> {
     let mut best: Option<(f64, Found<'_>)> = None;
     for series in unknowns.iter().filter(|series| series.points.len() >= LEAST) {
         progress(&format!("outside: {}", series.balance));

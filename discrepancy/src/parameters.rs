@@ -29,8 +29,8 @@ pub const PARAMETERS: [Parameter; 9] = [
         keys: &["friction.viscous_n_per_mm_per_s"],
         tolerance: 0.1,
     },
-    Parameter { name: "parameter:sliding-friction", keys: &["friction.sliding_force_n"], tolerance: 0.1 },
-    Parameter { name: "parameter:break-away-force", keys: &["friction.break_away_force_n"], tolerance: 0.1 },
+    Parameter { name: "parameter:sliding-friction", keys: &[SLIDING], tolerance: 0.1 },
+    Parameter { name: "parameter:break-away-force", keys: &[BREAK_AWAY], tolerance: 0.1 },
     Parameter { name: "parameter:supply-pressure", keys: &["supply.pressure_bar"], tolerance: 0.05 },
     Parameter {
         name: "parameter:spool-time-constant",
@@ -49,6 +49,9 @@ pub const PARAMETERS: [Parameter; 9] = [
         tolerance: 0.02,
     },
 ];
+
+const SLIDING: &str = "friction.sliding_force_n";
+const BREAK_AWAY: &str = "friction.break_away_force_n";
 
 /// How many there are.
 pub const COUNT: usize = PARAMETERS.len();
@@ -81,20 +84,58 @@ impl Parameter {
     }
 }
 
-/// The rig with all factors applied; a factor that would leave a range, or the break-away force below the sliding one, is
-/// held there.
+/// The rig with all factors applied. A number that would leave its range is held at its end, and a break-away force that would be
+/// below the sliding one at that; numbers that the rest of the file contradicts stay what they are.
 #[must_use]
 pub fn with_factors(rig: &RigParameters, factors: &[f64; COUNT]) -> RigParameters {
-    let mut rig = rig.clone();
-    // Break-away before sliding, growing ones first: the file's order between them holds at every step.
-    let order: [usize; COUNT] =
-        if factors[3] >= factors[2] { [0, 1, 3, 2, 4, 5, 6, 7, 8] } else { [0, 1, 2, 3, 4, 5, 6, 7, 8] };
-    for at in order {
-        if factors[at] != 1.0
-            && let Ok(scaled) = PARAMETERS[at].scaled(&rig, factors[at])
-        {
-            rig = scaled;
+    let mut changes: Vec<(&str, Vec<f64>)> = Vec::new();
+    for (parameter, factor) in PARAMETERS.iter().zip(factors).filter(|(_, factor)| **factor != 1.0) {
+        for path in parameter.keys {
+            let key = table::KEYS.iter().find(|key| key.path() == *path).expect("the table has it");
+            let held = rig.numbers(path).iter().map(|number| (number * factor).clamp(key.min, key.max));
+            changes.push((path, held.collect()));
         }
     }
-    rig
+    let new = |path: &str| {
+        changes.iter().find(|(own, _)| *own == path).map_or(rig.numbers(path)[0], |own| own.1[0])
+    };
+    let (sliding_n, rest_n) = (new(SLIDING), new(BREAK_AWAY));
+    if rest_n < sliding_n {
+        changes.retain(|(path, _)| *path != BREAK_AWAY);
+        changes.push((BREAK_AWAY, vec![sliding_n]));
+    }
+    let all = changes.iter().map(|(path, numbers)| (*path, numbers.as_slice()));
+    rig.with_all(all.clone()).unwrap_or_else(|_| {
+        all.fold(rig.clone(), |rig, (path, numbers)| rig.with(path, numbers).unwrap_or(rig))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factors(changed: &[(&str, f64)]) -> [f64; COUNT] {
+        let of = |name: &str| changed.iter().find(|(own, _)| *own == name).map_or(1.0, |own| own.1);
+        PARAMETERS.map(|parameter| of(parameter.name.trim_start_matches("parameter:")))
+    }
+
+    #[test]
+    fn factors_that_go_together_are_applied_together() {
+        let rig = RigParameters::baseline();
+        // Either of them alone would be refused on the way.
+        let own = with_factors(&rig, &factors(&[("break-away-force", 0.72), ("sliding-friction", 0.7)]));
+        assert_eq!(own.numbers(BREAK_AWAY)[0], 0.72 * rig.numbers(BREAK_AWAY)[0]);
+        assert_eq!(own.numbers(SLIDING)[0], 0.7 * rig.numbers(SLIDING)[0]);
+        let own = with_factors(&rig, &factors(&[("piston-area", 0.8)]));
+        for path in ["cylinder.piston_area_mm2", "cylinder.annulus_area_mm2"] {
+            assert_eq!(own.numbers(path)[0], 0.8 * rig.numbers(path)[0]);
+        }
+    }
+
+    #[test]
+    fn a_piston_at_rest_holds_at_least_what_slides() {
+        let rig = RigParameters::baseline();
+        let own = with_factors(&rig, &factors(&[("break-away-force", 0.7)]));
+        assert_eq!(own.numbers(BREAK_AWAY), own.numbers(SLIDING));
+    }
 }

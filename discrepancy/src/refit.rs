@@ -2,11 +2,11 @@
 //!
 //! ```text
 //!   e(z) = readings - simulation with the effects at z       columns: N (parameters), d simulation / d z_i
-//!   fit of the columns to e(z) -> step of z, halved until the loss falls; ridges hold how far all of it is from the file
+//!   fit of the columns to e(z) -> step of z, shorter until the loss falls; ridges hold how far all of it is from the file
 //! ```
 //!
-//! Derivatives are differences of a twentieth of the coordinate's unit, never exact ones: through stick and slip those of
-//! a single trajectory say nothing. Source: discrepancy-notes.md, pipeline 6.
+//! Derivatives are differences over a twentieth of the coordinate, two hundredths of its unit at least, never exact ones: through
+//! stick and slip those of a single trajectory say nothing. Source: discrepancy-notes.md, pipeline 6.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
@@ -17,9 +17,10 @@ use plant::RigParameters;
 /// Change of a coordinate by which derivatives are taken, at least and in proportion.
 const CHANGE: f64 = 0.02;
 const CHANGE_SHARE: f64 = 0.05;
-/// Steps at most, and halvings of one.
+/// Steps at most, how often one is made shorter, and to what share of it.
 const STEPS: usize = 7;
-const HALVINGS: usize = 3;
+const SHORTENINGS: usize = 3;
+const SHORTER: f64 = 0.4;
 /// Fall of the loss below which a fit has settled.
 const SETTLED: f64 = 0.3;
 /// Standard deviations of coordinates before anything is measured: amplitudes, shapes.
@@ -32,6 +33,7 @@ pub(crate) const MOST_OFF: f64 = 0.3;
 const PARAMETER_COSTS: f64 = 8.0;
 /// From where on a parameter counts as off.
 const COUNTS_AS_OFF: f64 = 0.005;
+
 /// One effect at some coordinates.
 #[derive(Clone, Debug)]
 pub struct Placed {
@@ -191,7 +193,7 @@ pub fn refit_steps(
         }
         let mut share = 1.0;
         let mut better = None;
-        for _ in 0..=HALVINGS {
+        for _ in 0..=SHORTENINGS {
             let mut placed = point.placed.clone();
             for ((at, key), change) in moved.iter().zip(&joint.coefficients[COUNT..]) {
                 let [least, most] = placed[*at].candidate.reach(*key);
@@ -204,7 +206,7 @@ pub fn refit_steps(
                 better = Some(tried);
                 break;
             }
-            share *= 0.4;
+            share *= SHORTER;
         }
         let Some(tried) = better else { break };
         let settled = before - (tried.fit.loss + prior(&tried.placed)) < SETTLED;
@@ -251,7 +253,7 @@ pub(crate) fn coordinate_columns(
 }
 
 /// What a coordinate changes, per unit of it; towards the inside where the range ends.
-fn derivative(
+pub(crate) fn derivative(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
     placed: &[Placed],

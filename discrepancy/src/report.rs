@@ -233,7 +233,7 @@ pub struct Dependence {
     pub variable: String,
     /// Share of the variance explained on folds it was not fitted on.
     pub r2: f64,
-    /// Of 200 circular shifts, the share that reached this much.
+    /// One and the circular shifts that reached this much, over one and all 200.
     pub p_value: f64,
 }
 
@@ -397,7 +397,7 @@ pub struct Finding {
     pub column: Option<String>,
     /// First line of the file that it is about.
     pub line: Option<u64>,
-    /// Whether the record cannot be used for it; else its samples are left out.
+    /// Whether the record cannot be used for it; else what it says is borne, or left out.
     pub fatal: bool,
     /// What, where, and what to do.
     pub text: String,

@@ -21,7 +21,7 @@ use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions};
-use crate::report::{self, InputFiles, NamedEffect, Quantity, Report, TableTerm, Verdict};
+use crate::report::{self, InputFiles, NamedEffect, Next, Quantity, Report, TableTerm, Verdict};
 use crate::tabulate::{tables, tabulate};
 use crate::verify::verify;
 use plant::{Axis, ParameterError, RigParameters};
@@ -196,7 +196,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     }
     let engine = Engine::new(part.as_ref().unwrap_or(&courses), rig);
     let linked = courses.iter().any(|course| course.linked);
-    let candidates = Candidate::all(courses[0].measured, linked, &task.without);
+    let candidates = Candidate::all(rig, courses[0].measured, linked, &task.without);
     let mut found = name(&engine, candidates, progress);
     if part.is_some() {
         progress("fitting what was found on all of the records");
@@ -211,7 +211,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
         // Beside what the parameters explain: a wrong mass is no unknown force.
         let calibrated = found.calibrated.rig(rig);
         let unknowns = locate(&calibrated, &courses, progress).unknowns;
-        report.outside = outside(&calibrated, &courses, &unknowns, progress);
+        report.outside = outside(&unknowns, progress);
         if let Some(told) = &mut report.outside {
             match tabulate(&engine, &found.calibrated, &found.told, told, &unknowns, progress) {
                 Ok(found) => {
@@ -270,26 +270,34 @@ fn held_out(
         return Ok(Pictures { record: courses[0].name.clone(), held_out: false, traces: verified.traces });
     };
     progress(&format!("judging on {}", test.display()));
+    let unusable = |why: String| WorkflowError::Unusable { file: test.display().to_string(), why };
     let opened = open(test, &task.options, rig)?;
-    let Some(course) = opened.course else {
-        return Err(WorkflowError::Unusable {
-            file: test.display().to_string(),
-            why: fatal(std::slice::from_ref(&opened.checked.report)),
-        });
+    let Some(mut course) = opened.course else {
+        return Err(unusable(fatal(std::slice::from_ref(&opened.checked.report))));
     };
     if let Some(train) = task.train.iter().find(|train| is_copy(train, test)) {
-        return Err(WorkflowError::Unusable {
-            file: test.display().to_string(),
-            why: format!(
-                "it is a copy of {}: a model is judged on a record that it never saw",
-                train.display()
-            ),
-        });
+        let train = train.display();
+        return Err(unusable(format!(
+            "it is a copy of {train}: a model is judged on a record that it never saw"
+        )));
     }
+    course.measured = judged_axes(&course, courses[0].measured).map_err(unusable)?;
     let verified = verify(rig, after, &course, progress);
     report.gap = verified.gap;
     report.verification = Some(verified.verification);
     Ok(Pictures { record: course.name.clone(), held_out: true, traces: verified.traces })
+}
+
+/// The axes of a held-out record that the training records show as well: of the others nothing was fitted.
+fn judged_axes(course: &Course, trained: [bool; 2]) -> Result<[bool; 2], String> {
+    let shared = [0, 1].map(|axis| course.measured[axis] && trained[axis]);
+    if shared == [false, false] {
+        return Err("it shows no axis that the training records show".to_owned());
+    }
+    if course.linked && shared != course.measured {
+        return Err("its rods are linked, and the training records show one of its axes alone".to_owned());
+    }
+    Ok(shared)
 }
 
 /// Whether two files have the same bytes.
@@ -331,7 +339,8 @@ pub struct ToldOutside {
 pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> {
     let additions: Vec<Addition> = told.named.iter().map(addition).collect();
     let changed = [&told.parameters[..], &told.carried].concat();
-    let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, &told.inputs.train)?;
+    let weighed = weighed(measured(told));
+    let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, weighed, &told.inputs.train)?;
     let terms = told.outside.as_ref().map_or(&[][..], |own| &own.tables);
     add_tables(&text, &rig_file.file, &tables(terms), &told.inputs.train)
 }
@@ -339,8 +348,12 @@ pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> 
 /// The experiment that tells apart what a report could not; `None` when there is nothing to tell apart.
 #[must_use]
 pub fn proposal(rig_file: &RigFile, told: &Told, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
-    let measured = Axis::ALL.map(|axis| told.inputs.axes.iter().any(|own| own == axis.name()));
-    proposal_for(rig_file, told, measured, progress)
+    proposal_for(rig_file, told, measured(told), progress)
+}
+
+/// Which axes the training records of a report showed.
+fn measured(told: &Told) -> [bool; 2] {
+    Axis::ALL.map(|axis| told.inputs.axes.iter().any(|own| own == axis.name()))
 }
 
 fn proposal_for(
@@ -361,7 +374,17 @@ fn proposal_for(
             Some(Explanation { rig, names: names.collect() })
         })
         .collect();
-    (explanations.len() > 1).then(|| next::propose(&rig_file.rig, &explanations, measured, progress))
+    if explanations.len() < 2 {
+        let named = &told.named[at];
+        let reason = format!(
+            "{} {} and what explains as much cannot both be written into the rig file beside the rest: nothing can be rehearsed",
+            named.effect,
+            place_name(&named.place)
+        );
+        let next = Next { reason, experiment: None, divergence: None, otherwise: None };
+        return Some(Proposal { next, experiment_toml: None, table: Vec::new() });
+    }
+    Some(next::propose(&rig_file.rig, &explanations, measured, progress))
 }
 
 fn open_all(
@@ -380,7 +403,7 @@ fn open_all(
 
 /// Takes what all records show: an axis that one of them lacks is left out of the others. Linked rods move together, so that no
 /// axis of theirs can be left out.
-fn on_shared_axes(courses: &mut [Course]) -> Result<(), WorkflowError> {
+pub(crate) fn on_shared_axes(courses: &mut [Course]) -> Result<(), WorkflowError> {
     let shared = [0, 1].map(|axis| courses.iter().all(|course| course.measured[axis]));
     let lacks = |course: &&Course| course.measured != shared && (course.linked || shared == [false, false]);
     if let Some(course) = courses.iter().find(lacks) {
@@ -389,6 +412,12 @@ fn on_shared_axes(courses: &mut [Course]) -> Result<(), WorkflowError> {
     }
     courses.iter_mut().for_each(|course| course.measured = shared);
     Ok(())
+}
+
+/// The axis whose mass a mass is that has a unit: of both together only a factor is told.
+#[must_use]
+pub(crate) fn weighed(measured: [bool; 2]) -> Axis {
+    if measured == [false, true] { Axis::Load } else { Axis::Drive }
 }
 
 /// What makes records unusable, in words.
@@ -446,6 +475,16 @@ mod tests {
             on_shared_axes(&mut courses).unwrap();
             assert!(courses.iter().all(|course| course.measured == shared), "{records:?}");
         }
+    }
+
+    #[test]
+    fn a_held_out_record_is_judged_on_what_was_trained() {
+        let judged = |measured, linked, trained| judged_axes(&course("a", measured, linked), trained);
+        assert_eq!(judged(BOTH, false, DRIVE), Ok(DRIVE));
+        assert_eq!(judged(DRIVE, false, BOTH), Ok(DRIVE));
+        assert_eq!(judged(BOTH, true, BOTH), Ok(BOTH));
+        assert!(judged(LOAD, false, DRIVE).unwrap_err().contains("no axis"));
+        assert!(judged(BOTH, true, DRIVE).unwrap_err().contains("linked"));
     }
 
     #[test]

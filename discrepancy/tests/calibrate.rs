@@ -12,7 +12,7 @@ use discrepancy::engine::Engine;
 use discrepancy::extend::extend;
 use discrepancy::parameters::COUNT;
 use discrepancy::refit::Around;
-use plant::RigParameters;
+use plant::{Axis, RigParameters};
 
 const KV_SUPPLY: [f64; 6] = [0.0, 0.0, 0.123, 0.36, 0.57, 0.66];
 
@@ -69,8 +69,8 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
         assert!((own.value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{own:?}, in truth {truth}");
     }
     // As a file it is the rig that left the record, as far as the record tells.
-    let text =
-        extend(RigParameters::BASELINE_TOML, "rig.toml", &[], &found.changed, &[]).expect("a rig file");
+    let text = extend(RigParameters::BASELINE_TOML, "rig.toml", &[], &found.changed, Axis::Drive, &[])
+        .expect("a rig file");
     let after = RigParameters::from_toml(&text, "rig.toml").expect("it was read once");
     let chi2 = |rig: &RigParameters| {
         let left = engine.residual(&engine.simulate(rig));

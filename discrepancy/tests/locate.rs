@@ -18,7 +18,7 @@ fn located(effect: Option<Hidden<'_>>) -> (Located, Option<Outside>) {
     });
     let courses = [course(&hidden, 11)];
     let located = locate(&rig, &courses, &mut |_| ());
-    let outside = outside(&rig, &courses, &located.unknowns, &mut |_| ());
+    let outside = outside(&located.unknowns, &mut |_| ());
     (located, outside)
 }
 

@@ -10,11 +10,14 @@ use discrepancy::parameters::{COUNT, with_factors};
 use plant::RigParameters;
 
 fn found(hidden: &RigParameters, without: &[&str]) -> Found {
+    found_beside(&RigParameters::baseline(), hidden, without)
+}
+
+fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> Found {
     let courses = [course(hidden, 11)];
-    let rig = RigParameters::baseline();
-    let engine = Engine::new(&courses, &rig);
+    let engine = Engine::new(&courses, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
-    name(&engine, Candidate::all([true, false], false, &without), &mut |_| ())
+    name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())
 }
 
 /// Name, place and numbers of an effect.
@@ -107,6 +110,22 @@ fn two_hidden_effects_are_both_named() {
     let mut named = names(&found(&hidden, &[]));
     named.sort();
     assert_eq!(named, ["inclination drive", "valve-dead-zone drive"]);
+}
+
+#[test]
+fn an_effect_that_the_rig_file_has_is_named_where_it_is_off_and_only_there() {
+    let leaking =
+        |nl_per_min: f64| with(&[("piston-leakage", "drive", &[("leakage_nl_per_min", nl_per_min)])]);
+    let rig = leaking(3.0);
+    assert_eq!(names(&found_beside(&rig, &rig, &[])), Vec::<String>::new());
+    for truth in [0.0, 6.0] {
+        let found = found_beside(&rig, &leaking(truth), &[]);
+        assert_eq!(names(&found), ["piston-leakage drive"], "{truth}");
+        let placed = &found.told.placed[0];
+        let told = placed.candidate.numbers(&placed.coordinates)[0];
+        assert!((told - truth).abs() < 0.3, "{told}, in truth {truth}");
+        assert_eq!(placed.candidate.baseline(0), Some(3.0));
+    }
 }
 
 #[test]

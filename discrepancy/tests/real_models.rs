@@ -4,7 +4,7 @@
 
 mod real;
 
-use discrepancy::balance::{close_on, extended_model_text};
+use discrepancy::balance::{close, extended_model_text};
 use discrepancy::report::{Report, Verdict};
 use real::{crate_folder, data};
 use std::io::Write;
@@ -16,7 +16,7 @@ fn model(name: &str) -> PathBuf {
 
 fn closed(model: &Path, train: &[PathBuf], tests: &[PathBuf]) -> Report {
     let tests: Vec<&Path> = tests.iter().map(PathBuf::as_path).collect();
-    let closed = close_on(model, train, &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"));
+    let closed = close(model, train, &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(closed.not_judged, None);
     closed.report
 }

@@ -12,6 +12,7 @@
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
 //!   door ──── the gateway, and a client that does what it is told
 //!   onlooker  a viewer of the telemetry, and the live page as programs see it
+//!   discrepancy  the workflow as a program
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   firmware  a controller in C, and how well it positions
 //!   own ───── algorithms in C, built as a user builds them
@@ -33,6 +34,7 @@ pub mod axis_table;
 pub mod binaries;
 pub mod broken;
 pub mod bus_cycles;
+pub mod discrepancy;
 pub mod disturb;
 pub mod door;
 pub mod events;

@@ -12,9 +12,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Build, Program, executable};
+use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::launch::Pace;
-use system_tests::process::{Ended, PATIENCE, Running};
+use system_tests::process::{Ended, Running};
 use system_tests::record_maker::{Experiment, Hidden, Recipe, simulate, write};
 use system_tests::records::json;
 use system_tests::scene::{SHORT, Scene};
@@ -60,16 +61,6 @@ fn records() -> &'static Records {
         let test = make("test", Experiment::HeldOut(0), 2);
         Records { folder, train, test }
     })
-}
-
-fn rig() -> PathBuf {
-    workspace().join("plant/rig.toml")
-}
-
-fn discrepancy(arguments: &[&dyn AsRef<OsStr>]) -> Ended {
-    let mut command = Command::new(executable(Program::Discrepancy, Build::Shipped));
-    command.args(arguments.iter().map(|argument| argument.as_ref()));
-    Running::start("discrepancy", &mut command).wait_within(2 * PATIENCE)
 }
 
 /// A step on a training record.

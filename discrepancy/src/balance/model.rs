@@ -4,7 +4,7 @@
 
 use super::BalanceError;
 use crate::records::{Channel, Mapping};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -130,15 +130,13 @@ impl Default for Baseline {
 }
 
 /// A term that was added to the model; its numbers are told for people, and fitted again with the others.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TermEntry {
     /// Name in the catalogue.
     pub effect: String,
     /// Which form of it; empty where there is one.
-    #[serde(default)]
     pub form: String,
     /// Numbers that shape it, in the units of their names.
-    #[serde(default)]
     pub shape: BTreeMap<String, f64>,
 }
 

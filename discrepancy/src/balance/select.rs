@@ -21,7 +21,7 @@
 
 use super::fit::{Columns, Cut, Rows, clustered_t};
 use super::model::{Selection, TermEntry};
-use super::terms::Family;
+use super::terms::{Family, amplitude};
 
 /// Clustered standard errors that folds in time ask, and those in bands.
 const T_TIME: f64 = 3.0;
@@ -60,11 +60,13 @@ pub(super) struct Judged {
     pub(super) number: f64,
     /// Share of the power left out in time that it takes.
     pub(super) share: f64,
-    /// The least of what was asked over what was there: above 1 passes.
+    /// The least of what was there over what was asked: above 1 passes.
     pub(super) score: f64,
     /// The gate that decided.
     pub(super) gate: String,
     pub(super) passes: bool,
+    /// Whether the records tell it from the baseline at all.
+    pub(super) is_excited: bool,
     /// Squares left out of each fold in time.
     left: Vec<f64>,
     /// Power that its fit leaves, and how many rows that is worth.
@@ -183,6 +185,7 @@ fn judge(
         score: 0.0,
         gate,
         passes: false,
+        is_excited: true,
         left: Vec::new(),
         power: f64::INFINITY,
         effective: 0.0,
@@ -200,7 +203,8 @@ fn judge(
         })
         .collect();
     if tried.is_empty() {
-        return refused("these records cannot tell it from the baseline".into(), 0, 0.0);
+        let alike = refused("these records cannot tell it from the baseline".into(), 0, 0.0);
+        return Judged { is_excited: false, ..alike };
     }
     let number_of = |fit: &super::fit::Fit| fit.numbers[columns.len()];
     let allowed = tried.iter().filter(|(_, fit, _)| !family.positive || number_of(fit) >= 0.0);
@@ -219,7 +223,7 @@ fn judge(
     };
     let variant = ties.remove(0);
     let (_, fit, power) = tried.iter().find(|(own, ..)| *own == variant).expect("it was tried");
-    let number = number_of(fit);
+    let number = amplitude(&family.variants[variant], &fit.numbers[columns.len()..]);
     let power_before = rows.power(&before.residual);
     let more = variants[variant].len() as f64;
     let all: usize = families.iter().map(|family| family.columns.len()).sum();
@@ -265,6 +269,7 @@ fn judge(
         score,
         gate,
         passes: score > 1.0,
+        is_excited: true,
         left,
         power: *power,
         effective,

@@ -128,12 +128,12 @@ impl Study {
             before: None,
         };
         let mut all = Vec::new();
-        let value =
-            if entry.form == "ripple" { numbers[first].hypot(numbers[first + 1]) } else { numbers[first] };
+        let value = terms::amplitude(entry, &numbers[first..]);
+        let error = terms::amplitude_error(entry, &numbers[first..], &errors[first..]);
         let base = terms::baseline(&self.model);
         let viscous = base.iter().position(|column| column.name == "viscous").map(|at| numbers[at]);
         if let Some(viscous) = viscous.filter(|b| entry.effect == "friction-asymmetry" && *b != 0.0) {
-            let [percent, error] = [value, errors[first]].map(|number| 100.0 * number / viscous);
+            let [percent, error] = [value, error].map(|number| 100.0 * number / viscous);
             all.push(quantity("asymmetry_percent", "%", percent, Some(error.abs())));
             all.push(quantity("viscous_outward_n_s_per_m", "N s/m", viscous + value, None));
             all.push(quantity("viscous_inward_n_s_per_m", "N s/m", viscous - value, None));
@@ -147,13 +147,13 @@ impl Study {
             _ => None,
         };
         let told = value * factor + before.unwrap_or(0.0);
-        let error = Some(errors[first] * factor);
+        let error = Some(error * factor);
         all.push(Quantity { before, ..quantity(name, unit, told, error) });
         all.extend(entry.shape.iter().map(|(key, value)| quantity(key, shape_unit(key), *value, None)));
         all
     }
 
-    /// Clustered standard errors of a fit over these columns; none known counts as infinite, and is told as none.
+    /// Clustered standard errors of a fit over these columns; one that is not known is NaN, and told as none.
     fn errors(&self, columns: &super::Columns, fit: &super::Fit) -> Vec<f64> {
         self.rows.covariance(columns, fit, &self.time).map_or_else(
             || vec![f64::NAN; columns.len()],
@@ -239,7 +239,10 @@ impl Study {
                 let last = self.found.last.iter().find(|last| last.place == judged.place);
                 let fate = match (taken(judged), last) {
                     (Some(round), _) => {
-                        format!("taken {} ({})", ["first", "second", "third"][round.min(2)], told(entry))
+                        let ordinal = ["first", "second", "third"]
+                            .get(round)
+                            .map_or_else(|| format!("as number {}", round + 1), |own| (*own).to_owned());
+                        format!("taken {ordinal} ({})", told(entry))
                     }
                     (None, Some(last)) if last.passes => {
                         format!("passes, but another was better ({})", told(entry))
@@ -267,8 +270,7 @@ impl Study {
 
     /// Families that no fit can tell from the baseline.
     fn not_excited(&self) -> Vec<EffectPlace> {
-        let told =
-            self.found.first.iter().filter(|judged| judged.gate.contains("cannot tell it from the baseline"));
+        let told = self.found.first.iter().filter(|judged| !judged.is_excited);
         let effects = told.map(|judged| self.families[judged.place].family.variants[0].effect.clone());
         effects.map(|effect| EffectPlace { place: place(&effect), effect }).collect()
     }
@@ -281,7 +283,7 @@ impl Study {
             let prepared = &self.families[judged.place];
             let entry = &prepared.family.variants[judged.variant];
             let (name, unit, factor) = shown(entry);
-            if entry.effect.starts_with("decoy:") || judged.gate.contains("cannot tell it") {
+            if entry.effect.starts_with("decoy:") || !judged.is_excited {
                 continue;
             }
             let column =

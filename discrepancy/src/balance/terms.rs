@@ -283,6 +283,20 @@ pub(super) fn shape_unit(key: &str) -> &'static str {
     units.iter().rev().find(|(end, _)| key.ends_with(*end)).map_or("", |(_, unit)| unit)
 }
 
+/// What a term does at most, by its numbers: a ripple is a sine and a cosine.
+pub(super) fn amplitude(entry: &TermEntry, numbers: &[f64]) -> f64 {
+    if entry.form == "ripple" { numbers[0].hypot(numbers[1]) } else { numbers[0] }
+}
+
+/// Its standard error, by those of its numbers.
+pub(super) fn amplitude_error(entry: &TermEntry, numbers: &[f64], errors: &[f64]) -> f64 {
+    if entry.form != "ripple" {
+        return errors[0];
+    }
+    let whole = amplitude(entry, numbers).max(f64::MIN_POSITIVE);
+    (numbers[0] * errors[0]).hypot(numbers[1] * errors[1]) / whole
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -52,10 +52,10 @@ fn closed(rig: &RigParameters) -> (Report, String) {
         file
     });
     let model = model(folder.path());
-    let report = close(&model, &files[..1], Some(&files[1]), &mut |_| {}).unwrap().report;
+    let report = close(&model, &files[..1], &[&files[1]], &mut |_| {}).unwrap().report;
     let extended = extended_model_text(&model, &report).unwrap();
     std::fs::write(folder.path().join("extended.toml"), &extended).unwrap();
-    let again = close(&folder.path().join("extended.toml"), &files[..1], None, &mut |_| {}).unwrap().report;
+    let again = close(&folder.path().join("extended.toml"), &files[..1], &[], &mut |_| {}).unwrap().report;
     assert!(again.named.is_empty(), "the extended model lacks {:?}", again.named);
     (report, extended)
 }
@@ -165,20 +165,20 @@ fn is_near(report: &Report, mass_kg: f64) -> bool {
 fn a_record_of_one_balance_is_checked_before_it_is_believed() {
     let good = tempfile::tempdir().unwrap();
     let (model, train) = mass(good.path(), |_, row| row);
-    let closed = close(&model, std::slice::from_ref(&train), None, &mut |_| {}).unwrap();
+    let closed = close(&model, std::slice::from_ref(&train), &[], &mut |_| {}).unwrap();
     assert_ne!(closed.report.verdict, Verdict::BadData, "{}", closed.report.summary);
     assert!(is_near(&closed.report, 1.6), "{}", closed.report.summary);
 
     let turned = tempfile::tempdir().unwrap();
     let (turned_model, turned_train) = mass(turned.path(), |_, [t, x, f]| [t, x, -f]);
-    let report = close(&turned_model, &[turned_train], None, &mut |_| {}).unwrap().report;
+    let report = close(&turned_model, &[turned_train], &[], &mut |_| {}).unwrap().report;
     assert_eq!((report.verdict, report.named.len()), (Verdict::BadData, 0), "{}", report.summary);
     assert!(report.summary.contains("a mass of -1."), "{}", report.summary);
 
     let stuck = tempfile::tempdir().unwrap();
     let (stuck_model, stuck_train) =
         mass(stuck.path(), |k, [t, x, f]| if k < 3500 { [t, 0.05, f] } else { [t, x, f] });
-    let report = close(&stuck_model, &[stuck_train], None, &mut |_| {}).unwrap().report;
+    let report = close(&stuck_model, &[stuck_train], &[], &mut |_| {}).unwrap().report;
     assert_eq!(report.verdict, Verdict::BadData, "{}", report.summary);
     assert!(report.summary.contains("mass.csv:2: drive_position_m: stuck"), "{}", report.summary);
 }
@@ -189,7 +189,7 @@ fn a_held_out_record_of_one_balance_that_cannot_be_used_takes_nothing_away() {
     let (model, train) = mass(folder.path(), |_, row| row);
     let test = folder.path().join("short.csv");
     std::fs::write(&test, "t,x,f\n0,0,0\n0.001,0,0\n").unwrap();
-    let closed = close(&model, &[train], Some(&test), &mut |_| {}).unwrap();
+    let closed = close(&model, &[train], &[&test], &mut |_| {}).unwrap();
     assert!(closed.not_judged.is_some_and(|why| why.contains("short.csv")));
     assert!(closed.report.verification.is_none() && is_near(&closed.report, 1.6));
 }
@@ -198,6 +198,6 @@ fn a_held_out_record_of_one_balance_that_cannot_be_used_takes_nothing_away() {
 fn a_stamp_far_beyond_is_refused_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let (model, train) = mass(folder.path(), |k, [t, x, f]| [if k == 5999 { 1e12 } else { t }, x, f]);
-    let error = close(&model, &[train], None, &mut |_| {}).unwrap_err().to_string();
+    let error = close(&model, &[train], &[], &mut |_| {}).unwrap_err().to_string();
     assert!(error.contains("mass.csv:6001: 1000000000000 s: 6000 rows"), "{error}");
 }

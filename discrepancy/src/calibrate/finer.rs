@@ -83,45 +83,45 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         }
     }
     let (at, products, fit) = best?;
-    let covariance = products.covariance(&all, &fit, &ridges)?;
+    // Points of tables with what they have in common, as the rig file takes them.
+    let in_file = numbers
+        .iter()
+        .zip(COUNT..)
+        .map(|(number, at)| if rig.numbers(number.key).len() > 1 { vec![at, scale] } else { vec![at] });
+    let sums: Vec<Vec<usize>> = all.iter().map(|at| vec![*at]).chain(in_file).collect();
+    let errors = products.jackknife_of_sums(&all, &fit, &ridges, &sums)?;
+    let (own_errors, file_errors) = errors.split_at(all.len());
     let factors = moved(rig, &numbers, &at, &fit.coefficients)?;
-    let variance = |left: usize, right: usize| covariance[(left, right)];
-    let error = |at: usize| variance(at, at).max(0.0).sqrt();
 
     let mut own = [1.0; COUNT];
     own.copy_from_slice(&factors[..COUNT]);
-    let errors = (0..COUNT).map(error).collect();
-    let refit = Refit { factors: own, errors, ..calibrated.fit.clone() };
+    let refit = Refit { factors: own, errors: own_errors[..COUNT].to_vec(), ..calibrated.fit.clone() };
     let parameters: Vec<Quantity> = (0..COUNT).map(|at| super::quantity(engine, at, &refit)).collect();
     let mut told = parameters.clone();
     let mut changed: Vec<Quantity> =
         parameters.into_iter().enumerate().filter(|(at, _)| *at != scale).map(|(_, own)| own).collect();
     changed.retain(|own| own.standard_error.is_some());
-    let is_told = |at: usize| error(COUNT + at) < UNTOLD * numbers[at].tolerance;
+    let is_told = |at: usize| own_errors[COUNT + at] < UNTOLD * numbers[at].tolerance;
     // Points of a table go together, so that it does not fall where one of them is left behind.
     let is_changed = |key: &str| {
         let any = (0..numbers.len()).any(|at| numbers[at].key == key && is_told(at));
         any || (rig.numbers(key).len() > 1 && told[scale].standard_error.is_some())
     };
     let changes: Vec<bool> = numbers.iter().map(|number| is_changed(number.key)).collect();
-    for (at, number) in (COUNT..).zip(&numbers) {
+    for (at, number) in numbers.iter().enumerate() {
         let list = rig.numbers(number.key);
         let before = list[number.place];
         let key = KEYS.iter().find(|key| key.path() == number.key)?;
-        let (mut factor, mut square) = (factors[at], variance(at, at));
         let of_table = list.len() > 1;
-        if of_table {
-            factor *= factors[scale];
-            square += variance(scale, scale) + 2.0 * variance(at, scale);
-        }
+        let factor = factors[COUNT + at] * if of_table { factors[scale] } else { 1.0 };
         let quantity = Quantity {
             name: if of_table { format!("{}[{}]", number.key, number.place) } else { number.key.to_owned() },
             value: before * factor,
             unit: key.unit.name().to_owned(),
-            standard_error: is_told(at - COUNT).then_some(before * square.max(0.0).sqrt()),
+            standard_error: is_told(at).then_some(before * file_errors[at]),
             before: Some(before),
         };
-        if changes[at - COUNT] {
+        if changes[at] {
             changed.push(quantity.clone());
         }
         told.push(quantity);

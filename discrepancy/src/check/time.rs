@@ -50,10 +50,12 @@ pub(super) fn check(notes: &mut Notes) {
         times.iter().copied().fold(f64::MIN, f64::max) - times.iter().copied().fold(f64::MAX, f64::min);
     let short = if of_rig { length_s < SHORTEST_S - 1.5 * nominal } else { times.len() < FEWEST_ROWS };
     if short {
-        let text = format!(
-            "{} rows over {length_s:.3} s are too short: at least {SHORTEST_S} s are needed",
-            times.len()
-        );
+        let least = if of_rig {
+            format!("{SHORTEST_S} s are needed")
+        } else {
+            format!("{FEWEST_ROWS} rows are needed")
+        };
+        let text = format!("{} rows over {length_s:.3} s are too short: at least {least}", times.len());
         notes.tell_time("too-short", Some(0), true, &text);
     }
     if !(0.9..=1.1).contains(&ratio) {

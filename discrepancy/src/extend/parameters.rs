@@ -4,8 +4,8 @@ use super::edits::Edits;
 use super::{ExtendError, told, written};
 use crate::parameters::PARAMETERS;
 use crate::report::Quantity;
+use plant::Axis;
 use plant::parameters::table::{KEYS, Key};
-use plant::{Axis, RigParameters};
 use std::ops::Range;
 use toml_edit::{Document, Item};
 
@@ -26,11 +26,11 @@ pub fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static str>> {
 
 /// The keys of a changed parameter, and the factor on them.
 ///
-/// Without a unit the value is the factor, on both axes; with the file's unit it is the new number of the first key. A mass is
-/// the load's where the number before was the load's and not the drive's.
+/// Without a unit the value is the factor, on both axes; with the file's unit it is the new number of the first key, a mass that
+/// of the axis that was `weighed`.
 fn scaling(
-    rig: &RigParameters,
     quantity: &Quantity,
+    weighed: Axis,
     number_of: impl Fn(&str) -> Option<f64>,
 ) -> Result<(Vec<&'static str>, Option<f64>), ExtendError> {
     let unknown = || ExtendError::UnknownParameter { name: quantity.name.clone(), known: names().join(", ") };
@@ -47,10 +47,7 @@ fn scaling(
         }
         return Ok((keys, Some(quantity.value)));
     }
-    let [drive_kg, load_kg] = [rig.mass().drive_kg, rig.mass().load_kg];
-    let is_load = quantity.before.is_some_and(|before| before == load_kg && before != drive_kg);
-    let axis = if is_load { Axis::Load } else { Axis::Drive };
-    let keys = key_of_parameter(&quantity.name, axis).ok_or_else(unknown)?;
+    let keys = key_of_parameter(&quantity.name, weighed).ok_or_else(unknown)?;
     let key = KEYS.iter().find(|key| key.path() == keys[0]).filter(|key| key.count == 1);
     let wanted = key.map_or("", |key| key.unit.name());
     if quantity.unit != wanted {
@@ -77,8 +74,8 @@ fn number_of_file(name: &str) -> Option<(&str, usize)> {
 /// The text with all changed parameters.
 pub(super) fn change(
     text: &str,
-    rig: &RigParameters,
     changed: &[Quantity],
+    weighed: Axis,
     from: &str,
     layout: &dyn Fn(&str, String) -> ExtendError,
 ) -> Result<String, ExtendError> {
@@ -115,7 +112,7 @@ pub(super) fn change(
             edits.replace(span.clone(), written(quantity.value));
             continue;
         }
-        let (keys, factor) = scaling(rig, quantity, number_of)?;
+        let (keys, factor) = scaling(quantity, weighed, number_of)?;
         for (at, path) in keys.into_iter().enumerate() {
             if done.iter().any(|own| own.split('[').next() == Some(path)) {
                 return Err(ExtendError::Twice { what: path.to_owned() });

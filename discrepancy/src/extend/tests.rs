@@ -29,7 +29,7 @@ fn quantity(name: &str, value: f64, unit: &str, before: Option<f64>) -> Quantity
 }
 
 fn extended(text: &str, additions: &[Addition], changed: &[Quantity]) -> RigParameters {
-    let text = extend(text, "rig.toml", additions, changed, &records()).unwrap();
+    let text = extend(text, "rig.toml", additions, changed, Axis::Drive, &records()).unwrap();
     RigParameters::from_toml(&text, "rig.toml").unwrap()
 }
 
@@ -41,7 +41,7 @@ fn new_lines<'t>(old: &str, new: &'t str) -> Vec<&'t str> {
 #[test]
 fn nothing_found_changes_nothing() {
     let text = RigParameters::BASELINE_TOML;
-    assert_eq!(extend(text, "rig.toml", &[], &[], &records()).unwrap(), text);
+    assert_eq!(extend(text, "rig.toml", &[], &[], Axis::Drive, &records()).unwrap(), text);
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn each_effect_is_switched_on_as_it_was_added_at_each_of_its_places() {
 #[test]
 fn a_new_table_tells_value_error_unit_range_and_records() {
     let old = RigParameters::BASELINE_TOML;
-    let new = extend(old, "rig.toml", &[leakage()], &[], &records()).unwrap();
+    let new = extend(old, "rig.toml", &[leakage()], &[], Axis::Drive, &records()).unwrap();
     assert!(new.starts_with(old));
     let lines = new_lines(old, &new);
     assert!(lines[0].starts_with("# piston-leakage: "), "{lines:?}");
@@ -78,7 +78,7 @@ fn a_new_table_tells_value_error_unit_range_and_records() {
 fn a_changed_parameter_keeps_its_comments_and_its_old_value() {
     let old = RigParameters::BASELINE_TOML.replace("drive_kg = 5.0", "drive_kg = 5.0   # weighed in May");
     let mass = quantity("parameter:mass", 5.25, "kg", Some(5.0));
-    let new = extend(&old, "rig.toml", &[], &[mass], &records()).unwrap();
+    let new = extend(&old, "rig.toml", &[], &[mass], Axis::Drive, &records()).unwrap();
     assert_eq!(
         new_lines(&old, &new),
         [
@@ -135,10 +135,15 @@ fn each_parameter_scales_what_the_records_of_the_study_scale() {
 }
 
 #[test]
-fn the_mass_that_was_the_loads_is_the_loads() {
-    let rig =
-        extended(RigParameters::BASELINE_TOML, &[], &[quantity("parameter:mass", 1.6, "kg", Some(1.5))]);
-    assert_eq!((rig.mass().load_kg, rig.mass().drive_kg), (1.6, 5.0));
+fn a_mass_is_that_of_the_axis_that_was_weighed() {
+    // As heavy as the drive: no number says which of them it is.
+    let text = RigParameters::BASELINE_TOML.replace("load_kg = 1.5", "load_kg = 5.0");
+    let changed = [quantity("parameter:mass", 5.2, "kg", Some(5.0))];
+    for (weighed, masses_kg) in [(Axis::Load, (5.2, 5.0)), (Axis::Drive, (5.0, 5.2))] {
+        let text = extend(&text, "rig.toml", &[], &changed, weighed, &records()).unwrap();
+        let rig = RigParameters::from_toml(&text, "rig.toml").unwrap();
+        assert_eq!((rig.mass().load_kg, rig.mass().drive_kg), masses_kg);
+    }
 }
 
 #[test]
@@ -160,7 +165,7 @@ fn an_effect_that_is_on_gets_other_numbers_and_keeps_the_rest() {
     let old = if second.default.is_some() { old } else { format!("{old}  {} = {value}\n", second.name) };
     let numbers = [(first.name, 91.25, Some(1.5)), (second.name, value, None)];
     let change = addition(sheet.name, "drive", &numbers);
-    let new = extend(&old, "rig.toml", &[change], &[], &records()).unwrap();
+    let new = extend(&old, "rig.toml", &[change], &[], Axis::Drive, &records()).unwrap();
     assert!(
         new.contains(&format!("  # mine\n  # was 8e1; 91.2 +- 1.5 Hz from a.csv, b.csv; {}", first.range())),
         "{new}"
@@ -219,10 +224,10 @@ fn windows_line_ends_a_missing_last_one_and_a_byte_order_mark_survive() {
     let unix = format!("\u{feff}{}", RigParameters::BASELINE_TOML.trim_end());
     let old = unix.replace('\n', "\r\n");
     let changed = [quantity("parameter:kv-scale", 1.05, "", Some(1.0))];
-    let new = extend(&old, "rig.toml", &[leakage()], &changed, &records()).unwrap();
+    let new = extend(&old, "rig.toml", &[leakage()], &changed, Axis::Drive, &records()).unwrap();
     assert_eq!(new.matches('\n').count(), new.matches("\r\n").count());
     assert!(new.starts_with('\u{feff}') && new.matches('\u{feff}').count() == 1);
-    let same = extend(&unix, "rig.toml", &[leakage()], &changed, &records()).unwrap();
+    let same = extend(&unix, "rig.toml", &[leakage()], &changed, Axis::Drive, &records()).unwrap();
     assert_eq!(new.replace("\r\n", "\n"), same);
 }
 
@@ -242,7 +247,7 @@ fn unusual_tables_keep_their_layout() {
         quantity("parameter:supply-pressure", 7.3, "bar", Some(7.0)),
         quantity("parameter:kv-scale", 2.0, "", None),
     ];
-    let new = extend(&old, "rig.toml", &[], &changed, &records()).unwrap();
+    let new = extend(&old, "rig.toml", &[], &changed, Axis::Drive, &records()).unwrap();
     assert!(new.starts_with("# was 7; 7.300 +- 0.073 bar, by parameter:supply-pressure"), "{new}");
     assert!(new.contains("supply = { pressure_bar = 7.3, exhaust"), "{new}");
     assert!(new.contains("[ # measured\n    0.0, 0.0,\n    0.23, 0.72, # here\n    1.2, 1.32 ]\n"), "{new}");
@@ -253,7 +258,7 @@ fn unusual_tables_keep_their_layout() {
 fn what_no_rig_can_hold_is_refused_with_what_could_be() {
     let base = RigParameters::BASELINE_TOML;
     let refused = |additions: &[Addition], changed: &[Quantity]| {
-        extend(base, "rig.toml", additions, changed, &records()).unwrap_err().to_string()
+        extend(base, "rig.toml", additions, changed, Axis::Drive, &records()).unwrap_err().to_string()
     };
     let says = |message: String, parts: &[&str]| {
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
@@ -281,14 +286,15 @@ fn what_no_rig_can_hold_is_refused_with_what_could_be() {
     );
     let twice = quantity("parameter:flow-lag", 1.1, "", None);
     says(refused(&[], &[twice.clone(), twice]), &["valve.flow_lag_time_constant_ms", "twice"]);
-    let broken = extend("[supply", "rig.toml", &[], &[], &[]).unwrap_err().to_string();
+    let broken = extend("[supply", "rig.toml", &[], &[], Axis::Drive, &[]).unwrap_err().to_string();
     says(broken, &["rig.toml:1: not TOML"]);
 }
 
 #[test]
 fn a_records_name_cannot_break_out_of_its_comment() {
     let records = ["a\nb = 1\r\u{7f}.csv".to_owned()];
-    let new = extend(RigParameters::BASELINE_TOML, "rig.toml", &[leakage()], &[], &records).unwrap();
+    let new =
+        extend(RigParameters::BASELINE_TOML, "rig.toml", &[leakage()], &[], Axis::Drive, &records).unwrap();
     assert!(new.contains("# Found from a\u{fffd}b = 1\u{fffd}\u{fffd}.csv."));
 }
 
@@ -333,7 +339,7 @@ fn a_number_of_the_file_is_changed_where_it_stands_and_its_neighbours_stay() {
         quantity("valve.kv_supply_m3_per_h[2]", 0.125, "m^3/h", Some(0.115)),
         quantity("valve.kv_supply_m3_per_h[4]", 0.61, "m^3/h", Some(0.6)),
     ];
-    let new = extend(text, "rig.toml", &[], &changed, &records()).unwrap();
+    let new = extend(text, "rig.toml", &[], &changed, Axis::Drive, &records()).unwrap();
     let rig = RigParameters::from_toml(&new, "rig.toml").unwrap();
     assert_eq!(rig.numbers("valve.kv_supply_m3_per_h"), [0.0, 0.0, 0.125, 0.36, 0.61, 0.66]);
     assert_eq!(rig.numbers("cylinder.dead_volume_cm3"), [24.5]);
@@ -347,7 +353,9 @@ fn a_number_of_the_file_is_changed_where_it_stands_and_its_neighbours_stay() {
 #[test]
 fn a_number_of_the_file_is_refused_where_it_is_none() {
     let refused = |changed: &[Quantity]| {
-        extend(RigParameters::BASELINE_TOML, "rig.toml", &[], changed, &records()).unwrap_err().to_string()
+        extend(RigParameters::BASELINE_TOML, "rig.toml", &[], changed, Axis::Drive, &records())
+            .unwrap_err()
+            .to_string()
     };
     let volume = quantity("cylinder.dead_volume_cm3", 24.5, "cm^3", Some(20.0));
     assert!(refused(&[volume.clone(), volume.clone()]).contains("changed twice"));

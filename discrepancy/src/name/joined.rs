@@ -1,7 +1,7 @@
 //! What stays of the effects that joined a model, and what would take their place as well.
 
 use super::nothing::Nothing;
-use super::{NUMBER_COSTS, SAFETY, STEPS, around_of, refine};
+use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, around_of, refine};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{Placed, Refit, refit_steps};
@@ -104,12 +104,18 @@ pub(super) fn drop_unneeded<'a>(
 }
 
 /// Whether two are the same effect at the same place.
-pub(super) fn same(left: &Placed, right: &Placed) -> bool {
+pub(crate) fn same(left: &Placed, right: &Placed) -> bool {
     left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
 }
 
-/// What takes the place of an effect of the model just as well.
-pub(super) fn alternatives(placed: &Placed, calibrated: &Calibrated, rounds: &[Vec<Refit>]) -> Vec<Refit> {
+/// What takes the place of an effect of the model just as well, the share of the excess that goes with that effect given.
+pub(super) fn alternatives(
+    placed: &Placed,
+    share: f64,
+    model: &Refit,
+    calibrated: &Calibrated,
+    rounds: &[Vec<Refit>],
+) -> Vec<Alternative> {
     // The round in which it joined.
     let Some(refits) = rounds.iter().find(|refits| {
         refits.first().and_then(|best| best.placed.last()).is_some_and(|joined| same(joined, placed))
@@ -117,10 +123,20 @@ pub(super) fn alternatives(placed: &Placed, calibrated: &Calibrated, rounds: &[V
         return Vec::new();
     };
     let best = &refits[0];
-    refits[1..].iter().filter(|own| own.loss - best.loss < alike(best, calibrated)).cloned().collect()
+    let is_new = |own: &Refit| {
+        own.placed.last().is_some_and(|other| !model.placed.iter().any(|placed| same(placed, other)))
+    };
+    refits[1..]
+        .iter()
+        .filter(|own| own.loss - best.loss < alike(best, calibrated) && is_new(own))
+        .map(|own| {
+            let less = (own.loss - best.loss) / calibrated.fit.loss.max(1e-9);
+            Alternative { fit: own.clone(), share: (share - less).clamp(0.0, 1.0) }
+        })
+        .collect()
 }
 
-/// Share of the excess that goes with each effect: of one alone all, of several what is missed without it.
+/// Share of the excess that goes with each effect: what went in the round in which it joined.
 pub(super) fn shares(model: &Refit, rounds: &[Vec<Refit>], calibrated: &Calibrated, excess: f64) -> Vec<f64> {
     let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
     let mut before = calibrated.fit.loss;

@@ -15,9 +15,10 @@ use crate::windows::dot;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Steps at most, and halvings of one.
+/// Steps at most, how often one is made shorter, and to what share of it.
 const STEPS: usize = 6;
-const HALVINGS: i32 = 4;
+const SHORTENINGS: i32 = 4;
+const SHORTER: f64 = 0.4;
 /// How often windows are left out of a step at most, and from where on they are: standard deviations of a window's squares.
 const DOUBTS: usize = 4;
 const BROKEN: f64 = 6.0;
@@ -182,8 +183,8 @@ fn along(
         out.sort_unstable();
         out.dedup();
         if out.len() == before {
-            return (1..=HALVINGS).find_map(|halving| {
-                moved(engine, point, chosen, &fit, 0.4_f64.powi(halving))
+            return (1..=SHORTENINGS).find_map(|times| {
+                moved(engine, point, chosen, &fit, SHORTER.powi(times))
                     .filter(|tried| tried.loss < point.loss)
             });
         }

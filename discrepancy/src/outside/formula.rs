@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The shortest formula wins that explains nearly as much as the best; one that explains less than most of what bins of any
-//! variable or pair explain is none.
+//! variable explain is none.
 //!
 //! Source: discrepancy-notes.md, Pipeline 8. Short laws before good ones: Udrescu, Tegmark 2020, Science Advances 6(16).
 
@@ -59,7 +59,7 @@ pub fn formula(sample: &Sample, unit: &str) -> Option<String> {
     })
 }
 
-/// What bins of the best variable or pair explain, in weighted squares, the mean included.
+/// What bins of the best variable explain, in weighted squares, the mean included.
 fn binned(sample: &Sample) -> f64 {
     let mean = sample.constant_share() * sample.squares();
     let variable = |at: &usize| *at != TIME;

@@ -58,9 +58,9 @@ fn finding(finding: &Finding) -> String {
     if let Some(line) = finding.line {
         place += &format!(", line {line}");
     }
-    let weight = if finding.fatal { "the record cannot be used" } else { "left out" };
+    let weight = if finding.fatal { " <span class=\"soft\">(the record cannot be used)</span>" } else { "" };
     format!(
-        "<li><span class=\"{class}\">{sign} {}</span>: {} <span class=\"soft\">({weight})</span></li>\n",
+        "<li><span class=\"{class}\">{sign} {}</span>: {}{weight}</li>\n",
         escaped(&place),
         escaped(&finding.text)
     )

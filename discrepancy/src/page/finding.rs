@@ -4,6 +4,7 @@ use super::candidates;
 use super::draw::{Plot, Sample, figure, range};
 use super::markup::{Cell, charts, heading, number, paragraph, table, words as said};
 use super::words;
+use crate::outside::SHIFTS;
 use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Surface, Verdict};
 use plant::effects::sheet;
 
@@ -128,7 +129,10 @@ fn unknown(outside: &Outside) -> String {
         words::balance(&outside.balance)
     ));
     let rows = outside.variables.iter().map(|one| {
-        let chance = if one.p_value <= 0.0 { "none of 200".to_owned() } else { words::percent(one.p_value) };
+        // The least that can be told: none of the shifted ones reached it.
+        let least = 1.0 / (SHIFTS + 1) as f64;
+        let chance =
+            if one.p_value <= least { format!("none of {SHIFTS}") } else { words::percent(one.p_value) };
         vec![said(&one.variable), number(words::percent(one.r2.max(0.0))), number(chance)]
     });
     text += &table(

@@ -290,7 +290,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
                 |variable: &str, r2, p_value| Dependence { variable: variable.to_owned(), r2, p_value };
             report.outside = Some(Outside {
                 balance: "drive.force".to_owned(),
-                variables: vec![dependence("x", 0.913, 0.0), dependence("p_a-p_b", 0.08, 0.21)],
+                variables: vec![dependence("x", 0.913, 1.0 / 201.0), dependence("p_a-p_b", 0.08, 0.21)],
                 curve: Some(curve("x", "m", "N", |x| 14.0 * (9.0 * x).sin() + 20.0 * x * x, 0.25)),
                 surface: Some(Surface {
                     variables: ["x", "sign(v)"].map(str::to_owned),

@@ -2,7 +2,7 @@
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
-use crate::name::Found;
+use crate::name::{Found, same};
 use crate::parameters::COUNT;
 use crate::refit::{Placed, Refit};
 use crate::report::{
@@ -54,9 +54,9 @@ fn named(found: &Found) -> Vec<NamedEffect> {
         let alternatives = alternatives
             .iter()
             .filter_map(|other| {
-                let placed = other.placed.last()?;
-                let from = other.errors.len() - COUNT - placed.coordinates.len();
-                Some(named_effect(placed, &other.errors[from..], *share, Vec::new()))
+                let placed = other.fit.placed.last()?;
+                let from = other.fit.errors.len() - COUNT - placed.coordinates.len();
+                Some(named_effect(placed, &other.fit.errors[from..], other.share, Vec::new()))
             })
             .collect();
         all.push(named_effect(placed, errors, *share, alternatives));
@@ -79,7 +79,7 @@ fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<N
             unit: key.unit.name().to_owned(),
             standard_error: Some(errors[at] * candidate.slope(at, placed.coordinates[at]).abs())
                 .filter(|error| error.is_finite()),
-            before: key.neutral.filter(|neutral| neutral.is_finite()),
+            before: candidate.baseline(at),
         })
         .collect();
     NamedEffect {
@@ -110,22 +110,27 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
         .map(|screened| {
             let placed = &screened.start;
             let candidate = &placed.candidate;
-            let fitted = found.fitted.iter().find(|own| {
-                let other = &own.placed[0].candidate;
-                other.sheet.name == candidate.sheet.name && other.place == candidate.place
-            });
-            let is_named = found.model.placed.iter().any(|own| {
-                own.candidate.sheet.name == candidate.sheet.name && own.candidate.place == candidate.place
-            });
-            let shown = fitted.map_or(placed, |own| &own.placed[0]);
-            let share = fitted.map(|own| {
+            let is_it = |own: &Placed| same(own, placed);
+            let is_last = |own: &&Refit| own.placed.last().is_some_and(is_it);
+            let alone = found.fitted.iter().filter(|own| own.placed.len() == 1).find(is_last);
+            let is_named = found.model.placed.iter().any(is_it);
+            let is_alike = found.alternatives.iter().flatten().any(|own| is_last(&&own.fit));
+            let shown = alone.map_or(placed, |own| &own.placed[0]);
+            let share = alone.map(|own| {
                 ((found.calibrated.fit.loss - own.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
             });
-            let fate = match (is_named, fitted.is_some()) {
-                (true, _) if !found.inadequate => "named",
-                (true, _) => "explains too little",
-                (false, true) => "fitted, and others explain more",
-                (false, false) => "not among the best of the screening",
+            let fate = if is_named && !found.inadequate {
+                "named"
+            } else if is_named {
+                "explains too little"
+            } else if is_alike && !found.inadequate {
+                "explains as much as what is named"
+            } else if alone.is_some() {
+                "fitted, and others explain more"
+            } else if found.fitted.iter().any(|own| is_last(&own)) {
+                "fitted beside what was named first, and others explain more"
+            } else {
+                "not among the best of the screening"
             };
             report::Candidate {
                 effect: candidate.sheet.name.to_owned(),
@@ -155,12 +160,11 @@ fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
                     coordinates[0] = *z;
                     coordinates
                 })[0];
-                let neutral = key.neutral.filter(|neutral| neutral.is_finite());
                 limits.push(DetectionLimit {
                     effect,
                     place,
                     name: key.name.to_owned(),
-                    value: neutral.map_or(at, |neutral| (at - neutral).abs()),
+                    value: candidate.baseline(0).map_or(at, |from| (at - from).abs()),
                     unit: key.unit.name().to_owned(),
                 });
             }

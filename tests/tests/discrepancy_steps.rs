@@ -1,0 +1,81 @@
+//! Steps of `discrepancy` alone: records that do not go together are refused by all of them, and what cannot be told apart gets
+//! an experiment.
+
+use plant::RigParameters;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use system_tests::discrepancy::{discrepancy, rig};
+use system_tests::record_maker::{Recipe, simulate, write};
+use system_tests::records::json;
+
+const GOOD: i32 = 0;
+const BAD_INPUT: i32 = 2;
+/// 8 s.
+const ROWS: usize = 8000;
+
+/// A record of the drive in which nothing is hidden.
+fn record(folder: &Path) -> PathBuf {
+    let mut record = simulate(&Recipe::default(), &RigParameters::baseline()).expect("a record");
+    record.rows.truncate(ROWS);
+    let out = folder.join("train");
+    write(&record, &out, &folder.join("truth")).expect("a folder that can be written");
+    out.join("measurement.csv")
+}
+
+#[test]
+fn steps_alone_refuse_records_that_do_not_go_together() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let train = &record(folder.path());
+    // The same rows as those of the other axis.
+    let other = folder.path().join("load.csv");
+    fs::write(&other, fs::read_to_string(train).expect("a record").replace("drive_", "load_"))
+        .expect("a file");
+    for step in ["calibrate", "locate"] {
+        let twice = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", train];
+        let _ = discrepancy(&twice).expect_code(BAD_INPUT).expect_said(&["--train", "given twice"]);
+        let mixed = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", &other];
+        let _ = discrepancy(&mixed).expect_code(BAD_INPUT).expect_said(&["load.csv", "the same axes"]);
+    }
+    // Of the held-out record nothing is told where it shows another axis.
+    let out = folder.path().join("closed");
+    let test = [
+        &"close" as &dyn AsRef<OsStr>,
+        &"--rig",
+        &rig(),
+        &"--train",
+        train,
+        &"--test",
+        &other,
+        &"--out",
+        &out,
+    ];
+    let ended = discrepancy(&test).expect_code(BAD_INPUT);
+    assert!(ended.stdout.contains("no axis that the training records show"), "{}", ended.stdout);
+    assert_eq!(json(&out.join("report.json"))["gap"], serde_json::json!({}));
+}
+
+#[test]
+fn next_writes_an_experiment_that_tells_apart_what_a_report_could_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [report, out] = ["report.json", "next.toml"].map(|file| folder.path().join(file));
+    let effect = |name: &str, key: &str, value: f64, more: &str| {
+        format!(
+            r#"{{ "effect": "{name}", "where": {{ "axis": "drive", "element": null }}, "share_explained": 1.0, "parameters":
+            [{{ "name": "{key}", "value": {value}, "unit": "", "standard_error": null, "before": null }}], "alternatives":
+            [{more}] }}"#
+        )
+    };
+    let other = effect("valve-dead-zone", "dead_zone_percent", 0.4, "");
+    let named = effect("command-dead-time", "delay_ms", 0.6, &other);
+    let inputs = r#"{ "rig": "rig.toml", "train": ["a.csv"], "axes": ["drive"], "searched_share": 1.0 }"#;
+    let told = format!(r#"{{ "inputs": {inputs}, "named": [{named}], "parameters": [] }}"#);
+    fs::write(&report, told).expect("a report");
+    let next =
+        discrepancy(&[&"next", &"--rig", &rig(), &"--report", &report, &"--out", &out]).expect_code(GOOD);
+    for part in ["command-dead-time drive and valve-dead-zone drive", "is expected to separate them"] {
+        assert!(next.stdout.contains(part), "'{part}' is missing in: {}", next.stdout);
+    }
+    let experiment = fs::read_to_string(&out).expect("an experiment file");
+    assert!(experiment.contains("[run]") && experiment.starts_with("# Proposed by"), "{experiment}");
+}
