@@ -28,6 +28,7 @@ mod extended;
 mod filter;
 mod fit;
 pub mod model;
+mod pictures;
 mod runs;
 mod select;
 mod tell;
@@ -37,9 +38,11 @@ pub use extended::extended_model_text;
 pub use filter::LowPass;
 pub use model::{Kind, Model};
 
+use crate::check::FEWEST_ROWS;
+use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions, Record};
 use crate::report::{Report, Verdict};
-use fit::{Columns, Cut, Fit, Rows, rms};
+use fit::{Columns, Cut, Fit, Rows, residual, rms};
 use plant::RigParameters;
 use runs::Run;
 use select::{Cuts, Found, Prepared};
@@ -120,7 +123,7 @@ pub enum BalanceError {
     },
     /// A record without enough rows.
     #[error(
-        "{file}: {rows} rows pass the model's [processing], 50 are needed: are position_mm, speed_above_mm_per_s right?"
+        "{file}: {rows} rows pass the model's [processing], {FEWEST_ROWS} are needed: are position_mm, speed_above_mm_per_s right?"
     )]
     Few {
         /// The record.
@@ -177,6 +180,14 @@ pub struct Closed {
     pub report: Report,
     /// Why nothing was judged.
     pub not_judged: Option<String>,
+    /// Series for the page.
+    pub pictures: Pictures,
+}
+
+/// What both models leave of some rows, the baseline's first.
+struct Fitted {
+    rows: Rows,
+    residuals: [Vec<f64>; 2],
 }
 
 /// Closes a balance: names what it lacks by the training records, and compares both models on the held-out ones, their residuals
@@ -193,8 +204,11 @@ pub fn close(
     let study = Study::of(model_file, train, progress)?;
     let mut report = study.report(model_file);
     // What was found stays, whatever the held-out records are like.
-    let judged = study.judge(tests, &mut report, progress);
-    Ok(Closed { report, not_judged: judged.err().map(|error| error.to_string()) })
+    let (pictures, not_judged) = match study.judge(tests, &mut report, progress) {
+        Ok(pictures) => (pictures, None),
+        Err(error) => (study.trained_pictures(), Some(error.to_string())),
+    };
+    Ok(Closed { report, not_judged, pictures })
 }
 
 /// The training records with all that was found in them.
@@ -275,15 +289,15 @@ impl Study {
         Ok(Self { model, rig, records, runs, rows, base, base_fit, time, families, found, own, own_fit })
     }
 
-    /// Opens the held-out records, and compares both models on them.
+    /// Opens the held-out records, and compares both models on them; without one, draws the training record.
     fn judge(
         &self,
         tests: &[&Path],
         report: &mut Report,
         progress: &mut dyn FnMut(&str),
-    ) -> Result<(), BalanceError> {
+    ) -> Result<Pictures, BalanceError> {
         if report.verdict == Verdict::BadData {
-            return Ok(());
+            return Ok(Pictures::default());
         }
         let mut held_out = Vec::new();
         for test in tests {
@@ -295,7 +309,30 @@ impl Study {
             }
             held_out.push(run);
         }
-        if held_out.is_empty() { Ok(()) } else { self.verify(&held_out, report) }
+        if held_out.is_empty() {
+            return Ok(self.trained_pictures());
+        }
+        let fitted = self.fitted(&held_out)?;
+        self.verify(&held_out, &fitted, report);
+        Ok(self.pictures(&held_out, &fitted, true))
+    }
+
+    fn trained_pictures(&self) -> Pictures {
+        let residuals = [self.base_fit.residual.clone(), self.own_fit.residual.clone()];
+        self.pictures(&self.runs, &Fitted { rows: self.rows.clone(), residuals }, false)
+    }
+
+    /// Both models, frozen, on records that were not used.
+    fn fitted(&self, runs: &[Run]) -> Result<Fitted, BalanceError> {
+        let mut columns = base_columns(&self.model, runs)?;
+        let rows = rows_of(runs);
+        let before = residual(&rows.target, &columns, &self.base_fit.numbers);
+        for taken in &self.found.taken {
+            let entry = &self.families[taken.judged.place].family.variants[taken.judged.variant];
+            columns.extend(term_columns(&self.model, entry, runs)?);
+        }
+        let after = residual(&rows.target, &columns, &self.own_fit.numbers);
+        Ok(Fitted { rows, residuals: [before, after] })
     }
 
     /// rms of the residual of baseline and extended model on the training records, ends included.

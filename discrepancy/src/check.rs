@@ -27,9 +27,11 @@ mod units;
 use crate::records::{Channel, Record, Signal};
 use crate::report::{ChannelCheck, Finding, RecordCheck};
 use grid::Grid;
+pub(crate) use grid::SPARSEST;
 use notes::Notes;
 use plant::{Axis, RigParameters};
 use std::collections::BTreeMap;
+pub(crate) use time::FEWEST_ROWS;
 
 /// Kind of the finding that an axis stood at the end of its stroke all the time.
 pub const PARKED: &str = "parked";

@@ -13,8 +13,8 @@ use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
 use crate::parameters::COUNT;
 use crate::refit::Around;
-use crate::report::{Gap, NamedEffect, Quantity, Report, Verdict, Verification};
-use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
+use crate::report::{Gap, NamedEffect, Quantity, Report, Verdict, Verification, decimals};
+use crate::workflow::{self, Outcome, RigFile, Task, Told, WorkflowError, close, open};
 use crate::{balance, locate, page, verify};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
@@ -171,11 +171,12 @@ fn one_balance_outcome(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, CommandError> {
     let tests: Vec<&Path> = tests.iter().map(PathBuf::as_path).collect();
-    let balance::Closed { report, not_judged } =
+    let balance::Closed { report, not_judged, pictures } =
         balance::close(&records.rig, &records.train, &tests, progress)?;
     let is_model = report.verdict != Verdict::BadData;
-    let extended = is_model.then(|| balance::extended_model_text(&records.rig, &report).ok()).flatten();
-    Ok(Outcome { report, extended, pictures: page::Pictures::default(), experiment: None, not_judged })
+    let extended =
+        is_model.then(|| balance::extended_model_text(&records.rig, &Told::from(&report)).ok()).flatten();
+    Ok(Outcome { report, extended, pictures, experiment: None, not_judged })
 }
 
 /// A model of one balance says itself how its records are read, and which terms it has.
@@ -314,9 +315,12 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
 }
 
 fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
-    let rig_file = RigFile::read(&arguments.rig)?;
     let report = read_report(&arguments.report)?;
-    let text = workflow::extended(&rig_file, &report).map_err(WorkflowError::from)?;
+    let text = if std::fs::read_to_string(&arguments.rig).is_ok_and(|text| balance::is_model_file(&text)) {
+        balance::extended_model_text(&arguments.rig, &report)?
+    } else {
+        workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?
+    };
     spare(&arguments.out, &[&arguments.rig, &arguments.report])?;
     folder::write(&arguments.out, &text)?;
     Ok(Exit::Good)
@@ -397,7 +401,7 @@ fn courses(arguments: &RecordArguments) -> Result<(RigFile, Vec<crate::course::C
     Ok((rig_file, courses))
 }
 
-fn read_report(path: &Path) -> Result<workflow::Told, CommandError> {
+fn read_report(path: &Path) -> Result<Told, CommandError> {
     let bytes = std::fs::read(path).map_err(|why| CommandError::File { file: path.to_owned(), why })?;
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }
@@ -474,7 +478,7 @@ fn significant(value: f64) -> String {
 fn quantity_in_words(own: &Quantity) -> String {
     let value = match own.standard_error.filter(|error| *error > 0.0) {
         Some(error) => {
-            let digits = (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize;
+            let digits = decimals(error);
             format!("{:.digits$} +- {error:.digits$}", own.value)
         }
         None => significant(own.value),

@@ -17,7 +17,7 @@ mod thinned;
 
 use crate::check::Checked;
 use crate::records::{Channel, Record, Signal};
-use plant::{Axis, Inputs, RigParameters, quantise_valve};
+use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
 use still::{Rate, Still};
 pub use thinned::{SEARCHED_S, searched_share};
 
@@ -26,8 +26,6 @@ pub const CHANNELS: usize = 4;
 /// Their signals.
 pub const SIGNALS: [Signal; CHANNELS] =
     [Signal::Position, Signal::Force, Signal::PressureA, Signal::PressureB];
-/// A period, s.
-pub const PERIOD_S: f64 = 1e-3;
 /// Samples to each side of a local parabola of the position.
 const POSITION_REACH: usize = 10;
 /// The same of a pressure.
@@ -42,7 +40,7 @@ const LEAST_JITTER_S: f64 = 2e-5;
 const JITTER_BLOCK: usize = 20;
 const JITTER_SPEED_M_PER_S: f64 = 0.1;
 /// Longest run of periods without a command that a window bears.
-const HELD_LONGEST: usize = 3;
+pub(crate) const HELD_LONGEST: usize = 3;
 
 /// A record on its grid.
 #[derive(Clone, Debug)]
@@ -127,7 +125,7 @@ impl CourseError {
 }
 
 /// Shortest record, periods.
-const SHORTEST: usize = 1000;
+pub(crate) const SHORTEST: usize = 1000;
 
 impl Course {
     /// Puts a checked record on its grid.

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::sync::Mutex;
 
 /// Change of a factor by which the sensitivity to a parameter is taken.
-const FACTOR_CHANGE: f64 = 0.01;
+pub(crate) const FACTOR_CHANGE: f64 = 0.01;
 
 /// How far the level of noise is corrected: an effect that is seen in every window must not pass for noise.
 const LEVELS: [f64; 2] = [0.6, 1.05];

@@ -17,7 +17,7 @@
 mod edits;
 mod parameters;
 
-use crate::report::Quantity;
+use crate::report::{Quantity, decimals};
 use edits::Edits;
 pub use parameters::key_of_parameter;
 use plant::effects::sheet::{EffectKey, Sheet};
@@ -238,8 +238,7 @@ fn in_comment(text: &str) -> String {
 fn told(value: f64, standard_error: Option<f64>, unit: &str) -> String {
     let text = match standard_error.filter(|error| error.is_finite() && *error > 0.0) {
         Some(error) => {
-            // The second digit that counts: 10^(floor(log10 e) - 1).
-            let digits = (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize;
+            let digits = decimals(error);
             format!("{value:.digits$} +- {error:.digits$} {unit}")
         }
         None => format!("{value} {unit}").trim_end().to_owned() + ", not bounded by the records",

@@ -23,6 +23,15 @@ const PASSES: usize = 12;
 /// Change of the loss below which it has settled.
 const SETTLED: f64 = 1e-3;
 
+/// Smallest chi2 per degree of freedom that a window counts with: one that is nearly empty is no better than a good one.
+pub const LEAST: f64 = 1e-3;
+
+/// The loss of windows with these squares and degrees of freedom.
+#[must_use]
+pub fn loss(squares: &[f64], freedom: &[f64]) -> f64 {
+    squares.iter().zip(freedom).map(|(square, freedom)| freedom * (square / freedom).max(LEAST).ln()).sum()
+}
+
 /// Products of a residual and some columns, window by window.
 #[derive(Clone, Debug)]
 pub struct Products {
@@ -107,17 +116,13 @@ impl Products {
     /// The loss of windows with these squares.
     #[must_use]
     pub fn loss(&self, squares: &[f64]) -> f64 {
-        squares
-            .iter()
-            .zip(&self.freedom)
-            .map(|(square, freedom)| freedom * (square / freedom).max(1e-3).ln())
-            .sum()
+        loss(squares, &self.freedom)
     }
 
     /// Weights of windows with these squares.
     #[must_use]
     pub fn weights(&self, squares: &[f64]) -> Vec<f64> {
-        let weight = |(square, freedom): (&f64, &f64)| freedom / square.max(1e-3 * freedom);
+        let weight = |(square, freedom): (&f64, &f64)| freedom / square.max(LEAST * freedom);
         squares.iter().zip(&self.freedom).map(weight).collect()
     }
 

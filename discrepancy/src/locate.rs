@@ -19,10 +19,10 @@ pub mod ratio;
 pub mod regime;
 pub mod simulated;
 
-use crate::course::{Course, PERIOD_S};
+use crate::course::Course;
 use crate::report::{BalanceBar, Location, RegimeCell, UnknownInput};
 use estimate::{Unknowns, estimate};
-use plant::{Axis, RigParameters};
+use plant::{Axis, PERIOD_S, RigParameters};
 use regime::{REGIMES, Regimes};
 
 /// Periods of a window.

@@ -48,9 +48,9 @@ const EXCESS: f64 = 0.08;
 /// The same of linked records, where micrometres decide when the eye meets the carriage: records of nothing leave up to 0.2.
 const EXCESS_LINKED: f64 = 0.3;
 /// Screened gain below which nothing is fitted: the best of some forty candidates gains half of it by chance.
-const WORTH_A_FIT: f64 = 25.0;
+pub(crate) const WORTH_A_FIT: f64 = 25.0;
 /// What each number of an effect costs: it must be worth more than one more candidate tried.
-const NUMBER_COSTS: f64 = 8.0;
+pub(crate) const NUMBER_COSTS: f64 = 8.0;
 /// Multiple of the threshold of nothing that is asked of the first effect.
 const SAFETY: f64 = 2.0;
 /// Share of what the parameters leave that the first effect must take.

@@ -52,7 +52,7 @@ pub struct Trace {
     pub before_residual: Values,
     /// Measured minus extended model; empty when there is none.
     pub after_residual: Values,
-    /// Standard deviation of the sensor's noise, its rounding included.
+    /// Standard deviation of the sensor's noise, its rounding included; 0 where nobody knows it.
     pub noise: f64,
 }
 

@@ -11,6 +11,7 @@
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products};
+use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use plant::RigParameters;
 
@@ -30,7 +31,7 @@ const SHAPE_TOLERANCE: f64 = 0.7;
 pub(crate) const MOST_OFF: f64 = 0.3;
 /// What each parameter that is off costs, as a number of an effect does: a sensor that shows four per cent too little is a better
 /// explanation than all masses, frictions and areas off by as much.
-const PARAMETER_COSTS: f64 = 8.0;
+const PARAMETER_COSTS: f64 = NUMBER_COSTS;
 /// From where on a parameter counts as off.
 const COUNTS_AS_OFF: f64 = 0.005;
 

@@ -414,6 +414,12 @@ pub struct ChannelCheck {
     pub unusable: f64,
 }
 
+/// Decimals of a value that is rounded to the second digit of its standard error.
+#[must_use]
+pub fn decimals(standard_error: f64) -> usize {
+    (1.0 - standard_error.log10().floor()).clamp(0.0, 12.0) as usize
+}
+
 /// What to measure next.
 #[derive(Clone, Debug, Serialize)]
 pub struct Next {

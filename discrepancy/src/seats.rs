@@ -8,9 +8,9 @@
 //! somewhere else: the start is moved by what is known of the sensor, so that the readings, and not the truth, begin at the
 //! record's. Source: effects.md, Sensors.
 
-use crate::course::{Course, PERIOD_S, Point};
+use crate::course::{Course, Point};
 use plant::effects::sheet::{Element, Part};
-use plant::{Axis, RigParameters};
+use plant::{Axis, PERIOD_S, RigParameters};
 
 /// What stands between a quantity and its reading.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -22,11 +22,12 @@ use crate::calibrate::{Calibrated, quantity};
 use crate::engine::Engine;
 use crate::locate::maps::map;
 use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
+use crate::name::WORTH_A_FIT;
 use crate::parameters::COUNT;
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
 use fit::{Beside, Lines, Model, Point, Tied};
-use plant::effects::tabulated::{self, Balance, Tabulated, Variable};
+use plant::effects::tabulated::{self, Balance, Tabulated, Variable, interpolated};
 use plant::{Axis, RigParameters};
 
 /// What is fitted of all that is screened: a variable that explains an unknown input best need not predict the windows best.
@@ -41,10 +42,6 @@ const MOST_POINTS: usize = tabulated::POINTS[1];
 /// Steps of a first fit, and of one that counts.
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
-/// What each point of a table costs, as a number of an effect does.
-const POINT_COSTS: f64 = 8.0;
-/// Fall of the loss for which a parameter is off beside a table, as much as naming asks of what is worth a fit.
-const NEEDED: f64 = 25.0;
 /// Share of the loss that a table must take to be added, and one over a second variable of what the first one left.
 const TAKES: f64 = 0.05;
 const TAKES_MORE: f64 = 0.15;
@@ -118,7 +115,7 @@ fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
     let Some((lines, held)) = Lines::of(engine, all).zip(held) else { return (best, [true; COUNT]) };
     let lines = lines.with(&[]);
     let bare = fit::steps(engine, held, &lines[COUNT..]);
-    let needed = fit::needed(engine, &bare, &lines, NEEDED);
+    let needed = fit::needed(engine, &bare, &lines, WORTH_A_FIT);
     let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
         return (bare, [false; COUNT]);
     };
@@ -265,7 +262,7 @@ impl Seek<'_> {
                 vec![mean.clamp(-most, most); 2]
             }
             (Over::Variable(_), Some(curve)) => {
-                at.iter().map(|x| line(&curve.at, &curve.value, *x).clamp(-most, most)).collect()
+                at.iter().map(|x| interpolated(&curve.at, &curve.value, *x).clamp(-most, most)).collect()
             }
         };
         let table = Tabulated { axis: self.axis, balance, variable, at, value };
@@ -282,7 +279,8 @@ impl Seek<'_> {
                 let points = if is_directed { DIRECTED_POINTS } else { POINTS };
                 // One more may come at the end.
                 let at = knots(&own.seen, (times * points).min(MOST_POINTS - 1));
-                own.table.value = at.iter().map(|x| line(&own.table.at, &own.table.value, *x)).collect();
+                own.table.value =
+                    at.iter().map(|x| interpolated(&own.table.at, &own.table.value, *x)).collect();
                 own.table.at = at;
             }
             let Some(point) = Point::of(self.engine, model) else { break };
@@ -318,23 +316,13 @@ fn knots(seen: &[f64], count: usize) -> Vec<f64> {
     at
 }
 
-/// A straight line between points, constant beyond them.
-fn line(at: &[f64], value: &[f64], x: f64) -> f64 {
-    let above = at.partition_point(|own| *own <= x);
-    if above == 0 || above == at.len() {
-        return value[above.min(at.len() - 1)];
-    }
-    let share = (x - at[above - 1]) / (at[above] - at[above - 1]);
-    value[above - 1] + (value[above] - value[above - 1]) * share
-}
-
 /// A table as the report tells it.
 fn term(table: &Tabulated) -> TableTerm {
     TableTerm {
         balance: format!("{}.{}", table.axis.name(), table.balance.name()),
         variable: table.variable.name().to_owned(),
         variable_unit: table.variable.unit().to_owned(),
-        unit: if table.balance == Balance::Force { "N" } else { "Nl/min" }.to_owned(),
+        unit: table.balance.unit().name().to_owned(),
         at: table.at.clone(),
         value: table.value.clone(),
     }

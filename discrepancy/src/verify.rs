@@ -29,6 +29,7 @@ mod power;
 mod traces;
 
 use crate::course::{CHANNELS, Course, SIGNALS, searched_share};
+use crate::fit::LEAST;
 use crate::page::Trace;
 use crate::records::Channel;
 use crate::report::{BeforeAfter, Gap, Verification};
@@ -158,7 +159,7 @@ fn is_better(before: &Power, after: &Power) -> bool {
         .iter()
         .zip(after.joint())
         .filter(|(before, _)| before.expected > 0.0)
-        .map(|(before, after)| after.expected * (before.over().max(1e-3) / after.over().max(1e-3)).ln())
+        .map(|(before, after)| after.expected * (before.over().max(LEAST) / after.over().max(LEAST)).ln())
         .collect();
     let count = gains.len() as f64;
     if count < 2.0 {

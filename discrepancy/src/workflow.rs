@@ -8,6 +8,7 @@
 //! Everything but [`Report::gap`] and [`Report::verification`] is done before the held-out record is opened.
 
 mod telling;
+mod told;
 
 use crate::balance::is_model_file;
 use crate::candidates::Candidate;
@@ -21,7 +22,7 @@ use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions};
-use crate::report::{self, InputFiles, NamedEffect, Next, Quantity, Report, TableTerm, Verdict};
+use crate::report::{self, InputFiles, NamedEffect, Next, Report, Verdict};
 use crate::tabulate::{tables, tabulate};
 use crate::verify::verify;
 use plant::{Axis, ParameterError, RigParameters};
@@ -29,6 +30,7 @@ use std::path::{Path, PathBuf};
 pub(crate) use telling::empty;
 pub use telling::place_name;
 use telling::{report_of, summary};
+pub use told::{Told, ToldOutside};
 
 /// What the workflow is asked.
 #[derive(Clone, Debug, Default)]
@@ -76,7 +78,7 @@ pub enum WorkflowError {
     Parameters(#[from] ParameterError),
     /// The rig file is a model of one balance.
     #[error(
-        "{file}: a model of one balance (it has a kind): only close and name take one; give a rig file here"
+        "{file}: a model of one balance (it has a kind): only close, name and extend take one; give a rig file here"
     )]
     OneBalance {
         /// The file.
@@ -225,13 +227,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
             }
         }
     }
-    let told = Told {
-        named: report.named.clone(),
-        parameters: report.parameters.clone(),
-        carried: report.carried.clone(),
-        inputs: report.inputs.clone(),
-        outside: report.outside.as_ref().map(|own| ToldOutside { tables: own.tables.clone() }),
-    };
+    let told = Told::from(&report);
     let mut experiment = None;
     if report.verdict == Verdict::Ambiguous
         && let Some(proposal) = proposal_for(&rig_file, &told, courses[0].measured, progress)
@@ -307,31 +303,6 @@ fn is_copy(one: &Path, other: &Path) -> bool {
         && matches!((std::fs::read(one), std::fs::read(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-/// What a report says of effects and parameters, as other steps need it.
-#[derive(Clone, Debug, serde::Deserialize)]
-pub struct Told {
-    /// Effects, the best first.
-    pub named: Vec<NamedEffect>,
-    /// Parameters that were off.
-    pub parameters: Vec<Quantity>,
-    /// Parameters that the model moved by less.
-    #[serde(default)]
-    pub carried: Vec<Quantity>,
-    /// Files.
-    pub inputs: InputFiles,
-    /// What the catalogue does not have.
-    #[serde(default)]
-    pub outside: Option<ToldOutside>,
-}
-
-/// The tables of what the catalogue does not have.
-#[derive(Clone, Debug, Default, serde::Deserialize)]
-pub struct ToldOutside {
-    /// Terms that were added.
-    #[serde(default)]
-    pub tables: Vec<TableTerm>,
-}
-
 /// The rig file with what a report names.
 ///
 /// # Errors
@@ -339,7 +310,7 @@ pub struct ToldOutside {
 pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> {
     let additions: Vec<Addition> = told.named.iter().map(addition).collect();
     let changed = [&told.parameters[..], &told.carried].concat();
-    let weighed = weighed(measured(told));
+    let weighed = weighed(told.measured());
     let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, weighed, &told.inputs.train)?;
     let terms = told.outside.as_ref().map_or(&[][..], |own| &own.tables);
     add_tables(&text, &rig_file.file, &tables(terms), &told.inputs.train)
@@ -348,12 +319,7 @@ pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> 
 /// The experiment that tells apart what a report could not; `None` when there is nothing to tell apart.
 #[must_use]
 pub fn proposal(rig_file: &RigFile, told: &Told, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
-    proposal_for(rig_file, told, measured(told), progress)
-}
-
-/// Which axes the training records of a report showed.
-fn measured(told: &Told) -> [bool; 2] {
-    Axis::ALL.map(|axis| told.inputs.axes.iter().any(|own| own == axis.name()))
+    proposal_for(rig_file, told, told.measured(), progress)
 }
 
 fn proposal_for(

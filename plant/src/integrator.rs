@@ -34,7 +34,7 @@ use crate::valve::Valve;
 use laws::{At, Laws};
 
 /// One step of [`crate::Plant`], s.
-pub(crate) const PERIOD_S: f64 = 1e-3;
+pub const PERIOD_S: f64 = 1e-3;
 
 /// Substeps in a period; see the table of the module's head.
 pub(crate) const SUBSTEPS: u32 = 10;

@@ -62,6 +62,7 @@ mod truth;
 mod valve;
 
 pub use batch::{Batch, Registers};
+pub use integrator::PERIOD_S;
 pub use parameters::{ParameterError, RigParameters};
 pub use plant::{LinkRefused, Plant};
 pub use scene::{People, Scene, SceneError};
@@ -69,4 +70,4 @@ pub use sensors::{AxisReadings, Reading, Sensors};
 pub use setup::{Setup, SetupError};
 pub use state::{Axis, AxisState, Inputs, State};
 pub use truth::{AxisTruth, Truth};
-pub use valve::quantise_valve;
+pub use valve::{StaticValve, quantise_valve};

@@ -16,8 +16,8 @@
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6.
 
 use crate::lanes::{Axes, Choice, Form, Pair};
-use crate::parameters::ValveParameters;
 use crate::parameters::table::VALVE_POINTS;
+use crate::parameters::{RigParameters, ValveParameters};
 
 /// Segments of a K_V table, and so hinges.
 const HINGES: usize = VALVE_POINTS - 1;
@@ -143,10 +143,38 @@ pub(crate) fn single_edge_flow(conductance: f64, far_pa: f64, chamber_pa: f64) -
     (conductance * ((upstream - throat) * throat).sqrt()).copysign(far_pa - chamber_pa)
 }
 
+/// The valve between supply and exhaust without its lags, for one chamber: what the model says of a flow, beside measurements.
+#[derive(Debug, Clone)]
+pub struct StaticValve {
+    valve: Valve,
+    supply_pa: f64,
+    exhaust_pa: f64,
+}
+
+impl StaticValve {
+    /// The valve of a rig.
+    #[must_use]
+    pub fn new(rig: &RigParameters) -> Self {
+        let (valve, supply) = (Valve::new(rig.valve()), rig.supply());
+        StaticValve { valve, supply_pa: supply.pressure_pa, exhaust_pa: supply.exhaust_pressure_pa }
+    }
+
+    /// Normal volume flow into a chamber, m^3/s, at an opening in [-1, 1], towards the supply where it is positive, and an
+    /// absolute pressure of at least 0, Pa.
+    #[must_use]
+    pub fn flow_m3_per_s(&self, opening: f64, chamber_pa: f64) -> f64 {
+        let [supply, exhaust] = self.valve.conductances(opening.abs());
+        if opening > 0.0 {
+            single_edge_flow(supply, self.supply_pa, chamber_pa)
+        } else {
+            single_edge_flow(exhaust, self.exhaust_pa, chamber_pa)
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::RigParameters;
 
     /// Eq. (4) as printed, in bar and m^3/h.
     fn paper_flow(kv: f64, upstream_bar: f64, downstream_bar: f64) -> f64 {
@@ -168,6 +196,24 @@ mod tests {
             let paper = paper_flow(0.6, up, down) / 3600.0 * f64::signum(far_bar - chamber_bar);
             // Ten roundings, and the difference of nearly equal pressures loses three digits at 6.999 bar.
             assert!((flow.drive() - paper).abs() <= 1e-12 * paper.abs(), "{far_bar} -> {chamber_bar}");
+        }
+    }
+
+    #[test]
+    fn without_lags_a_chamber_gets_what_the_paper_says() {
+        let rig = RigParameters::baseline();
+        let valve = StaticValve::new(&rig);
+        let [supply_kv, exhaust_kv] =
+            [rig.valve().kv_supply_m3_per_h, rig.valve().kv_exhaust_m3_per_h].map(|kv| kv[3]);
+        let opening = rig.valve().opening[3];
+        let (supply_bar, exhaust_bar) =
+            (rig.supply().pressure_pa / 1e5, rig.supply().exhaust_pressure_pa / 1e5);
+        for chamber_bar in [1.5, 4.0, 6.5] {
+            let filled = paper_flow(supply_kv, supply_bar, chamber_bar) / 3600.0;
+            let emptied = paper_flow(exhaust_kv, chamber_bar, exhaust_bar) / 3600.0;
+            let told = [opening, -opening].map(|own| valve.flow_m3_per_s(own, chamber_bar * 1e5));
+            assert!((told[0] - filled).abs() <= 1e-9 * filled, "{told:?}, {filled}");
+            assert!((told[1] + emptied).abs() <= 1e-9 * emptied, "{told:?}, {emptied}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! Steps of `discrepancy` alone: records that do not go together are refused by all of them, and what cannot be told apart gets
 //! an experiment.
 
-use plant::RigParameters;
+use plant::{Axis, RigParameters};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,28 +14,25 @@ const BAD_INPUT: i32 = 2;
 /// 8 s.
 const ROWS: usize = 8000;
 
-/// A record of the drive in which nothing is hidden.
-fn record(folder: &Path) -> PathBuf {
-    let mut record = simulate(&Recipe::default(), &RigParameters::baseline()).expect("a record");
+/// A record of an axis in which nothing is hidden.
+fn record(folder: &Path, axis: Axis) -> PathBuf {
+    let recipe = Recipe { axis, ..Recipe::default() };
+    let mut record = simulate(&recipe, &RigParameters::baseline()).expect("a record");
     record.rows.truncate(ROWS);
-    let out = folder.join("train");
-    write(&record, &out, &folder.join("truth")).expect("a folder that can be written");
+    let out = folder.join(axis.name());
+    write(&record, &out, &folder.join("truth").join(axis.name())).expect("a folder that can be written");
     out.join("measurement.csv")
 }
 
 #[test]
 fn steps_alone_refuse_records_that_do_not_go_together() {
     let folder = tempfile::tempdir().expect("a folder");
-    let train = &record(folder.path());
-    // The same rows as those of the other axis.
-    let other = folder.path().join("load.csv");
-    fs::write(&other, fs::read_to_string(train).expect("a record").replace("drive_", "load_"))
-        .expect("a file");
+    let [train, other] = &[Axis::Drive, Axis::Load].map(|axis| record(folder.path(), axis));
     for step in ["calibrate", "locate"] {
         let twice = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", train];
         let _ = discrepancy(&twice).expect_code(BAD_INPUT).expect_said(&["--train", "given twice"]);
-        let mixed = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", &other];
-        let _ = discrepancy(&mixed).expect_code(BAD_INPUT).expect_said(&["load.csv", "the same axes"]);
+        let mixed = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", other];
+        let _ = discrepancy(&mixed).expect_code(BAD_INPUT).expect_said(&["load", "the same axes"]);
     }
     // Of the held-out record nothing is told where it shows another axis.
     let out = folder.path().join("closed");
@@ -46,7 +43,7 @@ fn steps_alone_refuse_records_that_do_not_go_together() {
         &"--train",
         train,
         &"--test",
-        &other,
+        other,
         &"--out",
         &out,
     ];

@@ -1,21 +1,21 @@
 //! The model file with what was found: the terms join the baseline, and are fitted with it when it runs again.
 //!
-//! Everything of the old file stays, comments too. A term's numbers stand in it for people, under `fitted`; a linear term
-//! has no use for
-//! them, since the next run fits it again on its own records.
+//! Everything of the old file stays, comments too. A term's numbers stand in it for people, under `fitted`; a linear term has no
+//! use for them, since the next run fits it again on its own records.
 
 use super::BalanceError;
 use super::model::TermEntry;
 use super::terms::{shown, term};
-use crate::report::{Quantity, Report};
+use crate::report::Quantity;
+use crate::workflow::Told;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 
-/// The model file with the terms of a report; paths in it are made absolute, so that it may lie anywhere.
+/// The model file with the terms that a report tells; paths in it are made absolute, so that it may lie anywhere.
 ///
 /// # Errors
 /// [`BalanceError`] when the model file cannot be read.
-pub fn extended_model_text(model_file: &Path, report: &Report) -> Result<String, BalanceError> {
+pub fn extended_model_text(model_file: &Path, told: &Told) -> Result<String, BalanceError> {
     let open = |reason: String| BalanceError::Open { file: model_file.into(), reason };
     let text = std::fs::read_to_string(model_file).map_err(|error| open(error.to_string()))?;
     let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| {
@@ -34,11 +34,11 @@ pub fn extended_model_text(model_file: &Path, report: &Report) -> Result<String,
         let reason = "terms are written as [[terms]]".into();
         return Err(BalanceError::Syntax { file: model_file.into(), reason });
     };
-    let records = report.inputs.train.join(", ");
-    for effect in &report.named {
+    let records = told.inputs.train.join(", ");
+    for effect in &told.named {
         terms.push(entry(&effect.effect, &effect.parameters, &records));
     }
-    for quantity in &report.parameters {
+    for quantity in &told.parameters {
         terms.push(entry(&quantity.name, std::slice::from_ref(quantity), &records));
     }
     Ok(document.to_string())

@@ -4,9 +4,8 @@
 //!   c = (X' X)^-1 X' y          cov c = (X' X)^-1 (sum_g X_g' r_g r_g' X_g) (X' X)^-1  G / (G - 1)
 //! ```
 //!
-//! g are blocks of time: the residual of a model that lacks something is no noise, and rows beside each other say the same
-//! twice. For
-//! the same reason a count of rows is replaced by n / (1 + 2 sum rho_k), the sum ending where the autocorrelation first is
+//! g are blocks of time: the residual of a model that lacks something is no noise, and rows beside each other say the same twice.
+//! For the same reason a count of rows is replaced by n / (1 + 2 sum rho_k), the sum ending where the autocorrelation first is
 //! not positive.
 //!
 //! Source: Liang, Zeger 1986, Biometrika 73(1) (clusters); Geyer 1992, Statistical Science 7(4) (the sum's end).

@@ -5,15 +5,15 @@
 //!          ─► zero-phase Chebyshev I and every n-th sample, columns and target alike ─► rows that are fast and inside
 //! ```
 //!
-//! A chamber's target is what its flow balance lacks, `d(p (A x + V_0))/dt / p_N - q`, with q the baseline's: edge flow of
-//! the plant
-//! at the measured pressures, behind both lags.
+//! A chamber's target is what its flow balance lacks, `d(p (A x + V_0))/dt / p_N - q`, with q the baseline's: edge flow of the
+//! plant at the measured pressures, behind both lags.
 //!
 //! Source: Janot, Gautier, Brunot 2019 (processing of EMPS); effects.md, Real records; rig-model.md, One axis.
 
 use super::BalanceError;
 use super::filter::LowPass;
 use super::model::{Kind, Model};
+use crate::check::{FEWEST_ROWS, SPARSEST};
 use crate::records::{Channel, Record};
 use plant::{Inputs, Plant, RigParameters, Setup};
 
@@ -117,7 +117,7 @@ impl Run {
             fast && x_m[*at] > from_m && x_m[*at] < to_m
         };
         let kept: Vec<usize> = (0..x_m.len()).step_by(step).filter(counts).collect();
-        if kept.len() < 50 {
+        if kept.len() < FEWEST_ROWS {
             return Err(BalanceError::Few { file: name, rows: kept.len() });
         }
         let (first_s, last_s) = (grid.time_s[0], grid.time_s[grid.time_s.len() - 1]);
@@ -152,9 +152,6 @@ impl Run {
         }
     }
 }
-
-/// Samples of the grid for each row of a record, at most.
-const SPARSEST: usize = 20;
 
 /// An even grid of a record's time.
 struct Grid {

@@ -9,12 +9,10 @@
 //! | folds in time | takes `share_floor` of what the baseline leaves out, at 3 clustered standard errors | size, significance |
 //! | folds in bands of position, of speed | half of that share, at 2 | it must hold where it was not fitted |
 //!
-//! A record that repeats its path repeats its error in every block of time; bands ask for places and speeds not seen.
-//! They are asked of shapes that reach beyond a band, and of speed only when it varies by more than a factor of 3
-//! (deciles). The best of
-//! what passes is taken; another effect that passes and leaves no more on the same folds (3 clustered standard errors)
-//! explains the
-//! records as well.
+//! A record that repeats its path repeats its error in every block of time; bands ask for places and speeds not seen. They are
+//! asked of shapes that reach beyond a band, and of speed only when it varies by more than a factor of 3 (deciles). The best of
+//! what passes is taken; another effect that passes and leaves no more on the same folds (3 clustered standard errors) explains
+//! the records as well.
 //!
 //! Source: Schwarz 1978 (penalty); discrepancy-notes.md, 3, 5 and Pipeline 5; Roberts et al. 2017, Ecography 40(8) (blocked
 //! folds).

@@ -1,15 +1,15 @@
 //! The report of a balance: what was named and what was not, and the held-out record.
 //!
-//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the
-//! same reason
-//! `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their folds.
+//! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the same
+//! reason `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their
+//! folds.
 
-use super::fit::{clustered_t, residual, rms};
+use super::fit::{clustered_t, rms};
 use super::model::{Kind, TermEntry};
 use super::runs::Run;
 use super::select::{Judged, told};
 use super::terms::{self, shape_unit, shown};
-use super::{BalanceError, Study, base_columns, term_columns};
+use super::{Fitted, Study};
 use crate::report::{
     BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, Gap, InputFiles, Location, NamedEffect, Next,
     Outside, Quantity, Report, SCHEMA_VERSION, Verdict, Verification, Where,
@@ -374,22 +374,14 @@ impl Study {
         })
     }
 
-    /// Both models, frozen, on records that were not used.
-    pub(super) fn verify(&self, runs: &[Run], report: &mut Report) -> Result<(), BalanceError> {
-        let mut columns = base_columns(&self.model, runs)?;
-        let rows = super::rows_of(runs);
-        let target = &rows.target;
-        let before = residual(target, &columns, &self.base_fit.numbers);
-        for taken in &self.found.taken {
-            let entry = &self.families[taken.judged.place].family.variants[taken.judged.variant];
-            columns.extend(term_columns(&self.model, entry, runs)?);
-        }
-        let after = residual(target, &columns, &self.own_fit.numbers);
+    /// What both models leave of records that were not used.
+    pub(super) fn verify(&self, runs: &[Run], fitted: &Fitted, report: &mut Report) {
+        let Fitted { rows, residuals: [before, after] } = fitted;
         let signal = match self.model.kind {
             Kind::Chamber => "drive_flow_a_m3_per_s".to_owned(),
             _ => self.model.channels["force"].column(),
         };
-        let [before_rms, after_rms] = [rms(&before), rms(&after)];
+        let [before_rms, after_rms] = [before, after].map(|own| rms(own));
         let closed = (before_rms > 0.0).then(|| 1.0 - (after_rms / before_rms).powi(2));
         report.gap.insert(signal.clone(), Gap { before: before_rms, after: after_rms, floor: 0.0, closed });
         let cut = rows.in_time(self.model.selection.blocks);
@@ -397,7 +389,7 @@ impl Study {
             cut.folds.iter().map(|fold| fold.iter().map(|row| residual[*row].powi(2)).sum()).collect()
         };
         let differences: Vec<f64> =
-            squares(&before).iter().zip(squares(&after)).map(|(before, after)| before - after).collect();
+            squares(before).iter().zip(squares(after)).map(|(before, after)| before - after).collect();
         let trained = rms(&self.own_fit.residual).powi(2).max(f64::MIN_POSITIVE);
         let lag = |residual: &[f64]| {
             let products: f64 = residual.windows(2).map(|pair| pair[0] * pair[1]).sum();
@@ -412,11 +404,10 @@ impl Study {
             chi2_after: after_rms.powi(2) / trained,
             chi2_null: [folds[0], folds[folds.len() - 1]],
             free_run_nrmse_percent: BTreeMap::new(),
-            whiteness: BTreeMap::from([(signal, BeforeAfter { before: lag(&before), after: lag(&after) })]),
+            whiteness: BTreeMap::from([(signal, BeforeAfter { before: lag(before), after: lag(after) })]),
             physical: Vec::new(),
             confirmed: !self.found.taken.is_empty() && clustered_t(&differences) > 3.0,
         });
-        Ok(())
     }
 }
 

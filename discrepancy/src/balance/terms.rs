@@ -6,16 +6,13 @@
 //!   chamber    d(p (A x + V_0))/dt / p_N - q  =  0                               + sum c_i column_i(x, v, p, q)
 //! ```
 //!
-//! Every column is linear in its number; what shapes it (a pitch, a Stribeck velocity) is scanned, and its look-elsewhere
-//! paid for
-//! in selection. Names are the catalogue's; `decoy:` columns are in no catalogue, and a search that prefers one has found
+//! Every column is linear in its number; what shapes it (a pitch, a Stribeck velocity) is scanned, and its look-elsewhere paid
+//! for in selection. Names are the catalogue's; `decoy:` columns are in no catalogue, and a search that prefers one has found
 //! nothing.
 //!
-//! Pressure-dependent friction has two forms that two levels of pressure cannot tell apart: the root first (a round ring is
-//! a line
-//! contact, whose width grows with the root of the load, Hertz 1881, and with it the adhesive friction, Schallamach 1952,
-//! Proc. Phys.
-//! Soc. B 65), then the catalogue's straight line. Sources of the others: their files in `plant/src/effects/`.
+//! Pressure-dependent friction has two forms that two levels of pressure cannot tell apart: the root first (a round ring is a
+//! line contact, whose width grows with the root of the load, Hertz 1881, and with it the adhesive friction, Schallamach 1952,
+//! Proc. Phys. Soc. B 65), then the catalogue's straight line. Sources of the others: their files in `plant/src/effects/`.
 
 use super::BalanceError;
 use super::model::{Kind, Model, TermEntry};

@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::report::Verdict;
+use crate::workflow::Told;
 use plant::{Inputs, Plant, Sensors, Setup, quantise_valve};
 use std::fmt::Write;
 
@@ -44,6 +45,19 @@ fn model(folder: &Path) -> PathBuf {
     file
 }
 
+/// The page shows the held-out record with both models, in the unit of the balance: the noise of its sensor is not known.
+fn drawn(report: &Report, pictures: &Pictures) {
+    let [trace] = &pictures.traces[..] else { panic!("{} signals", pictures.traces.len()) };
+    assert!(pictures.held_out && pictures.record.ends_with("2.csv"), "{}", pictures.record);
+    let left =
+        |values: &[f64]| rms(&values.iter().copied().filter(|own| own.is_finite()).collect::<Vec<_>>());
+    let [before, after] = [left(&trace.before_residual), left(&trace.after_residual)];
+    assert!(after < if report.named.is_empty() { 1.001 } else { 0.9 } * before, "{before}, {after}");
+    assert!(trace.time_s.windows(2).all(|pair| pair[0] <= pair[1]));
+    let page = crate::page::page(report, pictures);
+    assert!(page.contains(&format!("difference, {}", trace.unit)) && !page.contains("times the noise"));
+}
+
 fn closed(rig: &RigParameters) -> (Report, String) {
     let folder = tempfile::tempdir().unwrap();
     let files = [1, 2].map(|seed| {
@@ -52,8 +66,9 @@ fn closed(rig: &RigParameters) -> (Report, String) {
         file
     });
     let model = model(folder.path());
-    let report = close(&model, &files[..1], &[&files[1]], &mut |_| {}).unwrap().report;
-    let extended = extended_model_text(&model, &report).unwrap();
+    let Closed { report, pictures, .. } = close(&model, &files[..1], &[&files[1]], &mut |_| {}).unwrap();
+    drawn(&report, &pictures);
+    let extended = extended_model_text(&model, &Told::from(&report)).unwrap();
     std::fs::write(folder.path().join("extended.toml"), &extended).unwrap();
     let again = close(&folder.path().join("extended.toml"), &files[..1], &[], &mut |_| {}).unwrap().report;
     assert!(again.named.is_empty(), "the extended model lacks {:?}", again.named);

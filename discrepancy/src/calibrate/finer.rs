@@ -10,7 +10,7 @@
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
 use super::{Calibrated, POINTS, SETTLED, UNTOLD};
-use crate::engine::Engine;
+use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit, parameter_ridges};
@@ -26,8 +26,6 @@ const FINER: [(&str, f64); 3] = [
 ];
 /// The parameter that scales the tables.
 const KV_SCALE: &str = "parameter:kv-scale";
-/// Change of a factor by which the sensitivity to it is taken, either way.
-const CHANGE: f64 = 0.01;
 /// Shares of a step that are tried, until a rig can be so.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 
@@ -133,7 +131,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
 /// of a table that are equal cannot, and go along with the others.
 fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
     let has_neighbours = |number: &Number| {
-        [CHANGE, -CHANGE].iter().all(|change| {
+        [FACTOR_CHANGE, -FACTOR_CHANGE].iter().all(|change| {
             let factors: Vec<f64> = parameters.iter().copied().chain([1.0 + change]).collect();
             with(rig, std::slice::from_ref(number), &factors).is_some()
         })
@@ -184,6 +182,6 @@ fn columns(engine: &Engine<'_>, numbers: &[Number], factors: &[f64]) -> Option<V
             with(engine.rig(), numbers, &factors)
         })
     };
-    let rigs = around(CHANGE).chain(around(-CHANGE)).collect::<Option<Vec<_>>>()?;
-    Some(engine.differences(&rigs, 2.0 * CHANGE))
+    let rigs = around(FACTOR_CHANGE).chain(around(-FACTOR_CHANGE)).collect::<Option<Vec<_>>>()?;
+    Some(engine.differences(&rigs, 2.0 * FACTOR_CHANGE))
 }

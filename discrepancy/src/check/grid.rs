@@ -14,7 +14,7 @@ pub(super) struct Grid {
 }
 
 /// Places for each row that a record may need at most; one with larger holes is taken row by row.
-const SPARSEST: usize = 20;
+pub(crate) const SPARSEST: usize = 20;
 
 impl Grid {
     /// The grid of the rows whose time was found good.

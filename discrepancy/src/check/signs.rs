@@ -17,8 +17,7 @@ use super::grid::Grid;
 use super::notes::{Notes, Subject};
 use super::smooth::{means, slopes};
 use crate::records::{Channel, Signal};
-use plant::parameters::ValveParameters;
-use plant::{Axis, RigParameters};
+use plant::{Axis, RigParameters, StaticValve};
 
 /// Places to each side of a mean, and of a slope: 15 ms together keep noise down and edges in.
 const REACH: usize = 7;
@@ -194,7 +193,7 @@ impl Pairs {
 
 /// Flow balance of both chambers: what the valve should pass against what the chambers take.
 fn flows(motion: &Motion, rig: &RigParameters, period_s: f64) -> Option<Pairs> {
-    let (cylinder, supply) = (rig.cylinder(), rig.supply());
+    let (cylinder, through) = (rig.cylinder(), StaticValve::new(rig));
     let mut pairs = Vec::new();
     for chamber in 0..2 {
         let contents: Vec<Option<f64>> = (motion.extension_m.iter().zip(&motion.pressures_pa[chamber]))
@@ -212,16 +211,8 @@ fn flows(motion: &Motion, rig: &RigParameters, period_s: f64) -> Option<Pairs> {
                 let toward = |time_constant_s: f64| 1.0 - (-period_s / time_constant_s).exp();
                 spool += toward(valve.spool_time_constant_s) * ((*opening)? - spool);
                 let opening = if chamber == 0 { spool } else { -spool };
-                let flow = if opening > 0.0 {
-                    flow_m3_per_h(kv(&valve.kv_supply_m3_per_h, valve, opening), supply.pressure_pa, (*p)?)
-                } else {
-                    -flow_m3_per_h(
-                        kv(&valve.kv_exhaust_m3_per_h, valve, -opening),
-                        (*p)?,
-                        supply.exhaust_pressure_pa,
-                    )
-                };
-                lagged += toward(valve.flow_lag_time_constant_s) * (flow / 3600.0 - lagged);
+                let flow_m3_per_s = through.flow_m3_per_s(opening, (*p)?.max(0.0));
+                lagged += toward(valve.flow_lag_time_constant_s) * (flow_m3_per_s - lagged);
                 Some(lagged)
             })
             .collect();
@@ -233,20 +224,6 @@ fn flows(motion: &Motion, rig: &RigParameters, period_s: f64) -> Option<Pairs> {
         }
     }
     Pairs::of(&pairs)
-}
-
-/// Normal flow through an opening, m3/h, the other way when the pressures say so [rig-model.md, One axis, paper eq. (4)].
-fn flow_m3_per_h(kv: f64, from_pa: f64, to_pa: f64) -> f64 {
-    let (up, down, sign) = if from_pa >= to_pa { (from_pa, to_pa, 1.0) } else { (to_pa, from_pa, -1.0) };
-    let (up, down) = (up / 1e5, (down / 1e5).max(0.0));
-    let per_kv = if down >= 0.5 * up { 25.9 * ((up - down) * down).sqrt() } else { 12.95 * up };
-    sign * kv * per_kv
-}
-
-fn kv(table: &[f64], valve: &ValveParameters, opening: f64) -> f64 {
-    let at = valve.opening.partition_point(|own| *own < opening).clamp(1, table.len() - 1);
-    let [from, to] = [valve.opening[at - 1], valve.opening[at]];
-    table[at - 1] + (table[at] - table[at - 1]) * ((opening - from) / (to - from)).clamp(0.0, 1.0)
 }
 
 /// Force of the gas, N, without its constant part.

@@ -3,20 +3,19 @@
 //! Rows are good in time that belong to the longest chain of growing times; a single stamp that leaps ahead is so told from
 //! a clock that was set back. Source of the chain: Fredman 1975, Discrete Math. 11(1), longest growing subsequence.
 
-use super::grid::period_s;
+use super::grid::{SPARSEST, period_s};
 use super::notes::Notes;
 use super::smooth::quantile;
+use crate::course::{HELD_LONGEST, SHORTEST};
 use crate::records::{Channel, Signal};
-use plant::Axis;
+use plant::{Axis, PERIOD_S};
 
-/// Period that the rig's records have, s.
-const PERIOD_S: f64 = 1e-3;
-/// Shortest record of the rig, s; `course` asks for the same.
-const SHORTEST_S: f64 = 1.0;
+/// Shortest record of the rig, s.
+const SHORTEST_S: f64 = SHORTEST as f64 * PERIOD_S;
 /// Fewest rows of a foreign record.
-const FEWEST_ROWS: usize = 50;
+pub(crate) const FEWEST_ROWS: usize = 50;
 /// Rows missing in a row that are a hole and not lost samples; a command is held over the latter.
-const HOLE: usize = 4;
+const HOLE: usize = HELD_LONGEST + 1;
 /// Holes that are told one by one.
 const HOLES_TOLD: usize = 20;
 /// Part of a period by which times must differ to be two.
@@ -26,7 +25,7 @@ const MOST_LOST: f64 = 0.5;
 /// Share of rows with a time that cannot be, beyond which it is the clock and no single stamp.
 const MOST_JUMPING: f64 = 0.01;
 /// Holes, in units of the rows that there are, that no record has: the stamp beyond is wrong.
-const FARTHEST: f64 = 19.0;
+const FARTHEST: f64 = SPARSEST as f64 - 1.0;
 /// Spread of sampling instants around their grid, in periods, that is told, and that spoils speeds.
 const JITTER: [f64; 2] = [0.02, 0.25];
 

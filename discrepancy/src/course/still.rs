@@ -4,7 +4,8 @@
 //! millimetre per second from none. So rest is what is slow for a while, creeping what then goes evenly one way for longer, and
 //! where neither is sure the other rate stands beside: a simulation finds out which of them meets the readings.
 
-use super::{PERIOD_S, POSITION_REACH, Parabola};
+use super::{POSITION_REACH, Parabola};
+use plant::PERIOD_S;
 
 /// Periods that a piston must seem at rest around an instant to be at rest in it.
 const REST_REACH: usize = 12;

@@ -20,7 +20,7 @@ pub const SEARCHED_S: f64 = 20.0;
 pub fn searched_share(courses: &[Course]) -> f64 {
     let axes = |course: &Course| course.measured.iter().filter(|measured| **measured).count();
     let all_s: f64 =
-        courses.iter().map(|course| course.len() as f64 * super::PERIOD_S * axes(course) as f64).sum();
+        courses.iter().map(|course| course.len() as f64 * plant::PERIOD_S * axes(course) as f64).sum();
     (SEARCHED_S / all_s).min(1.0)
 }
 

@@ -24,9 +24,9 @@ use super::colour::colours;
 use super::regime::Regimes;
 use super::simulated::{Nudge, Pass, Readings};
 use super::{NORMAL_LITRES_PER_MINUTE, UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
-use crate::course::{CHANNELS, Course, PERIOD_S};
+use crate::course::{CHANNELS, Course};
 use nalgebra::{SMatrix, SVector};
-use plant::{Axis, RigParameters};
+use plant::{Axis, PERIOD_S, RigParameters};
 
 /// Numbers of a window and axis.
 const NUMBERS: usize = 9;

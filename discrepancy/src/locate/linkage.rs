@@ -14,8 +14,8 @@ use super::colour::widens;
 use super::estimate::variables;
 use super::regime::Regimes;
 use super::{UnknownPoint, VARIABLES, WINDOW};
-use crate::course::{Course, PERIOD_S};
-use plant::RigParameters;
+use crate::course::Course;
+use plant::{PERIOD_S, RigParameters};
 
 /// Force above which the rods touch beyond doubt, over the noise of its sensor.
 const TOUCHING: f64 = 10.0;

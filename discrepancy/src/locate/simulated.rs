@@ -9,9 +9,9 @@
 //! stored air at the end of each period.
 
 use super::WINDOW;
-use crate::course::{CHANNELS, Course, PERIOD_S};
+use crate::course::{CHANNELS, Course};
 use crate::windows::seated;
-use plant::{Inputs, Plant, RigParameters, Setup};
+use plant::{Inputs, PERIOD_S, Plant, RigParameters, Setup};
 
 /// Readings of a window, as whoever has no noise sees them.
 pub(super) type Readings = [[[f64; CHANNELS]; WINDOW]; 2];

@@ -20,7 +20,7 @@ const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
 
 /// Chi2 per degree of freedom from which on a window is far off, and the share of the windows that may be: of a model that
 /// leaves the others within their noise, these few say that a break-away came at another moment, and nothing of the model.
-const FAR_OFF: f64 = 3.0;
+pub(super) const FAR_OFF: f64 = 3.0;
 const FEW: f64 = 0.05;
 
 /// What a model leaves, against all candidates, window by window.

@@ -7,8 +7,9 @@
 //! Naming moves the parameters by straight lines: good enough to compare models that have them in common, but what a straight
 //! line promised is not what the simulator leaves.
 
+use super::nothing::FAR_OFF;
 use crate::engine::Engine;
-use crate::fit::{Fit, Products};
+use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{MOST_OFF, Placed, Refit, coordinate_columns, coordinate_ridge, parameter_ridges, rig_of};
 use crate::windows::dot;
@@ -22,8 +23,6 @@ const SHORTER: f64 = 0.4;
 /// How often windows are left out of a step at most, and from where on they are: standard deviations of a window's squares.
 const DOUBTS: usize = 4;
 const BROKEN: f64 = 6.0;
-/// Chi2 per degree of freedom from which on a window is far off.
-const FAR_OFF: f64 = 3.0;
 /// Fall of the loss below which a fit has settled.
 const SETTLED: f64 = 0.3;
 
@@ -89,10 +88,9 @@ pub(super) fn settled(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]
 fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Option<Point> {
     let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
     let residual = engine.residual(&simulated);
-    let products = Products::new(&residual, &[], engine.freedom(), engine.rows());
     let squares: Vec<f64> = residual.chunks_exact(engine.rows()).map(|own| dot(own, own)).collect();
     let believed = |ridge: f64, off: f64| ridge * off * off;
-    let loss = products.loss(&squares)
+    let loss = loss(&squares, engine.freedom())
         + parameter_ridges()
             .iter()
             .zip(&factors)

@@ -4,6 +4,7 @@ use super::draw::{Bar, bars, figure};
 use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as said};
 use super::words;
 use crate::report::{Candidate, Report, Verdict};
+use crate::workflow::place_name;
 
 /// Candidates that are drawn; all stand in the table.
 const DRAWN: usize = 15;
@@ -14,7 +15,7 @@ pub(super) fn candidates(report: &Report) -> String {
         return String::new();
     }
     let bar = |one: &Candidate| Bar {
-        label: format!("{} {}", one.effect, words::place_key(&one.place)),
+        label: format!("{} {}", one.effect, place_name(&one.place)),
         value: one.score,
         text: words::short(one.score),
         is_full: one.score > 1.0,

@@ -5,6 +5,7 @@ use super::finding::curve_figure;
 use super::markup::{Cell, charts, folded, heading, paragraph, table, words as said};
 use super::thin::{COLUMNS, columns};
 use super::words;
+use crate::locate::regime::REGIMES;
 use crate::report::{Location, Report, UnknownInput};
 
 /// Over this many times its noise a balance stands out to the eye.
@@ -55,8 +56,6 @@ fn balances(location: &Location) -> String {
         &bars("balances", "Unknown input of each balance over its noise", &rows),
     )
 }
-
-const REGIMES: [&str; 6] = ["hold", "onset", "motion-out", "motion-in", "near-ends", "valve-edge"];
 
 fn regimes(location: &Location) -> String {
     let cells = &location.regimes;

@@ -26,9 +26,13 @@ pub(super) fn before(report: &Report, pictures: &Pictures) -> String {
     if report.verdict == Verdict::BadData {
         return String::new();
     }
-    let mut lead = "One picture is of the second in which record and simulation differ most, the other of their difference over \
-                    the whole record, in units of the sensor's noise"
-        .to_owned();
+    let mut lead =
+        "One picture is of the second in which record and simulation differ most, the other of their difference over \
+         the whole record"
+            .to_owned();
+    if pictures.traces.iter().any(|trace| trace.noise > 0.0) {
+        lead += ", in units of the sensor's noise";
+    }
     lead += if report.verdict == Verdict::NothingMissing { ": it stays within it." } else { "." };
     all(report, pictures, Model::Before, &lead)
 }
@@ -43,14 +47,13 @@ pub(super) fn after(report: &Report, pictures: &Pictures) -> String {
 }
 
 fn all(report: &Report, pictures: &Pictures, model: Model, lead: &str) -> String {
-    let mut traces: Vec<&Trace> =
-        pictures.traces.iter().filter(|trace| trace.noise > 0.0 && !trace.time_s.is_empty()).collect();
+    let mut traces: Vec<&Trace> = pictures.traces.iter().filter(|trace| !trace.time_s.is_empty()).collect();
     if model == Model::After {
         traces.retain(|trace| !trace.after.is_empty());
     }
     // The largest disagreement first; equal ones by name.
     traces.sort_by(|one, other| {
-        let size = |trace: &Trace| rms(&trace.before_residual) / trace.noise;
+        let size = |trace: &Trace| rms(&trace.before_residual) * difference(trace).1;
         size(other).total_cmp(&size(one)).then_with(|| one.signal.cmp(&other.signal))
     });
     let Some((first, others)) = traces.split_first() else { return String::new() };
@@ -146,26 +149,44 @@ fn look(model: Model) -> (&'static str, &'static str) {
     }
 }
 
+/// What a difference is told in, and the factor: the sensor's noise, or the signal's unit where nobody knows that.
+fn difference(trace: &Trace) -> (String, f64) {
+    if trace.noise > 0.0 {
+        return ("times the noise".to_owned(), 1.0 / trace.noise);
+    }
+    words::shown(&trace.unit)
+}
+
 fn whole(report: &Report, trace: &Trace, model: Model) -> String {
-    let over_noise =
-        |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value / trace.noise).collect() };
+    let (unit, factor) = difference(trace);
+    let has_noise = trace.noise > 0.0;
+    let told = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value * factor).collect() };
     let first = if report.verdict == Verdict::NothingMissing { "measured minus simulated" } else { "before" };
-    let (before, after) = (over_noise(&trace.before_residual), over_noise(&trace.after_residual));
+    let (before, after) = (told(&trace.before_residual), told(&trace.after_residual));
     let (low, high) = range(before.iter().chain(&after).copied()).unwrap_or((-1.0, 1.0));
-    let reach = low.abs().max(high.abs()).max(4.0);
+    let reach = low.abs().max(high.abs()).max(if has_noise { 4.0 } else { f64::MIN_POSITIVE });
     let x = (trace.time_s[0], trace.time_s[trace.time_s.len() - 1]);
-    let mut plot = Plot::new(x, (-reach, reach), "time, s", "difference over the sensor's noise");
+    let over = if has_noise {
+        "difference over the sensor's noise".to_owned()
+    } else {
+        format!("difference, {unit}")
+    };
+    let mut plot = Plot::new(x, (-reach, reach), "time, s", &over);
     let part = worst(trace);
     plot.stretch(trace.time_s[part.start], trace.time_s[part.end - 1]);
-    plot.between(-2.0, 2.0);
+    if has_noise {
+        plot.between(-2.0, 2.0);
+    }
     plot.series("line s1", "trace s1", &columns(&trace.time_s, &before, COLUMNS));
     let mut legend = vec![(Sample::Area("trace s1"), first)];
     if model == Model::After {
         plot.series("line s2", "trace s2", &columns(&trace.time_s, &after, COLUMNS));
         legend.push((Sample::Area("trace s2"), "after"));
     }
-    legend.push((Sample::Area("area"), "noise, \u{b1} 2 standard deviations"));
-    let sizes = format!("rms {} times the noise", words::short(rms(&before)));
+    if has_noise {
+        legend.push((Sample::Area("area"), "noise, \u{b1} 2 standard deviations"));
+    }
+    let sizes = format!("rms {} {unit}", words::short(rms(&before)));
     let sizes = if model == Model::After {
         format!("{sizes} before, {} after", words::short(rms(&after)))
     } else {

@@ -1,6 +1,6 @@
 //! Numbers, places and signals as a person reads them. What is no number is a dash, never NaN.
 
-use crate::report::{Quantity, Where};
+use crate::report::{Quantity, Where, decimals};
 use plant::effects::sheet;
 use plant::effects::sheet::PlaceKind;
 
@@ -67,7 +67,7 @@ pub(super) fn quantity(quantity: &Quantity) -> String {
     let error = quantity.standard_error.filter(|error| error.is_finite() && *error > 0.0);
     let text = match error {
         Some(error) => {
-            let digits = (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize;
+            let digits = decimals(error);
             format!("{} \u{b1} {}", fixed(quantity.value, digits), fixed(error, digits))
         }
         None => short(quantity.value),
@@ -184,11 +184,6 @@ pub(super) fn place(effect: &str, place: &Where) -> String {
         Some(element @ ("a" | "b")) => format!("{axis}, chamber {element}"),
         Some(element) => format!("{axis}, {element} sensor"),
     }
-}
-
-/// Where an effect is, as in the rig file.
-pub(super) fn place_key(place: &Where) -> String {
-    place.element.as_ref().map_or_else(|| place.axis.clone(), |element| format!("{}.{element}", place.axis))
 }
 
 /// The words in a sentence: `a`, `a and b`, `a, b and c`.

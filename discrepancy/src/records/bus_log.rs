@@ -12,9 +12,8 @@
 
 use super::acting::Acting;
 use super::cycles::{self, Cycles, Logged};
-use super::measurement::PERIOD_S;
 use super::{Channel, Form, LoggedBy, ReadError, Record, RigSetup, Signal};
-use plant::Axis;
+use plant::{Axis, PERIOD_S};
 use protocol::candump;
 use protocol::frames::{DecodeError, Frame, RigStatus, Sensors};
 use std::collections::BTreeMap;
@@ -212,7 +211,7 @@ fn rows(
         }
         let skipped = cycles.skipped.contains(&cycle) && row.line.is_none();
         let valves = if skipped { acting.skip(cycle) } else { acting.latch(cycle, begin_ns) };
-        record.push_row(line, cycle as f64 * 1e-3);
+        record.push_row(line, cycle as f64 * PERIOD_S);
         for axis in Axis::ALL.into_iter().filter(|axis| axes[axis.index()]) {
             lost[axis.index()] += u64::from(!skipped && row.sensors[axis.index()].is_none());
             put_row(record, axis, valves[axis.index()], row.sensors[axis.index()].as_ref());

@@ -48,7 +48,6 @@ pub enum MappingError {
 /// What the columns of a foreign CSV mean; checked.
 #[derive(Clone, Debug)]
 pub struct Mapping {
-    pub(super) file: PathBuf,
     pub(super) layout: Layout,
     pub(super) decimal_comma: bool,
     pub(super) absent: Vec<String>,
@@ -216,7 +215,6 @@ impl Mapping {
         let mut absent = read.absent;
         absent.push(String::new());
         Ok(Self {
-            file: file.into(),
             layout,
             decimal_comma,
             absent,
@@ -226,12 +224,6 @@ impl Mapping {
             nominal_period_s,
             channels,
         })
-    }
-
-    /// The mapping file.
-    #[must_use]
-    pub fn file(&self) -> &Path {
-        &self.file
     }
 }
 

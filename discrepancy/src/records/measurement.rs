@@ -7,11 +7,8 @@
 
 use super::table::{Layout, Table};
 use super::{Channel, Form, ReadError, Record, RigSetup, Signal, Unknown};
-use plant::Axis;
+use plant::{Axis, PERIOD_S};
 use std::path::Path;
-
-/// The rig's period (bus.md, Time).
-pub(super) const PERIOD_S: f64 = 1e-3;
 
 pub(super) fn read(file: &Path, unknown: Unknown) -> Result<Record, ReadError> {
     let table = Table::read(file, &Layout::default())?;

@@ -8,9 +8,10 @@
 //! [`crate::refit`] moves the coordinates of effects and takes parameters linearly; here parameters are simulated too, since a
 //! table would take up what their straight lines leave.
 
-use super::{POINT_COSTS, with_tables};
-use crate::engine::Engine;
-use crate::fit::Products;
+use super::with_tables;
+use crate::engine::{Engine, FACTOR_CHANGE};
+use crate::fit::{Products, loss};
+use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
 use crate::windows::{Passage, Reach, dot};
@@ -18,8 +19,6 @@ use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
 
-/// Change of a factor by which derivatives are taken.
-const FACTOR_CHANGE: f64 = 0.01;
 /// The same of a value: N, Nl/min; and in proportion.
 const FORCE_CHANGE_N: f64 = 1.0;
 const FLOW_CHANGE_NL_PER_MIN: f64 = 0.5;
@@ -35,8 +34,6 @@ const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 const SETTLED: f64 = 1.0;
 /// Parts of the records that are left out in turn, to see what a model only learned.
 const FOLDS: usize = 5;
-/// Smallest power of a window over its noise, as in [`crate::fit`].
-const LEAST: f64 = 1e-3;
 
 /// A table whose values are moved.
 #[derive(Clone, Debug)]
@@ -162,7 +159,7 @@ impl Model {
         let factors: f64 =
             (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].tolerance).powi(2)).sum();
         let points = self.moved().iter().filter(|own| matches!(own, Coordinate::Value(..))).count();
-        factors + POINT_COSTS * points as f64
+        factors + NUMBER_COSTS * points as f64
     }
 }
 
@@ -179,10 +176,8 @@ impl Point {
     /// `None` where no rig can be so.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
-        let windows = residual.chunks_exact(engine.rows()).zip(engine.freedom());
-        let left: f64 =
-            windows.map(|(own, freedom)| freedom * (dot(own, own) / freedom).max(LEAST).ln()).sum();
-        let loss = left + model.costs();
+        let squares: Vec<f64> = residual.chunks_exact(engine.rows()).map(|own| dot(own, own)).collect();
+        let loss = loss(&squares, engine.freedom()) + model.costs();
         loss.is_finite().then_some(Point { model, residual, loss })
     }
 

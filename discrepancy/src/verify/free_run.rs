@@ -3,7 +3,7 @@
 use crate::course::{CHANNELS, Course, Point};
 use crate::report::BeforeAfter;
 use crate::windows::{first_state, seat};
-use plant::{Axis, Plant, RigParameters};
+use plant::{Axis, PERIOD_S, Plant, RigParameters};
 use std::collections::BTreeMap;
 
 /// Periods that are not judged: memories and lags fill [rig-model.md, Accuracy].
@@ -77,7 +77,7 @@ pub(super) fn free_run(course: &Course, rig: &RigParameters) -> FreeRun {
     let unphysical = unphysical
         .into_iter()
         .map(|((i, what), period)| {
-            format!("{} axis: {what}, first after {:.3} s", Axis::ALL[i].name(), period as f64 * 1e-3)
+            format!("{} axis: {what}, first after {:.3} s", Axis::ALL[i].name(), period as f64 * PERIOD_S)
         })
         .collect();
     FreeRun { nrmse_percent, unphysical }

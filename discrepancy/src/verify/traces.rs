@@ -1,10 +1,9 @@
 //! Series for the page: measured, both models window by window, and what each leaves.
 
 use super::{Model, column};
-use crate::course::PERIOD_S;
 use crate::page::Trace;
 use crate::windows::WINDOW;
-use plant::Axis;
+use plant::{Axis, PERIOD_S};
 
 /// One trace for each lane, over the whole record; what no window has is NaN.
 pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {

@@ -2,7 +2,8 @@
 //! draws of it.
 
 use super::{FORCE, WINDOW, Windows, dot};
-use crate::course::{Course, PERIOD_S};
+use crate::course::Course;
+use plant::PERIOD_S;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 use std::f64::consts::TAU;

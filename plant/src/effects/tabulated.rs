@@ -77,7 +77,9 @@ impl Balance {
         }
     }
 
-    const fn unit(self) -> Unit {
+    /// The unit of its values in a file.
+    #[must_use]
+    pub const fn unit(self) -> Unit {
         match self {
             Balance::Force => Unit::Newton,
             Balance::FlowA | Balance::FlowB => Unit::NormalLitrePerMinute,
@@ -246,14 +248,23 @@ struct Law {
 
 impl Law {
     fn value(&self, seen: &Seen) -> f64 {
-        let x = self.variable.of(seen);
-        let above = self.at.partition_point(|at| *at <= x);
-        if above == 0 || above == self.at.len() {
-            return self.value[above.min(self.at.len() - 1)];
-        }
-        let share = (x - self.at[above - 1]) / (self.at[above] - self.at[above - 1]);
-        self.value[above - 1] + (self.value[above] - self.value[above - 1]) * share
+        interpolated(&self.at, &self.value, self.variable.of(seen))
     }
+}
+
+/// What a table of rising points says at `x`: a straight line between them, constant beyond.
+///
+/// # Panics
+/// For a table without points, or with fewer values than points.
+#[inline]
+#[must_use]
+pub fn interpolated(at: &[f64], value: &[f64], x: f64) -> f64 {
+    let above = at.partition_point(|own| *own <= x);
+    if above == 0 || above == at.len() {
+        return value[above.min(at.len() - 1)];
+    }
+    let share = (x - at[above - 1]) / (at[above] - at[above - 1]);
+    value[above - 1] + (value[above] - value[above - 1]) * share
 }
 
 /// The tables of an axis.

@@ -26,12 +26,14 @@ pub(crate) fn score(arguments: &ScoreArguments) -> Done {
 }
 
 pub(crate) fn compare(arguments: &CompareArguments) -> Done {
-    let text = compare::markdown(&all(&arguments.columns)?)?;
+    let scores = all(&arguments.columns)?;
+    let text = compare::markdown(&scores)?;
     if let Some(path) = &arguments.to {
         write_whole(path, text.as_bytes())?;
     }
     if arguments.write {
-        document::put(&committed(PAGE), "compare", &text)?;
+        let is_left_out = scores.iter().any(|score| score.leave_out.is_some());
+        document::put(&committed(PAGE), if is_left_out { "leave-out" } else { "compare" }, &text)?;
     }
     if arguments.to.is_none() && !arguments.write {
         say(&format!("\n{text}"));
