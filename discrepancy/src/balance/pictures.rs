@@ -30,6 +30,10 @@ impl Study {
         };
         let shown = |value: &dyn Fn(usize) -> f64| drawn(&|row| factor * value(row), &|_| f64::NAN);
         let time_s = |row: usize| run.time_s[run.kept[row - range.start]];
+        // At the ends filters swing in: the largest difference there says nothing of the model.
+        let judged = |value: &dyn Fn(usize) -> f64| {
+            shown(&|row| if fitted.rows.judged[row] { value(row) } else { f64::NAN })
+        };
         let target = &fitted.rows.target;
         let [before, after] = &fitted.residuals;
         let trace = Trace {
@@ -39,8 +43,8 @@ impl Study {
             measured: shown(&|row| target[row]),
             before: shown(&|row| target[row] - before[row]),
             after: shown(&|row| target[row] - after[row]),
-            before_residual: shown(&|row| before[row]),
-            after_residual: shown(&|row| after[row]),
+            before_residual: judged(&|row| before[row]),
+            after_residual: judged(&|row| after[row]),
             // Nobody knows the sensors of a foreign record.
             noise: 0.0,
         };
