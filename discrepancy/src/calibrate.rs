@@ -61,12 +61,18 @@ impl Calibrated {
 /// A parameter of a fit, in the unit of the rig file; of tables their common factor.
 #[must_use]
 pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
-    let parameter = PARAMETERS[at];
-    let (before, unit) = parameter.value(engine.rig(), engine.windows()[0].course().measured);
+    let (parameter, measured) = (PARAMETERS[at], engine.windows()[0].course().measured);
+    let (before, unit) = parameter.value(engine.rig(), measured);
+    // What was simulated: a number is held at the end of its range, and rest at what slides.
+    let value = if unit.is_empty() {
+        before * fit.factors[at]
+    } else {
+        parameter.value(&with_factors(engine.rig(), &fit.factors), measured).0
+    };
     let error = fit.errors[fit.errors.len() - COUNT + at];
     Quantity {
         name: parameter.name.to_owned(),
-        value: before * fit.factors[at],
+        value,
         unit: unit.to_owned(),
         standard_error: (error < UNTOLD * parameter.tolerance).then_some(before * error),
         before: Some(before),

@@ -6,11 +6,11 @@ mod course;
 mod record;
 
 use course::course;
-use discrepancy::calibrate::calibrate;
 use discrepancy::calibrate::finer::{Finer, finer};
+use discrepancy::calibrate::{calibrate, quantity};
 use discrepancy::engine::Engine;
 use discrepancy::extend::extend;
-use discrepancy::parameters::COUNT;
+use discrepancy::parameters::{COUNT, PARAMETERS};
 use discrepancy::refit::Around;
 use plant::{Axis, RigParameters};
 
@@ -20,6 +20,23 @@ fn found(engine: &Engine<'_>) -> Finer {
     let ones = [1.0; COUNT];
     let around = Around { columns: engine.parameter_columns(engine.rig(), &ones), factors: ones };
     finer(engine, &calibrate(engine, &around)).expect("a rig")
+}
+
+#[test]
+fn what_is_told_of_a_parameter_is_what_was_simulated_and_a_rig_file() {
+    let rig = RigParameters::baseline();
+    let courses = [course(&rig, &rig)];
+    let engine = Engine::new(&courses, &rig);
+    let ones = [1.0; COUNT];
+    let around = Around { columns: engine.parameter_columns(&rig, &ones), factors: ones };
+    let mut fit = calibrate(&engine, &around).fit;
+    // A fit on lines may have rest below what slides.
+    let [sliding, rest] = ["parameter:sliding-friction", "parameter:break-away-force"]
+        .map(|name| PARAMETERS.iter().position(|own| own.name == name).expect("one of them"));
+    (fit.factors[sliding], fit.factors[rest]) = (1.1, 0.8);
+    let told = [sliding, rest].map(|at| quantity(&engine, at, &fit));
+    assert_eq!(told[0].value, told[1].value, "{told:?}");
+    extend(RigParameters::BASELINE_TOML, "rig.toml", &[], &told, Axis::Drive, &[]).expect("a rig file");
 }
 
 #[test]
