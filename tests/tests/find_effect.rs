@@ -114,7 +114,11 @@ fn a_sealed_effect_is_found_over_the_bus_added_and_the_gap_shrinks() {
     let ended = find_effect(&["--lockstep", "--seed", SEED, "--expect-right", "--out", out]).expect_code(0);
     let told = format!("named: {HIDDEN}");
     assert!(ended.stdout.contains(&told), "'{told}' is missing in: {}{}", ended.stdout, ended.stderr);
+    assert!(ended.stdout.contains(" repeated |"), "the rig itself is no column of: {}", ended.stdout);
     let folder = Path::new(out).join("seed-9");
+    // What names the hidden terms of the rig measured once more lies where only the last step looks.
+    let repeated = folder.join("held-out/repeated");
+    assert!(repeated.join("measurement.csv").exists() && !repeated.join("truth.csv").exists());
     for file in ["gap.html", "told.txt", "workflow/report.html", "workflow/rig.toml", "hidden/sealed.toml"] {
         assert!(folder.join(file).exists(), "{file}");
     }
