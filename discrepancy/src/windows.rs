@@ -25,12 +25,12 @@ pub use passage::{Passage, Reach};
 use plant::{Batch, Inputs, Plant, RigParameters};
 use starts::SETTLING;
 pub(crate) use starts::{first_state, seat, seated};
-use whiten::drift;
+use whiten::{SPIKE, drift};
 
 /// Periods of a window.
 pub const WINDOW: usize = 400;
 /// Place of the force among the readings.
-const FORCE: usize = 1;
+pub(crate) const FORCE: usize = 1;
 /// Steps of a period where only a difference is wanted.
 const COARSE_SUBSTEPS: u32 = 5;
 
@@ -227,7 +227,7 @@ impl<'a> Windows<'a> {
             *value = 0.0;
         }
         for (at, window) in values.chunks_exact_mut(self.rows()).enumerate() {
-            self.flatten_spikes(window);
+            self.flatten(window, SPIKE);
             self.whiten(at, window);
         }
     }

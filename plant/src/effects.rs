@@ -12,7 +12,7 @@ pub mod draw;
 mod first_order;
 mod flows;
 mod friction;
-mod laminar_gap;
+pub(crate) mod laminar_gap;
 mod memory;
 mod node;
 mod over_stroke;

@@ -23,21 +23,15 @@
 //! between two rival models.
 
 use super::driven::Driven;
-use super::nuisance::{Product, dot};
-use crate::course::Point;
-use crate::windows::seated;
+use super::nuisance::Product;
+use crate::course::{CHANNELS, Point};
+use crate::windows::{FORCE, dot, project, seated};
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
 /// Share of a signature that forms and numbers leave unexplained: 25 = (1 - 0.95^2) / e^2.
 const MODEL_ERROR: f64 = 1.0 / 16.0;
 /// Periods of a window.
 const WINDOW: usize = 100;
-/// Readings of an axis: position, force, pressures a and b.
-const CHANNELS: usize = 4;
-/// Place of the force among them.
-const FORCE: usize = 1;
-/// Numbers of the initial state of an axis.
-const STATE_NUMBERS: usize = 4;
 /// Slower than this a piston is at rest, m/s: bristles creep.
 const REST_M_PER_S: f64 = 1e-5;
 /// Share of its length below which what is left of a direction is rounding.
@@ -129,9 +123,7 @@ fn signatures(
         for signature in &mut left {
             let own = &mut signature[span.clone()];
             own.iter_mut().zip(&out).filter(|(_, out)| **out).for_each(|(own, _)| *own = 0.0);
-            for direction in &basis {
-                take_off(own, direction);
-            }
+            project(own, &basis);
         }
     }
     left
@@ -228,16 +220,10 @@ impl<'a> Observer<'a> {
         };
         let mut columns = Vec::new();
         for axes in together {
-            for number in 0..STATE_NUMBERS {
+            for number in 0..Point::NUDGES.len() {
                 let mut points = self.points(window);
                 for axis in &axes {
-                    let point = &mut points[*axis];
-                    match number {
-                        0 => point.extension_m += 2e-6,
-                        1 => point.rod_velocity_m_per_s += 2e-4,
-                        2 => point.pressures_pa[0] += 50.0,
-                        _ => point.pressures_pa[1] += 50.0,
-                    }
+                    points[*axis] = points[*axis].nudged(number);
                 }
                 let mut plant = plant_in(rig, &base.starts[window]);
                 plant
@@ -286,11 +272,8 @@ fn basis(columns: Vec<Vec<f64>>, out: &[bool]) -> Vec<Vec<f64>> {
     for mut column in columns {
         column.iter_mut().zip(out).filter(|(_, out)| **out).for_each(|(own, _)| *own = 0.0);
         let before = dot(&column, &column).sqrt();
-        for _ in 0..2 {
-            for direction in &kept {
-                take_off(&mut column, direction);
-            }
-        }
+        project(&mut column, &kept);
+        project(&mut column, &kept);
         let left = dot(&column, &column).sqrt();
         if left > RANK * before {
             column.iter_mut().for_each(|own| *own /= left);
@@ -298,10 +281,4 @@ fn basis(columns: Vec<Vec<f64>>, out: &[bool]) -> Vec<Vec<f64>> {
         }
     }
     kept
-}
-
-/// Takes off what lies along a unit vector.
-fn take_off(vector: &mut [f64], direction: &[f64]) {
-    let share = dot(vector, direction);
-    vector.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
 }

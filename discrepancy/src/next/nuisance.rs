@@ -9,6 +9,7 @@
 //! (nuisance with a prior); the names are those of effects.md.
 
 use crate::parameters::{PARAMETERS, Parameter};
+use crate::windows::dot;
 use nalgebra::{DMatrix, DVector};
 use plant::{ParameterError, RigParameters};
 
@@ -59,10 +60,6 @@ impl<'a> Product<'a> {
         };
         dot(left, right) - along(left).dot(&(&self.inverse * along(right)))
     }
-}
-
-pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
 }
 
 #[cfg(test)]

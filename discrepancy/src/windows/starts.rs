@@ -1,7 +1,6 @@
 //! Where windows begin: what a start explains, and starts that are moved to where their readings are met best.
 
-use super::whiten::SPIKE_REACH;
-use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, dot, project};
+use super::{COARSE_SUBSTEPS, WINDOW, Windows, dot, project};
 use crate::course::{Course, Point};
 use nalgebra::{DMatrix, DVector};
 use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
@@ -22,8 +21,8 @@ const LINKED_PASSES: usize = 3;
 const SHIFTS_M: [[f64; 3]; 2] = [[30e-6, 70e-6, 120e-6], [5e-6, 12e-6, 25e-6]];
 /// The same of others, where it is asked for.
 pub(super) const SETTLING: usize = 2;
-/// Changes of a start by which sensitivities are taken: x, v, p_a, p_b. Small, so that the course stays what it is.
-const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
+/// Standard deviations by which a nudge changes a reading of the force at most; more is a jump.
+const JUMP: f64 = 0.5;
 /// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
 const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 
@@ -122,7 +121,8 @@ impl Windows<'_> {
             for (place, axis) in measured.iter().enumerate() {
                 let part = |number: usize| {
                     let most = if self.course.linked { FARTHEST[number] } else { DOUBT[number] };
-                    shares[at] * (moved[place * NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
+                    shares[at]
+                        * (moved[place * Point::NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
                 point.extension_m += part(0);
@@ -196,13 +196,7 @@ impl Windows<'_> {
     fn seat(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
         let mut points = self.points[start / WINDOW];
         if let Some((axis, number)) = nudged {
-            let point = &mut points[axis];
-            match number {
-                0 => point.extension_m += NUDGES[0],
-                1 => point.rod_velocity_m_per_s += NUDGES[1],
-                2 => point.pressures_pa[0] += NUDGES[2],
-                _ => point.pressures_pa[1] += NUDGES[3],
-            }
+            points[axis] = points[axis].nudged(number);
         }
         seat(plant, self.course, &points);
     }
@@ -213,7 +207,7 @@ impl Windows<'_> {
         let rows = self.rows();
         let nudges: Vec<(usize, usize)> = (0..2)
             .filter(|axis| self.course.measured[*axis])
-            .flat_map(|axis| (0..NUDGES.len()).map(move |number| (axis, number)))
+            .flat_map(|axis| (0..Point::NUDGES.len()).map(move |number| (axis, number)))
             .collect();
         let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
         for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
@@ -235,11 +229,13 @@ impl Windows<'_> {
             let valid = &self.valid[all.len() * rows..][..rows];
             let straight = read.remove(0);
             let columns = read.into_iter().zip(&nudges).map(|(mut own, (_, number))| {
-                let scale = DOUBT[*number] / NUDGES[*number];
                 for ((own, straight), valid) in own.iter_mut().zip(&straight).zip(valid) {
-                    *own = if *valid { (*own - straight) * scale } else { 0.0 };
+                    *own = if *valid { *own - straight } else { 0.0 };
                 }
-                self.flatten_jumps(&mut own, scale);
+                // Before the small change is scaled up: a jump that moves by a sample is no part of it.
+                self.flatten(&mut own, JUMP);
+                let scale = DOUBT[*number] / Point::NUDGES[*number];
+                own.iter_mut().for_each(|own| *own *= scale);
                 self.whiten(all.len(), &mut own);
                 own
             });
@@ -247,29 +243,6 @@ impl Windows<'_> {
             all.push(columns);
         }
         all
-    }
-
-    /// A sensitivity is scaled up from a small change: a jump that moves by a sample is no part of it.
-    pub(super) fn flatten_jumps(&self, own: &mut [f64], scale: f64) {
-        own.iter_mut().for_each(|own| *own /= scale);
-        let width = self.lanes.len();
-        for lane in 0..width {
-            if self.lanes[lane].1 != FORCE {
-                continue;
-            }
-            let force: Vec<f64> = own.iter().skip(lane).step_by(width).copied().collect();
-            for at in 0..force.len() {
-                let from = at.saturating_sub(SPIKE_REACH);
-                let to = (at + SPIKE_REACH + 1).min(force.len());
-                let mut near = force[from..to].to_vec();
-                near.sort_unstable_by(f64::total_cmp);
-                let median = near[near.len() / 2];
-                if (force[at] - median).abs() > 0.5 {
-                    own[at * width + lane] = median;
-                }
-            }
-        }
-        own.iter_mut().for_each(|own| *own *= scale);
     }
 }
 

@@ -9,9 +9,9 @@ use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
 
 /// Readings to each side that a reading of the force is compared with.
-pub(super) const SPIKE_REACH: usize = 4;
+const SPIKE_REACH: usize = 4;
 /// Standard deviations by which it may differ from their median.
-const SPIKE: f64 = 6.0;
+pub(super) const SPIKE: f64 = 6.0;
 
 impl Windows<'_> {
     /// The residual of a model that lacks nothing: noise, treated as a residual is.
@@ -71,12 +71,12 @@ impl Windows<'_> {
         }
     }
 
-    pub(super) fn flatten_spikes(&self, window: &mut [f64]) {
+    /// Puts readings of the force that differ from those around them by more than `limit` back to their median, in every lane of
+    /// `values`, periods one after the other.
+    pub(super) fn flatten(&self, values: &mut [f64], limit: f64) {
         let width = self.lanes.len();
-        let forces: Vec<usize> =
-            self.lanes.iter().enumerate().filter(|(_, (_, at))| *at == FORCE).map(|(lane, _)| lane).collect();
-        for lane in forces {
-            let own: Vec<f64> = window.iter().skip(lane).step_by(width).copied().collect();
+        for lane in (0..width).filter(|lane| self.lanes[*lane].1 == FORCE) {
+            let own: Vec<f64> = values.iter().skip(lane).step_by(width).copied().collect();
             for at in 0..own.len() {
                 let mut near = [0.0; 2 * SPIKE_REACH + 1];
                 let from = at.saturating_sub(SPIKE_REACH);
@@ -85,8 +85,8 @@ impl Windows<'_> {
                 near.copy_from_slice(&own[from..to]);
                 near.sort_unstable_by(f64::total_cmp);
                 let median = near[near.len() / 2];
-                if (own[at] - median).abs() > SPIKE {
-                    window[at * width + lane] = median;
+                if (own[at] - median).abs() > limit {
+                    values[at * width + lane] = median;
                 }
             }
         }

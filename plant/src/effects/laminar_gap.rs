@@ -1,4 +1,5 @@
-//! A gap through which air leaks in layers: what leakage past the piston and past a rod's or cap's seal have in common.
+//! A gap through which air leaks in layers: what leakage past the piston, past a rod's or cap's seal and a
+//! leaking chamber have in common.
 //!
 //! ```text
 //! q = k (p1^2 - p2^2)        k = q_ref / ((6 bar)^2 - (1 bar)^2)
@@ -12,8 +13,8 @@ use super::sheet::EffectKey;
 use crate::parameters::table::Unit;
 
 /// k, m^3/s per Pa^2.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LaminarGap(f64);
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct LaminarGap(f64);
 
 impl LaminarGap {
     /// q_ref in a rig file.
@@ -30,13 +31,13 @@ impl LaminarGap {
     };
 
     /// The gap that passes this normal flow, m^3/s, from 6 to 1 bar absolute.
-    pub(super) fn of(leakage_m3_per_s: f64) -> Self {
+    pub(crate) fn of(leakage_m3_per_s: f64) -> Self {
         const REFERENCE_PA2: f64 = 6e5 * 6e5 - 1e5 * 1e5;
         LaminarGap(leakage_m3_per_s / REFERENCE_PA2)
     }
 
     /// q, normal flow from one pressure to the other, m^3/s.
-    pub(super) fn flow(self, from_pa: f64, to_pa: f64) -> f64 {
+    pub(crate) fn flow(self, from_pa: f64, to_pa: f64) -> f64 {
         self.0 * ((from_pa - to_pa) * (from_pa + to_pa))
     }
 }

@@ -24,13 +24,13 @@
 //! Source: laminar gap flow, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; [Neugebauer 2011] is DOI
 //! 10.2478/v10180-011-0014-6.
 
+use crate::effects::laminar_gap::LaminarGap;
 use crate::valve::{FLOW_PER_KV, single_edge_flow};
 
 /// A way out of one chamber.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Outlet {
-    /// k, m^3/s per Pa^2.
-    gap: f64,
+    gap: LaminarGap,
     /// Conductance of the hole, m^3/s per Pa.
     hole: f64,
 }
@@ -38,8 +38,7 @@ pub(crate) struct Outlet {
 impl Outlet {
     /// A gap that passes a normal flow from 6 to 1 bar absolute, m^3/s, and a hole of this K_V, m^3/h.
     pub(crate) fn new(leakage_m3_per_s: f64, burst_kv_m3_per_h: f64) -> Self {
-        const REFERENCE_PA2: f64 = 6e5 * 6e5 - 1e5 * 1e5;
-        Outlet { gap: leakage_m3_per_s / REFERENCE_PA2, hole: burst_kv_m3_per_h * FLOW_PER_KV }
+        Outlet { gap: LaminarGap::of(leakage_m3_per_s), hole: burst_kv_m3_per_h * FLOW_PER_KV }
     }
 
     pub(crate) fn is_open(&self) -> bool {
@@ -49,7 +48,7 @@ impl Outlet {
     /// Normal flow into the chamber, m^3/s, negative above the atmosphere; pressures absolute, Pa. `most_m3_per_s` is what
     /// would bring the chamber to the atmosphere's pressure within the step.
     pub(crate) fn inflow(&self, chamber_pa: f64, atmospheric_pa: f64, most_m3_per_s: f64) -> f64 {
-        let gap = self.gap * ((atmospheric_pa - chamber_pa) * (atmospheric_pa + chamber_pa));
+        let gap = self.gap.flow(atmospheric_pa, chamber_pa);
         let hole =
             if self.hole > 0.0 { single_edge_flow(self.hole, atmospheric_pa, chamber_pa) } else { 0.0 };
         (gap + hole).clamp(-most_m3_per_s, most_m3_per_s)
