@@ -27,11 +27,45 @@ use regime::{REGIMES, Regimes};
 
 /// Periods of a window.
 pub const WINDOW: usize = 20;
+/// A variable that an unknown input may depend on.
+#[derive(Clone, Copy, Debug)]
+pub struct WindowVariable {
+    /// As reports have it.
+    pub name: &'static str,
+    /// Its unit; empty for a number.
+    pub unit: &'static str,
+    /// How much it costs: of those that explain nearly as much the cheapest is told first.
+    pub(crate) costs: usize,
+    /// Nodes that it is in a formula.
+    pub(crate) nodes: usize,
+}
+
+const fn variable(name: &'static str, unit: &'static str, costs: usize, nodes: usize) -> WindowVariable {
+    WindowVariable { name, unit, costs, nodes }
+}
+
 /// What an unknown input may depend on.
-pub const VARIABLES: [&str; 12] =
-    ["x", "v", "|v|", "sign(v)", "p_a", "p_b", "p_a-p_b", "u", "du/dt", "F", "t", "dp/dt"];
-/// Their units.
-pub const VARIABLE_UNITS: [&str; 12] = ["m", "m/s", "m/s", "", "Pa", "Pa", "Pa", "", "1/s", "N", "s", "Pa/s"];
+pub const VARIABLES: [WindowVariable; 12] = [
+    variable("x", "m", 0, 1),
+    variable("v", "m/s", 0, 1),
+    variable("|v|", "m/s", 1, 2),
+    variable("sign(v)", "", 0, 2),
+    variable("p_a", "Pa", 0, 1),
+    variable("p_b", "Pa", 0, 1),
+    variable("p_a-p_b", "Pa", 1, 3),
+    variable("u", "", 0, 1),
+    variable("du/dt", "1/s", 2, 2),
+    variable("F", "N", 1, 1),
+    variable("t", "s", 3, 1),
+    variable("dp/dt", "Pa/s", 2, 2),
+];
+/// Places of some of them.
+pub(crate) const POSITION: usize = 0;
+pub(crate) const VELOCITY: usize = 1;
+pub(crate) const SPEED: usize = 2;
+pub(crate) const DIRECTION: usize = 3;
+pub(crate) const FORCE: usize = 9;
+pub(crate) const TIME: usize = 10;
 /// From m^3/s to Nl/min.
 pub const NORMAL_LITRES_PER_MINUTE: f64 = 6e4;
 /// Most points of a series in the report.
@@ -170,7 +204,7 @@ fn thinned(series: &UnknownSeries) -> UnknownInput {
             let weight = point.deviation.powi(-2);
             weights += weight;
             values += weight * point.value;
-            times_s += point.variables[10];
+            times_s += point.variables[TIME];
         }
         thin.time_s.push(times_s / points.len() as f64);
         thin.value.push(values / weights);

@@ -17,13 +17,11 @@ pub mod dependence;
 pub mod formula;
 
 use crate::locate::maps::{map, surface};
-use crate::locate::{UnknownSeries, VARIABLES};
+use crate::locate::{TIME, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Dependence, Outside};
 pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
 
-/// How much a variable costs: of those nearly as good the cheapest is told first.
-const COSTS: [usize; VARIABLES.len()] = [0, 0, 1, 0, 0, 0, 1, 0, 2, 1, 3, 2];
 /// Share of the best variable's R2 that is nearly as good.
 const NEARLY: f64 = 0.9;
 /// R2 by which a pair must do better than its better half.
@@ -79,7 +77,7 @@ impl Found<'_> {
             .iter()
             .map(|variable| {
                 let (r2, p_value, _) = self.tests[*variable];
-                Dependence { variable: VARIABLES[*variable].to_owned(), r2, p_value }
+                Dependence { variable: VARIABLES[*variable].name.to_owned(), r2, p_value }
             })
             .collect();
         let mean = self.sample.mean_over_error().abs();
@@ -92,7 +90,7 @@ impl Found<'_> {
             if variables.is_empty() { None } else { formula::formula(&self.sample, self.series.unit) };
         Outside {
             balance: self.series.balance.clone(),
-            curve: order.first().map(|first| smooth(map(self.series, *first), VARIABLES[*first])),
+            curve: order.first().map(|first| smooth(map(self.series, *first), VARIABLES[*first].name)),
             surface: pair.map(|pair| surface(self.series, pair)),
             formula,
             variables,
@@ -111,7 +109,7 @@ impl Found<'_> {
         order.sort_by(|left, right| r2(right).total_cmp(&r2(left)));
         let Some(most) = order.first().map(r2) else { return (order, None) };
         let near = order.iter().take_while(|variable| r2(variable) >= NEARLY * most).count();
-        order[..near].sort_by_key(|variable| COSTS[*variable]);
+        order[..near].sort_by_key(|variable| VARIABLES[*variable].costs);
         let Some((mut pair, _)) = self.pair().filter(|(_, together)| *together > most + PAIR) else {
             return (order, None);
         };
@@ -126,7 +124,7 @@ impl Found<'_> {
         let mut best: Option<([usize; 2], f64)> = None;
         for left in 0..VARIABLES.len() {
             for right in left + 1..VARIABLES.len() {
-                let is_half = |at: usize| at != dependence::TIME && self.tests[at].0 > HALF;
+                let is_half = |at: usize| at != TIME && self.tests[at].0 > HALF;
                 if !is_half(left) || !is_half(right) {
                     continue;
                 }

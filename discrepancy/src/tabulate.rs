@@ -218,7 +218,7 @@ impl Seek<'_> {
 
     /// Where a variable of a table stands among those that unknown inputs are told over; no curve is over the last one.
     fn place(variable: Variable) -> Option<usize> {
-        VARIABLES.iter().position(|own| *own == variable.name())
+        VARIABLES.iter().position(|own| own.name == variable.name())
     }
 
     /// What a variable was in a window.

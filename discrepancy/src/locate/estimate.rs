@@ -319,7 +319,7 @@ fn gather(
             let mut variables = variables(course, axis, *from, balance);
             if balance == 3 {
                 // Over what the sensor reads itself, its every error would be a law.
-                variables[9] = *baseline_force_n;
+                variables[super::FORCE] = *baseline_force_n;
             }
             let scale = if balance < 2 { NORMAL_LITRES_PER_MINUTE } else { 1.0 };
             balances[balance].push(UnknownPoint {

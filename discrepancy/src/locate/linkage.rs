@@ -65,7 +65,7 @@ pub(super) fn gather(
         let stiff_n = linkage.stiffness_n_per_m * noise_m / n.sqrt();
         let damped_n = linkage.damping_n_s_per_m * slope_noise_m_per_s;
         let mut variables: [f64; VARIABLES.len()] = variables(course, 0, from, 2);
-        variables[9] = forces.iter().sum::<f64>() / WINDOW as f64;
+        variables[super::FORCE] = forces.iter().sum::<f64>() / WINDOW as f64;
         points.push(UnknownPoint {
             record,
             window,

@@ -1,6 +1,6 @@
 //! Unknown inputs over the variable that they follow most closely, as means of 20 bins with a band; over two as a surface.
 
-use super::{UnknownPoint, UnknownSeries, VARIABLE_UNITS, VARIABLES};
+use super::{UnknownPoint, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Surface};
 
 /// Bins of a map.
@@ -30,8 +30,8 @@ pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
 #[must_use]
 pub fn map(series: &UnknownSeries, variable: usize) -> Curve {
     let mut curve = Curve {
-        variable: format!("{} over {}", series.balance, VARIABLES[variable]),
-        variable_unit: VARIABLE_UNITS[variable].to_owned(),
+        variable: format!("{} over {}", series.balance, VARIABLES[variable].name),
+        variable_unit: VARIABLES[variable].unit.to_owned(),
         unit: series.unit.to_owned(),
         at: Vec::new(),
         value: Vec::new(),
@@ -86,8 +86,8 @@ pub fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
         cells.iter().map(|row| row.iter().map(|own| own.map(of)).collect()).collect()
     };
     Surface {
-        variables: variables.map(|variable| VARIABLES[variable].to_owned()),
-        variable_units: variables.map(|variable| VARIABLE_UNITS[variable].to_owned()),
+        variables: variables.map(|variable| VARIABLES[variable].name.to_owned()),
+        variable_units: variables.map(|variable| VARIABLES[variable].unit.to_owned()),
         unit: series.unit.to_owned(),
         at,
         value: rows(|(value, _)| value),
@@ -167,6 +167,7 @@ fn between(series: &UnknownSeries, variable: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::regime::Regimes;
+    use super::super::{DIRECTION, POSITION};
     use super::*;
 
     #[test]
@@ -175,7 +176,7 @@ mod tests {
         let point = |at: usize| {
             let (x, direction) = (0.01 * (at % 40) as f64, [-1.0, 0.0, 1.0][(at / 40) % 3]);
             let mut variables = [0.0; VARIABLES.len()];
-            (variables[0], variables[3]) = (x, direction);
+            (variables[POSITION], variables[DIRECTION]) = (x, direction);
             let value = 20.0 * x * direction + if at.is_multiple_of(2) { 0.1 } else { -0.1 };
             let (per_pressure_offset, regimes) = ([0.0; 2], Regimes::default());
             UnknownPoint {
@@ -188,8 +189,10 @@ mod tests {
                 regimes,
             }
         };
-        let points =
-            (0..1200).map(point).filter(|own| own.variables[3] >= 0.0 || own.variables[0] < 0.35).collect();
+        let points = (0..1200)
+            .map(point)
+            .filter(|own| own.variables[DIRECTION] >= 0.0 || own.variables[POSITION] < 0.35)
+            .collect();
         let series = UnknownSeries { balance: "drive.force".to_owned(), unit: "N", points };
         let surface = surface(&series, [0, 3]);
         assert_eq!(surface.variables, ["x", "sign(v)"]);

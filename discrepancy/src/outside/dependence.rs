@@ -15,8 +15,6 @@ use crate::locate::{UnknownSeries, VARIABLES};
 
 /// Circular shifts.
 pub const SHIFTS: usize = 200;
-/// Place of time among the variables.
-pub const TIME: usize = 10;
 /// Windows of a block of a fold: 0.2 s, so that both folds see each stroke in all its parts.
 const BLOCK: usize = 10;
 /// Bins to each side of a pair.

@@ -9,8 +9,8 @@
 //!
 //! Source: discrepancy-notes.md, Pipeline 8. Short laws before good ones: Udrescu, Tegmark 2020, Science Advances 6(16).
 
-use super::dependence::{Bins, Sample, TIME};
-use crate::locate::{VARIABLE_UNITS, VARIABLES};
+use super::dependence::{Bins, Sample};
+use crate::locate::{DIRECTION, POSITION, SPEED, TIME, VARIABLES, VELOCITY, WindowVariable};
 use std::f64::consts::TAU;
 
 /// Share of the best formula's gain that a shorter one may miss.
@@ -72,24 +72,22 @@ fn binned(sample: &Sample) -> f64 {
 fn forms() -> Vec<Form> {
     let mut forms = vec![form(1, "", "", true, |_| 0.0)];
     for at in (0..VARIABLES.len()).filter(|at| *at != TIME) {
-        let (name, unit) = (VARIABLES[at], VARIABLE_UNITS[at]);
-        // |v| and sign(v) are two nodes, p_a-p_b is three.
-        let own = [1, 1, 2, 2, 1, 1, 3, 1, 2, 1, 1, 2][at];
+        let WindowVariable { name, unit, nodes: own, .. } = VARIABLES[at];
         let text = if name == "p_a-p_b" { "(p_a-p_b)" } else { name };
         forms.push(form(2 + own, text, unit, false, move |variables| variables[at]));
         if own <= 2 {
             forms.push(form(4 + own, text, unit, true, move |variables| variables[at]));
         }
-        if own == 1 && at != 1 {
+        if own == 1 && at != VELOCITY {
             let product = format!("sign(v)*{text}");
-            forms.push(form(5, &product, unit, false, move |variables| variables[3] * variables[at]));
+            forms.push(form(5, &product, unit, false, move |variables| variables[DIRECTION] * variables[at]));
         }
     }
-    forms.push(form(5, "|v|*v", "m2/s2", false, |variables| variables[1] * variables[2]));
+    forms.push(form(5, "|v|*v", "m2/s2", false, |variables| variables[VELOCITY] * variables[SPEED]));
     for step in 0..PERIODS {
         let period_m = SHORTEST_M * 1.02_f64.powi(step as i32);
         let text = format!("sin(2 pi x/{period_m:.4} m)");
-        forms.push(form(5, &text, "", false, move |variables| (TAU * variables[0] / period_m).sin()));
+        forms.push(form(5, &text, "", false, move |variables| (TAU * variables[POSITION] / period_m).sin()));
     }
     forms
 }
