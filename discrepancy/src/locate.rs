@@ -27,6 +27,33 @@ use regime::{REGIMES, Regimes};
 
 /// Periods of a window.
 pub const WINDOW: usize = 20;
+/// What an unknown input may depend on.
+pub const VARIABLES: [WindowVariable; 12] = [
+    variable("x", "m", 0, 1),
+    variable("v", "m/s", 0, 1),
+    variable("|v|", "m/s", 1, 2),
+    variable("sign(v)", "", 0, 2),
+    variable("p_a", "Pa", 0, 1),
+    variable("p_b", "Pa", 0, 1),
+    variable("p_a-p_b", "Pa", 1, 3),
+    variable("u", "", 0, 1),
+    variable("du/dt", "1/s", 2, 2),
+    variable("F", "N", 1, 1),
+    variable("t", "s", 3, 1),
+    variable("dp/dt", "Pa/s", 2, 2),
+];
+/// Where some of them stand there.
+pub(crate) const POSITION: usize = 0;
+pub(crate) const VELOCITY: usize = 1;
+pub(crate) const SPEED: usize = 2;
+pub(crate) const DIRECTION: usize = 3;
+pub(crate) const FORCE: usize = 9;
+pub(crate) const TIME: usize = 10;
+/// From m^3/s to Nl/min.
+pub const NORMAL_LITRES_PER_MINUTE: f64 = 6e4;
+/// Most points of a series in the report.
+const SERIES: usize = 1500;
+
 /// A variable that an unknown input may depend on.
 #[derive(Clone, Copy, Debug)]
 pub struct WindowVariable {
@@ -43,33 +70,6 @@ pub struct WindowVariable {
 const fn variable(name: &'static str, unit: &'static str, costs: usize, nodes: usize) -> WindowVariable {
     WindowVariable { name, unit, costs, nodes }
 }
-
-/// What an unknown input may depend on.
-pub const VARIABLES: [WindowVariable; 12] = [
-    variable("x", "m", 0, 1),
-    variable("v", "m/s", 0, 1),
-    variable("|v|", "m/s", 1, 2),
-    variable("sign(v)", "", 0, 2),
-    variable("p_a", "Pa", 0, 1),
-    variable("p_b", "Pa", 0, 1),
-    variable("p_a-p_b", "Pa", 1, 3),
-    variable("u", "", 0, 1),
-    variable("du/dt", "1/s", 2, 2),
-    variable("F", "N", 1, 1),
-    variable("t", "s", 3, 1),
-    variable("dp/dt", "Pa/s", 2, 2),
-];
-/// Places of some of them.
-pub(crate) const POSITION: usize = 0;
-pub(crate) const VELOCITY: usize = 1;
-pub(crate) const SPEED: usize = 2;
-pub(crate) const DIRECTION: usize = 3;
-pub(crate) const FORCE: usize = 9;
-pub(crate) const TIME: usize = 10;
-/// From m^3/s to Nl/min.
-pub const NORMAL_LITRES_PER_MINUTE: f64 = 6e4;
-/// Most points of a series in the report.
-const SERIES: usize = 1500;
 
 /// Where baseline and records disagree.
 #[derive(Clone, Debug)]
@@ -212,4 +212,15 @@ fn thinned(series: &UnknownSeries) -> UnknownInput {
     }
     thin.noise = (variances / thin.value.len() as f64).sqrt();
     thin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn named_places_are_those_of_the_table() {
+        let named = [POSITION, VELOCITY, SPEED, DIRECTION, FORCE, TIME].map(|place| VARIABLES[place].name);
+        assert_eq!(named, ["x", "v", "|v|", "sign(v)", "F", "t"]);
+    }
 }

@@ -194,7 +194,7 @@ mod tests {
             .filter(|own| own.variables[DIRECTION] >= 0.0 || own.variables[POSITION] < 0.35)
             .collect();
         let series = UnknownSeries { balance: "drive.force".to_owned(), unit: "N", points };
-        let surface = surface(&series, [0, 3]);
+        let surface = surface(&series, [POSITION, DIRECTION]);
         assert_eq!(surface.variables, ["x", "sign(v)"]);
         assert_eq!((surface.at[0].len(), surface.at[1].as_slice()), (10, &[-1.0, 0.0, 1.0][..]));
         for (row, direction) in surface.value.iter().zip([-1.0, 0.0, 1.0]) {
