@@ -105,7 +105,7 @@ fn figures(scores: &[Score]) -> Vec<Row> {
         wanted: wanted.to_owned(),
     };
     let mut rows = vec![
-        row("program, CRC-32", "", &|score| format!("{} {:08x}", score.program.name, score.program.crc32)),
+        row("program, CRC-32", "", &|score| score.program.told()),
         row("draws, seed", "", &|score| format!("{}, {}", score.cases.len(), score.seed)),
     ];
     let lines = scores.first().map_or(&[][..], |first| &first.tables.headline);

@@ -99,11 +99,12 @@ impl<'a> Curves<'a> {
                 .collect::<Vec<_>>()
         };
         let heads = row("noise", &|score| format!("times {}", noise(score)));
+        let programs = row("program, CRC-32", &|score| score.program.told());
         let draws = row("draws, seed", &|score| format!("{}, {}", score.cases.len(), score.seed));
         let lines = self.scores[0].tables.headline.iter().map(|line| {
             row(&line.name, &|score| rate_of(score, &line.name).as_ref().map_or(String::new(), told_line))
         });
-        let over_noise = grid(&heads, std::iter::once(draws).chain(lines));
+        let over_noise = grid(&heads, [programs, draws].into_iter().chain(lines));
         let mut heads = vec!["amplitude over its limit at this noise".to_owned()];
         let curves = self.over_amplitude();
         heads.extend(curves.iter().map(|curve| curve.name.clone()));
@@ -224,6 +225,8 @@ mod tests {
         assert_eq!(with_weak.lines().next(), text.lines().next());
         // In the order of the noise, however they were given.
         assert_eq!(text.lines().next().unwrap(), "| noise | times 0.5 | times 4 |");
+        // Two programs on one curve are seen.
+        assert!(row("| program").contains(&scores[0].program.told()), "{text}");
         assert_eq!(row("| 1 to 3"), "| 1 to 3 | none | 38/38 (91 to 100 %) |");
         assert_eq!(row("| 10 to 30"), "| 10 to 30 | 38/38 (91 to 100 %) | none |");
         assert!(row("| nothing hidden: called").ends_with("| 0/2 (at most 77.6 %) | 0/2 (at most 77.6 %) |"));

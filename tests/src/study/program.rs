@@ -55,6 +55,14 @@ pub struct Identity {
     pub leave_out: bool,
 }
 
+impl Identity {
+    /// Name and checksum in a table's cell.
+    #[must_use]
+    pub fn told(&self) -> String {
+        format!("{} {:08x}", self.name, self.crc32)
+    }
+}
+
 /// How a program ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
