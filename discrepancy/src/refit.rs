@@ -96,6 +96,11 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
     factors.iter().map(|factor| (factor - 1.0).powi(2)).map(|own| own / (own + COUNTS_AS_OFF.powi(2))).sum()
 }
 
+/// What so many numbers of effects and the parameters that are off cost.
+pub(crate) fn costs(numbers: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
+    penalty * numbers as f64 + PARAMETER_COSTS * parameters_off(factors)
+}
+
 /// Ridge of a coordinate.
 pub(crate) fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
     let tolerance = if candidate.is_shape(key) { SHAPE_TOLERANCE } else { AMPLITUDE_TOLERANCE };
@@ -235,10 +240,7 @@ pub fn refit_steps(
     for (own, change) in factors.iter_mut().zip(&point.fit.coefficients) {
         *own = (*own + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
-    let loss = point.fit.loss
-        + prior(&point.placed)
-        + penalty * moved.len() as f64
-        + PARAMETER_COSTS * parameters_off(&factors);
+    let loss = point.fit.loss + prior(&point.placed) + costs(moved.len(), &factors, penalty);
     Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
 }
 

@@ -8,6 +8,7 @@
 use super::home::{Placement, at_home, gap_start};
 use super::joined::same;
 use super::pitch::at_best_pitch;
+use super::settle::ended;
 use super::{EXCESS, NUMBER_COSTS, STEPS, WORTH_A_FIT, is_large, refine};
 use crate::engine::Engine;
 use crate::refit::{Around, Placed, Refit, loss_at, refit_steps};
@@ -26,6 +27,8 @@ const BELIEVED: f64 = 0.2;
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 /// How many contenders are fitted with sensitivities of their own.
 const REFINED: usize = 3;
+/// Share of what the best takes within which others come close.
+const CLOSE: f64 = 0.02;
 /// What stands between linked rods: screening sees little of it, since starts were moved to where the rig without it meets the
 /// readings.
 const BACKLASH: &str = "coupling-backlash";
@@ -116,7 +119,22 @@ impl<'a> Round<'a> {
             round.with_gap(engine, point, model, gap);
         }
         sort(&mut round.fits);
+        round.run_off(engine, model);
         Some(round)
+    }
+
+    /// Where others come close to the best, fits all of them in the simulator to the end: with straight lines of the parameters,
+    /// one that leads all of them far from the file may pass the one that is right.
+    fn run_off(&mut self, engine: &Engine<'a>, model: &Refit) {
+        let Some(best) = self.fits.first().map(|own| own.loss) else { return };
+        let is_close = |own: &&Refit| own.loss - best < CLOSE * (model.loss - best);
+        let close = self.fits.iter().take(REFINED).filter(is_close).count();
+        if close < 2 || engine.is_linked() {
+            return;
+        }
+        let fits: Vec<Refit> = self.fits[..close].par_iter().map(|own| ended(engine, own)).collect();
+        self.fits.splice(..close, fits);
+        sort(&mut self.fits);
     }
 
     /// Fits a gap from another width than the one that screening says.

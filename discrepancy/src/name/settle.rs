@@ -7,11 +7,14 @@
 //! Naming moves the parameters by straight lines: good enough to compare models that have them in common, but what a straight
 //! line promised is not what the simulator leaves.
 
+use super::NUMBER_COSTS;
 use super::nothing::FAR_OFF;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
-use crate::refit::{MOST_OFF, Placed, Refit, coordinate_columns, coordinate_ridge, parameter_ridges, rig_of};
+use crate::refit::{
+    MOST_OFF, Placed, Refit, coordinate_columns, coordinate_ridge, costs, parameter_ridges, rig_of,
+};
 use crate::windows::dot;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -39,6 +42,13 @@ pub(super) fn grounded(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let losses: Vec<f64> = tried.par_iter().map(loss).collect();
     let best = (0..WAYS.len()).min_by(|one, other| losses[*one].total_cmp(&losses[*other]));
     tried[best.expect("one at least")]
+}
+
+/// A model fitted in the simulator to the end, all parameters beside, with what its numbers cost; itself where that is no better.
+pub(super) fn ended(engine: &Engine<'_>, model: &Refit) -> Refit {
+    let Some(mut own) = settled(engine, model, &[true; COUNT]) else { return model.clone() };
+    own.loss += costs(numbers(&own.placed).len(), &own.factors, NUMBER_COSTS);
+    if own.loss < model.loss { own } else { model.clone() }
 }
 
 /// A model where the simulator was asked.
