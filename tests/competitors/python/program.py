@@ -7,11 +7,9 @@ writes DIR/report.json and never fails on a record: what cannot be used is `bad-
 """
 
 import argparse
-import hashlib
 import json
 import math
 import os
-import pickle
 import sys
 import time
 import traceback
@@ -49,28 +47,8 @@ def empty(verdict, reason=None):
     return report | ({"reason": reason} if reason else {})
 
 
-def kept_library(options, trains, rig):
-    """The library of these records, which all three methods share; built once where AIRBENCH_COMPETITORS_KEPT names a folder."""
-    folder = os.environ.get("AIRBENCH_COMPETITORS_KEPT")
-    if not folder:
-        return library.build(trains, rig)
-    digest = hashlib.sha256()
-    for path in [options.rig, *options.train]:
-        with open(path, "rb") as file:
-            digest.update(hashlib.file_digest(file, "sha256").digest())
-    kept = os.path.join(folder, digest.hexdigest())
-    if os.path.exists(kept):
-        with open(kept, "rb") as file:
-            return pickle.load(file)
+def judge(method, rig, trains, test_path):
     regression = library.build(trains, rig)
-    with open(f"{kept}.{os.getpid()}", "wb") as file:
-        pickle.dump(regression, file)
-    os.replace(file.name, kept)
-    return regression
-
-
-def judge(method, rig, trains, options):
-    regression = kept_library(options, trains, rig)
     choice = METHODS[method](regression)
     effects, parameters = naming.named(regression, choice)
     if effects:
@@ -86,7 +64,7 @@ def judge(method, rig, trains, options):
         unseen = [{"effect": effect, "where": {"axis": place, "element": None}} for effect in candidates.WITHOUT_SIGNATURE]
         report["not_excited"] += unseen
     report["detection_limits"] = naming.detection_limits(regression)
-    report["gap"] = gap(rig, options.test, regression, choice)
+    report["gap"] = gap(rig, test_path, regression, choice)
     return report
 
 
@@ -133,7 +111,7 @@ def main():
     except (OSError, KeyError, ValueError) as error:
         sys.exit(f"{method}: cannot use {options.rig}: {error!r}")
     try:
-        report = judge(method, rig, [record.read(path) for path in options.train], options)
+        report = judge(method, rig, [record.read(path) for path in options.train], options.test)
     except (record.BadData, OSError) as error:
         report = empty("bad-data", str(error))
     except Exception:  # a competitor that falls over has lost the record, not the study
