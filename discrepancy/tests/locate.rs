@@ -1,8 +1,11 @@
 //! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
 
-mod common;
+#[path = "common/course.rs"]
+mod course;
+#[path = "common/record.rs"]
+mod record;
 
-use common::course;
+use course::course;
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
 use discrepancy::report::Outside;
@@ -16,7 +19,7 @@ fn located(effect: Option<Hidden<'_>>) -> (Located, Option<Outside>) {
     let hidden = effect.map_or(rig.clone(), |(name, place, numbers)| {
         rig.with_effect(name, place, numbers).expect("numbers of the sheet")
     });
-    let courses = [course(&hidden, 11)];
+    let courses = [course(&hidden, &rig)];
     let located = locate(&rig, &courses, &mut |_| ());
     let outside = outside(&located.unknowns, &mut |_| ());
     (located, outside)

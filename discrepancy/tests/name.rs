@@ -1,8 +1,11 @@
 //! Claims about naming, on records that the plant makes here with something hidden in it.
 
-mod common;
+#[path = "common/course.rs"]
+mod course;
+#[path = "common/record.rs"]
+mod record;
 
-use common::course;
+use course::course;
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{Found, name};
@@ -14,7 +17,7 @@ fn found(hidden: &RigParameters, without: &[&str]) -> Found {
 }
 
 fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> Found {
-    let courses = [course(hidden, 11)];
+    let courses = [course(hidden, &RigParameters::baseline())];
     let engine = Engine::new(&courses, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
     name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())
@@ -41,7 +44,7 @@ fn factors(found: &Found) -> Vec<(f64, f64)> {
 
 #[test]
 fn rigs_side_by_side_show_what_each_shows_alone() {
-    let courses = [course(&RigParameters::baseline(), 11)];
+    let courses = [course(&RigParameters::baseline(), &RigParameters::baseline())];
     let engine = Engine::new(&courses, &RigParameters::baseline());
     let off = |at: usize| {
         let mut factors = [1.0; COUNT];
