@@ -2,9 +2,7 @@
 //!
 //! Each run leaves the page of a made-up report in the target folder's `tmp/report-page.html`, to be looked at.
 
-#[path = "report_page/sample.rs"]
-mod sample;
-
+use crate::sample;
 use bench::report::model::{Distribution, PercentilesNs, Report, Source};
 use bench::report::page::page;
 use roxmltree::{Document, Node, ParsingOptions};

@@ -1,11 +1,6 @@
 //! A record tells the numbers of a rig that nothing is missing from: its volumes and the points of its valve's tables too.
 
-#[path = "common/course.rs"]
-mod course;
-#[path = "common/record.rs"]
-mod record;
-
-use course::course;
+use crate::course::course;
 use discrepancy::calibrate::finer::{Finer, finer};
 use discrepancy::calibrate::{calibrate, quantity};
 use discrepancy::engine::Engine;

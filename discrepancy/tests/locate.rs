@@ -1,11 +1,6 @@
 //! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
 
-#[path = "common/course.rs"]
-mod course;
-#[path = "common/record.rs"]
-mod record;
-
-use course::course;
+use crate::course::course;
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
 use discrepancy::report::Outside;

@@ -1,11 +1,6 @@
 //! Claims about naming, on records that the plant makes here with something hidden in it.
 
-#[path = "common/course.rs"]
-mod course;
-#[path = "common/record.rs"]
-mod record;
-
-use course::course;
+use crate::course::course;
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{Found, name};

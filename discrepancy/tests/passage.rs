@@ -1,11 +1,6 @@
 //! A neighbour of a rig is simulated only where it differs, and shows the same as if it were simulated everywhere.
 
-#[path = "common/course.rs"]
-mod course;
-#[path = "common/record.rs"]
-mod record;
-
-use course::course;
+use crate::course::course;
 use discrepancy::windows::Windows;
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};

@@ -2,12 +2,10 @@
 //! skipped aloud
 //! where the records are not there.
 
-mod real;
-
+use crate::real::{crate_folder, data};
 use discrepancy::balance::{close, extended_model_text};
 use discrepancy::report::{Report, Verdict};
 use discrepancy::workflow::Told;
-use real::{crate_folder, data};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

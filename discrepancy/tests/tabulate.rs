@@ -1,12 +1,9 @@
 //! What no effect of the catalogue explains is added to the model as a table, and closes the gap on another record.
 
-#[path = "common/record.rs"]
-mod record;
-
+use crate::record::{STROKES_RAD_PER_S, measurement};
 use discrepancy::report::Verdict;
 use discrepancy::workflow::{Outcome, RigFile, Task, Told, close, extended};
 use plant::RigParameters;
-use record::{STROKES_RAD_PER_S, measurement};
 
 /// Closes on two records of a rig with something hidden in it that is no candidate.
 fn closed(hidden: &RigParameters, without: &str) -> (Outcome, RigFile) {

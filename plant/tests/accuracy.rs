@@ -1,11 +1,8 @@
 //! The integration against its limit of small steps, as rig-model.md, Accuracy, asks for it.
 
-mod reference;
-mod scenario;
-mod windows;
-
+use crate::scenario;
+use crate::windows::{Errors, Scheme, compare, reference_windows};
 use plant::RigParameters;
-use windows::{Errors, Scheme, compare, reference_windows};
 
 #[test]
 fn windows_of_100_ms_stay_within_a_fifth_of_the_sensors_noise() {

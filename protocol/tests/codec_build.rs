@@ -1,11 +1,8 @@
 //! A `rig.dbc` that is broken, or says what the generator does not know, fails the build with file and line.
 
-#[path = "../build/emit.rs"]
-mod emit;
-#[path = "../build/model.rs"]
-mod model;
-#[path = "../build/source.rs"]
-mod source;
+use crate::emit;
+use crate::model;
+use crate::source;
 
 const RIG: &str = include_str!("../rig.dbc");
 

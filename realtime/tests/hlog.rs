@@ -1,13 +1,12 @@
 //! What `write_hlog` writes, hdrhistogram's own reader reads back equal.
 
+use crate::common;
 use std::fs;
 use std::io::ErrorKind;
 use std::time::Duration;
 
 use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 use realtime::{Recorder, write_hlog};
-
-mod common;
 
 fn recorder_of(values: impl IntoIterator<Item = u64>) -> Recorder {
     let mut recorder = Recorder::new();

@@ -1,5 +1,6 @@
 //! The writer's account against the loop's own, and the log second by second against both.
 
+use crate::common;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
@@ -9,8 +10,6 @@ use realtime::{
     Clock, CycleStages, Instant, IntervalLog, OverrunPolicy, PeriodicConfig, PeriodicLoop, StageAccount,
     VirtualClock,
 };
-
-mod common;
 
 const PERIOD: Duration = Duration::from_millis(1);
 

@@ -2,10 +2,7 @@
 //!
 //! The tables behind it: `controller/docs/gains.md`, `controller/docs/better-than-the-paper.md`.
 
-#[path = "../examples/shared/cases.rs"]
-mod cases;
-
-use cases::{Case, Made, figures};
+use crate::cases::{Case, Made, figures};
 use controller::program::file::Source;
 use plant::{Axis, RigParameters};
 use std::path::Path;

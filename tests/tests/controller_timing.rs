@@ -1,9 +1,7 @@
 //! The timing of both processes on one clock: tables that join by cycle, histograms that hold every frame, and a stop of the
 //! controller that its own rows explain.
 
-#[path = "../../realtime/tests/common/mod.rs"]
-mod hlog;
-
+use crate::hlog;
 use protocol::timing::{self, CycleTiming, Exchange};
 use rustix::process::Signal;
 use serde_json::Value;

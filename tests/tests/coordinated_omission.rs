@@ -3,9 +3,7 @@
 //! A loop that measures itself sees one late wake-up where fifty cycles were late; a report made of that would be fifty times too
 //! good. Here the rig's process is stopped from outside for 50 ms, as a debugger does it.
 
-#[path = "../../realtime/tests/common/mod.rs"]
-mod hlog;
-
+use crate::hlog;
 use hdrhistogram::Histogram;
 use protocol::timing::{self, CycleTiming};
 use rustix::process::Signal;

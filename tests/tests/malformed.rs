@@ -3,9 +3,7 @@
 //! A member of the lockstep barrier beside the controller injects one packet of the table every third cycle, while the
 //! carriage moves. Lockstep makes the proof sharp: `truth.csv` is byte-equal to that of a run without the injector.
 
-mod malformed_table;
-
-use malformed_table::{COUNTERS, Counter, Injection, table};
+use crate::malformed_table::{COUNTERS, Counter, Injection, table};
 use protocol::frames::{Frame, Tick, ValveCommand};
 use serde_json::Value;
 use system_tests::launch::Pace;

@@ -3,13 +3,11 @@
 //! The rules stand in `tidy_rules`, each with samples that it must find and samples that it must pass; a rule that finds nothing
 //! any more fails here before it can wave something through.
 
-mod tidy_rules;
-
+use crate::tidy_rules::{File, Problem, RULES, names_of_scripts, too_large};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use tidy_rules::{File, Problem, RULES, names_of_scripts, too_large};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate stands in the workspace")
@@ -105,4 +103,32 @@ fn a_large_file_and_a_script_in_prose_are_found() {
     let text = "Run `scripts/test`.\nOr .ci/run, or (scripts/vm/job); see scripts/.\nhttps://example.org/scripts/other";
     let expected = [(1, "scripts/test"), (2, ".ci/run"), (2, "scripts/vm/job"), (2, "scripts")];
     assert_eq!(names_of_scripts(text), expected.map(|(line, name)| (line, name.to_owned())));
+}
+
+#[test]
+fn every_file_of_tests_belongs_to_an_executable() {
+    let (files, _) = tracked();
+    let text = |path: &str| files.iter().find(|file| file.path == path).map_or("", |file| file.text.as_str());
+    let mut complaints = Vec::new();
+    let mut modules = 0;
+    for file in &files {
+        // CRATE/tests/NAME.rs
+        let Some((room, name)) = file.path.strip_suffix(".rs").and_then(|path| path.split_once("/tests/"))
+        else {
+            continue;
+        };
+        if name == "main" || name.contains('/') || text(&format!("{room}/tests/main.rs")).is_empty() {
+            continue;
+        }
+        modules += 1;
+        let is_module =
+            text(&format!("{room}/tests/main.rs")).lines().any(|line| line == format!("mod {name};"));
+        let is_target = text(&format!("{room}/Cargo.toml")).contains(&format!("name = \"{name}\""));
+        if !is_module && !is_target {
+            complaints
+                .push(format!("{}:1: no executable holds it: name it in {room}/tests/main.rs", file.path));
+        }
+    }
+    assert!(modules > 50, "only {modules} files of tests: the search is broken");
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }

@@ -1,6 +1,6 @@
 //! The lockstep barrier over real sockets: the same order whatever the timing, and a name when a member does not answer.
 
-use crate::support::*;
+use super::support::*;
 use protocol::bus::control::{Control, Kind, Role};
 use protocol::bus::host::Host;
 use protocol::bus::lockstep::BarrierConfig;

@@ -1,6 +1,6 @@
 //! A foreign controller in lockstep: it joins by its echo, and neither a lossy wire nor its own full queue holds the barrier.
 
-use crate::support::*;
+use super::support::*;
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{Bus, Received, WireOptions};

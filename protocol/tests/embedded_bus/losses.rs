@@ -1,7 +1,7 @@
 //! Losses add up: what the wire loses on purpose, and what a listener loses that does not read, are in the host's report by
 //! identifier, and equal what the receivers missed.
 
-use crate::support::*;
+use super::support::*;
 use protocol::bus::host::HostReport;
 use protocol::bus::{Received, WireOptions};
 use protocol::can::CanFrame;

@@ -1,6 +1,6 @@
 //! Packets that are no frames: counted where they arrive, delivered to nobody, and no harm to anyone else.
 
-use crate::support::*;
+use super::support::*;
 use protocol::bus::Received;
 use protocol::can::{CAN_FRAME_BYTES, CanFrame};
 use rustix::net::SocketAddrUnix;

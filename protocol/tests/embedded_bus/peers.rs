@@ -1,6 +1,6 @@
 //! What peers see of each other: echo rule, order, stamps, and a host that comes, goes and comes back.
 
-use crate::support::*;
+use super::support::*;
 use protocol::bus::{Bus, Received, SendError};
 use protocol::can::CanFrame;
 use rustix::net::SocketAddrUnix;

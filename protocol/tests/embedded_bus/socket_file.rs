@@ -1,6 +1,6 @@
 //! The socket's file and its lock: whose it is, who may use it, and who may remove it.
 
-use crate::support::*;
+use super::support::*;
 use protocol::bus::host::Host;
 use protocol::bus::{BusError, WireOptions};
 use std::fs;

@@ -1,0 +1,16 @@
+//! The integration tests of `protocol`, one executable; `descriptors.rs` needs a process of its own.
+
+#[path = "../build/emit.rs"]
+mod emit;
+#[path = "../build/model.rs"]
+mod model;
+#[path = "../build/source.rs"]
+mod source;
+
+mod codec_build;
+mod codec_cantools;
+mod codec_catalogue;
+mod codec_errors;
+mod codec_round_trip;
+mod embedded_bus;
+mod modelled_wire;

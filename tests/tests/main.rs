@@ -1,0 +1,67 @@
+//! The whole-system tests, one executable: a test is a module here, not a link of its own.
+
+#[path = "../examples/shared/cases.rs"]
+mod cases;
+#[path = "../../realtime/tests/common/mod.rs"]
+mod hlog;
+mod malformed_table;
+mod tidy_rules;
+
+mod allocations;
+mod campaign;
+mod check_controller;
+mod claims;
+mod cli;
+mod confinement;
+mod controller_timing;
+mod coordinated_omission;
+mod discrepancy_cli;
+mod discrepancy_steps;
+mod disturbances;
+mod effects_emulator;
+mod emergency_stop;
+mod emergency_stop_way_back;
+mod experiments;
+mod faster_after_a_step;
+mod faults_bus;
+mod faults_bus_table;
+mod faults_lockstep;
+mod faults_output;
+mod faults_privileges;
+mod faults_processes;
+mod faults_real_time;
+mod faults_script;
+mod faults_signals;
+mod faults_table;
+mod find_effect;
+mod firmware;
+mod fmu;
+mod gateway;
+mod gateway_hostile;
+mod hand_and_console;
+mod latency_script;
+mod live_parameters;
+mod lockstep;
+mod logs_export;
+mod logs_replay;
+mod loss;
+mod malformed;
+mod modelled_wire;
+mod noise;
+mod own_algorithm;
+mod partner_faults;
+mod report_files;
+mod sealed;
+mod sensor_loss;
+mod set_points_by_hand;
+mod soak;
+mod study;
+mod telemetry;
+mod tidy;
+mod two_processes;
+mod vm_cards;
+mod vm_vcan;
+mod watch_api;
+mod watch_page;
+mod xcp;
+mod xcp_packets;
