@@ -130,6 +130,9 @@ install_mdf4() { install_requirements mdf4 "$(dirname "${BASH_SOURCE[0]}")/../di
 # The client of a Dask cluster, which scripts/campaign hands parts out with.
 install_dask() { install_requirements dask "$(dirname "${BASH_SOURCE[0]}")/../campaign/dask/requirements.txt"; }
 
+# MkDocs, which scripts/book builds the book with.
+install_book() { install_requirements book "$(dirname "${BASH_SOURCE[0]}")/../docs/book/requirements.txt"; }
+
 install_gungraun() {
     [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return
     cargo install --quiet --locked --debug gungraun-runner --version "$gungraun_version" --root "$tools" # it starts valgrind

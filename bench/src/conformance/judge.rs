@@ -1,7 +1,7 @@
 //! The checks: what the contract of the bus asks of a controller, held against what was heard of it.
 //!
 //! Source: the repository's `bench/docs/check-controller.md`, a section for each; the contract is `protocol/rig.dbc` and
-//! README.md, Buses.
+//! `docs/buses.md`.
 
 use super::cli::{CheckPace, ConformanceArguments};
 use super::watch::{Heard, What, Wrong};
