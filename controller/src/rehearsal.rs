@@ -15,7 +15,7 @@
 use crate::axis::{AxisController, AxisRecord};
 use crate::pace::STOPPED_CYCLES;
 use crate::station::{News, Outlets, Station};
-use crossbeam_channel::{Receiver, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use plant::scene::{Action, HandForces, Holder, Outcome, RigCall};
 use plant::tables::CycleRecord;
 use plant::{AxisReadings, Inputs as PlantInputs, People, Plant, RigParameters, Scene, Sensors, SetupError};
@@ -23,8 +23,8 @@ use protocol::bus::control::Role;
 use protocol::bus::{Bus, BusCounters, BusError, Received, SendError};
 use protocol::can::CanFrame;
 use protocol::frames::{
-    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, EncodeError, Frame, RIG_STATUS, RigStatus,
-    Sensors as SensorFrame, Tick, ValveCommand,
+    ALIVE_RANGE, EmergencyStop, EncodeError, Frame, RIG_STATUS, RigStatus, Sensors as SensorFrame, Tick,
+    ValveCommand,
 };
 use protocol::periods;
 use std::time::Duration;
@@ -91,6 +91,7 @@ pub struct Rehearsal<R = PeopledPlant> {
     cycle: u64,
     closing: bool,
     off_the_wire: Option<EncodeError>,
+    listener: Option<Sender<CanFrame>>,
 }
 
 /// What a cycle left.
@@ -203,6 +204,7 @@ impl<R: SimulatedRig> Rehearsal<R> {
             cycle: 0,
             closing: false,
             off_the_wire: None,
+            listener: None,
         }
     }
 
@@ -243,9 +245,8 @@ impl<R: SimulatedRig> Rehearsal<R> {
         }
         // Ahead of the sensors, as the rig does.
         if let Some(call) = self.rig.rig_call(cycle) {
-            let release = call == RigCall::Release;
-            let reason = if release { EmergencyStopReason::None } else { EmergencyStopReason::Operator };
-            self.hand_over(&Frame::RigEmergencyStop(EmergencyStop { reason, release }));
+            let stop = EmergencyStop::of_operator(call == RigCall::Release);
+            self.hand_over(&Frame::RigEmergencyStop(stop));
         }
         let [drive, load] = readings;
         self.hand_over(&Frame::DriveSensors(sensor_frame(drive, cycle)));
@@ -280,12 +281,18 @@ impl<R: SimulatedRig> Rehearsal<R> {
     fn hand_over(&mut self, frame: &Frame) {
         match frame.encode() {
             Ok(frame) => {
+                self.listener.iter().for_each(|listener| _ = listener.try_send(frame));
                 self.station.take(&frame);
             }
             Err(error) => {
                 let _ = self.off_the_wire.get_or_insert(error);
             }
         }
+    }
+
+    /// Copies each frame of the rig into this queue; what does not fit is lost.
+    pub fn listen(&mut self, listener: Sender<CanFrame>) {
+        self.listener = Some(listener);
     }
 
     /// The rig.

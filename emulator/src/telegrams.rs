@@ -3,9 +3,7 @@
 use plant::scene::RigCall;
 use plant::{AxisReadings, Plant};
 use protocol::can::CanFrame;
-use protocol::frames::{
-    ALIVE_RANGE, EmergencyStop, EmergencyStopReason, FaultMark, Frame, RIG_STATUS, RigStatus, Sensors, Tick,
-};
+use protocol::frames::{ALIVE_RANGE, EmergencyStop, FaultMark, Frame, RIG_STATUS, RigStatus, Sensors, Tick};
 
 /// Sensors of one axis in `cycle`.
 #[must_use]
@@ -41,8 +39,7 @@ pub fn tick(cause: TickCause, cycle: u64, skipped: u64, lockstep: bool) -> Frame
 /// The rig's own emergency stop: somebody pressed its button, or released it.
 #[must_use]
 pub fn emergency_stop(call: RigCall) -> Frame {
-    let release = call == RigCall::Release;
-    Frame::RigEmergencyStop(EmergencyStop { reason: EmergencyStopReason::Operator, release })
+    Frame::RigEmergencyStop(EmergencyStop::of_operator(call == RigCall::Release))
 }
 
 /// The bench's mark that a fault of this number begins or ends.

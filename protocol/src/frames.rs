@@ -284,6 +284,15 @@ pub enum DecodeError {
 
 struct Unit<'a>(&'a SignalSpec);
 
+impl EmergencyStop {
+    /// An operator's stop, or its release, which has no reason: there is none to go on stopping.
+    #[must_use]
+    pub fn of_operator(release: bool) -> Self {
+        let reason = if release { EmergencyStopReason::None } else { EmergencyStopReason::Operator };
+        Self { reason, release }
+    }
+}
+
 impl fmt::Display for Unit<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.0.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.0.unit) }

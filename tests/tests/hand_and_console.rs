@@ -1,5 +1,7 @@
 //! People at the rig: scripted hands and buttons, the rig's own emergency stop on the bus, and its console.
 
+use controller::rehearsal::{Rehearsal, RehearsalParts};
+use plant::RigParameters;
 use protocol::can::CanFrame;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
 use std::path::Path;
@@ -34,7 +36,7 @@ fn rig_calls(log: &Path) -> Vec<(usize, bool)> {
     for frame in bus_log(log) {
         match Frame::decode(&frame) {
             Ok(Frame::RigEmergencyStop(stop)) => {
-                assert_eq!(stop.reason, EmergencyStopReason::Operator);
+                assert_eq!(stop, EmergencyStop::of_operator(stop.release));
                 calls.push((cycle, stop.release));
             }
             Ok(Frame::DriveSensors(_)) => cycle += 1,
@@ -74,6 +76,36 @@ fn a_scripted_stop_is_called_out_every_100_ms_and_empties_the_supply() {
     let setup = &json(&scene.path("emulator/run.json"))["rig_setup"];
     assert_eq!(setup["event"][0]["do"], "emergency-stop");
     assert_eq!(setup["event"][1]["at_s"], 0.95);
+}
+
+#[test]
+fn the_rig_says_the_same_in_lockstep_and_in_a_rehearsal() {
+    const CYCLES: usize = 1000;
+    let scene = with_people(STOP_AND_RELEASE);
+    lockstep(&scene, CYCLES, |_| None);
+    let logged = bus_log(&scene.path("emulator/bus.log"));
+
+    let rig = RigParameters::baseline();
+    let people = plant::Scene::from_toml(STOP_AND_RELEASE, "people", &rig).expect("a scene");
+    let setup = plant::Scene { carriage_position_m: 0.1, ..people };
+    let parts = RehearsalParts { rig: &rig, scene: &setup, seed: 1, controllers: Vec::new() };
+    let mut rehearsal = Rehearsal::new(parts).expect("a rig");
+    let (listener, frames) = crossbeam_channel::bounded(4 * CYCLES);
+    rehearsal.listen(listener);
+    (0..CYCLES).for_each(|_| _ = rehearsal.step(|_, _| {}));
+    let rehearsed: Vec<CanFrame> = frames.try_iter().collect();
+
+    let release = |frames: &[CanFrame]| {
+        let is_release = |frame: &&CanFrame| {
+            matches!(Frame::decode(frame), Ok(Frame::RigEmergencyStop(EmergencyStop { release: true, .. })))
+        };
+        frames.iter().find(is_release).map(|frame| frame.data().to_vec())
+    };
+    // rig.dbc: the reason is none in a release.
+    assert_eq!([release(&logged), release(&rehearsed)], [Some(vec![0, 1]), Some(vec![0, 1])]);
+    assert!(rehearsed.len() > 2 * CYCLES, "{} frames", rehearsed.len());
+    let first = logged.iter().zip(&rehearsed).position(|(one, other)| one != other);
+    assert_eq!(first.map(|at| (logged[at], rehearsed[at])), None, "the first frame that differs");
 }
 
 #[test]

@@ -3,9 +3,7 @@
 //! Ranges are not checked here: the console of the emulator knows them, and its answer is handed on.
 
 use super::minute::LONGEST_S;
-use protocol::frames::{
-    EmergencyStop, EmergencyStopReason, Frame, HandSetPointAxis, RunControl, RunControlCommand,
-};
+use protocol::frames::{Frame, HandSetPointAxis, RunControl, RunControlCommand};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -78,13 +76,6 @@ pub enum Order {
     Line(String),
     /// The last so many seconds, saved.
     Save(f64),
-}
-
-/// The emergency stop of the console, or its release, as a person would send them: `108#0100`, `108#0001`.
-#[must_use]
-pub fn stop_frame(release: bool) -> EmergencyStop {
-    let reason = if release { EmergencyStopReason::None } else { EmergencyStopReason::Operator };
-    EmergencyStop { reason, release }
 }
 
 /// Reads what is asked for.

@@ -4,7 +4,7 @@ use super::WatchError;
 use super::assets;
 use super::cli::WatchArguments;
 use super::client::{Client, refusal};
-use super::control::{self, Order, stop_frame};
+use super::control::{self, Order};
 use super::feed::Feed;
 use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, response, said};
 use super::metrics;
@@ -384,11 +384,11 @@ impl Server {
         match order {
             Order::Stop => {
                 self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
-                Some(self.send(&Frame::ConsoleEmergencyStop(stop_frame(false)), now_ms))
+                Some(self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(false)), now_ms))
             }
             Order::Release => {
                 self.stop_due_ms = None;
-                Some(self.send(&Frame::ConsoleEmergencyStop(stop_frame(true)), now_ms))
+                Some(self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(true)), now_ms))
             }
             Order::Frame(frame) => Some(self.send(&frame, now_ms)),
             Order::SetPoint { axis, position_m, force_n } => {
@@ -437,7 +437,7 @@ impl Server {
     fn repeat_stop(&mut self, now_ms: u64) {
         if self.stop_due_ms.is_some_and(|due_ms| now_ms >= due_ms) {
             self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
-            let _ = self.send(&Frame::ConsoleEmergencyStop(stop_frame(false)), now_ms);
+            let _ = self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(false)), now_ms);
         }
     }
 
