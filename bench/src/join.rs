@@ -13,7 +13,7 @@ use crate::figures::{self, Figures, position};
 use crate::record::{self, Record};
 use crate::reports::{self, Reports};
 use crate::{SummaryError, thresholds};
-use protocol::run_folder::write_json;
+use runlog::run_folder::write_json;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 

@@ -18,7 +18,7 @@ use bench::{
 };
 use clap::Parser;
 use protocol::exit::Exit;
-use protocol::run_folder::write_json;
+use runlog::run_folder::write_json;
 use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@
 //!
 //! Frames are kept in memory, 33 bytes each: an hour of a rig with both controllers some 600 MB.
 
-use protocol::candump::{LogError, LogLine, LogReader};
+use runlog::candump::{LogError, LogLine, LogReader};
 use std::fs::File;
 use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};

@@ -71,7 +71,7 @@ pub fn json(runs: &[Run]) -> Value {
         .collect();
     let names: Vec<_> = runs.iter().map(|run| run.name.as_str()).collect();
     json!({
-        "schema_version": protocol::run_folder::SCHEMA_VERSION,
+        "schema_version": runlog::run_folder::SCHEMA_VERSION,
         "experiment": runs.first().map(Run::title),
         "runs": names,
         "figures": figures,

@@ -11,7 +11,7 @@ use crate::page::page;
 use crate::parts::write_whole;
 use crate::shard::{Shard, ShardError};
 use protocol::exit::Exit;
-use protocol::run_folder::SCHEMA_VERSION;
+use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::json;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};

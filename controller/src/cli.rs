@@ -5,7 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use plant::Axis;
 use protocol::bus::BusUrl;
 use protocol::exit::EXIT_CODE_HELP;
-use protocol::run_folder;
+use runlog::run_folder;
 use std::path::PathBuf;
 
 /// Controls the axes of the rig over a CAN bus.

@@ -8,8 +8,8 @@ use crate::station::{News, Station};
 use crate::timing::{Stopwatch, StopwatchAccount};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{Bus, BusError, Received};
-use protocol::timing::Vitals;
 use realtime::{Clock, Continued, Interrupt, VitalsReader};
+use runlog::timing::Vitals;
 use std::time::{Duration, Instant as WallInstant};
 
 /// Longest wait for a frame before looking at the world again.

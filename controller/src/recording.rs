@@ -11,7 +11,7 @@ use crate::xcp::clerk::Clerk;
 use crossbeam_channel::{Receiver, TryRecvError};
 use plant::Axis;
 use protocol::frames::MainChainState;
-use protocol::run_folder::LineFile;
+use runlog::run_folder::LineFile;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};

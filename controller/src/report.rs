@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 /// The report of a process.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// See [`protocol::run_folder::SCHEMA_VERSION`].
+    /// See [`runlog::run_folder::SCHEMA_VERSION`].
     pub schema_version: u32,
     /// How it was called.
     pub command_line: Vec<String>,

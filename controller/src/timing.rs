@@ -28,8 +28,8 @@ use crossbeam_channel::Sender;
 use plant::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
-use protocol::timing::{CycleTiming, Exchange, Vitals};
 use realtime::Clock;
+use runlog::timing::{CycleTiming, Exchange, Vitals};
 pub use timed_bus::TimedBus;
 
 /// Cycles that an answer may be older than the newest one and still belong to the same rig; below, the rig began anew.

@@ -2,7 +2,7 @@
 //! result stays beside a new one.
 
 use crate::next::menu::MENU;
-use protocol::run_folder::write_whole;
+use runlog::run_folder::write_whole;
 use serde::Serialize;
 use std::fs;
 use std::io;

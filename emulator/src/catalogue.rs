@@ -7,7 +7,7 @@ use crate::run::RunError;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Group, PlaceKind, Sheet};
 use protocol::exit::Exit;
-use protocol::run_folder::SCHEMA_VERSION;
+use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;

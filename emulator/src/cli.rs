@@ -5,8 +5,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::bus::BusUrl;
 use protocol::exit::EXIT_CODE_HELP;
 use protocol::frames::{DRIVE_VALVE_COMMAND, LOAD_VALVE_COMMAND};
-use protocol::run_folder;
 use realtime::OverrunPolicy;
+use runlog::run_folder;
 use std::path::PathBuf;
 
 /// FIFO priority of the rig loop; above most of the system, below the kernel's own threads at 99.

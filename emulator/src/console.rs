@@ -15,7 +15,7 @@ use crate::faults::{Fault, NEEDS_HOST};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use plant::scene::{Action, Part};
 use protocol::frames::{HAND_FORCE, SignalSpec};
-use protocol::telemetry::LONGEST_LINE;
+use runlog::telemetry::LONGEST_LINE;
 use std::io::{self, BufRead, Read};
 
 /// Commands that may wait; a person is slower than the loop, and a file that is piped in waits for it.

@@ -9,7 +9,7 @@
 //! The echo of a command holds 12 bits of the cycle's number; the whole number is the newest cycle with these bits.
 
 use protocol::frames::ECHO_RANGE;
-use protocol::timing::{CycleTiming, Exchange};
+use runlog::timing::{CycleTiming, Exchange};
 
 /// What a cycle's exchange was, and how old the command is that acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
 use crate::summary::Summary;
 use protocol::exit::Exit;
-use protocol::run_folder::{SCHEMA_VERSION, write_json};
 use realtime::{Percentiles, Recorder as Histogram, StageFigures};
+use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use std::path::Path;
 
 /// Saves what is left to save, tells the run in a few lines, and says how it went.

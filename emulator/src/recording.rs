@@ -18,7 +18,7 @@ use crate::event::Event;
 use crate::exchange::{RoundTrip, TimingRecord};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use plant::tables::CycleRecord;
-use protocol::candump::FrameRecord;
+use runlog::candump::FrameRecord;
 use std::sync::{Arc, Weak};
 
 /// Cycles that fit the queue: 16 s, longer than any stall that a run survives in practice.

@@ -27,11 +27,11 @@ use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock, WireOrders};
 use protocol::exit::Exit;
-use protocol::flight_dump;
-use protocol::run_folder::{SCHEMA_VERSION, clear_results, write_json};
 use realtime::{
     Clock, Continued, Freeze, Grants, Interrupt, Machine, MonotonicClock, PeriodicConfig, Request,
 };
+use runlog::flight_dump;
+use runlog::run_folder::{SCHEMA_VERSION, clear_results, write_json};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;

@@ -24,15 +24,15 @@ use plant::tables::CycleRecord;
 use plant::{Axis, AxisReadings, Inputs, People, Plant, Sensors};
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
-use protocol::candump::FrameRecord;
 use protocol::commands::{Change, CommandCounters, CommandIntake};
 use protocol::frames::{
     ChainStatus, DecodeError, EmergencyStop, Frame, LinkRequest, MainChainState, ValveCommand,
 };
 use protocol::live_cycles::LiveCycles;
 use protocol::periods;
-use protocol::timing::CycleTiming;
 use realtime::Overrun;
+use runlog::candump::FrameRecord;
+use runlog::timing::CycleTiming;
 use std::time::Duration;
 
 /// Longest wait for room in the recorder's queue after a stall, in ms; a writer that is slower than this has failed.

@@ -16,7 +16,7 @@ use serde::Serialize;
 /// `run.json`: what a run was made with.
 #[derive(Debug, Serialize)]
 pub struct RunDescription {
-    /// See [`protocol::run_folder::SCHEMA_VERSION`].
+    /// See [`runlog::run_folder::SCHEMA_VERSION`].
     pub schema_version: u32,
     /// The emulator's command line.
     pub emulator_command_line: Vec<String>,
@@ -54,7 +54,7 @@ pub struct RunDescription {
 /// `summary.json` as the emulator knows it.
 #[derive(Debug, Serialize)]
 pub struct Summary {
-    /// See [`protocol::run_folder::SCHEMA_VERSION`].
+    /// See [`runlog::run_folder::SCHEMA_VERSION`].
     pub schema_version: u32,
     /// Largest |set-point - position sensor| while the set-point moves; the controllers know it.
     pub position_error_dynamic_m: Option<f64>,

@@ -7,7 +7,7 @@
 //!
 //! The thread that writes the run's files serves it: the 1 ms path does nothing for it that it does not do without. Nothing here
 //! waits. What the buffer of a viewer has no room for is lost to that viewer, by whole records, and counted; lockstep does not
-//! wait for viewers either. The packets are described in [`protocol::telemetry`].
+//! wait for viewers either. The packets are described in [`runlog::telemetry`].
 
 mod description;
 mod viewer;
@@ -16,7 +16,7 @@ use crate::console::Console;
 use crate::event::Event;
 use plant::tables::CycleRecord;
 use protocol::socket_file::{SocketFile, SocketFileError, SocketType};
-use protocol::telemetry::{Kind, write_cycle, write_packet};
+use runlog::telemetry::{Kind, write_cycle, write_packet};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;

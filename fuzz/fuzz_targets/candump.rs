@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use protocol::candump::{FrameRecord, LogReader, parse_line, write_line};
+use runlog::candump::{FrameRecord, LogReader, parse_line, write_line};
 
 fuzz_target!(|bytes: &[u8]| {
     let lines = bytes.iter().filter(|byte| **byte == b'\n').count() as u64 + 1;

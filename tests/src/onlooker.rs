@@ -3,7 +3,7 @@
 use crate::binaries::{Build, Program, executable};
 use crate::process::{PATIENCE, Running, wait_until};
 use crate::scene::Scene;
-use protocol::telemetry::{Decoder, Packet};
+use runlog::telemetry::{Decoder, Packet};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};

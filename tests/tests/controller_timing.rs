@@ -2,7 +2,7 @@
 //! controller that its own rows explain.
 
 use crate::hlog;
-use protocol::timing::{self, CycleTiming, Exchange};
+use runlog::timing::{self, CycleTiming, Exchange};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::collections::BTreeMap;

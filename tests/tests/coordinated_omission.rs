@@ -5,7 +5,7 @@
 
 use crate::hlog;
 use hdrhistogram::Histogram;
-use protocol::timing::{self, CycleTiming};
+use runlog::timing::{self, CycleTiming};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

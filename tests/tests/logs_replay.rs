@@ -1,7 +1,7 @@
 //! A recorded log back on a bus: every frame, in order and by its time; never stale commands to a live rig.
 
 use protocol::can::CanFrame;
-use protocol::candump::read_line;
+use runlog::candump::read_line;
 use rustix::process::Signal;
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! The telemetry: what viewers are told is what stands in the run's files, and nothing that they do reaches the run.
 
-use protocol::telemetry::Packet;
+use runlog::telemetry::Packet;
 use rustix::process::Signal;
 use serde_json::{Value, json as value};
 use std::os::unix::fs::PermissionsExt;

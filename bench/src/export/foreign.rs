@@ -6,7 +6,7 @@
 use super::ExportError;
 use super::cli::Format;
 use crate::recorded_log::RecordedLog;
-use protocol::candump::write_line;
+use runlog::candump::write_line;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -78,7 +78,7 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::candump::LogReader;
+    use runlog::candump::LogReader;
 
     fn schedule(text: &str, leave_out: &[LeftOut]) -> Result<Schedule, TooLong> {
         let frames = LogReader::new(text.as_bytes()).map(Result::unwrap).collect();

@@ -19,8 +19,8 @@ use super::findings::lost_by_gaps;
 use super::joined::PERIOD_NS;
 use super::model::{AroundRow, Event, ProbeGap};
 use super::probe::{self, Gap};
-use protocol::timing::CycleTiming;
 use rules::{Known, Seen};
+use runlog::timing::CycleTiming;
 use std::collections::BTreeMap;
 
 /// A wake-up or an execution is looked at from this much later than usual on, ns.

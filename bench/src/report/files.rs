@@ -6,7 +6,7 @@ use super::kinds::PING_PONGS;
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
-use protocol::timing::{self, CycleTiming};
+use runlog::timing::{self, CycleTiming};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Display;

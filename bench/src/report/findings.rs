@@ -9,7 +9,7 @@ use super::explain::rules::in_words;
 use super::files::RunFiles;
 use super::joined::PERIOD_NS;
 use super::model::{Cause, Event, Finding};
-use protocol::timing::CycleTiming;
+use runlog::timing::CycleTiming;
 use serde_json::Value;
 use std::collections::BTreeMap;
 

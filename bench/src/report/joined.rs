@@ -10,7 +10,7 @@
 
 use super::files::{PROCESSES, RunFiles};
 use super::samples::Samples;
-use protocol::timing::{CycleTiming, Exchange};
+use runlog::timing::{CycleTiming, Exchange};
 use std::collections::{BTreeMap, HashMap};
 
 /// Length of a cycle, ns.

@@ -3,7 +3,7 @@
 use super::files::RunFiles;
 use super::joined::PERIOD_NS;
 use super::samples::Samples;
-use protocol::timing::{CycleTiming, Exchange, Vitals};
+use runlog::timing::{CycleTiming, Exchange, Vitals};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -157,8 +157,8 @@ pub(crate) fn write(run: &RunFiles, folder: &Path) {
     run.controllers.iter().for_each(|(process, told)| json(&format!("{process}.json"), told));
     for (process, rows) in &run.rows {
         let mut table = Vec::new();
-        protocol::timing::write_head(&mut table).unwrap();
-        rows.iter().for_each(|row| protocol::timing::write_row(&mut table, row).unwrap());
+        runlog::timing::write_head(&mut table).unwrap();
+        rows.iter().for_each(|row| runlog::timing::write_row(&mut table, row).unwrap());
         std::fs::write(folder.join(format!("{process}-timing.csv")), table).unwrap();
     }
 }

@@ -10,7 +10,7 @@
 
 use super::hlog::{self, Interval};
 use super::{Made, ReportError, jitterdebugger, markdown, page};
-use protocol::run_folder::write_json;
+use runlog::run_folder::write_json;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;

@@ -99,7 +99,7 @@ impl SoakArguments {
 }
 
 fn new_folder() -> PathBuf {
-    let folder = protocol::run_folder::new_folder();
+    let folder = runlog::run_folder::new_folder();
     let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     folder.with_file_name(format!("soak-{name}"))
 }

@@ -7,7 +7,7 @@ use super::SoakError;
 use super::merged::Merged;
 use super::model::{SOAK_SCHEMA_VERSION, Segment, Settings, Soak, Totals};
 use super::{junit, procfs, verdict};
-use protocol::run_folder::{write_json, write_whole};
+use runlog::run_folder::{write_json, write_whole};
 use rustix::fs::{FlockOperation, flock};
 use std::fs::File;
 use std::io;

@@ -1,6 +1,6 @@
 //! The telemetry of an emulator as a viewer has it: connected whenever there is one, asked for nothing but commands.
 
-use protocol::telemetry::{Decoder, Packet};
+use runlog::telemetry::{Decoder, Packet};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;

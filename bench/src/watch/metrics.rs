@@ -94,7 +94,7 @@ fn number(value: &Value) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::report::hlog::{self, Interval};
-    use protocol::telemetry::Packet;
+    use runlog::telemetry::Packet;
 
     #[test]
     fn a_quantile_that_too_few_samples_cannot_tell_has_no_line() {

@@ -1,8 +1,8 @@
 //! The last minute as a record: `measurement.csv` and `bus.log` in the forms of a run, which `discrepancy check` reads.
 
 use super::columns::{AXES, MEASURED, MEASURED_COUNT};
-use protocol::candump::{self, FrameRecord};
-use protocol::run_folder::LineFile;
+use runlog::candump::{self, FrameRecord};
+use runlog::run_folder::LineFile;
 use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

@@ -8,8 +8,8 @@ use super::rhythm::Rhythm;
 use super::rows::{Rows, SPACING_CYCLES};
 use super::wire::{News, Wire};
 use protocol::can::CanFrame;
-use protocol::candump::FrameRecord;
-use protocol::telemetry::Packet;
+use runlog::candump::FrameRecord;
+use runlog::telemetry::Packet;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -307,7 +307,7 @@ impl View {
         let described = &self.description;
         let column = |column: &super::columns::Column| json!({ "name": column.name, "unit": column.unit });
         json!({
-            "schema_version": protocol::run_folder::SCHEMA_VERSION,
+            "schema_version": runlog::run_folder::SCHEMA_VERSION,
             "experiment": described["experiment"],
             "pace": described["pace"],
             "sealed": described["sealed"],

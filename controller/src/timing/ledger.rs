@@ -12,15 +12,15 @@
 
 use super::{Measured, Passed};
 use crossbeam_channel::Receiver;
-use protocol::flight_dump::{self, Event, Log};
 use protocol::frames::{Frame, MessageSpec};
-use protocol::run_folder::LineFile;
-use protocol::timing::{CycleTiming, write_head, write_row};
 use realtime::flight::{Dump, Lateness, MOST_DUMPS, keep_first};
 use realtime::{
     ArrivalFigures, Arrivals, Clock, CycleStages, FlightRecorder, Freeze, Instant, IntervalLog,
     MonotonicClock, Severity, StageAccount, StageFigures, Stamped, Trigger, VitalCounts, VitalTotals,
 };
+use runlog::flight_dump::{self, Event, Log};
+use runlog::run_folder::LineFile;
+use runlog::timing::{CycleTiming, write_head, write_row};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io;

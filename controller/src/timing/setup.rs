@@ -7,8 +7,8 @@ use crate::report;
 use crate::run::RunError;
 use crossbeam_channel::bounded;
 use protocol::bus::BusUrl;
-use protocol::flight_dump::Log;
 use realtime::{Clock, Freeze, Instant, MonotonicClock};
+use runlog::flight_dump::Log;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Rows and waits that fit the queue: 16 s of cycles, and as many sensors that were overtaken.

@@ -14,8 +14,8 @@ use super::acting::Acting;
 use super::cycles::{self, Cycles, Logged};
 use super::{Channel, Form, LoggedBy, ReadError, Record, RigSetup, Signal};
 use plant::{Axis, PERIOD_S};
-use protocol::candump;
 use protocol::frames::{DecodeError, Frame, RigStatus, Sensors};
+use runlog::candump;
 use std::collections::BTreeMap;
 use std::path::Path;
 

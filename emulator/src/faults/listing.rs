@@ -5,7 +5,7 @@ use super::table::{FaultKey, FaultSpec, Places, all};
 use crate::cli::FaultsArguments;
 use crate::run::RunError;
 use protocol::exit::Exit;
-use protocol::run_folder::SCHEMA_VERSION;
+use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -4,8 +4,8 @@ use super::{CYCLE, End, Paced, Ride};
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
 use protocol::commands::STALE_AFTER_CYCLES;
-use protocol::timing::{CycleTiming, Vitals};
 use realtime::{Clock, PeriodicConfig, PeriodicLoop, VitalCounts, VitalsReader};
+use runlog::timing::{CycleTiming, Vitals};
 use std::time::{Duration, Instant};
 
 /// How long after the farewell the answers to the last cycles may still come in.

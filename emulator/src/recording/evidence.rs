@@ -11,17 +11,17 @@
 use crate::event::Event;
 use crate::exchange::{AxisCycle, RoundTrip, TimingRecord};
 use crate::pace::CYCLE;
-use protocol::candump::FrameRecord;
-use protocol::flight_dump::{self, Log};
 use protocol::frames::{Frame, MESSAGES, MessageSpec, RIG_STATUS};
-use protocol::run_folder::LineFile;
-use protocol::timing::{self, CycleTiming};
 use realtime::flight::{Dump, Lateness, MOST_DUMPS, keep_first};
 use realtime::stages::Further;
 use realtime::{
     ArrivalFigures, Arrivals, CycleStages, FlightRecorder, IntervalLog, Percentiles, Severity, StageAccount,
     StageFigures, Stamped, Trigger, VitalCounts, VitalTotals, WallClockStep, WallClockWatch,
 };
+use runlog::candump::FrameRecord;
+use runlog::flight_dump::{self, Log};
+use runlog::run_folder::LineFile;
+use runlog::timing::{self, CycleTiming};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::io;

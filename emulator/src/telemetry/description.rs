@@ -18,7 +18,7 @@ use crate::faults::listing;
 use crate::inputs::Inputs;
 use crate::telemetry::Untold;
 use plant::{Truth, tables};
-use protocol::run_folder::SCHEMA_VERSION;
+use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::{Value, json};
 use std::path::Path;
 

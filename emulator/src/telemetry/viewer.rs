@@ -1,7 +1,7 @@
 //! A viewer: its socket, its bounded buffer, and the lines that it asks.
 
 use crate::console::{self, Console};
-use protocol::telemetry::{Kind, LONGEST_LINE, write_loss, write_packet};
+use runlog::telemetry::{Kind, LONGEST_LINE, write_loss, write_packet};
 use serde_json::json;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
     use crate::console::{Command, Limits};
     use plant::scene::Action;
-    use protocol::telemetry::{Decoder, Packet, write_cycle};
+    use runlog::telemetry::{Decoder, Packet, write_cycle};
 
     /// A viewer and its far end.
     fn pair() -> (Viewer, UnixStream) {

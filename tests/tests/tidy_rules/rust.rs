@@ -24,9 +24,10 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 9] = [
+const ROOMS: [&str; 10] = [
     "protocol",
     "realtime",
+    "runlog",
     "plant",
     "emulator",
     "controller",
@@ -39,12 +40,13 @@ const ROOMS: [&str; 9] = [
 const KNOWS: &[(&str, &[&str])] = &[
     ("protocol", &[]),
     ("realtime", &[]),
+    ("runlog", &["protocol", "realtime"]),
     ("plant", &[]),
     ("fmu", &["plant"]),
-    ("emulator", &["protocol", "realtime", "plant"]),
-    ("controller", &["protocol", "realtime", "plant"]),
-    ("discrepancy", &["protocol", "realtime", "plant", "controller", "bench"]),
-    ("campaign", &["protocol", "realtime", "plant", "controller", "bench"]),
+    ("emulator", &["protocol", "realtime", "runlog", "plant"]),
+    ("controller", &["protocol", "realtime", "runlog", "plant"]),
+    ("discrepancy", &["protocol", "realtime", "runlog", "plant", "controller", "bench"]),
+    ("campaign", &["protocol", "realtime", "runlog", "plant", "controller", "bench"]),
 ];
 
 /// House-style: who knows whom.

@@ -20,7 +20,7 @@
 
 use crate::report::model::Cause;
 use crate::report::probe::Watched;
-use protocol::timing::Vitals;
+use runlog::timing::Vitals;
 
 /// Faults in a cycle from which on they are a cause by themselves: a locked process has none.
 const MANY_FAULTS: u64 = 20;

@@ -4,7 +4,7 @@ use super::*;
 use crossbeam_channel::{Sender, bounded};
 use protocol::can::CanFrame;
 use protocol::frames::{Sensors, Tick};
-use protocol::timing::{self, Vitals};
+use runlog::timing::{self, Vitals};
 use std::fs;
 use tempfile::TempDir;
 

@@ -5,7 +5,7 @@ use crate::event::EventKind;
 use plant::Axis;
 use protocol::can::CanFrame;
 use protocol::frames::ValveCommand;
-use protocol::timing::Exchange;
+use runlog::timing::Exchange;
 use std::path::Path;
 
 const MS: u64 = 1_000_000;

@@ -7,10 +7,10 @@
 //!     event.json    what happened; written last, so that a folder with it is whole
 //! ```
 
-use crate::can::CanFrame;
 use crate::candump::{self, FrameRecord};
-use crate::run_folder::{SCHEMA_VERSION, write_json};
+use crate::run_folder::{SCHEMA_VERSION, named, write_json};
 use crate::timing::{CycleTiming, write_head, write_row};
+use protocol::can::CanFrame;
 use serde::Serialize;
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -135,10 +135,6 @@ fn write_file(
         out.flush()
     });
     written.map_err(|error| named(path, &error))
-}
-
-fn named(path: &Path, error: &io::Error) -> io::Error {
-    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
 /// An event with the version of the files that describe it.

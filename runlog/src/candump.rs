@@ -5,7 +5,7 @@
 
 mod reader;
 
-use crate::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
+use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
 use std::io::{self, Write};
 
 pub use reader::{LogError, LogLine, LogProblem, LogReader, MOST_LINE_BYTES};
