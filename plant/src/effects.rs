@@ -1,7 +1,7 @@
 //! The catalogue: what the baseline leaves out and a real servo-pneumatic axis has; one file for each effect.
 //!
 //! All are off unless a rig file switches them on by name and place, as `[effects.piston-leakage.drive]`. A new effect is one
-//! file and one line in the list below.
+//! file and one line in the list below; `example.rs`, which only tests see, is added that way.
 //!
 //! Source: effects.md, the catalogue of physical effects; each file names its own.
 
@@ -27,7 +27,8 @@ use crate::parameters::RigParameters;
 use crate::state::Axis;
 pub(crate) use acting::Effects;
 pub(crate) use replaced::{dead_volumes_m3, linkage};
-use sheet::{Effect, Element, Part, Place, PlaceKind, Sheet, Switched};
+pub(crate) use sheet::OpenBalance;
+use sheet::{Effect, Element, Law, Part, Place, PlaceKind, Sheet, Switched};
 use tabulated::{Balance, Tables};
 pub(crate) use terms::Term;
 pub use terms::Terms;
@@ -35,81 +36,86 @@ pub use terms::Terms;
 /// What an effect is kept in, by the kind of its place: of one axis, `Axis` once, `Chamber` for a and b, `Channel` for position,
 /// force, a and b.
 macro_rules! slot {
-    ($type:ty, Axis) => { Option<$type> };
     ($type:ty, Chamber) => { [Option<$type>; 2] };
     ($type:ty, Channel) => { [Option<$type>; 4] };
-    ($type:ty, Linkage) => { Option<$type> };
-    ($type:ty, Supply) => { Option<$type> };
+    ($type:ty, $kind:ident) => { Option<$type> };
 }
 
-macro_rules! put {
-    ($slot:expr, $place:expr, $effect:expr, Axis) => {
-        $slot = Some($effect)
-    };
-    ($slot:expr, $place:expr, $effect:expr, Linkage) => {
-        $slot = Some($effect)
-    };
-    ($slot:expr, $place:expr, $effect:expr, Supply) => {
-        $slot = Some($effect)
-    };
-    ($slot:expr, $place:expr, $effect:expr, Chamber) => {
-        $slot[chamber($place)] = Some($effect)
-    };
-    ($slot:expr, $place:expr, $effect:expr, Channel) => {
-        $slot[channel($place)] = Some($effect)
-    };
-}
-
-macro_rules! is_in {
+/// The slot of an element.
+macro_rules! at {
     ($slot:expr, $element:expr, Chamber) => {
-        match $element {
-            Some(Element::B) => $slot[1].is_some(),
-            _ => $slot[0].is_some(),
-        }
+        $slot[chamber($element)]
     };
     ($slot:expr, $element:expr, Channel) => {
-        match $element {
-            Some(Element::Force) => $slot[1].is_some(),
-            Some(Element::A) => $slot[2].is_some(),
-            Some(Element::B) => $slot[3].is_some(),
-            _ => $slot[0].is_some(),
-        }
+        $slot[channel($element)]
     };
     ($slot:expr, $element:expr, $kind:ident) => {
+        $slot
+    };
+}
+
+/// Whether an effect is on at any element.
+macro_rules! any {
+    ($slot:expr, Chamber) => {
+        $slot.iter().any(Option::is_some)
+    };
+    ($slot:expr, Channel) => {
+        $slot.iter().any(Option::is_some)
+    };
+    ($slot:expr, $kind:ident) => {
         $slot.is_some()
     };
 }
 
 macro_rules! catalogue {
-    ($($module:ident: $type:ident, $kind:ident;)*) => {
-        $(mod $module;)*
-        $(use $module::$type;)*
+    ($($(#[$when:meta])* $module:ident: $type:ident, $kind:ident;)*) => {
+        $($(#[$when])* mod $module;)*
+        $($(#[$when])* use $module::$type;)*
 
         /// The effects of one axis that are switched on; those of linkage and supply stand with the drive's.
         #[derive(Debug, Clone, Default)]
         pub(crate) struct AxisEffects {
-            $(pub(crate) $module: slot!($type, $kind),)*
+            $($(#[$when])* pub(crate) $module: slot!($type, $kind),)*
             /// Terms of no effect, from tables.
             pub(crate) tabulated: Tables,
         }
 
-        /// The data sheets of all effects, in the order of the catalogue.
-        pub const SHEETS: &[Sheet] = &[$($type::SHEET),*];
+        /// Every data sheet, that of the tests' example too.
+        const ALL_SHEETS: &[Sheet] = &[$($(#[$when])* $type::SHEET),*];
 
         impl AxisEffects {
             fn switch_on(&mut self, switched: &Switched, numbers: &[f64], rig: &RigParameters) {
-                $(if switched.name == $type::SHEET.name {
-                    put!(self.$module, switched.place, $type::new(numbers, rig), $kind);
+                $($(#[$when])*
+                if switched.name == $type::SHEET.name {
+                    at!(self.$module, switched.place.element, $kind) = Some($type::new(numbers, rig));
                 })*
             }
 
             /// Whether the effect of this module is on, at this element where it is one of an element.
             pub(crate) fn is_on(&self, module: &str, element: Option<Element>) -> bool {
                 match module {
-                    $(stringify!($module) => is_in!(self.$module, element, $kind),)*
+                    $($(#[$when])* stringify!($module) => at!(self.$module, element, $kind).is_some(),)*
                     "tabulated" => self.tabulated.adds(balance_of(element)),
                     _ => false,
                 }
+            }
+
+            /// Calls `each` with the laws of every effect that is on.
+            fn each_law(&self, mut each: impl FnMut(Law)) {
+                $($(#[$when])*
+                if any!(self.$module, $kind) {
+                    $type::SHEET.laws.iter().for_each(|law| each(*law));
+                })*
+            }
+
+            /// Calls `each` with module and term of every effect that adds to an open balance.
+            #[inline(always)]
+            pub(crate) fn each_term(&self, balance: &OpenBalance<'_>, mut each: impl FnMut(&'static str, f64)) {
+                let _element = balance.element(); // not read where all effects are of an axis
+                $($(#[$when])*
+                if let Some(term) = at!(self.$module, _element, $kind).as_ref().and_then(|on| on.open_term(balance)) {
+                    each(stringify!($module), term);
+                })*
             }
         }
     };
@@ -155,7 +161,15 @@ catalogue! {
     force_sensor_offset: ForceSensorOffset, Axis;
     force_sensor_gain: ForceSensorGain, Axis;
     time_skew: TimeSkew, Channel;
+    #[cfg(test)] example: Example, Axis;
 }
+
+/// The data sheets of all effects, in the order of the catalogue.
+#[cfg(not(test))]
+pub const SHEETS: &[Sheet] = ALL_SHEETS;
+/// The same without the tests' example, which stands last.
+#[cfg(test)]
+pub const SHEETS: &[Sheet] = ALL_SHEETS.split_last().expect("the example is there").1;
 
 impl AxisEffects {
     /// The effects of both axes that a rig has switched on.
@@ -178,63 +192,51 @@ impl AxisEffects {
     }
 }
 
-/// Which laws of an axis have effects in them; what has none goes by the baseline's.
-#[derive(Debug, Clone, Copy)]
+/// Which laws of an axis have effects in them; the others are the baseline's.
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Touched {
-    /// From command to spool.
     pub(crate) spool: bool,
-    /// What passes the ports, and what the air in the chambers does.
     pub(crate) air: bool,
-    /// Friction.
+    pub(crate) stored_air: bool,
     pub(crate) friction: bool,
-    /// What sensors show of the past.
-    pub(crate) sensors: bool,
+    pub(crate) past_readings: bool,
+}
+
+impl Touched {
+    /// By the sheets of the effects of both axes, and their tables.
+    pub(crate) fn of(on: &[AxisEffects; 2]) -> [Touched; 2] {
+        let mut both = [Touched::default(); 2];
+        for (axis, effects) in on.iter().enumerate() {
+            effects.each_law(|law| match law {
+                Law::Spool => both[axis].spool = true,
+                Law::Air => both[axis].air = true,
+                Law::Supply => both.iter_mut().for_each(|axis| axis.air = true),
+                Law::StoredAir => (both[axis].air, both[axis].stored_air) = (true, true),
+                Law::Friction => both[axis].friction = true,
+                Law::PastReadings => both[axis].past_readings = true,
+            });
+            if effects.tabulated.adds_air() {
+                (both[axis].air, both[axis].stored_air) = (true, true);
+            }
+        }
+        both
+    }
 }
 
 impl AxisEffects {
-    /// Which laws of this axis have effects in them, itself or by the supply.
-    fn touched(&self, supply_droop: bool) -> Touched {
-        let passage = self.critical_pressure_ratio.is_some()
-            || self.valve_characteristic.is_some()
-            || self.valve_dead_zone.is_some()
-            || self.valve_null_leakage.is_some()
-            || self.line_delay.is_some()
-            || self.line_resistance.is_some()
-            || self.check_valve_restriction.is_some()
-            || self.silencer_back_pressure.is_some()
-            || self.end_cushion.is_some();
-        Touched {
-            spool: self.valve_hysteresis.is_some()
-                || self.valve_offset.is_some()
-                || self.spool_second_order.is_some()
-                || self.spool_rate_limit.is_some()
-                || self.command_dead_time.is_some(),
-            air: passage || self.adds_air() || supply_droop,
-            friction: self.stribeck_friction.is_some()
-                || self.presliding.is_some()
-                || self.friction_asymmetry.is_some()
-                || self.pressure_dependent_friction.is_some()
-                || self.position_dependent_friction.is_some()
-                || self.rest_time_dependent_break_away.is_some(),
-            sensors: self.position_sensor_lag.is_some()
-                || self.pressure_sensor_lag.iter().any(Option::is_some)
-                || self.time_skew.iter().any(Option::is_some),
-        }
-    }
-
-    /// Whether something but the valve's flow changes the air in the chambers.
-    pub(crate) fn adds_air(&self) -> bool {
-        self.heat_exchange.is_some()
-            || self.piston_leakage.is_some()
-            || self.rod_leakage.iter().any(Option::is_some)
-            || self.tabulated.adds_air()
+    /// The sum of the terms of an open balance.
+    #[inline(always)]
+    pub(crate) fn added(&self, balance: OpenBalance<'_>) -> f64 {
+        let mut sum = 0.0;
+        self.each_term(&balance, |_, term| sum += term);
+        sum
     }
 }
 
 /// The sheet of an effect by its name.
 #[must_use]
 pub fn sheet(name: &str) -> Option<&'static Sheet> {
-    SHEETS.iter().find(|sheet| sheet.name == name)
+    ALL_SHEETS.iter().find(|sheet| sheet.name == name)
 }
 
 /// The balance of tables at a chamber, or at none.
@@ -246,13 +248,13 @@ fn balance_of(element: Option<Element>) -> Balance {
     }
 }
 
-fn chamber(place: Place) -> usize {
-    usize::from(place.element == Some(Element::B))
+fn chamber(element: Option<Element>) -> usize {
+    usize::from(element == Some(Element::B))
 }
 
 /// In the order of a measurement's columns.
-fn channel(place: Place) -> usize {
-    match place.element {
+fn channel(element: Option<Element>) -> usize {
+    match element {
         Some(Element::Position) | None => 0,
         Some(Element::Force) => 1,
         Some(Element::A) => 2,

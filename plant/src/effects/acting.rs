@@ -13,7 +13,7 @@ use super::presliding::Bristle;
 use super::replaced::linkage_terms;
 use super::sums::{Damping, ExhaustSide, Force, Gap, Stiffness, SupplySide};
 use super::tabulated::Seen;
-use super::{AxisEffects, Touched};
+use super::{AxisEffects, OpenBalance, Touched};
 use crate::faults::{Faults, Outlet};
 use crate::integrator::laws::{At, Laws};
 use crate::integrator::{Held, Integrator, Lanes, Middle};
@@ -59,7 +59,7 @@ impl Effects {
         let on = AxisEffects::of(rig);
         let mut effects = Box::new(Effects {
             memory: Memory::at_rest(&on, of, state),
-            touched: [0, 1].map(|axis: usize| on[axis].touched(on[0].supply_droop.is_some())),
+            touched: Touched::of(&on),
             on,
             ways: [[[[of.spans()[0].motion_to_end; 2]; 2]; 2]; 2],
             substep_s: of.substep_s(),
@@ -85,13 +85,14 @@ impl Effects {
 
     /// What is broken in the laws from now on; [`Effects::move_with`] follows.
     pub(crate) fn set_faults(&mut self, faults: &Faults) {
-        let droop = self.on[0].supply_droop.is_some();
+        self.touched = Touched::of(&self.on);
         for (axis, faults) in faults.axes.iter().enumerate() {
             self.friction_factors[axis] = faults.friction_factor;
             self.outlets[axis] = faults.outlets();
-            self.touched[axis] = self.on[axis].touched(droop);
-            self.touched[axis].air |= self.leaks(axis);
-            if !self.adds_air(axis) {
+            let leaks = self.leaks(axis);
+            self.touched[axis].air |= leaks;
+            self.touched[axis].stored_air |= leaks;
+            if !self.touched[axis].stored_air {
                 self.memory.moving.axes[axis].air_rate_w = [0.0; 2];
             }
         }
@@ -99,11 +100,6 @@ impl Effects {
 
     fn leaks(&self, axis: usize) -> bool {
         self.outlets[axis].iter().any(Outlet::is_open)
-    }
-
-    /// Whether something but the valve's flow changes the air in the chambers of an axis.
-    fn adds_air(&self, axis: usize) -> bool {
-        self.on[axis].adds_air() || self.leaks(axis)
     }
 
     /// Terms of the linkage's numbers.
@@ -147,6 +143,7 @@ impl Effects {
                 .map_or(0.0, |effect| ALONG_X[axis] * effect.term(position_m)),
             end_cushion: on.end_cushion.map_or(0.0, |effect| effect.stop_force(extension_m, self.stroke_m)),
             tabulated: on.tabulated.force(seen),
+            added: on.added(OpenBalance::Force(seen)),
         }
     }
 }
@@ -374,7 +371,7 @@ impl Laws for Effects {
         let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
         let mut stored = to.air().map(|air| air.stored.to_array());
         for axis in [0, 1] {
-            if !self.adds_air(axis) {
+            if !self.touched[axis].stored_air {
                 continue;
             }
             let lane = |pair: Pair| pair.to_array()[axis];
@@ -434,7 +431,7 @@ impl Laws for Effects {
             for (line, flow) in self.memory.lines[axis].iter_mut().zip(own.port_flow_m3_per_s) {
                 line.iter_mut().for_each(|line| line.push(flow));
             }
-            if self.touched[axis].sensors {
+            if self.touched[axis].past_readings {
                 self.keep_readings(of, axis, lanes);
             }
         }

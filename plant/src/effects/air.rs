@@ -1,5 +1,6 @@
 //! The air with effects: what enters a chamber beside the valve's flow, what heat does to it, and what a line delays.
 
+use super::OpenBalance;
 use super::acting::Effects;
 use super::flows::{Ports, PortsAt};
 use super::heat_exchange::{ChamberHeat, wetted_m2};
@@ -50,10 +51,12 @@ impl Effects {
             on.rod_leakage[chamber]
                 .map_or(0.0, |effect| -effect.flow(pressure_pa[chamber], of.atmospheric_pa()))
         };
-        [
-            Leakage { piston_leakage: -across, rod_leakage: out(0), tabulated: on.tabulated.flow(0, seen) },
-            Leakage { piston_leakage: across, rod_leakage: out(1), tabulated: on.tabulated.flow(1, seen) },
-        ]
+        [0, 1].map(|chamber| Leakage {
+            piston_leakage: if chamber == 0 { -across } else { across },
+            rod_leakage: out(chamber),
+            tabulated: on.tabulated.flow(chamber, seen),
+            added: on.added(OpenBalance::Leakage { chamber, seen }),
+        })
     }
 
     /// What heat adds to the rate of a chamber's stored air, but for the piston's work; `span_s` is 0 for an instant.

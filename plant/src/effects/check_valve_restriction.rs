@@ -25,7 +25,7 @@
 //! Source: two resistances in series, ISO 6358-3:2014; spring of the non-return valve, Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -44,6 +44,7 @@ impl Effect for CheckValveRestriction {
         name: "check-valve-restriction",
         group: Group::Flow,
         place: PlaceKind::Axis,
+        laws: &[Law::Air],
         law: "a non-return valve at each chamber port needs a pressure to crack and restricts as a second orifice",
         source: "ISO 6358-3:2014, Beater 2007; range: textbook prior",
         keys: &[

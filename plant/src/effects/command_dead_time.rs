@@ -12,7 +12,7 @@
 //!
 //! Source: dead time of sampled loops, Astrom and Wittenmark, Computer-Controlled Systems, 1997; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,6 +28,7 @@ impl Effect for CommandDeadTime {
         name: "command-dead-time",
         group: Group::Flow,
         place: PlaceKind::Axis,
+        laws: &[Law::Spool],
         law: "the command acts a fixed time late",
         source: "dead time of sampled loops, Astrom and Wittenmark 1997; range: textbook prior",
         keys: &[EffectKey {

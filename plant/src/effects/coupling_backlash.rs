@@ -30,6 +30,7 @@ impl Effect for CouplingBacklash {
         name: "coupling-backlash",
         group: Group::Motion,
         place: PlaceKind::Linkage,
+        laws: &[],
         law: "the gap of the eye differs from the file",
         source: "rig-model.md, Masses and linkage; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -33,6 +33,7 @@ impl Effect for CouplingCompliance {
         name: "coupling-compliance",
         group: Group::Motion,
         place: PlaceKind::Linkage,
+        laws: &[],
         law: "stiffness and damping of the linkage differ from the file",
         source: "rig-model.md, Masses and linkage; range: effects.md, textbook prior",
         keys: &[

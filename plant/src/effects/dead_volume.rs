@@ -30,6 +30,7 @@ impl Effect for DeadVolume {
         name: "dead-volume",
         group: Group::Chamber,
         place: PlaceKind::Axis,
+        laws: &[],
         law: "dead volume and hose of the axis' chambers differ from the file",
         source: "inactive volume, Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
         keys: &[EffectKey {

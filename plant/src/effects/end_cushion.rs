@@ -26,7 +26,7 @@
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; adjusting screw and check valve as makers of cylinders draw
 //! them; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -47,6 +47,7 @@ impl Effect for EndCushion {
         name: "end-cushion",
         group: Group::Motion,
         place: PlaceKind::Axis,
+        laws: &[Law::Air],
         law: "near both ends the chamber that is emptied vents through a cushion orifice; an elastic stop ends the stroke",
         source: "eq. (4) for the orifice; range: effects.md, textbook prior",
         keys: &[

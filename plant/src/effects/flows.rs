@@ -11,6 +11,7 @@
 //!
 //! Source: [Dowell, Jarratt 1971], BIT 11, 168-174.
 
+use super::OpenBalance;
 use super::acting::Effects;
 use super::sums::{Characteristic, Edge, Opening, Port, PortFlow};
 use crate::integrator::Integrator;
@@ -63,8 +64,10 @@ impl Effects {
     /// Flows of an axis at its two ports.
     pub(crate) fn ports(&self, of: &Integrator, axis: usize, at: &PortsAt) -> Ports {
         let on = &self.on[axis];
-        let opening =
-            Opening { valve_dead_zone: on.valve_dead_zone.map_or(0.0, |effect| effect.term(at.spool)) };
+        let opening = Opening {
+            valve_dead_zone: on.valve_dead_zone.map_or(0.0, |effect| effect.term(at.spool)),
+            added: on.added(OpenBalance::Opening { spool: at.spool }),
+        };
         let spool = opening.sum(at.spool);
         let open = spool.abs().min(1.0);
         let table = |open: f64| of.valve.conductances(open).map(|conductance| conductance / FLOW_PER_KV);

@@ -28,6 +28,7 @@ impl Effect for ForceSensorOffset {
         name: "force-sensor-offset",
         group: Group::Sensor,
         place: PlaceKind::Axis,
+        laws: &[],
         law: "the force sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -1,5 +1,6 @@
 //! Friction with effects: the levels of one axis in both directions, each the sum of its named terms.
 
+use super::OpenBalance;
 use super::acting::Effects;
 use super::memory::AxisMoving;
 use super::presliding::{Bristle, Under};
@@ -43,6 +44,7 @@ impl Effects {
             position_dependent_friction: on
                 .position_dependent_friction
                 .map_or(0.0, |effect| effect.term(at.extension_m)),
+            added: on.added(OpenBalance::SlidingLevel { at, speed_m_per_s: speed, direction }),
         }
     }
 
@@ -64,6 +66,7 @@ impl Effects {
             rest_time_dependent_break_away: on
                 .rest_time_dependent_break_away
                 .map_or(0.0, |effect| effect.term(at.rest_s)),
+            added: on.added(OpenBalance::BreakAwayLevel { at, direction }),
         }
     }
 

@@ -23,7 +23,7 @@
 //! Almeida 2006, Reduced-order thermodynamic models for servo-pneumatic actuator chambers, Proc. IMechE I 220; range:
 //! textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -54,6 +54,7 @@ impl Effect for HeatExchange {
         name: "heat-exchange",
         group: Group::Chamber,
         place: PlaceKind::Axis,
+        laws: &[Law::StoredAir],
         law: "the gas of each chamber has its own temperature and exchanges heat with the wall",
         source: "energy balance, Beater 2007, Carneiro and de Almeida 2006; range: textbook prior",
         keys: &[EffectKey {

@@ -30,6 +30,7 @@ impl Effect for Inclination {
         name: "inclination",
         group: Group::Motion,
         place: PlaceKind::Axis,
+        laws: &[],
         law: "a constant force along x: gravity on an inclined axis, a hanging load",
         source: "gravity along the axis; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -38,6 +38,7 @@ impl Effect for PositionDependentForce {
         name: "position-dependent-force",
         group: Group::Motion,
         place: PlaceKind::Axis,
+        laws: &[],
         law: "a force over x that does not flip with the velocity: hose or cable spring, cogging",
         source: "Hooke's law, cogging as a sine of its pitch; range: effects.md, textbook prior",
         keys: &[

@@ -23,7 +23,7 @@
 //! and range: effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -49,6 +49,7 @@ impl Effect for PositionDependentFriction {
         name: "position-dependent-friction",
         group: Group::Motion,
         place: PlaceKind::Axis,
+        laws: &[Law::Friction],
         law: "friction has a bump, a slope or a ripple over the stroke and flips with the velocity",
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); shapes and range: effects.md, textbook prior",
         keys: &[

@@ -28,6 +28,7 @@ impl Effect for PositionSensorGain {
         name: "position-sensor-gain",
         group: Group::Sensor,
         place: PlaceKind::Axis,
+        laws: &[],
         law: "the position sensor reads too much by a share",
         source: "gain error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -18,7 +18,7 @@
 //! Source: first-order lag, filter of the transducer; range 0.5 to 8 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -34,6 +34,7 @@ impl Effect for PositionSensorLag {
         name: "position-sensor-lag",
         group: Group::Sensor,
         place: PlaceKind::Axis,
+        laws: &[Law::PastReadings],
         law: "the position sensor is a first-order lag",
         source: "first-order lag, filter of the transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -28,6 +28,7 @@ impl Effect for PositionSensorOffset {
         name: "position-sensor-offset",
         group: Group::Sensor,
         place: PlaceKind::Axis,
+        laws: &[],
         law: "the position sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -15,7 +15,7 @@
 //! Source: growth of a pneumatic cylinder's friction with its pressures, measured: Tran, Yanada, "Dynamic friction behaviors
 //! of pneumatic cylinders", Intelligent Control and Automation 4(2), 2013; linear form and range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -31,6 +31,7 @@ impl Effect for PressureDependentFriction {
         name: "pressure-dependent-friction",
         group: Group::Motion,
         place: PlaceKind::Axis,
+        laws: &[Law::Friction],
         law: "friction grows with the sum of the gauge pressures that press the seals on",
         source: "Tran, Yanada 2013, Intelligent Control and Automation 4(2); linear form and range: effects.md, textbook prior",
         keys: &[EffectKey {

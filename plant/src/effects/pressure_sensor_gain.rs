@@ -28,6 +28,7 @@ impl Effect for PressureSensorGain {
         name: "pressure-sensor-gain",
         group: Group::Sensor,
         place: PlaceKind::Chamber,
+        laws: &[],
         law: "the pressure sensor reads too much by a share",
         source: "gain error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {

@@ -18,7 +18,7 @@
 //! Source: first-order lag, sense line as one resistance and one volume; range 1 to 10 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -34,6 +34,7 @@ impl Effect for PressureSensorLag {
         name: "pressure-sensor-lag",
         group: Group::Sensor,
         place: PlaceKind::Chamber,
+        laws: &[Law::PastReadings],
         law: "the pressure sensor sits at the end of a sense line: a first-order lag",
         source: "first-order lag, sense line as one resistance and one volume; range: effects.md, textbook prior",
         keys: &[EffectKey {

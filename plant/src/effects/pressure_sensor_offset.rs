@@ -28,6 +28,7 @@ impl Effect for PressureSensorOffset {
         name: "pressure-sensor-offset",
         group: Group::Sensor,
         place: PlaceKind::Chamber,
+        laws: &[],
         law: "the pressure sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         keys: &[EffectKey {

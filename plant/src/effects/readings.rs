@@ -1,5 +1,6 @@
 //! Readings with effects: what each sensor shows before noise and steps, as the truth and its named terms.
 
+use super::OpenBalance;
 use super::acting::Effects;
 use super::sums::{ForceReading, PositionReading, PressureReading};
 
@@ -22,6 +23,7 @@ impl Effects {
                 .map_or(0.0, |_| self.memory.moving.axes[axis].shown[0] - truth),
             position_sensor_gain: on.position_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
             position_sensor_offset: on.position_sensor_offset.map_or(0.0, |effect| effect.term()),
+            added: on.added(OpenBalance::PositionReading { truth_m: truth }),
         }
     }
 
@@ -32,6 +34,7 @@ impl Effects {
             time_skew: self.skew(axis, 1, truth),
             force_sensor_gain: on.force_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
             force_sensor_offset: on.force_sensor_offset.map_or(0.0, |effect| effect.term()),
+            added: on.added(OpenBalance::ForceReading { truth_n: truth }),
         }
     }
 
@@ -44,6 +47,7 @@ impl Effects {
                 .map_or(0.0, |_| self.memory.moving.axes[axis].shown[1 + chamber] - truth),
             pressure_sensor_gain: on.pressure_sensor_gain[chamber].map_or(0.0, |effect| effect.term(truth)),
             pressure_sensor_offset: on.pressure_sensor_offset[chamber].map_or(0.0, |effect| effect.term()),
+            added: on.added(OpenBalance::PressureReading { chamber, truth_pa: truth }),
         }
     }
 }

@@ -14,7 +14,7 @@
 //! Source: laminar gap flow of a gas, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::laminar_gap::LaminarGap;
-use super::sheet::{Effect, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 
 /// The numbers of this effect at one chamber.
@@ -28,6 +28,7 @@ impl Effect for RodLeakage {
         name: "rod-leakage",
         group: Group::Chamber,
         place: PlaceKind::Chamber,
+        laws: &[Law::StoredAir],
         law: "laminar leakage to the atmosphere: past the rod seal out of b, past the cap's static seal out of a",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
         keys: &[LaminarGap::KEY],

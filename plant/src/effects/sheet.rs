@@ -5,6 +5,8 @@
 
 use std::fmt;
 
+use super::friction::Rubbing;
+use super::tabulated::Seen;
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -17,6 +19,8 @@ pub struct Sheet {
     pub group: Group,
     /// Where it can be switched on.
     pub place: PlaceKind,
+    /// The laws of an axis that it changes; an axis steps by the baseline's laws but for those of the effects on it.
+    pub laws: &'static [Law],
     /// The change to the baseline in a sentence.
     pub law: &'static str,
     /// Where law and range come from.
@@ -67,6 +71,23 @@ pub enum Group {
     Motion,
     /// What sensors make of the truth.
     Sensor,
+}
+
+/// Laws of an axis that have a baseline form and one with effects. Forces and algebraic readings have one form only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// From command to spool.
+    Spool,
+    /// Flow through the ports.
+    Air,
+    /// The supply pressure of both axes.
+    Supply,
+    /// The stored air of a chamber, beside the valve's flow.
+    StoredAir,
+    /// Friction.
+    Friction,
+    /// Readings that depend on earlier instants.
+    PastReadings,
 }
 
 /// Where effects of a kind can be.
@@ -197,11 +218,55 @@ pub struct Switched {
     pub numbers: Vec<f64>,
 }
 
-/// What every effect of the catalogue is made from; its laws are its own functions.
+/// An effect of the catalogue.
 pub(crate) trait Effect: Sized {
     /// Its data sheet.
     const SHEET: Sheet;
 
     /// The effect at one place: `numbers` in SI, one for each key, already checked against the sheet.
     fn new(numbers: &[f64], rig: &RigParameters) -> Self;
+
+    /// Its term of a balance, in SI; `None` for a balance that it does not act on.
+    ///
+    /// Terms that need memory, a flow that is solved for, or a fixed place in the order of a sum are named in `sums.rs` instead.
+    #[inline(always)] // an effect without open terms costs nothing
+    fn open_term(&self, _balance: &OpenBalance<'_>) -> Option<f64> {
+        None
+    }
+}
+
+/// A balance to which an effect adds from its own file, with what the term may depend on.
+#[derive(Debug, Clone, Copy)]
+#[allow(dead_code)] // no shipped effect reads all of it
+pub(crate) enum OpenBalance<'a> {
+    /// Opening of the edges, by the spool's position; laws: [`Law::Air`].
+    Opening { spool: f64 },
+    /// Normal flow into a chamber beside the valve's, m^3/s; laws: [`Law::StoredAir`].
+    Leakage { chamber: usize, seen: &'a Seen },
+    /// Sliding level at a speed, N; direction 1 extending, -1 retracting; laws: [`Law::Friction`].
+    SlidingLevel { at: &'a Rubbing, speed_m_per_s: f64, direction: f64 },
+    /// Break-away level, N; laws: [`Law::Friction`].
+    BreakAwayLevel { at: &'a Rubbing, direction: f64 },
+    /// Force on the piston along its extension, N; laws: none.
+    Force(&'a Seen),
+    /// Reading of the position by its truth, m; laws: none.
+    PositionReading { truth_m: f64 },
+    /// Reading of the force by its truth, N; laws: none.
+    ForceReading { truth_n: f64 },
+    /// Reading of a pressure by its truth, Pa; laws: none.
+    PressureReading { chamber: usize, truth_pa: f64 },
+}
+
+impl OpenBalance<'_> {
+    /// The chamber or sensor it belongs to: effects of that element act on it, and those of the axis.
+    pub(super) const fn element(&self) -> Option<Element> {
+        match self {
+            OpenBalance::Leakage { chamber, .. } | OpenBalance::PressureReading { chamber, .. } => {
+                Some([Element::A, Element::B][*chamber])
+            }
+            OpenBalance::PositionReading { .. } => Some(Element::Position),
+            OpenBalance::ForceReading { .. } => Some(Element::Force),
+            _ => None,
+        }
+    }
 }

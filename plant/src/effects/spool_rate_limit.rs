@@ -14,7 +14,7 @@
 //!
 //! Source: slew rate of saturated actuators, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -30,6 +30,7 @@ impl Effect for SpoolRateLimit {
         name: "spool-rate-limit",
         group: Group::Flow,
         place: PlaceKind::Axis,
+        laws: &[Law::Spool],
         law: "the spool moves no faster than its actuator can",
         source: "saturated actuators, Merritt 1967 ch. 7; range: textbook prior",
         keys: &[EffectKey {

@@ -20,7 +20,7 @@
 
 use super::line_resistance::full_flow_m3_per_s;
 use super::node::Node;
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -36,6 +36,7 @@ impl Effect for SupplyDroop {
         name: "supply-droop",
         group: Group::Flow,
         place: PlaceKind::Supply,
+        laws: &[Law::Supply],
         law: "the supply node is a volume fed through a regulator that gives way under flow",
         source: "ISO 6953-2:2015, Beater 2007; range: textbook prior",
         keys: &[

@@ -3,6 +3,7 @@
 //! The balances are told in the order of `sums.rs`, axis by axis, then those of linkage and supply. A term of an effect that
 //! is off is not told.
 
+use super::OpenBalance;
 use super::acting::Effects;
 use super::air::HeatAt;
 use super::sheet::{Element, Part};
@@ -90,6 +91,15 @@ impl Teller<'_> {
             }
         });
     }
+
+    /// Lists the terms of an open balance behind those of `balance`.
+    fn open<B: Balance>(&mut self, balance: &B, name: Option<&'static str>, open: &OpenBalance<'_>) {
+        self.balance(balance, name, open.element());
+        let (part, element) = (self.part, name);
+        self.effects.on[usize::from(part == Part::Load)].each_term(open, |effect, value| {
+            (self.tell)(Term { part, element, balance: B::NAME, effect, unit: B::UNIT, value });
+        });
+    }
 }
 
 impl Effects {
@@ -121,7 +131,8 @@ impl Effects {
             teller.balance(&rate, None, None);
             teller.balance(&limited, None, None);
             let ports = self.ports_at(of, axis, state, &air);
-            teller.balance(&ports.opening, None, None);
+            let open = OpenBalance::Opening { spool: state.axes[axis].spool };
+            teller.open(&ports.opening, None, &open);
             for (edge, name) in ["supply", "exhaust"].into_iter().enumerate() {
                 teller.balance(&ports.characteristic[edge], Some(name), None);
             }
@@ -140,7 +151,7 @@ impl Effects {
                 teller.balance(&ports.port[chamber], at, element);
                 teller.balance(&ports.port_flow[chamber], at, element);
                 teller.balance(&self.line(axis, chamber, ports.flow_m3_per_s[chamber], 0.0), at, element);
-                teller.balance(&leakage[chamber], at, element);
+                teller.open(&leakage[chamber], at, &OpenBalance::Leakage { chamber, seen: &seen });
                 let heat = HeatAt {
                     stored_j: lane(lanes.air()[chamber].stored),
                     volume_m3: lane(air.volume[chamber]),
@@ -166,25 +177,27 @@ impl Effects {
             } else {
                 -1.0
             };
-            teller.balance(
-                &self.sliding_level(of, axis, &rubbing, place.velocity.abs(), direction),
-                None,
-                None,
-            );
-            teller.balance(&self.break_away_level(of, axis, &rubbing, direction), None, None);
+            let (at, speed) = (&rubbing, place.velocity.abs());
+            let open = OpenBalance::SlidingLevel { at, speed_m_per_s: speed, direction };
+            teller.open(&self.sliding_level(of, axis, at, speed, direction), None, &open);
+            let open = OpenBalance::BreakAwayLevel { at, direction };
+            teller.open(&self.break_away_level(of, axis, at, direction), None, &open);
             teller.balance(&self.viscous_term(of, axis, direction), None, None);
             let bristles = self.bristles(of, axis, &rubbing, place, force).unwrap_or_default();
             teller.balance(&bristles, None, None);
-            teller.balance(&self.force(axis, &seen), None, None);
+            teller.open(&self.force(axis, &seen), None, &OpenBalance::Force(&seen));
 
             // What the sensors make of it.
             let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m() - place.extension };
-            let (position, force) = (Some(Element::Position), Some(Element::Force));
-            teller.balance(&self.position_reading(axis, position_m), Some("position"), position);
-            teller.balance(&self.force_reading(axis, forces.sensor_n(of, axis)), Some("force"), force);
-            for (chamber, (name, element)) in CHAMBERS.into_iter().enumerate() {
-                let reading = self.pressure_reading(axis, chamber, air.of_axis_pa(axis)[chamber]);
-                teller.balance(&reading, Some(name), Some(element));
+            let open = OpenBalance::PositionReading { truth_m: position_m };
+            teller.open(&self.position_reading(axis, position_m), Some("position"), &open);
+            let force_n = forces.sensor_n(of, axis);
+            let open = OpenBalance::ForceReading { truth_n: force_n };
+            teller.open(&self.force_reading(axis, force_n), Some("force"), &open);
+            for (chamber, (name, _)) in CHAMBERS.into_iter().enumerate() {
+                let truth_pa = air.of_axis_pa(axis)[chamber];
+                let open = OpenBalance::PressureReading { chamber, truth_pa };
+                teller.open(&self.pressure_reading(axis, chamber, truth_pa), Some(name), &open);
             }
         }
         let (gap, stiffness, damping) = self.linkage_terms();

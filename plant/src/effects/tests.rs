@@ -102,6 +102,7 @@ fn a_sum_is_the_baseline_and_its_fields_and_off_is_zero() {
         position_sensor_lag: 2.0,
         position_sensor_gain: 4.0,
         position_sensor_offset: 8.0,
+        added: 0.0,
     };
     assert_eq!(reading.sum(16.0), 31.0);
     assert_eq!(PositionReading::default().sum(0.1), 0.1);

@@ -15,7 +15,7 @@
 //!
 //! Source: definition; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -31,6 +31,7 @@ impl Effect for TimeSkew {
         name: "time-skew",
         group: Group::Sensor,
         place: PlaceKind::Channel,
+        laws: &[Law::PastReadings],
         law: "a channel shows the truth of a fixed time before",
         source: "definition; range: effects.md, textbook prior",
         keys: &[EffectKey {

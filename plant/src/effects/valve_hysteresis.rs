@@ -14,7 +14,7 @@
 //!
 //! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -30,6 +30,7 @@ impl Effect for ValveHysteresis {
         name: "valve-hysteresis",
         group: Group::Flow,
         place: PlaceKind::Axis,
+        laws: &[Law::Spool],
         law: "a play of half-width h lies between command and spool",
         source: "play operator, Krasnosel'skii and Pokrovskii 1989; range: textbook prior",
         keys: &[EffectKey {

@@ -15,7 +15,7 @@
 //! Source: centre leakage of a spool with clearance, Merritt, Hydraulic Control Systems, 1967, chapter 5; range: textbook
 //! prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -31,6 +31,7 @@ impl Effect for ValveNullLeakage {
         name: "valve-null-leakage",
         group: Group::Flow,
         place: PlaceKind::Axis,
+        laws: &[Law::Air],
         law: "every edge keeps a floor of its largest K_V",
         source: "spool clearance, Merritt 1967 ch. 5; range: textbook prior",
         keys: &[EffectKey {

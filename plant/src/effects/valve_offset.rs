@@ -12,7 +12,7 @@
 //!
 //! Source: null bias, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,6 +28,7 @@ impl Effect for ValveOffset {
         name: "valve-offset",
         group: Group::Flow,
         place: PlaceKind::Axis,
+        laws: &[Law::Spool],
         law: "the spool's null lies beside the command's",
         source: "null bias, Merritt 1967 ch. 7; range: textbook prior",
         keys: &[EffectKey {
