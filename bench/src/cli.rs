@@ -133,7 +133,8 @@ pub struct ReportArguments {
     /// Put a run, or the runs in a folder, into a group to be set beside others; may be repeated.
     #[arg(long, value_name = "NAME=FOLDER")]
     pub group: Vec<String>,
-    /// Hold the report against the bounds of a threshold file; exit with 1 when one is broken.
+    /// Hold the report against the bounds of a threshold file; exit with 1 when one is broken. A ratio whose interval crosses
+    /// its bound is not resolved, which is no reason for 1.
     #[arg(long, value_name = "FILE.toml")]
     pub bounds: Option<PathBuf>,
     /// Write report.md only.

@@ -6,12 +6,14 @@
 //! | | `drive-round-trip` of the rig | ping-pongs beside the run |
 //! | spinning | wake-up p99 of runs that wake early and spin | what is claimed of it |
 //!
-//! Medians and intervals are those of [`ratios`], over the pairs; what is claimed stands in `bench/latency-bounds*.toml`.
+//! Medians and intervals are those of [`ratios`], over the pairs; what is claimed stands in `bench/latency-bounds*.toml`, and
+//! [`resolution`] says whether it is kept.
 
 use crate::SummaryError;
 use crate::grid::Grid;
 use crate::report::model::{Ratio, Report, RunPart};
 use crate::report::ratios;
+use crate::report::resolution::{self, Verdict};
 use clap::Args;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -93,7 +95,13 @@ fn grid(rows: &[Ratio]) -> Grid {
         };
         let claimed = most.map_or_else(
             || "-".to_owned(),
-            |most| format!("{most} {}", if ratio.median <= most { "kept" } else { "**broken**" }),
+            |most| match resolution::verdict(ratio, None, Some(most)) {
+                Verdict::Kept => format!("{most} kept"),
+                Verdict::Broken => format!("{most} **broken**"),
+                Verdict::NotResolved { pairs } => {
+                    format!("{most} **not resolved**: {}", resolution::in_words(pairs))
+                }
+            },
         );
         vec![
             ratio.name.clone(),
@@ -152,10 +160,13 @@ mod tests {
     fn a_row_tells_medians_interval_and_whether_the_claim_is_kept() {
         let row = |name: &str, pairs_ns| ratios::ratio(name.into(), pairs_ns).unwrap();
         let wake_up = (0..10).map(|n| (13_000 + n * 100, 13_000)).collect();
+        let crossing = [20, 27, 60, 80, 105, 105, 200, 300, 495, 600].map(|n| (n * 100, 10_000)).into();
         let rows = [
             row("emulator-wakeup p50 / cyclictest p50", wake_up),
-            row("drive-round-trip p50 / ping-pong-bus p50", vec![(60_000, 30_000)]),
+            row("drive-round-trip p50 / ping-pong-bus p50", vec![(60_000, 30_000); 6]),
             row("drive-round-trip p50 / ping-pong-socketpair p50", vec![(60_000, 30_000)]),
+            row("drive-round-trip p50 / ping-pong-bus p50", vec![(60_000, 30_000)]),
+            row("emulator-wakeup p99 / cyclictest p99", crossing),
         ];
         let text = grid(&rows).markdown();
         let lines: Vec<&str> = text.lines().filter(|line| line.contains(" / ")).collect();
@@ -164,11 +175,15 @@ mod tests {
             "{text}"
         );
         assert!(lines[0].contains("1.1 kept"), "{text}");
-        assert!(lines[1].contains("1.5 **broken**") && lines[1].contains("too few pairs"), "{text}");
+        assert!(lines[1].contains("1.5 **broken**") && lines[1].contains("2.00 to 2.00 (96.9 %)"), "{text}");
         assert!(
             lines[2].contains("2.00") && !lines[2].contains("broken"),
             "claimed of the bus alone: {text}"
         );
+        let few = "1.5 **not resolved**: an interval needs 6 pairs";
+        assert!(lines[3].contains(few) && lines[3].contains("too few pairs"), "{text}");
+        let crosses = "1.1 **not resolved**: about 12000 pairs would resolve it";
+        assert!(lines[4].contains(crosses) && lines[4].contains("0.27 to 4.95"), "{text}");
     }
 
     #[test]

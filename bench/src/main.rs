@@ -140,7 +140,7 @@ fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
     report::output::write(&made, &out, arguments.markdown_only)?;
     print(&report::markdown::table(&made.report));
     print(&format!("\n  report in {}", out.display()));
-    Ok(if made.kept() { Exit::Good } else { Exit::BoundBroken })
+    Ok(if made.is_broken() { Exit::BoundBroken } else { Exit::Good })
 }
 
 fn name_cause(arguments: &CauseArguments) -> Result<Exit, ReportError> {

@@ -14,6 +14,8 @@
 
 /// Least confidence of an interval.
 const CONFIDENCE: f64 = 0.95;
+/// Fewer values have no interval: 1 − 2 · (1/2)^5 is below [`CONFIDENCE`].
+pub const LEAST_VALUES: u64 = 6;
 
 /// A median; its interval, from six values on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +70,7 @@ mod tests {
     #[test]
     fn confidences_are_those_of_the_table() {
         assert_eq!(order(5), None);
+        assert!((0..20).all(|count| order(count).is_some() == (count as u64 >= LEAST_VALUES)));
         for (count, j, confidence) in [(6, 1, 0.968_75), (9, 2, 0.960_937_5), (12, 3, 0.961_425_781_25)] {
             assert_eq!(order(count), Some((j, confidence)), "{count}");
         }

@@ -23,6 +23,7 @@
 //! | [`controlled`] | what was not controlled |
 //! | [`comparison`] | groups of runs side by side |
 //! | [`bounds`] | a threshold file held against a report |
+//! | [`resolution`] | whether pairs suffice to say that a ratio keeps its bound |
 //! | [`markdown`] | the summary for a merge request, and the short table |
 //! | [`jitterdebugger`] | wake-up latencies in its JSON |
 //! | [`output`] | all files of a report |
@@ -51,6 +52,7 @@ pub mod parts;
 pub mod probe;
 pub mod ratios;
 pub mod reference;
+pub mod resolution;
 pub mod samples;
 pub mod tallies;
 
@@ -61,6 +63,7 @@ use self::choice::Chosen;
 use self::files::RunFiles;
 use self::joined::Series;
 use self::model::{Report, SCHEMA, SCHEMA_VERSION};
+use self::resolution::Verdict;
 use self::samples::Samples;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -195,10 +198,10 @@ impl Made {
         Ok(())
     }
 
-    /// Whether all bounds were kept.
+    /// Whether a bound was broken; one that is not resolved was not.
     #[must_use]
-    pub fn kept(&self) -> bool {
-        self.report.bounds.iter().all(|bound| bound.kept)
+    pub fn is_broken(&self) -> bool {
+        self.report.bounds.iter().any(|bound| bound.verdict() == Verdict::Broken)
     }
 }
 

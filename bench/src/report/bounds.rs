@@ -10,12 +10,14 @@
 //! ```
 //!
 //! Figures: a distribution of all runs with `p50_ns`, `p90_ns`, `p99_ns`, `p999_ns`, `p9999_ns`, `max_ns` or `count`; a ratio's
-//! median; a count summed over the runs; how often a cause was found. A figure that exists and was not measured breaks its
-//! bound; one that does not exist is an error, which names those that do.
+//! median; a count summed over the runs; how often a cause was found. A ratio whose interval crosses its bound neither keeps
+//! nor breaks it ([`resolution`]). A figure that exists and was not measured breaks its bound; one that does not exist is an
+//! error, which names those that do.
 
 use super::kinds;
-use super::model::{BoundResult, Cause, PercentilesNs, Report};
+use super::model::{BoundResult, Cause, PercentilesNs, Ratio, Report};
 use super::ratios;
+use super::resolution::{self, Verdict};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -74,17 +76,43 @@ fn one(figure: &str, bound: &toml::Value, report: &Report) -> Result<BoundResult
     };
     let (min, max) = (side("min")?, side("max")?);
     let value = value(figure, report).ok_or_else(|| unknown(figure, report))?;
-    let kept =
-        value.is_some_and(|value| min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max));
-    Ok(BoundResult { figure: figure.to_owned(), value, min, max, kept })
+    let ratio = figure.strip_prefix("ratio.").and_then(|name| ratio(name, report));
+    let verdict = match ratio {
+        Some(ratio) => resolution::verdict(ratio, min, max),
+        None if value.is_some_and(|value| {
+            min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max)
+        }) =>
+        {
+            Verdict::Kept
+        }
+        None => Verdict::Broken,
+    };
+    let (resolved, pairs_to_resolve) = match verdict {
+        Verdict::NotResolved { pairs } => (false, pairs),
+        Verdict::Kept | Verdict::Broken => (true, None),
+    };
+    Ok(BoundResult {
+        figure: figure.to_owned(),
+        value,
+        min,
+        max,
+        kept: verdict == Verdict::Kept,
+        interval: ratio.and_then(|ratio| ratio.interval),
+        resolved,
+        pairs_to_resolve,
+    })
+}
+
+/// The ratio of a name as [`ratios::short_name`] makes it.
+fn ratio<'a>(name: &str, report: &'a Report) -> Option<&'a Ratio> {
+    report.ratios.iter().find(|ratio| ratios::short_name(&ratio.name) == name)
 }
 
 /// The value of a figure: the inner nothing when it was not measured, the outer when there is none of that name.
 fn value(figure: &str, report: &Report) -> Option<Option<f64>> {
     if let Some(name) = figure.strip_prefix("ratio.") {
-        let told = report.ratios.iter().find(|ratio| ratios::short_name(&ratio.name) == name);
         let known = ratios::names().any(|known| ratios::short_name(&known) == name);
-        return told.map(|ratio| Some(ratio.median)).or(known.then_some(None));
+        return ratio(name, report).map(|ratio| Some(ratio.median)).or(known.then_some(None));
     }
     if let Some(name) = figure.strip_prefix("counts.") {
         let counts: Vec<_> = report.runs.iter().filter_map(|run| run.counts.get(name)).collect();
@@ -170,6 +198,31 @@ mod tests {
             },
             expected
         );
+    }
+
+    #[test]
+    fn a_ratio_is_judged_by_its_interval() {
+        let mut report = report_of(vec![made_up::run(2000)]);
+        let name = "emulator-wakeup p99 / cyclictest p99";
+        let mut judged = |factors: [u64; 10]| {
+            let pairs_ns = factors.map(|factor| (factor * 100, 10_000)).into();
+            report.ratios = vec![ratios::ratio(name.into(), pairs_ns).unwrap()];
+            let text = "[bounds]\n\"ratio.emulator-wakeup.p99\" = { max = 1.1 }";
+            judge(text, &report).unwrap().remove(0)
+        };
+        let bound = judged([20, 27, 60, 80, 105, 105, 200, 300, 495, 600]);
+        assert_eq!((bound.value, bound.interval), (Some(1.05), Some((0.27, 4.95))));
+        assert_eq!(bound.verdict(), Verdict::NotResolved { pairs: Some(11_111) });
+        assert!(!bound.kept && !bound.resolved);
+        assert_eq!(judged([99; 10]).verdict(), Verdict::Kept);
+        assert_eq!(judged([124; 10]).verdict(), Verdict::Broken);
+        let text = serde_json::to_string(&bound).unwrap();
+        let told = "\"kept\":false,\"interval\":[0.27,4.95],\"resolved\":false,\"pairs_to_resolve\":11111";
+        assert!(text.contains(told), "{text}");
+        // A report of before says nothing of it.
+        let before = "{\"figure\":\"a\",\"value\":null,\"min\":null,\"max\":1,\"kept\":false}";
+        let before: BoundResult = serde_json::from_str(before).unwrap();
+        assert_eq!(before.verdict(), Verdict::Broken);
     }
 
     #[test]

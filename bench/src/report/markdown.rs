@@ -3,6 +3,7 @@
 use super::cause::in_kebab;
 use super::explain::rules::in_words;
 use super::model::{BoundResult, Comparison, Distribution, Event, PercentilesNs, Ratio, Report, Source};
+use super::resolution::{self, Verdict};
 use super::tallies;
 use crate::grid::Grid;
 use std::fmt::Write as _;
@@ -121,12 +122,31 @@ fn bounds(bounds: &[BoundResult]) -> String {
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value}"));
     let row = |bound: &BoundResult| {
         let value = bound.value.map_or_else(|| "not measured".into(), |value| format!("{value}"));
-        let kept = if bound.kept { "kept" } else { "BROKEN" };
-        vec![bound.figure.clone(), value, number(bound.min), number(bound.max), kept.into()]
+        let verdict = match bound.verdict() {
+            Verdict::Kept => "kept",
+            Verdict::Broken => "BROKEN",
+            Verdict::NotResolved { .. } => "not resolved",
+        };
+        vec![bound.figure.clone(), value, number(bound.min), number(bound.max), verdict.into()]
     };
     let grid =
         Grid { head: words(["bound", "value", "min", "max", ""]), rows: bounds.iter().map(row).collect() };
-    grid.markdown()
+    let open: Vec<_> = bounds.iter().filter_map(not_resolved).collect();
+    let gap = if open.is_empty() { "" } else { "\n" };
+    format!("{}{gap}{}", grid.markdown(), list(&open))
+}
+
+/// Why a bound is neither kept nor broken, and how it could be decided.
+fn not_resolved(bound: &BoundResult) -> Option<String> {
+    let Verdict::NotResolved { pairs } = bound.verdict() else { return None };
+    let interval = bound.interval.map_or_else(String::new, |(low, high)| {
+        format!(" the interval of the median, {low:.3} to {high:.3}, crosses it;")
+    });
+    Some(format!(
+        "{} is not resolved, neither kept nor broken:{interval} {}.",
+        bound.figure,
+        resolution::in_words(pairs)
+    ))
 }
 
 fn comparison(comparison: &Comparison) -> String {

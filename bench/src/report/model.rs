@@ -3,6 +3,7 @@
 //! Times are ns in whole numbers where they were measured, s where a person reads them against a run; every key has its unit.
 //! Nothing is NaN: what was not measured is null or missing from its list.
 
+use super::resolution::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -366,7 +367,7 @@ pub struct ComparisonCell {
     pub beyond_noise: Option<bool>,
 }
 
-/// A bound and whether it was kept.
+/// A bound and whether it was kept. One on a ratio is judged by the interval of its median, all others by their value.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BoundResult {
     /// Figure as the threshold file names it.
@@ -377,6 +378,32 @@ pub struct BoundResult {
     pub min: Option<f64>,
     /// Largest allowed.
     pub max: Option<f64>,
-    /// Whether it was kept.
+    /// Whether it was kept; false too when that is not resolved.
     pub kept: bool,
+    /// Interval of a ratio's median; null for other figures, and with fewer than six pairs.
+    #[serde(default)]
+    pub interval: Option<(f64, f64)>,
+    /// Whether the interval lies on one side of the bound, so that it is kept or broken.
+    #[serde(default = "decided")]
+    pub resolved: bool,
+    /// Pairs that would resolve it, see [`super::resolution`]; null when it is resolved, or when no number would.
+    #[serde(default)]
+    pub pairs_to_resolve: Option<u64>,
+}
+
+/// Reports of before were decided by the value alone.
+fn decided() -> bool {
+    true
+}
+
+impl BoundResult {
+    /// Kept, broken, or neither.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match (self.resolved, self.kept) {
+            (false, _) => Verdict::NotResolved { pairs: self.pairs_to_resolve },
+            (true, true) => Verdict::Kept,
+            (true, false) => Verdict::Broken,
+        }
+    }
 }

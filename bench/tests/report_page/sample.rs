@@ -425,19 +425,48 @@ pub(crate) fn rich() -> Report {
             BoundResult {
                 figure: "emulator-wakeup.p99_us".into(),
                 value: Some(48.3),
-                min: None,
                 max: Some(100.0),
                 kept: true,
+                ..resolved()
             },
-            BoundResult { figure: "frames_lost".into(), value: None, min: None, max: Some(0.0), kept: false },
+            BoundResult { figure: "frames_lost".into(), max: Some(0.0), ..resolved() },
+            BoundResult {
+                figure: "ratio.emulator-wakeup.p99".into(),
+                value: Some(1.05),
+                max: Some(1.1),
+                interval: Some((0.27, 4.95)),
+                resolved: false,
+                pairs_to_resolve: Some(11_111),
+                ..resolved()
+            },
+            BoundResult {
+                figure: "ratio.emulator-wakeup.p50".into(),
+                value: Some(1.1),
+                resolved: false,
+                ..resolved()
+            },
             BoundResult {
                 figure: "cycles".into(),
                 value: Some(f64::INFINITY),
                 min: Some(59_000.0),
-                max: None,
                 kept: true,
+                ..resolved()
             },
         ],
+    }
+}
+
+/// A bound of a figure that was not measured.
+fn resolved() -> BoundResult {
+    BoundResult {
+        figure: String::new(),
+        value: None,
+        min: None,
+        max: None,
+        kept: false,
+        interval: None,
+        resolved: true,
+        pairs_to_resolve: None,
     }
 }
 

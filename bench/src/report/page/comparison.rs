@@ -3,6 +3,7 @@
 use super::markup::{Cell, Table, none, number, paragraph, words as text};
 use super::words::{self, NOTHING};
 use crate::report::model::{BoundResult, Comparison, ComparisonCell};
+use crate::report::resolution::{self, Verdict};
 
 /// The groups with their changes against the first.
 pub(super) fn comparison(comparison: Option<&Comparison>) -> String {
@@ -47,20 +48,35 @@ fn noise(beyond: Option<bool>) -> &'static str {
     }
 }
 
-/// The bounds, kept or broken.
+/// The bounds: kept, broken, or not resolved.
 pub(super) fn bounds(bounds: &[BoundResult]) -> String {
-    let mut table = Table::new("Bounds", ["figure", "value", "at least", "at most", "verdict"]);
+    let mut table = Table::new("Bounds", ["figure", "value", "interval", "at least", "at most", "verdict"]);
     let told = |value: Option<f64>| value.map_or_else(|| NOTHING.into(), words::short);
     for bound in bounds {
         let value = if bound.value.is_some() { told(bound.value) } else { "not measured".into() };
-        let verdict = if bound.kept { "kept" } else { "broken" };
+        let (is_good, verdict) = match bound.verdict() {
+            Verdict::Kept => (Some(true), "kept".into()),
+            Verdict::Broken => (Some(false), "broken".into()),
+            Verdict::NotResolved { pairs } => {
+                (None, format!("not resolved: {}", resolution::in_words(pairs)))
+            }
+        };
+        let interval = bound.interval.map_or_else(
+            || NOTHING.into(),
+            |(low, high)| format!("{} – {}", words::short(low), words::short(high)),
+        );
         table.row([
             text(&bound.figure),
             number(value),
+            number(interval),
             number(told(bound.min)),
             number(told(bound.max)),
-            Cell::Judged(bound.kept, verdict.into()),
+            Cell::Judged(is_good, verdict),
         ]);
     }
-    table.html_or("No threshold file was given.")
+    let said = "A ratio is judged by the interval of its median. Where the interval crosses the bound, or there are fewer than six \
+                pairs and so no interval, the bound is not resolved: neither kept nor broken. The pairs that would resolve it \
+                follow from an interval that shrinks as one over the root of their number, around a median that stays.";
+    let lead = if bounds.is_empty() { String::new() } else { paragraph(said) };
+    format!("{lead}{}", table.html_or("No threshold file was given."))
 }

@@ -13,8 +13,8 @@ pub(super) enum Cell {
     Number(String),
     /// Text with something said below it in small letters.
     About(String, String),
-    /// Good or bad, told by its words and its colour.
-    Judged(bool, String),
+    /// Good, bad, or neither; its words, a sign and its colour say so.
+    Judged(Option<bool>, String),
 }
 
 /// Text.
@@ -40,7 +40,11 @@ impl Cell {
                 format!("{}<span class=\"about\">{}</span>", escaped(text), escaped(about))
             }
             Self::Judged(is_good, text) => {
-                let (class, sign) = if *is_good { ("good", '✓') } else { ("bad", '✗') };
+                let (class, sign) = match is_good {
+                    Some(true) => ("good", '✓'),
+                    Some(false) => ("bad", '✗'),
+                    None => ("open", '?'),
+                };
                 format!("<span class=\"{class}\">{sign} {}</span>", escaped(text))
             }
         }
