@@ -11,7 +11,7 @@
 #![allow(clippy::print_stdout)]
 
 use discrepancy::candidates::Candidate;
-use discrepancy::next::driven::{Driven, drive};
+use discrepancy::next::closed_loop::{ClosedLoopRun, drive};
 use discrepancy::next::menu::Entry;
 use discrepancy::parameters::PARAMETERS;
 use plant::{Plant, RigParameters};
@@ -91,13 +91,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// The first edge of the drive's valve in the experiment.
-fn edge(driven: &Driven, began: usize) -> Option<usize> {
+fn edge(driven: &ClosedLoopRun, began: usize) -> Option<usize> {
     let valve = |at: usize| driven.inputs[at].valve[0];
     (began.max(1)..driven.inputs.len() - COMPARED).find(|at| (valve(*at) - valve(at - 1)).abs() > EDGE)
 }
 
 /// What the drive's sensors show from an edge on: a run is repeated by its commands.
-fn changes(rig: &RigParameters, driven: &Driven, edge: usize) -> Result<Changes, String> {
+fn changes(rig: &RigParameters, driven: &ClosedLoopRun, edge: usize) -> Result<Changes, String> {
     let mut plant = Plant::in_state(rig, &driven.start).map_err(|error| error.to_string())?;
     let mut shown = Vec::new();
     for inputs in &driven.inputs[..=edge + COMPARED] {
@@ -124,7 +124,7 @@ fn row(
     quiet: &RigParameters,
     head: &str,
     rig: &RigParameters,
-    (baseline, baseline_edge): (&Driven, usize),
+    (baseline, baseline_edge): (&ClosedLoopRun, usize),
     own: &Changes,
     noise: &[f64; 3],
 ) -> Result<(f64, String), String> {

@@ -20,9 +20,9 @@ use plant::RigParameters;
 /// Points at most.
 const POINTS: usize = 8;
 /// Fall of the loss below which it has settled.
-const SETTLED: f64 = 1.0;
+const CONVERGED: f64 = 1.0;
 /// Share of the tolerance above which an error says that the record does not tell.
-const UNTOLD: f64 = 0.7;
+const UNRESOLVED: f64 = 0.7;
 
 /// The parameters that fit best, effects left out.
 #[derive(Clone, Debug)]
@@ -38,12 +38,12 @@ pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
     for _ in 1..POINTS {
         let columns = engine.parameter_columns(engine.rig(), &best.factors);
         let next = Around { columns, factors: best.factors };
-        let Some(own) = refit(engine, &next, &[], 0.0) else { break };
-        let settled = own.loss > best.loss - SETTLED;
-        if own.loss < best.loss {
-            best = own;
+        let Some(fit) = refit(engine, &next, &[], 0.0) else { break };
+        let converged = fit.loss > best.loss - CONVERGED;
+        if fit.loss < best.loss {
+            best = fit;
         }
-        if settled {
+        if converged {
             break;
         }
     }
@@ -61,7 +61,7 @@ impl Calibrated {
 /// A parameter of a fit, in the unit of the rig file; of tables their common factor.
 #[must_use]
 pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
-    let (parameter, measured) = (PARAMETERS[at], engine.windows()[0].course().measured);
+    let (parameter, measured) = (PARAMETERS[at], engine.windows()[0].record().measured);
     let (before, unit) = parameter.value(engine.rig(), measured);
     // What was simulated: a number is held at the end of its range, and rest at what slides.
     let value = if unit.is_empty() {
@@ -74,7 +74,7 @@ pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
         name: parameter.name.to_owned(),
         value,
         unit: unit.to_owned(),
-        standard_error: (error < UNTOLD * parameter.tolerance).then_some(before * error),
+        standard_error: (error < UNRESOLVED * parameter.tolerance).then_some(before * error),
         before: Some(before),
     }
 }

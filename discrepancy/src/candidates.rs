@@ -123,10 +123,10 @@ impl Candidate {
     }
 
     fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
-        let own = rig.effects().iter().find(|own| own.name == sheet.name && own.place == place);
-        let present = own.map(|own| {
+        let effect = rig.effects().iter().find(|effect| effect.name == sheet.name && effect.place == place);
+        let present = effect.map(|effect| {
             let mut numbers = [0.0; MOST_KEYS];
-            numbers[..own.numbers.len()].copy_from_slice(&own.numbers);
+            numbers[..effect.numbers.len()].copy_from_slice(&effect.numbers);
             numbers
         });
         Candidate { sheet, place, present }

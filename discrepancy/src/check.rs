@@ -108,7 +108,7 @@ pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     range::check(&mut notes, rig, &grid);
     stuck::check(&mut notes, rig, &grid);
     let channels =
-        record.channels().map(|channel| (channel.column(), told(channel, &notes, &grid))).collect();
+        record.channels().map(|channel| (channel.column(), channel_check(channel, &notes, &grid))).collect();
     // Signs are asked of numbers that mean what they say.
     if !notes.is_fatal() {
         signs::check(&mut notes, rig, &grid);
@@ -117,7 +117,7 @@ pub fn check(record: &Record, rig: &RigParameters) -> Checked {
 }
 
 /// Noise, quantum and share of bad samples of a channel.
-fn told(channel: Channel, notes: &Notes, grid: &Grid) -> ChannelCheck {
+fn channel_check(channel: Channel, notes: &Notes, grid: &Grid) -> ChannelCheck {
     let values = grid.series(notes, channel);
     let present: Vec<f64> = values.iter().flatten().copied().collect();
     // A command is what it is: it has steps and no noise.

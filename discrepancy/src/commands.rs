@@ -11,11 +11,12 @@ use crate::cli::{
 };
 use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
+use crate::gridded_record::GriddedRecord;
 use crate::parameters::COUNT;
 use crate::refit::Around;
 use crate::report::{Gap, NamedEffect, Quantity, Report, Verdict, Verification, decimals};
-use crate::workflow::{self, Outcome, RigFile, Task, Told, WorkflowError, close, open};
-use crate::{balance, locate, page, verify};
+use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
+use crate::{locate, page, single_equation, verify};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,7 +34,7 @@ pub enum CommandError {
     Workflow(#[from] WorkflowError),
     /// A model of one balance.
     #[error(transparent)]
-    Balance(#[from] balance::BalanceError),
+    Balance(#[from] single_equation::BalanceError),
     /// A result cannot be written.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -119,7 +120,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     never_seen(&records.train, tests)?;
     let text = std::fs::read_to_string(&records.rig)
         .map_err(|why| CommandError::File { file: records.rig.clone(), why })?;
-    let one_balance = balance::is_model_file(&text);
+    let one_balance = single_equation::is_model_file(&text);
     let model = match records.rig.file_name() {
         Some(name) if one_balance => PathBuf::from(name),
         _ => PathBuf::from("rig.toml"),
@@ -127,13 +128,13 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
     let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests).chain(&records.mapping);
     let out = Folder::open(&out, inputs)?;
-    // Told before a minute of work.
+    // Reported before a minute of work.
     for name in [Path::new("report.json"), Path::new("report.html"), &model] {
         out.file(name)?;
     }
     let mut progress = progress();
     let outcome = if one_balance {
-        nothing_for_one_balance(arguments)?;
+        refuse_whole_rig_options(arguments)?;
         one_balance_outcome(records, tests, &mut progress)?
     } else {
         let task = Task {
@@ -171,16 +172,17 @@ fn one_balance_outcome(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, CommandError> {
     let tests: Vec<&Path> = tests.iter().map(PathBuf::as_path).collect();
-    let balance::Closed { report, not_judged, pictures } =
-        balance::close(&records.rig, &records.train, &tests, progress)?;
+    let single_equation::Closed { report, not_judged, pictures } =
+        single_equation::close(&records.rig, &records.train, &tests, progress)?;
     let is_model = report.verdict != Verdict::BadData;
-    let extended =
-        is_model.then(|| balance::extended_model_text(&records.rig, &Told::from(&report)).ok()).flatten();
+    let extended = is_model
+        .then(|| single_equation::extended_model_text(&records.rig, &Reported::from(&report)).ok())
+        .flatten();
     Ok(Outcome { report, extended, pictures, experiment: None, not_judged })
 }
 
 /// A model of one balance says itself how its records are read, and which terms it has.
-fn nothing_for_one_balance(arguments: &NameArguments) -> Result<(), CommandError> {
+fn refuse_whole_rig_options(arguments: &NameArguments) -> Result<(), CommandError> {
     let given = [
         ("--mapping", arguments.records.mapping.is_some(), "mapping = \"…\" in the model file"),
         ("--strict", arguments.records.strict, "it reads the columns under [channels] alone"),
@@ -192,15 +194,15 @@ fn nothing_for_one_balance(arguments: &NameArguments) -> Result<(), CommandError
 
 /// No record is given twice, and none is held out that was trained on. Only names are looked at: nothing is opened.
 fn never_seen(train: &[PathBuf], tests: &[PathBuf]) -> Result<(), CommandError> {
-    let own = |file: &PathBuf| std::fs::canonicalize(file).unwrap_or_else(|_| file.clone());
+    let canonical = |file: &PathBuf| std::fs::canonicalize(file).unwrap_or_else(|_| file.clone());
     let mut seen = BTreeSet::new();
-    if let Some(twice) = train.iter().find(|file| !seen.insert(own(file))) {
+    if let Some(twice) = train.iter().find(|file| !seen.insert(canonical(file))) {
         let twice = twice.display();
         return Err(CommandError::BadData(format!(
             "--train {twice}: given twice: the same noise would count as two measurements"
         )));
     }
-    let Some(test) = tests.iter().find(|file| seen.contains(&own(file))) else { return Ok(()) };
+    let Some(test) = tests.iter().find(|file| seen.contains(&canonical(file))) else { return Ok(()) };
     let test = test.display();
     Err(CommandError::BadData(format!(
         "--test {test}: a training record as well: a model is judged on a record that it never saw"
@@ -245,8 +247,8 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
             let _ = writeln!(text, "  {}{}", if finding.fatal { "fatal: " } else { "" }, finding.text);
         }
         for (channel, check) in &report.channels {
-            let told = |value: Option<f64>| value.map_or("unknown".to_owned(), significant);
-            let (noise, quantum) = (told(check.noise), told(check.quantum));
+            let shown = |value: Option<f64>| value.map_or("unknown".to_owned(), significant);
+            let (noise, quantum) = (shown(check.noise), shown(check.quantum));
             let _ = writeln!(
                 text,
                 "  {channel}: noise {noise}, quantum {quantum}, {:.2} % unusable",
@@ -264,28 +266,28 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
 
 fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let out = folder(arguments)?;
-    let (rig_file, courses) = courses(arguments)?;
-    let engine = Engine::new(&courses, &rig_file.rig);
+    let (rig_file, gridded) = gridded_records(arguments)?;
+    let engine = Engine::new(&gridded, &rig_file.rig);
     let ones = [1.0; COUNT];
     let around = Around { columns: engine.parameter_columns(&rig_file.rig, &ones), factors: ones };
     let calibrated = calibrate(&engine, &around);
     let finer = finer(&engine, &calibrated).ok_or_else(|| {
         CommandError::BadData("what fits these records best is out of the rig file's ranges".to_owned())
     })?;
-    let quantities = finer.told;
+    let quantities = finer.quantities;
     let mut text = String::new();
-    for own in &quantities {
-        let _ = match (own.standard_error, own.before) {
-            (Some(_), Some(before)) => writeln!(text, "{} (rig file: {before})", quantity_in_words(own)),
-            (Some(_), None) => writeln!(text, "{}", quantity_in_words(own)),
-            (None, _) => writeln!(text, "{}: these records cannot tell", own.name),
+    for quantity in &quantities {
+        let _ = match (quantity.standard_error, quantity.before) {
+            (Some(_), Some(before)) => writeln!(text, "{} (rig file: {before})", quantity_in_words(quantity)),
+            (Some(_), None) => writeln!(text, "{}", quantity_in_words(quantity)),
+            (None, _) => writeln!(text, "{}: these records cannot tell", quantity.name),
         };
     }
     print(&text)?;
     if let Some(out) = out {
         out.write_json("parameters.json", &quantities)?;
         let records: Vec<String> = arguments.train.iter().map(|path| path.display().to_string()).collect();
-        let weighed = workflow::weighed(courses[0].measured);
+        let weighed = workflow::weighed(gridded[0].measured);
         let text =
             crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, weighed, &records)
                 .map_err(WorkflowError::from)?;
@@ -296,9 +298,9 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
 
 fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let out = folder(arguments)?;
-    let (rig_file, courses) = courses(arguments)?;
+    let (rig_file, gridded) = gridded_records(arguments)?;
     let mut progress = progress();
-    let located = locate::locate(&rig_file.rig, &courses, &mut progress);
+    let located = locate::locate(&rig_file.rig, &gridded, &mut progress);
     let mut text = String::new();
     for bar in &located.location.balances {
         let _ = writeln!(
@@ -316,11 +318,12 @@ fn locate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
 
 fn extend_command(arguments: &ExtendArguments) -> Result<Exit, CommandError> {
     let report = read_report(&arguments.report)?;
-    let text = if std::fs::read_to_string(&arguments.rig).is_ok_and(|text| balance::is_model_file(&text)) {
-        balance::extended_model_text(&arguments.rig, &report)?
-    } else {
-        workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?
-    };
+    let text =
+        if std::fs::read_to_string(&arguments.rig).is_ok_and(|text| single_equation::is_model_file(&text)) {
+            single_equation::extended_model_text(&arguments.rig, &report)?
+        } else {
+            workflow::extended(&RigFile::read(&arguments.rig)?, &report).map_err(WorkflowError::from)?
+        };
     spare(&arguments.out, &[&arguments.rig, &arguments.report])?;
     folder::write(&arguments.out, &text)?;
     Ok(Exit::Good)
@@ -331,8 +334,8 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     let out = arguments.out.as_ref().map(|out| Folder::open(out, inputs)).transpose()?;
     let [before, after] = [RigFile::read(&arguments.rig)?.rig, RigFile::read(&arguments.extended)?.rig];
     let opened = open(&arguments.test, &arguments.options(), &before)?;
-    let Some(course) = opened.course else { return Err(CommandError::BadData(opened.checked.why_not())) };
-    let verified = verify::verify(&before, &after, &course, &mut progress());
+    let Some(gridded) = opened.gridded else { return Err(CommandError::BadData(opened.checked.why_not())) };
+    let verified = verify::verify(&before, &after, &gridded, &mut progress());
     let mut text = String::new();
     for (signal, gap) in &verified.gap {
         let closed = gap.closed.map_or("no gap".into(), |closed| format!("{:.1} % closed", closed * 100.0));
@@ -356,8 +359,8 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     verified.verification.physical.iter().for_each(|unphysical| text.push_str(&format!("{unphysical}\n")));
     print(&text)?;
     if let Some(out) = out {
-        let told = VerifiedFile { gap: &verified.gap, verification: &verified.verification };
-        out.write_json("verification.json", &told)?;
+        let shown = VerifiedFile { gap: &verified.gap, verification: &verified.verification };
+        out.write_json("verification.json", &shown)?;
     }
     Ok(if *confirmed { Exit::Good } else { Exit::BoundBroken })
 }
@@ -388,20 +391,22 @@ fn next_command(arguments: &NextArguments) -> Result<Exit, CommandError> {
     Ok(Exit::Good)
 }
 
-fn courses(arguments: &RecordArguments) -> Result<(RigFile, Vec<crate::course::Course>), CommandError> {
+fn gridded_records(arguments: &RecordArguments) -> Result<(RigFile, Vec<GriddedRecord>), CommandError> {
     never_seen(&arguments.train, &[])?;
     let rig_file = RigFile::read(&arguments.rig)?;
-    let mut courses = Vec::new();
+    let mut all = Vec::new();
     for path in &arguments.train {
         let opened = open(path, &arguments.options(), &rig_file.rig)?;
-        let Some(course) = opened.course else { return Err(CommandError::BadData(opened.checked.why_not())) };
-        courses.push(course);
+        let Some(gridded) = opened.gridded else {
+            return Err(CommandError::BadData(opened.checked.why_not()));
+        };
+        all.push(gridded);
     }
-    workflow::on_shared_axes(&mut courses)?;
-    Ok((rig_file, courses))
+    workflow::on_shared_axes(&mut all)?;
+    Ok((rig_file, all))
 }
 
-fn read_report(path: &Path) -> Result<Told, CommandError> {
+fn read_report(path: &Path) -> Result<Reported, CommandError> {
     let bytes = std::fs::read(path).map_err(|why| CommandError::File { file: path.to_owned(), why })?;
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }
@@ -414,8 +419,9 @@ fn folder(arguments: &RecordArguments) -> Result<Option<Folder>, CommandError> {
 
 /// A file to be written that is none of those that are read.
 fn spare(out: &Path, inputs: &[&PathBuf]) -> Result<(), CommandError> {
-    let own = std::fs::canonicalize(out).ok();
-    let is_input = own.is_some() && inputs.iter().any(|file| std::fs::canonicalize(file).ok() == own);
+    let canonical = std::fs::canonicalize(out).ok();
+    let is_input =
+        canonical.is_some() && inputs.iter().any(|file| std::fs::canonicalize(file).ok() == canonical);
     if is_input { Err(FolderError::Input { file: out.to_owned() }.into()) } else { Ok(()) }
 }
 
@@ -451,8 +457,8 @@ fn in_words(report: &Report) -> String {
             let _ = writeln!(text, "    or {}", effect_in_words(other));
         }
     }
-    for own in &report.parameters {
-        let _ = writeln!(text, "  {}", quantity_in_words(own));
+    for quantity in &report.parameters {
+        let _ = writeln!(text, "  {}", quantity_in_words(quantity));
     }
     for (signal, gap) in &report.gap {
         if let Some(closed) = gap.closed {
@@ -475,13 +481,13 @@ fn significant(value: f64) -> String {
 }
 
 /// `leakage_nl_per_min = 2.513 +- 0.041 Nl/min`: rounded to the second digit of the standard error.
-fn quantity_in_words(own: &Quantity) -> String {
-    let value = match own.standard_error.filter(|error| *error > 0.0) {
+fn quantity_in_words(quantity: &Quantity) -> String {
+    let value = match quantity.standard_error.filter(|error| *error > 0.0) {
         Some(error) => {
             let digits = decimals(error);
-            format!("{:.digits$} +- {error:.digits$}", own.value)
+            format!("{:.digits$} +- {error:.digits$}", quantity.value)
         }
-        None => significant(own.value),
+        None => significant(quantity.value),
     };
-    format!("{} = {value} {}", own.name, own.unit).trim_end().to_owned()
+    format!("{} = {value} {}", quantity.name, quantity.unit).trim_end().to_owned()
 }

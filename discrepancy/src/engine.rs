@@ -9,9 +9,9 @@
 //! All in windows, whitened, with what the windows' starts explain taken out ([`crate::windows`]). Simulations run on all
 //! cores; what they give is gathered in the order of the candidates, so that two runs have the same bits.
 
-use crate::course::Course;
+use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
-use crate::windows::{Passage, Reach, Windows, dot};
+use crate::windows::{Reach, ReferenceRun, Windows, dot};
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -44,25 +44,25 @@ pub struct Engine<'a> {
 impl<'a> Engine<'a> {
     /// An engine of some records of the same axes.
     #[must_use]
-    pub fn new(courses: &'a [Course], rig: &RigParameters) -> Self {
-        let windows: Vec<Windows<'a>> = courses.par_iter().map(|course| Windows::new(course, rig)).collect();
+    pub fn new(records: &'a [GriddedRecord], rig: &RigParameters) -> Self {
+        let windows: Vec<Windows<'a>> = records.par_iter().map(|record| Windows::new(record, rig)).collect();
         let rows = windows.first().map_or(0, Windows::rows);
         let freedom = windows.iter().flat_map(Windows::freedom).collect();
         let mut engine =
             Engine { windows, rig: rig.clone(), rows, freedom, level: 1.0, kept: Mutex::default() };
         let residual = engine.residual(&engine.simulate(rig));
         engine.level = level(&residual, rows, &engine.freedom);
-        engine.freedom.iter_mut().for_each(|own| *own *= engine.level);
+        engine.freedom.iter_mut().for_each(|freedom| *freedom *= engine.level);
         engine
     }
 
     /// The same records with starts where another rig meets them best: where rods are linked, micrometres decide which of them
     /// touch, and a rig may only be held against readings from where it would have been itself.
     #[must_use]
-    pub fn settled_at(&self, rig: &RigParameters) -> Engine<'a> {
+    pub fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
         let windows: Vec<Windows<'a>> =
-            self.windows.par_iter().map(|own| Windows::new(own.course(), rig)).collect();
-        let freedom = windows.iter().flat_map(Windows::freedom).map(|own| own * self.level).collect();
+            self.windows.par_iter().map(|windows| Windows::new(windows.record(), rig)).collect();
+        let freedom = windows.iter().flat_map(Windows::freedom).map(|freedom| freedom * self.level).collect();
         Engine {
             windows,
             rig: self.rig.clone(),
@@ -76,7 +76,7 @@ impl<'a> Engine<'a> {
     /// Whether a record was made with linked rods.
     #[must_use]
     pub fn is_linked(&self) -> bool {
-        self.windows.iter().any(|windows| windows.course().linked)
+        self.windows.iter().any(|windows| windows.record().linked)
     }
 
     /// The baseline.
@@ -117,7 +117,7 @@ impl<'a> Engine<'a> {
 
     /// The same, kept with where each window went, for [`Engine::simulate_where`].
     #[must_use]
-    pub fn pass(&self, rig: &RigParameters) -> Vec<Passage> {
+    pub fn pass(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
         self.windows.par_iter().map(|windows| windows.pass(rig)).collect()
     }
 
@@ -126,7 +126,7 @@ impl<'a> Engine<'a> {
     pub fn simulate_where(
         &self,
         rig: &RigParameters,
-        passed: &[Passage],
+        passed: &[ReferenceRun],
         differs: impl Fn(&Reach) -> bool,
     ) -> Vec<f64> {
         let windows = self.windows.iter().zip(passed);
@@ -142,8 +142,8 @@ impl<'a> Engine<'a> {
         let simulate = |rigs: &[RigParameters]| {
             let mut all = vec![Vec::new(); rigs.len()];
             for windows in &self.windows {
-                let own = windows.simulate_side_by_side(rigs);
-                all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+                let simulated = windows.simulate_side_by_side(rigs);
+                all.iter_mut().zip(simulated).for_each(|(all, simulated)| all.extend(simulated));
             }
             all
         };
@@ -157,7 +157,7 @@ impl<'a> Engine<'a> {
         let (up, down) = simulated.split_at(rigs.len() / 2);
         let difference = |(up, down): (&Vec<f64>, &Vec<f64>)| {
             let mut column = self.difference(up, down);
-            column.iter_mut().for_each(|own| *own /= change);
+            column.iter_mut().for_each(|value| *value /= change);
             column
         };
         up.par_iter().zip(down).map(difference).collect()
@@ -198,7 +198,7 @@ impl<'a> Engine<'a> {
     #[must_use]
     pub fn parameter_columns(&self, rig: &RigParameters, factors: &[f64; COUNT]) -> Vec<Vec<f64>> {
         let kept = || self.kept.lock().expect("nobody panics with it");
-        if let Some((.., columns)) = kept().iter().find(|(own, at, _)| own == rig && at == factors) {
+        if let Some((.., columns)) = kept().iter().find(|(at_rig, at, _)| at_rig == rig && at == factors) {
             return columns.clone();
         }
         let around = |at: usize, change: f64| {
@@ -224,11 +224,14 @@ impl<'a> Engine<'a> {
 /// By how much the quietest windows are off what noise gives: the noise as it was estimated is right to some per cent only, and
 /// over 200 windows a few per cent would look like a large excess.
 fn level(residual: &[f64], rows: usize, freedom: &[f64]) -> f64 {
-    let mut quiet: Vec<f64> =
-        residual.chunks_exact(rows).zip(freedom).map(|(own, freedom)| dot(own, own) / freedom).collect();
+    let mut quiet: Vec<f64> = residual
+        .chunks_exact(rows)
+        .zip(freedom)
+        .map(|(window, freedom)| dot(window, window) / freedom)
+        .collect();
     quiet.sort_unstable_by(f64::total_cmp);
-    let Some(own) = quiet.get(quiet.len() / 10) else { return 1.0 };
+    let Some(quantile) = quiet.get(quiet.len() / 10) else { return 1.0 };
     let mean = freedom.iter().sum::<f64>() / freedom.len() as f64;
     // The lowest tenth of chi2 / f ends 1.28 standard deviations below 1.
-    (own / (1.0 - 1.28 * (2.0 / mean).sqrt())).clamp(LEVELS[0], LEVELS[1])
+    (quantile / (1.0 - 1.28 * (2.0 / mean).sqrt())).clamp(LEVELS[0], LEVELS[1])
 }

@@ -71,7 +71,7 @@ pub enum ExtendError {
         /// Its keys.
         known: String,
     },
-    /// Told twice.
+    /// Reported twice.
     #[error("{what} is to be changed twice")]
     Twice {
         /// Effect and place, or the parameter.
@@ -145,19 +145,19 @@ pub fn extend(
     let mut text = parameters::change(rig_text, changed, weighed, &from, &layout)?;
     let mut done: Vec<(&str, &str)> = Vec::new();
     for addition in additions {
-        let told = format!("{} at {}", addition.effect, addition.place);
+        let effect = format!("{} at {}", addition.effect, addition.place);
         if done.contains(&(addition.effect.as_str(), addition.place.as_str())) {
-            return Err(ExtendError::Twice { what: told });
+            return Err(ExtendError::Twice { what: effect });
         }
         done.push((&addition.effect, &addition.place));
         let sheet = checked(addition)?;
         // Parsed anew for each: its predecessor has moved the spans.
         let document =
-            Document::parse(text.as_str()).map_err(|error| layout(&told, error.message().to_owned()))?;
+            Document::parse(text.as_str()).map_err(|error| layout(&effect, error.message().to_owned()))?;
         let mut edits = Edits::new(&text);
         edits.switch_on(&document, sheet, addition, &from);
         let extended = edits.applied();
-        Document::parse(extended.as_str()).map_err(|error| layout(&told, error.message().to_owned()))?;
+        Document::parse(extended.as_str()).map_err(|error| layout(&effect, error.message().to_owned()))?;
         text = extended;
     }
     RigParameters::from_toml(&text, file).map_err(ExtendError::Refused)?;
@@ -235,7 +235,7 @@ fn in_comment(text: &str) -> String {
 }
 
 /// `2.513 +- 0.041 Nl/min`: the value rounded to the second digit of its standard error.
-fn told(value: f64, standard_error: Option<f64>, unit: &str) -> String {
+fn quantity_text(value: f64, standard_error: Option<f64>, unit: &str) -> String {
     let text = match standard_error.filter(|error| error.is_finite() && *error > 0.0) {
         Some(error) => {
             let digits = decimals(error);
@@ -253,7 +253,12 @@ fn written(value: f64) -> String {
 
 /// The comment above a number of an effect.
 fn key_comment(key: &EffectKey, value: f64, standard_error: Option<f64>, from: &str) -> String {
-    format!("{}{from}; {}: {}", told(value, standard_error, key.unit.name()), key.range(), key.meaning)
+    format!(
+        "{}{from}; {}: {}",
+        quantity_text(value, standard_error, key.unit.name()),
+        key.range(),
+        key.meaning
+    )
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 /// Passes of reweighting.
 const PASSES: usize = 12;
 /// Change of the loss below which it has settled.
-const SETTLED: f64 = 1e-3;
+const CONVERGED: f64 = 1e-3;
 
 /// Smallest chi2 per degree of freedom that a window counts with: one that is nearly empty is no better than a good one.
 pub const LEAST: f64 = 1e-3;
@@ -132,10 +132,10 @@ impl Products {
             .map(|window| {
                 let (scores, information) = (&self.scores[window], &self.information[window]);
                 let mut square = self.squares[window];
-                for (at, own) in chosen.iter().zip(coefficients) {
-                    square -= 2.0 * own * scores[*at];
+                for (at, coefficient) in chosen.iter().zip(coefficients) {
+                    square -= 2.0 * coefficient * scores[*at];
                     for (other_at, other) in chosen.iter().zip(coefficients) {
-                        square += own * other * information[at * self.columns + other_at];
+                        square += coefficient * other * information[at * self.columns + other_at];
                     }
                 }
                 square.max(0.0)
@@ -178,24 +178,29 @@ impl Products {
         let mut weights = self.weights(&self.squares);
         let mut coefficients = vec![0.0; chosen.len()];
         let mut squares = self.squares.clone();
-        let held = |own: &[f64]| -> f64 {
-            own.iter().zip(from).zip(ridges).map(|((own, from), ridge)| ridge * (own + from).powi(2)).sum()
+        let held = |coefficients: &[f64]| -> f64 {
+            coefficients
+                .iter()
+                .zip(from)
+                .zip(ridges)
+                .map(|((value, from), ridge)| ridge * (value + from).powi(2))
+                .sum()
         };
         let mut loss = self.loss(&squares) + held(&coefficients);
         for _ in 0..PASSES {
             let (matrix, mut vector) = self.normal(chosen, &weights, ridges);
-            vector.iter_mut().zip(ridges).zip(from).for_each(|((own, ridge), from)| *own -= ridge * from);
+            vector.iter_mut().zip(ridges).zip(from).for_each(|((score, ridge), from)| *score -= ridge * from);
             let Some(solved) = solve(matrix, &vector) else { break };
-            let own: Vec<f64> = solved.iter().copied().collect();
-            let own_squares = self.squares(chosen, &own);
-            let own_loss = self.loss(&own_squares) + held(&own);
-            if own_loss > loss - SETTLED && own_loss >= loss {
+            let tried: Vec<f64> = solved.iter().copied().collect();
+            let tried_squares = self.squares(chosen, &tried);
+            let tried_loss = self.loss(&tried_squares) + held(&tried);
+            if tried_loss > loss - CONVERGED && tried_loss >= loss {
                 break;
             }
-            let settled = loss - own_loss < SETTLED;
-            (coefficients, squares, loss) = (own, own_squares, own_loss);
+            let converged = loss - tried_loss < CONVERGED;
+            (coefficients, squares, loss) = (tried, tried_squares, tried_loss);
             weights = self.weights(&squares);
-            if settled {
+            if converged {
                 break;
             }
         }
@@ -214,10 +219,10 @@ impl Products {
             let mut weights = all.clone();
             weights[of(fold)].fill(0.0);
             let (matrix, mut vector) = self.normal(chosen, &weights, ridges);
-            vector.iter_mut().zip(ridges).zip(from).for_each(|((own, ridge), from)| *own -= ridge * from);
-            let own =
-                solve(matrix, &vector).map_or(vec![0.0; chosen.len()], |own| own.iter().copied().collect());
-            self.squares(chosen, &own)[of(fold)].to_vec()
+            vector.iter_mut().zip(ridges).zip(from).for_each(|((score, ridge), from)| *score -= ridge * from);
+            let solution = solve(matrix, &vector)
+                .map_or(vec![0.0; chosen.len()], |solution| solution.iter().copied().collect());
+            self.squares(chosen, &solution)[of(fold)].to_vec()
         });
         self.loss(&judged.collect::<Vec<_>>())
     }
@@ -229,14 +234,14 @@ impl Products {
         let (matrix, _) = self.normal(first, weights, ridges);
         let inverse = matrix.try_inverse().unwrap_or_else(|| DMatrix::zeros(count, count));
         (count..self.columns)
-            .map(|own| {
+            .map(|column| {
                 let cross = DVector::from_iterator(
                     count,
                     first.iter().map(|at| {
                         weights
                             .iter()
                             .zip(&self.information)
-                            .map(|(weight, products)| weight * products[at * self.columns + own])
+                            .map(|(weight, products)| weight * products[at * self.columns + column])
                             .sum::<f64>()
                     }),
                 );
@@ -244,7 +249,7 @@ impl Products {
                 let whole: f64 = weights
                     .iter()
                     .zip(&self.information)
-                    .map(|(weight, products)| weight * products[own * self.columns + own])
+                    .map(|(weight, products)| weight * products[column * self.columns + column])
                     .sum();
                 let scores = weights
                     .iter()
@@ -252,7 +257,7 @@ impl Products {
                     .map(|(weight, scores)| {
                         let taken: f64 =
                             first.iter().zip(shares.iter()).map(|(at, share)| share * scores[*at]).sum();
-                        weight * (scores[own] - taken)
+                        weight * (scores[column] - taken)
                     })
                     .collect();
                 (scores, (whole - cross.dot(&shares)).max(1e-9 * whole.max(1e-300)))
@@ -274,7 +279,9 @@ impl Products {
                     let taken: f64 = chosen
                         .iter()
                         .zip(&fit.coefficients)
-                        .map(|(other, own)| own * self.information[window][at * self.columns + other])
+                        .map(|(other, coefficient)| {
+                            coefficient * self.information[window][at * self.columns + other]
+                        })
                         .sum();
                     weight * (self.scores[window][*at] - taken)
                 })
@@ -319,18 +326,18 @@ impl Products {
         let mut changes = Vec::with_capacity(fit.weights.len());
         for (window, weight) in fit.weights.iter().enumerate() {
             let information = &self.information[window];
-            let own = DMatrix::from_fn(count, count, |row, column| {
+            let part = DMatrix::from_fn(count, count, |row, column| {
                 weight * information[chosen[row] * self.columns + chosen[column]]
             });
             let score = DVector::from_fn(count, |row, _| {
                 let taken: f64 = chosen
                     .iter()
                     .zip(&fit.coefficients)
-                    .map(|(other, own)| own * information[chosen[row] * self.columns + other])
+                    .map(|(other, coefficient)| coefficient * information[chosen[row] * self.columns + other])
                     .sum();
                 weight * (self.scores[window][chosen[row]] - taken)
             });
-            changes.push(solve(&matrix - own, &score)?);
+            changes.push(solve(&matrix - part, &score)?);
         }
         let error = |places: &[usize]| {
             let change_of = |change: &DVector<f64>| places.iter().map(|at| change[*at]).sum::<f64>();
@@ -349,7 +356,7 @@ impl Products {
 /// What a standard error from a few numbers is multiplied with, so that two of them hold what two hold when many tell it.
 fn widened(freedom: f64) -> f64 {
     let share = Normal::standard().cdf(2.0);
-    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |own| own.inverse_cdf(share) / 2.0)
+    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| student.inverse_cdf(share) / 2.0)
 }
 
 /// Solves symmetric equations that may be nearly singular, columns brought to one scale.
@@ -366,7 +373,7 @@ fn solve(matrix: DMatrix<f64>, vector: &DVector<f64>) -> Option<DVector<f64>> {
         right[row] /= scales[row];
     }
     let solved = scaled.cholesky()?.solve(&right);
-    Some(DVector::from_iterator(count, solved.iter().zip(&scales).map(|(own, scale)| own / scale)))
+    Some(DVector::from_iterator(count, solved.iter().zip(&scales).map(|(value, scale)| value / scale)))
 }
 
 #[cfg(test)]
@@ -384,8 +391,8 @@ mod tests {
             .iter()
             .zip(noise)
             .enumerate()
-            .map(|(at, (own, noise))| {
-                amplitude * own + noise * 12.0_f64.sqrt() + if spoilt && at < 50 { 40.0 } else { 0.0 }
+            .map(|(at, (value, noise))| {
+                amplitude * value + noise * 12.0_f64.sqrt() + if spoilt && at < 50 { 40.0 } else { 0.0 }
             })
             .collect();
         (residual, column)
@@ -405,17 +412,17 @@ mod tests {
             let products = Products::new(&residual, columns, &[50.0; 10], 50);
             let fit = products.fit(&all, &ridges);
             let mut left = residual.clone();
-            for (column, own) in columns.iter().zip(&fit.coefficients) {
-                left.iter_mut().zip(*column).for_each(|(left, part)| *left -= own * part);
+            for (column, coefficient) in columns.iter().zip(&fit.coefficients) {
+                left.iter_mut().zip(*column).for_each(|(left, part)| *left -= coefficient * part);
             }
             let products = Products::new(&left, columns, &[50.0; 10], 50);
             (fit.loss, products.unseen_loss(&all, &ridges, &fit.coefficients, 5))
         };
-        let nothing = loss(&[]).1;
+        let null = loss(&[]).1;
         let (seen, unseen) = loss(&[&column]);
-        assert!(unseen < nothing - 50.0 && (unseen - seen).abs() < 5.0, "{nothing} {seen} {unseen}");
+        assert!(unseen < null - 50.0 && (unseen - seen).abs() < 5.0, "{null} {seen} {unseen}");
         let (seen, unseen) = loss(&chance.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        assert!(seen < nothing - 10.0 && unseen > nothing, "{nothing} {seen} {unseen}");
+        assert!(seen < null - 10.0 && unseen > null, "{null} {seen} {unseen}");
     }
 
     #[test]
@@ -459,7 +466,7 @@ mod tests {
                             (0..rows).map(|_| normal(&mut random) + common).collect::<Vec<_>>()
                         })
                         .zip(&column)
-                        .map(|(noise, own)| noise + 0.5 * own)
+                        .map(|(noise, value)| noise + 0.5 * value)
                         .collect();
                     let products = Products::new(&residual, &[&column], &[rows as f64; 40], rows);
                     let fit = products.fit(&[0], &[1e-9]);

@@ -59,7 +59,7 @@ impl Folder {
     /// [`FolderError::Input`] when it is one of those that are read.
     pub fn file(&self, name: impl AsRef<Path>) -> Result<PathBuf, FolderError> {
         let file = self.path.join(name);
-        let known = fs::canonicalize(&file).is_ok_and(|own| self.inputs.contains(&own));
+        let known = fs::canonicalize(&file).is_ok_and(|path| self.inputs.contains(&path));
         if known { Err(FolderError::Input { file }) } else { Ok(file) }
     }
 
@@ -119,10 +119,10 @@ mod tests {
 
     #[test]
     fn what_is_read_is_not_written_over_under_any_name() {
-        let own = tempfile::tempdir().unwrap();
-        let rig = own.path().join("rig.toml");
+        let scratch = tempfile::tempdir().unwrap();
+        let rig = scratch.path().join("rig.toml");
         fs::write(&rig, "a").unwrap();
-        let folder = Folder::open(&own.path().join("."), [&rig]).unwrap();
+        let folder = Folder::open(&scratch.path().join("."), [&rig]).unwrap();
         let error = folder.write("rig.toml", "b").unwrap_err();
         assert!(error.to_string().contains("would be written over"), "{error}");
         assert_eq!(fs::read_to_string(&rig).unwrap(), "a");
@@ -133,25 +133,25 @@ mod tests {
 
     #[test]
     fn an_earlier_result_goes_and_foreign_files_stay() {
-        let own = tempfile::tempdir().unwrap();
-        let folder = Folder::open(own.path(), []).unwrap();
+        let scratch = tempfile::tempdir().unwrap();
+        let folder = Folder::open(scratch.path(), []).unwrap();
         folder.write("rig.toml", "of somebody").unwrap();
         folder.clear(Path::new("rig.toml")).unwrap();
-        assert!(own.path().join("rig.toml").exists(), "no report.json: nothing of ours");
+        assert!(scratch.path().join("rig.toml").exists(), "no report.json: nothing of ours");
         for name in ["report.json", "next-chirps.toml", "notes.txt"] {
             folder.write(name, "x").unwrap();
         }
         folder.clear(Path::new("rig.toml")).unwrap();
         let left: Vec<_> =
-            fs::read_dir(own.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+            fs::read_dir(scratch.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(left, ["notes.txt"]);
     }
 
     #[test]
     fn a_file_that_cannot_be_written_is_told_with_what_to_do() {
-        let own = tempfile::tempdir().unwrap();
-        fs::create_dir(own.path().join("report.json.part")).unwrap();
-        let error = write(&own.path().join("report.json"), "after").unwrap_err().to_string();
+        let scratch = tempfile::tempdir().unwrap();
+        fs::create_dir(scratch.path().join("report.json.part")).unwrap();
+        let error = write(&scratch.path().join("report.json"), "after").unwrap_err().to_string();
         assert!(error.contains("report.json") && error.contains("choose another folder"), "{error}");
     }
 }

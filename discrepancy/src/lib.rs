@@ -3,10 +3,10 @@
 //! | file | holds |
 //! |---|---|
 //! | [`records`] | one reader of records, whatever their form: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
-//! | [`balance`] | a model that is one balance alone, and the real records |
+//! | [`single_equation`] | a model that is one balance alone, and the real records |
 //! | [`check`] | whether a record can be used, and its noise |
-//! | [`course`] | a record on the simulation's grid |
-//! | [`seats`] | where the pistons were, by sensors that lie |
+//! | [`gridded_record`] | a record on the simulation's grid |
+//! | [`sensor_inverse`] | where the pistons were, by sensors that lie |
 //! | [`windows`] | a record in windows, each simulated from its own start |
 //! | [`engine`] | all records with everything that is simulated of them |
 //! | [`fit`] | what some columns explain of the windows |
@@ -27,17 +27,16 @@
 //! | [`commands`], [`cli`] | the program |
 //! | [`page`] | the same as one page for people |
 
-pub mod balance;
 pub mod calibrate;
 pub mod candidates;
 pub mod check;
 pub mod cli;
 pub mod commands;
-pub mod course;
 pub mod engine;
 pub mod extend;
 pub mod fit;
 pub mod folder;
+pub mod gridded_record;
 pub mod locate;
 pub mod name;
 pub mod next;
@@ -48,7 +47,8 @@ pub mod records;
 pub mod refit;
 pub mod report;
 pub mod screen;
-pub mod seats;
+pub mod sensor_inverse;
+pub mod single_equation;
 pub mod tabulate;
 pub mod verify;
 pub mod windows;

@@ -11,15 +11,15 @@
 //!
 //! Source: discrepancy-notes.md, 2 and 9, and Pipeline 4. Unknown inputs: Gillijns, De Moor 2007, Automatica 43(1).
 
-pub mod colour;
 pub mod estimate;
 pub mod linkage;
 pub mod maps;
+pub mod noise_colour;
 pub mod ratio;
 pub mod regime;
 pub mod simulated;
 
-use crate::course::Course;
+use crate::gridded_record::GriddedRecord;
 use crate::report::{BalanceBar, Location, RegimeCell, UnknownInput};
 use estimate::{Unknowns, estimate};
 use plant::{Axis, PERIOD_S, RigParameters};
@@ -136,11 +136,11 @@ fn over_noise<'a>(points: impl Iterator<Item = &'a UnknownPoint>) -> Option<f64>
 }
 
 /// Estimates the unknown inputs of all records against a baseline; `progress` hears of each record.
-pub fn locate(rig: &RigParameters, courses: &[Course], progress: &mut dyn FnMut(&str)) -> Located {
+pub fn locate(rig: &RigParameters, gridded: &[GriddedRecord], progress: &mut dyn FnMut(&str)) -> Located {
     let mut unknowns = Unknowns::default();
-    for (record, course) in courses.iter().enumerate() {
-        progress(&format!("locate: {} of {}, {:.0} s", record + 1, courses.len(), seconds(course.len())));
-        estimate(rig, course, record, &mut unknowns);
+    for (record, gridded) in gridded.iter().enumerate() {
+        progress(&format!("locate: {} of {}, {:.0} s", record + 1, gridded.len(), seconds(gridded.len())));
+        estimate(rig, gridded, record, &mut unknowns);
     }
     let series = unknowns.into_series();
     let bars = series.iter().filter_map(bar).collect();
@@ -176,12 +176,12 @@ fn bar(series: &UnknownSeries) -> Option<BalanceBar> {
 
 fn cells(series: &UnknownSeries) -> Vec<RegimeCell> {
     let cell = |regime: &&'static str| {
-        let own = || series.points.iter().filter(|point| point.regimes.contains(regime));
+        let within = || series.points.iter().filter(|point| point.regimes.contains(regime));
         Some(RegimeCell {
             balance: series.balance.clone(),
             regime: (*regime).to_owned(),
-            windows: own().count(),
-            over_noise: over_noise(own())?,
+            windows: within().count(),
+            over_noise: over_noise(within())?,
         })
     };
     REGIMES.iter().filter_map(cell).collect()

@@ -13,13 +13,13 @@
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
-mod home;
-mod joined;
-mod needed;
-mod nothing;
+mod elimination;
+mod gauss_newton;
+mod needed_parameters;
+mod null_distribution;
 mod pitch;
 mod round;
-mod settle;
+mod start_states;
 
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
@@ -27,22 +27,22 @@ use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{Around, Placed, Refit, derivative, refit, rig_of};
 use crate::screen::{Columns, Screened};
-use home::{Placement, at_home};
-pub(crate) use joined::same;
-use joined::{alternatives, drop_unneeded, shares, swap};
-use needed::with_needed;
-use nothing::Nothing;
+pub(crate) use elimination::same;
+use elimination::{alternatives, drop_unneeded, shares, swap};
+use gauss_newton::{backtrack, fit_selected};
+use needed_parameters::with_needed;
+use null_distribution::NullDistribution;
 use rayon::prelude::*;
 use round::{Contenders, Round};
-use settle::{grounded, settled};
+use start_states::{Restarted, refit_with_starts};
 
 /// Effects at most.
 const MOST: usize = 3;
 /// Steps of a candidate's first fit.
 const STEPS: usize = 5;
 /// How often a model is fitted with sensitivities of its own at most, and the fall of the loss that ends it.
-const REFININGS: usize = 4;
-const SETTLED: f64 = 1.0;
+const RELINEARISATIONS: usize = 4;
+const CONVERGED: f64 = 1.0;
 /// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
 const EXCESS: f64 = 0.08;
 /// The same of linked records, where micrometres decide when the eye meets the carriage: records of nothing leave up to 0.2.
@@ -86,7 +86,7 @@ pub struct Found {
     pub model: Refit,
     /// The model as it is told: parameters that it does not need are what the file says. Of one that explains too little, the
     /// parameters alone.
-    pub told: Refit,
+    pub reported: Refit,
     /// What takes the place of each of its effects just as well.
     pub alternatives: Vec<Vec<Alternative>>,
     /// Share of the excess that goes with each effect.
@@ -100,7 +100,7 @@ pub struct Found {
     /// Screening's columns, for limits.
     pub columns: Columns,
     /// Loss with the parameters alone, as screening sees it.
-    pub nothing: f64,
+    pub null_loss: f64,
     /// Smallest coordinate of each candidate's amplitude that would have been accepted; `None` where nothing is seen of it.
     pub limits: Vec<Option<f64>>,
     /// Whether the model leaves more than it may.
@@ -117,10 +117,10 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     progress(&format!("screening {} candidates", candidates.len()));
     let columns = Columns::new(engine, candidates);
     let baseline = engine.residual(&engine.simulate(engine.rig()));
-    let (nothing, mut screened) = columns.screen(engine, &around, &baseline, &[]);
+    let (null_loss, mut screened) = columns.screen(engine, &around, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
-    let Placement { mut home, fit } = at_home(engine, &calibrated.fit, 0.0);
+    let Restarted { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated.fit, 0.0);
     let calibrated = Calibrated { fit };
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
@@ -128,64 +128,65 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     // Of each effect that joined, the fits of its round, the best first.
     let mut rounds: Vec<Vec<Refit>> = Vec::new();
     for number in 0..MOST {
-        let here = home.as_ref().unwrap_or(engine);
-        let own =
-            if number == 0 { (nothing, screened.clone()) } else { screen_again(here, &columns, &model) };
-        let Some(contenders) = Contenders::of(own, here, &columns, &model, threshold) else { break };
+        let here = restarted.as_ref().unwrap_or(engine);
+        let screening =
+            if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, &model) };
+        let Some(contenders) = Contenders::of(screening, here, &columns, &model, threshold) else { break };
         progress(&format!("fitting {} candidates, round {}", contenders.count(), number + 1));
         let point = if number == 0 { around.clone() } else { around_of(here, &model) };
         let Some(mut round) = Round::fitted(here, &point, &model, &contenders, progress) else { break };
         fitted.extend(round.fits.iter().cloned());
         round.keep_large();
-        let best_home = round.take_home();
-        let there = best_home.as_ref().unwrap_or(here);
+        let best_restarted = round.take_engine();
+        let there = best_restarted.as_ref().unwrap_or(here);
         let Some(best) = round.fits.first_mut() else { break };
         // What nothing gains is told by what the best model leaves: what it explains is no noise. What another effect still adds
         // is none either: a model that may be needed beside another one joins, and is taken out at the end if it is not.
         if !takes(&model, best) {
             break;
         }
-        best.factors = grounded(there, best);
-        threshold = Nothing::new(there, &columns, &around_of(there, best), best).threshold();
+        best.factors = backtrack(there, best);
+        threshold = NullDistribution::new(there, &columns, &around_of(there, best), best).threshold();
         model = best.clone();
         rounds.push(round.fits);
         if number > 0 {
             swap(there, &mut model, &calibrated, &mut rounds, progress);
         }
-        home = best_home.or(home);
+        restarted = best_restarted.or(restarted);
     }
-    let here = home.as_ref().unwrap_or(engine);
+    let here = restarted.as_ref().unwrap_or(engine);
     drop_unneeded(here, &calibrated, &columns, &mut model, &mut rounds);
-    let left = Nothing::new(here, &columns, &around_of(here, &model), &model);
-    threshold = left.threshold();
-    let limits = limits_of(&left, &columns, threshold);
+    let null = NullDistribution::new(here, &columns, &around_of(here, &model), &model);
+    threshold = null.threshold();
+    let limits = limits_of(&null, &columns, threshold);
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
     let freedom = here.freedom().iter().sum::<f64>();
     let level = model.loss / freedom;
     let excess_level = if engine.is_linked() { EXCESS_LINKED } else { EXCESS };
     let reduced = (calibrated.fit.loss - model.loss) / freedom;
     let inadequate = level > excess_level && model.loss > STAYS * calibrated.fit.loss && reduced < REDUCES;
-    let told = if inadequate {
-        let home = engine.is_linked().then(|| engine.settled_at(&calibrated.rig(engine.rig())));
-        with_needed(home.as_ref().unwrap_or(engine), &calibrated.fit)
+    let reported = if inadequate {
+        let restarted = engine.is_linked().then(|| engine.with_starts_under(&calibrated.rig(engine.rig())));
+        with_needed(restarted.as_ref().unwrap_or(engine), &calibrated.fit)
     } else {
         with_needed(here, &model)
     };
     let shares = shares(&model, &rounds, &calibrated, excess);
-    let told_alike = model.placed.iter().zip(&shares);
-    let alternatives =
-        told_alike.map(|(own, share)| alternatives(own, *share, &model, &calibrated, &rounds)).collect();
+    let with_shares = model.placed.iter().zip(&shares);
+    let alternatives = with_shares
+        .map(|(placed, share)| alternatives(placed, *share, &model, &calibrated, &rounds))
+        .collect();
     Found {
         calibrated,
         model,
-        told,
+        reported,
         alternatives,
         shares,
         screened,
         fitted,
         threshold,
         columns,
-        nothing,
+        null_loss,
         limits,
         inadequate,
     }
@@ -193,11 +194,11 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
 
 /// Takes what is told of a part of the records to all of them: its numbers, fitted there, with their errors there.
 pub fn on_all(engine: &Engine<'_>, found: &mut Found) {
-    let Some(rig) = rig_of(engine.rig(), &found.told.placed, &found.told.factors) else { return };
-    let home = engine.is_linked().then(|| engine.settled_at(&rig));
-    let needed = found.told.factors.map(|factor| factor != 1.0);
-    if let Some(told) = settled(home.as_ref().unwrap_or(engine), &found.told, &needed) {
-        found.told = told;
+    let Some(rig) = rig_of(engine.rig(), &found.reported.placed, &found.reported.factors) else { return };
+    let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
+    let needed = found.reported.factors.map(|factor| factor != 1.0);
+    if let Some(reported) = fit_selected(restarted.as_ref().unwrap_or(engine), &found.reported, &needed) {
+        found.reported = reported;
     }
 }
 
@@ -208,15 +209,15 @@ fn around_of(engine: &Engine<'_>, model: &Refit) -> Around {
 }
 
 /// Fits a model again with sensitivities taken at itself, until that no longer helps.
-fn refine(engine: &Engine<'_>, own: &Refit) -> Refit {
-    let mut best = own.clone();
-    for _ in 0..REFININGS {
+fn relinearise(engine: &Engine<'_>, model: &Refit) -> Refit {
+    let mut best = model.clone();
+    for _ in 0..RELINEARISATIONS {
         let Some(next) = refit(engine, &around_of(engine, &best), &best.placed, NUMBER_COSTS) else { break };
-        let settled = next.loss > best.loss - SETTLED;
+        let converged = next.loss > best.loss - CONVERGED;
         if next.loss < best.loss {
             best = next;
         }
-        if settled {
+        if converged {
             break;
         }
     }
@@ -253,12 +254,12 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
 
 /// From which coordinate of its amplitude on a candidate would have been named: it must stand out of nothing, be worth a fit, and
 /// be no smaller than what counts as an effect.
-fn limits_of(left: &Nothing, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
-    let told = left.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
+fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
+    let limits = null.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {
         limit.map(|limit: f64| limit.max(least_coordinate(candidate, 0)))
     };
-    told.into_iter().zip(&columns.candidates).map(floored).collect()
+    limits.into_iter().zip(&columns.candidates).map(floored).collect()
 }
 
 /// Screens all candidates against what a model leaves, its own derivatives beside.

@@ -7,29 +7,29 @@
 //!
 //! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude, against noise and against
 //! what no model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise:
-//! an experiment that reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`otherwise`] says what
+//! an experiment that reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`remedies`] says what
 //! would and the controller cannot do: tilting, uncoupling, a locked piston.
 //!
 //! | file | holds |
 //! |---|---|
 //! | [`menu`] | the experiments |
-//! | [`driven`] | one of them in closed loop with an explanation's rig |
+//! | [`closed_loop`] | one of them in closed loop with an explanation's rig |
 //! | [`divergence`] | how far explanations lie apart in it |
 //! | [`nuisance`] | numbers of the baseline that are refitted beside |
-//! | [`otherwise`] | what would separate effects where no experiment does |
+//! | [`remedies`] | what would separate effects where no experiment does |
 //!
 //! Which entry separates which twins: `discrepancy/docs/next.md`. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner
 //! 1965.
 
+pub mod closed_loop;
 pub mod divergence;
-pub mod driven;
 pub mod menu;
 pub mod nuisance;
-pub mod otherwise;
+pub mod remedies;
 
 use crate::report::Next;
+use closed_loop::drive;
 use divergence::{Divergence, divergences};
-use driven::drive;
 use menu::{Entry, MENU};
 use plant::RigParameters;
 use rayon::prelude::*;
@@ -126,18 +126,18 @@ pub fn judge(
     explanations: &[Explanation],
     axes_measured: [bool; 2],
 ) -> Option<Judged> {
-    let named = |name: &str| explanations.iter().any(|one| one.names.iter().any(|own| own == name));
+    let named = |name: &str| explanations.iter().any(|one| one.names.iter().any(|known| known == name));
     let numbers = nuisance::numbers().filter(|number| !named(number.name));
     let numbers: Vec<_> = numbers.filter_map(|number| nuisance::off(baseline, number).ok()).collect();
     let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
         .into_par_iter()
-        .map(|own| {
-            let driven = drive(entry, baseline, &explanations[own].rig).ok()?;
-            let driven = Some(driven).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
-            let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != own).collect();
-            let rigs: Vec<_> = [own].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
-            let values = divergences(&driven, baseline, &rigs, &numbers, axes_measured);
-            Some(rivals.into_iter().zip(values).map(|(rival, value)| (own, rival, value)).collect())
+        .map(|truth| {
+            let run = drive(entry, baseline, &explanations[truth].rig).ok()?;
+            let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
+            let rivals: Vec<usize> = (0..explanations.len()).filter(|rival| *rival != truth).collect();
+            let rigs: Vec<_> = [truth].iter().chain(&rivals).map(|place| &explanations[*place].rig).collect();
+            let values = divergences(&run, baseline, &rigs, &numbers, axes_measured);
+            Some(rivals.into_iter().zip(values).map(|(rival, value)| (truth, rival, value)).collect())
         })
         .collect();
     Some(Judged { name: entry.name, pairs: pairs?.concat() })
@@ -170,7 +170,7 @@ fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<Strin
         .filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) < WANTED)
         .map(|(one, other, _)| (*one.min(other), *one.max(other)))
         .collect();
-    let otherwise = otherwise::of_pairs(explanations, &left);
+    let otherwise = remedies::of_pairs(explanations, &left);
     if left.len() == best.pairs.len() {
         let reason = format!(
             "{alike}, and no experiment of this rig separates them: \

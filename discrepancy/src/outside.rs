@@ -65,11 +65,11 @@ pub fn outside(unknowns: &[UnknownSeries], progress: &mut dyn FnMut(&str)) -> Op
             best = Some((excess, Found { series, sample, tests }));
         }
     }
-    best.map(|(_, found)| found.told())
+    best.map(|(_, found)| found.report())
 }
 
 impl Found<'_> {
-    fn told(&self) -> Outside {
+    fn report(&self) -> Outside {
         let (order, pair) = self.order();
         let constant = self.sample.constant_share();
         let explained = order.first().map_or(0.0, |first| self.tests[*first].0);
@@ -145,10 +145,10 @@ fn smooth(mut curve: Curve, variable: &str) -> Curve {
     for at in 0..values.len() {
         let (mut sum, mut weight, mut squares) = (0.0, 0.0, 0.0);
         for near in at.saturating_sub(1)..(at + 2).min(values.len()) {
-            let own = weights[near] * if near == at { 2.0 } else { 1.0 };
-            sum += own * values[near];
-            weight += own;
-            squares += own * own / weights[near];
+            let share = weights[near] * if near == at { 2.0 } else { 1.0 };
+            sum += share * values[near];
+            weight += share;
+            squares += share * share / weights[near];
         }
         curve.value[at] = sum / weight;
         curve.band[at] = squares.sqrt() / weight;

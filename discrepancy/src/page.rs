@@ -17,13 +17,13 @@
 
 mod candidates;
 mod checks;
+mod decimate;
 mod draw;
 mod finding;
 mod held_out;
 mod location;
 mod markup;
 mod pictures;
-mod thin;
 mod verdict;
 mod words;
 

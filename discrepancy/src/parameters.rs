@@ -75,9 +75,9 @@ impl Parameter {
         if self.name == "parameter:mass" && measured == [true; 2] {
             return (1.0, "");
         }
-        let own = if self.name == "parameter:mass" && !measured[0] { self.keys.len() - 1 } else { 0 };
-        let key = table::KEYS.iter().find(|key| key.path() == self.keys[own]).expect("the table has it");
-        match rig.numbers(self.keys[own]) {
+        let place = if self.name == "parameter:mass" && !measured[0] { self.keys.len() - 1 } else { 0 };
+        let key = table::KEYS.iter().find(|key| key.path() == self.keys[place]).expect("the table has it");
+        match rig.numbers(self.keys[place]) {
             [one] => (*one, key.unit.name()),
             _ => (1.0, ""),
         }
@@ -97,7 +97,7 @@ pub fn with_factors(rig: &RigParameters, factors: &[f64; COUNT]) -> RigParameter
         }
     }
     let new = |path: &str| {
-        changes.iter().find(|(own, _)| *own == path).map_or(rig.numbers(path)[0], |own| own.1[0])
+        changes.iter().find(|(change, _)| *change == path).map_or(rig.numbers(path)[0], |change| change.1[0])
     };
     let (sliding_n, rest_n) = (new(SLIDING), new(BREAK_AWAY));
     if rest_n < sliding_n {
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     fn factors(changed: &[(&str, f64)]) -> [f64; COUNT] {
-        let of = |name: &str| changed.iter().find(|(own, _)| *own == name).map_or(1.0, |own| own.1);
+        let of = |name: &str| changed.iter().find(|(entry, _)| *entry == name).map_or(1.0, |entry| entry.1);
         PARAMETERS.map(|parameter| of(parameter.name.trim_start_matches("parameter:")))
     }
 
@@ -123,19 +123,19 @@ mod tests {
     fn factors_that_go_together_are_applied_together() {
         let rig = RigParameters::baseline();
         // Either of them alone would be refused on the way.
-        let own = with_factors(&rig, &factors(&[("break-away-force", 0.72), ("sliding-friction", 0.7)]));
-        assert_eq!(own.numbers(BREAK_AWAY)[0], 0.72 * rig.numbers(BREAK_AWAY)[0]);
-        assert_eq!(own.numbers(SLIDING)[0], 0.7 * rig.numbers(SLIDING)[0]);
-        let own = with_factors(&rig, &factors(&[("piston-area", 0.8)]));
+        let scaled = with_factors(&rig, &factors(&[("break-away-force", 0.72), ("sliding-friction", 0.7)]));
+        assert_eq!(scaled.numbers(BREAK_AWAY)[0], 0.72 * rig.numbers(BREAK_AWAY)[0]);
+        assert_eq!(scaled.numbers(SLIDING)[0], 0.7 * rig.numbers(SLIDING)[0]);
+        let scaled = with_factors(&rig, &factors(&[("piston-area", 0.8)]));
         for path in ["cylinder.piston_area_mm2", "cylinder.annulus_area_mm2"] {
-            assert_eq!(own.numbers(path)[0], 0.8 * rig.numbers(path)[0]);
+            assert_eq!(scaled.numbers(path)[0], 0.8 * rig.numbers(path)[0]);
         }
     }
 
     #[test]
     fn a_piston_at_rest_holds_at_least_what_slides() {
         let rig = RigParameters::baseline();
-        let own = with_factors(&rig, &factors(&[("break-away-force", 0.7)]));
-        assert_eq!(own.numbers(BREAK_AWAY), own.numbers(SLIDING));
+        let scaled = with_factors(&rig, &factors(&[("break-away-force", 0.7)]));
+        assert_eq!(scaled.numbers(BREAK_AWAY), scaled.numbers(SLIDING));
     }
 }

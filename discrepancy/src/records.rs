@@ -228,7 +228,7 @@ impl Record {
     /// Whether the record has any channel of the axis.
     #[must_use]
     pub fn has_axis(&self, axis: Axis) -> bool {
-        self.channels().any(|channel| matches!(channel, Channel::Of(own, _) if own == axis))
+        self.channels().any(|channel| matches!(channel, Channel::Of(channel_axis, _) if channel_axis == axis))
     }
 
     /// What the reader noticed.

@@ -23,7 +23,7 @@ const STEPS: usize = 7;
 const SHORTENINGS: usize = 3;
 const SHORTER: f64 = 0.4;
 /// Fall of the loss below which a fit has settled.
-const SETTLED: f64 = 0.3;
+const CONVERGED: f64 = 0.3;
 /// Standard deviations of coordinates before anything is measured: amplitudes, shapes.
 const AMPLITUDE_TOLERANCE: f64 = 3.0;
 const SHAPE_TOLERANCE: f64 = 0.7;
@@ -93,7 +93,11 @@ pub(crate) fn parameter_ridges() -> Vec<f64> {
 
 /// How many parameters are off, those that are so by little counted in part.
 fn parameters_off(factors: &[f64; COUNT]) -> f64 {
-    factors.iter().map(|factor| (factor - 1.0).powi(2)).map(|own| own / (own + COUNTS_AS_OFF.powi(2))).sum()
+    factors
+        .iter()
+        .map(|factor| (factor - 1.0).powi(2))
+        .map(|square| square / (square + COUNTS_AS_OFF.powi(2)))
+        .sum()
 }
 
 /// What so many numbers of effects and the parameters that are off cost.
@@ -203,8 +207,8 @@ pub fn refit_steps(
             let mut placed = point.placed.clone();
             for ((at, key), change) in moved.iter().zip(&joint.coefficients[COUNT..]) {
                 let [least, most] = placed[*at].candidate.reach(*key);
-                let own = &mut placed[*at].coordinates[*key];
-                *own = (*own + share * change).clamp(least, most);
+                let coordinate = &mut placed[*at].coordinates[*key];
+                *coordinate = (*coordinate + share * change).clamp(least, most);
             }
             if let Some(tried) = evaluate(placed)
                 && tried.fit.loss + prior(&tried.placed) < before
@@ -215,9 +219,9 @@ pub fn refit_steps(
             share *= SHORTER;
         }
         let Some(tried) = better else { break };
-        let settled = before - (tried.fit.loss + prior(&tried.placed)) < SETTLED;
+        let converged = before - (tried.fit.loss + prior(&tried.placed)) < CONVERGED;
         point = tried;
-        if settled {
+        if converged {
             break;
         }
     }
@@ -228,17 +232,18 @@ pub fn refit_steps(
     let covariance = products.covariance(&chosen, &at_point, &all_ridges);
     let (plain, _) = products.normal(&chosen, &at_point.weights, &all_ridges);
     let plain = plain.try_inverse();
-    let error = |at: usize| covariance.as_ref().map_or(f64::INFINITY, |own| own[(at, at)].max(0.0).sqrt());
+    let error =
+        |at: usize| covariance.as_ref().map_or(f64::INFINITY, |matrix| matrix[(at, at)].max(0.0).sqrt());
     let inflation = match (&covariance, &plain) {
-        (Some(own), Some(plain)) if !moved.is_empty() => {
-            (own[(COUNT, COUNT)] / plain[(COUNT, COUNT)]).max(1.0)
+        (Some(clustered), Some(plain)) if !moved.is_empty() => {
+            (clustered[(COUNT, COUNT)] / plain[(COUNT, COUNT)]).max(1.0)
         }
         _ => 1.0,
     };
     let errors = (COUNT..chosen.len()).chain(0..COUNT).map(error).collect();
     let mut factors = around.factors;
-    for (own, change) in factors.iter_mut().zip(&point.fit.coefficients) {
-        *own = (*own + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
+    for (factor, change) in factors.iter_mut().zip(&point.fit.coefficients) {
+        *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
     let loss = point.fit.loss + prior(&point.placed) + costs(moved.len(), &factors, penalty);
     Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
@@ -265,14 +270,14 @@ pub(crate) fn derivative(
     key: usize,
 ) -> Option<Vec<f64>> {
     let candidate = placed[at].candidate;
-    let own = placed[at].coordinates[key];
-    let size = CHANGE.max(CHANGE_SHARE * own.abs());
+    let coordinate = placed[at].coordinates[key];
+    let size = CHANGE.max(CHANGE_SHARE * coordinate.abs());
     let [_, most] = candidate.reach(key);
-    let change = if own + size > most { -size } else { size };
+    let change = if coordinate + size > most { -size } else { size };
     let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;
     let moved = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);
     let mut column = engine.difference(&moved, simulated);
-    column.iter_mut().for_each(|own| *own /= change);
+    column.iter_mut().for_each(|value| *value /= change);
     Some(column)
 }

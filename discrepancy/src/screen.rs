@@ -82,12 +82,12 @@ impl Columns {
         ridges.resize(always, 1e-2);
         from.resize(always, 0.0);
         let basic: Vec<usize> = (0..always).collect();
-        let nothing = products.fit_from(&basic, &ridges, &from).loss;
+        let null_loss = products.fit_from(&basic, &ridges, &from).loss;
         let screened = (0..self.candidates.len())
             .into_par_iter()
             .filter_map(|at| self.screen_one(&products, at, &basic, &ridges, &from))
             .collect();
-        (nothing, screened)
+        (null_loss, screened)
     }
 
     fn screen_one(
@@ -108,13 +108,13 @@ impl Columns {
         for (probe, place) in &leading {
             for with in if joining.is_empty() { vec![&alone] } else { vec![&alone, &joining] } {
                 let mut chosen = basic.to_vec();
-                let mut own_ridges = ridges.to_vec();
+                let mut chosen_ridges = ridges.to_vec();
                 chosen.push(always + place);
                 chosen.extend(with.iter().map(|(_, place)| always + place));
-                own_ridges.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
-                let mut own_from = from.to_vec();
-                own_from.resize(chosen.len(), 0.0);
-                let fit = products.fit_from(&chosen, &own_ridges, &own_from);
+                chosen_ridges.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
+                let mut chosen_from = from.to_vec();
+                chosen_from.resize(chosen.len(), 0.0);
+                let fit = products.fit_from(&chosen, &chosen_ridges, &chosen_from);
                 let mut coordinates = probe.clone();
                 let [least, most] = candidate.range(0);
                 let coefficient = fit.coefficients[always];

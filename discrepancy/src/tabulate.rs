@@ -65,23 +65,23 @@ pub struct Tables {
 pub fn tabulate(
     engine: &Engine<'_>,
     calibrated: &Calibrated,
-    told: &Refit,
+    reported: &Refit,
     outside: &Outside,
     unknowns: &[UnknownSeries],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Tables, String> {
     let (axis, balance) = place(&outside.balance)
         .ok_or_else(|| format!("a table adds to a force or to a flow, and {} is neither", outside.balance))?;
-    let home = engine.is_linked().then(|| engine.settled_at(&calibrated.rig(engine.rig())));
-    let engine = home.as_ref().unwrap_or(engine);
-    let free = told.factors.map(|factor| factor != 1.0);
-    let alone = Model::alone(told.factors, free);
-    let nothing = Point::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
-    let nothing = fit::fit(engine, nothing, FIRST_STEPS);
+    let restarted = engine.is_linked().then(|| engine.with_starts_under(&calibrated.rig(engine.rig())));
+    let engine = restarted.as_ref().unwrap_or(engine);
+    let free = reported.factors.map(|factor| factor != 1.0);
+    let alone = Model::alone(reported.factors, free);
+    let parameters_alone = Point::of(engine, alone).ok_or("no rig can have the parameters that are off")?;
+    let parameters_alone = fit::fit(engine, parameters_alone, FIRST_STEPS);
     let seek = Seek { engine, axis, balance, unknowns };
 
     progress("a table for what is missing");
-    let (first, used) = seek.best(&nothing, None).ok_or("no rig can have its curve")?;
+    let (first, used) = seek.best(&parameters_alone, None).ok_or("no rig can have its curve")?;
     let mut best = seek.finer(first);
     progress("a table over a second variable");
     if let Some((second, _)) = seek.best(&best, Some(used))
@@ -90,13 +90,13 @@ pub fn tabulate(
         best = fit::fit(engine, second, STEPS);
     }
     let (best, off) = with_needed(engine, best);
-    let share_explained = (nothing.loss - best.loss) / nothing.loss.max(1e-9);
-    if best.loss > nothing.loss - TAKES * nothing.loss.abs() {
+    let share_explained = (parameters_alone.loss - best.loss) / parameters_alone.loss.max(1e-9);
+    if best.loss > parameters_alone.loss - TAKES * parameters_alone.loss.abs() {
         return Err("its table leaves the windows of the training records no better".to_owned());
     }
     let lines = Lines::of(engine, best.model.clone()).ok_or("no rig can have its neighbours")?;
-    let bare = Lines::of(engine, nothing.model.clone()).ok_or("no rig can have its neighbours")?;
-    let unseen = bare.unseen_loss(engine, &nothing);
+    let bare = Lines::of(engine, parameters_alone.model.clone()).ok_or("no rig can have its neighbours")?;
+    let unseen = bare.unseen_loss(engine, &parameters_alone);
     if lines.unseen_loss(engine, &best) > unseen - TAKES * unseen.abs() {
         return Err("its table leaves windows that it was not fitted on no better".to_owned());
     }
@@ -121,8 +121,8 @@ fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
     };
     // Far from where the tables were fitted, the lines that are known do for the first steps.
     let is_in = |at: &usize| needed.get(*at).is_none_or(|needed| *needed);
-    let own: Vec<&[f64]> = (0..lines.len()).filter(is_in).map(|at| lines[at]).collect();
-    (fit::fit(engine, fit::steps(engine, start, &own), STEPS), needed)
+    let columns: Vec<&[f64]> = (0..lines.len()).filter(is_in).map(|at| lines[at]).collect();
+    (fit::fit(engine, fit::steps(engine, start, &columns), STEPS), needed)
 }
 
 /// What a table can be over: a variable, or nothing.
@@ -134,9 +134,9 @@ enum Over {
 
 /// `drive.flow-a`; `None` for a balance that a table cannot add to.
 fn place(balance: &str) -> Option<(Axis, Balance)> {
-    let (axis, own) = balance.split_once('.')?;
+    let (axis, name) = balance.split_once('.')?;
     let axis = Axis::ALL.into_iter().find(|known| known.name() == axis)?;
-    Some((axis, Balance::ALL.into_iter().find(|known| known.name() == own)?))
+    Some((axis, Balance::ALL.into_iter().find(|known| known.name() == name)?))
 }
 
 /// The search for tables of a balance.
@@ -160,19 +160,21 @@ impl Seek<'_> {
         let all = Variable::ALL.into_iter().map(Over::Variable).chain([Over::Constant]);
         // Each balance's lines once, however many sets it is in.
         let flat = |over: Over, balance: Balance| {
-            let mut own = self.table(over, balance)?;
-            own.table.value.fill(0.0);
-            lines.beside(self.engine, own)
+            let mut tied = self.table(over, balance)?;
+            tied.table.value.fill(0.0);
+            lines.beside(self.engine, tied)
         };
         let flats: Vec<(Over, Vec<Beside>)> = all
             .filter(|over| Some(*over) != used)
-            .map(|over| (over, sets[sets.len() - 1].iter().filter_map(|own| flat(over, *own)).collect()))
+            .map(|over| {
+                (over, sets[sets.len() - 1].iter().filter_map(|balance| flat(over, *balance)).collect())
+            })
             .collect();
         let mut screened: Vec<(f64, Over, Vec<&Beside>)> = Vec::new();
-        for (over, own) in &flats {
+        for (over, tables) in &flats {
             for balances in sets {
                 let beside: Vec<&Beside> =
-                    own.iter().filter(|own| balances.contains(&own.balance())).collect();
+                    tables.iter().filter(|table| balances.contains(&table.balance())).collect();
                 if beside.len() == balances.len() {
                     screened.push((lines.promised(self.engine, from, &beside), *over, beside));
                 }
@@ -180,15 +182,15 @@ impl Seek<'_> {
         }
         screened.sort_by(|left, right| left.0.total_cmp(&right.0));
         let fitted = screened.iter().take(TRIED).filter_map(|(_, over, beside)| {
-            let balances: Vec<Balance> = beside.iter().map(|own| own.balance()).collect();
+            let balances: Vec<Balance> = beside.iter().map(|table| table.balance()).collect();
             let start = self.start(&from.model, *over, &balances)?;
             // Beside a table with many points, which is fitted well already, the lines of the screening do.
-            let own = if from.model.tables.is_empty() {
+            let point = if from.model.tables.is_empty() {
                 fit::fit(self.engine, start, FIRST_STEPS)
             } else {
                 fit::steps(self.engine, start, &lines.with(beside))
             };
-            Some((own, *over))
+            Some((point, *over))
         });
         fitted.min_by(|left, right| left.0.loss.total_cmp(&right.0.loss))
     }
@@ -197,11 +199,11 @@ impl Seek<'_> {
     fn with(&self, model: &Model, over: Over, balances: &[Balance], is_flat: bool) -> Option<Model> {
         let mut model = model.clone();
         for balance in balances {
-            let mut own = self.table(over, *balance)?;
+            let mut tied = self.table(over, *balance)?;
             if is_flat {
-                own.table.value.fill(0.0);
+                tied.table.value.fill(0.0);
             }
-            model.tables.push(own);
+            model.tables.push(tied);
         }
         Some(model)
     }
@@ -218,7 +220,7 @@ impl Seek<'_> {
 
     /// Where a variable of a table stands among those that unknown inputs are told over; no curve is over the last one.
     fn place(variable: Variable) -> Option<usize> {
-        VARIABLES.iter().position(|own| own.name == variable.name())
+        VARIABLES.iter().position(|known| known.name == variable.name())
     }
 
     /// What a variable was in a window.
@@ -274,14 +276,14 @@ impl Seek<'_> {
         let mut best = fit::fit(self.engine, start, STEPS);
         for times in FINER {
             let mut model = best.model.clone();
-            for own in model.tables.iter_mut().filter(|own| own.table.at.len() > 2) {
-                let is_directed = own.table.variable == Variable::DirectedExtension;
+            for tied in model.tables.iter_mut().filter(|tied| tied.table.at.len() > 2) {
+                let is_directed = tied.table.variable == Variable::DirectedExtension;
                 let points = if is_directed { DIRECTED_POINTS } else { POINTS };
                 // One more may come at the end.
-                let at = knots(&own.seen, (times * points).min(MOST_POINTS - 1));
-                own.table.value =
-                    at.iter().map(|x| interpolated(&own.table.at, &own.table.value, *x)).collect();
-                own.table.at = at;
+                let at = knots(&tied.seen, (times * points).min(MOST_POINTS - 1));
+                tied.table.value =
+                    at.iter().map(|x| interpolated(&tied.table.at, &tied.table.value, *x)).collect();
+                tied.table.at = at;
             }
             let Some(point) = Point::of(self.engine, model) else { break };
             let tried = fit::fit(self.engine, point, FIRST_STEPS);
@@ -333,7 +335,7 @@ fn term(table: &Tabulated) -> TableTerm {
 pub fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
     let table = |term: &TableTerm| {
         let (axis, balance) = place(&term.balance)?;
-        let variable = Variable::ALL.into_iter().find(|own| own.name() == term.variable)?;
+        let variable = Variable::ALL.into_iter().find(|known| known.name() == term.variable)?;
         Some(Tabulated { axis, balance, variable, at: term.at.clone(), value: term.value.clone() })
     };
     terms.iter().filter_map(table).collect()
@@ -342,7 +344,7 @@ pub fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
 /// The rig with more tables than it has.
 fn with_tables(rig: &RigParameters, tables: &[Tied]) -> Option<RigParameters> {
     let mut all = rig.tabulated().to_vec();
-    all.extend(tables.iter().map(|own| own.table.clone()));
+    all.extend(tables.iter().map(|tied| tied.table.clone()));
     rig.with_tabulated(&all).ok()
 }
 
@@ -366,13 +368,13 @@ mod tests {
 
     #[test]
     fn terms_of_a_report_are_tables_of_a_rig() {
-        let told = Tabulated {
+        let reported = Tabulated {
             axis: Axis::Load,
             balance: Balance::FlowB,
             variable: Variable::PressureB,
             at: vec![1e5, 6e5],
             value: vec![0.0, -3.5],
         };
-        assert_eq!(tables(&[term(&told)]), [told]);
+        assert_eq!(tables(&[term(&reported)]), [reported]);
     }
 }

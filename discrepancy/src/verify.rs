@@ -24,17 +24,17 @@
 //! Cameron, Gelbach, Miller 2008, Rev. Econ. Stat. 90(3): clusters.
 
 mod free_run;
-mod nothing;
+mod null_power;
 mod power;
 mod traces;
 
-use crate::course::{CHANNELS, Course, SIGNALS, searched_share};
 use crate::fit::LEAST;
+use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::page::Trace;
 use crate::records::Channel;
 use crate::report::{BeforeAfter, Gap, Verification};
 use crate::windows::Windows;
-use nothing::Nothing;
+use null_power::NullPower;
 use plant::{Axis, RigParameters};
 use power::{Power, kept, levels, pooled};
 use std::collections::BTreeMap;
@@ -63,50 +63,50 @@ pub struct Verified {
 pub fn verify(
     before: &RigParameters,
     after: &RigParameters,
-    course: &Course,
+    record: &GriddedRecord,
     progress: &mut dyn FnMut(&str),
 ) -> Verified {
     progress("held-out record in windows, before and after");
-    let (before, after) = rayon::join(|| Model::new(course, before), || Model::new(course, after));
+    let (before, after) = rayon::join(|| Model::new(record, before), || Model::new(record, after));
     progress("held-out record: what noise alone would show");
-    let part = course.thinned(searched_share(std::slice::from_ref(course)));
+    let part = record.thinned(searched_share(std::slice::from_ref(record)));
     let part = part.as_ref().map(|part| Model::new(part, after.windows.rig()));
-    let nothing = Nothing::new(&after, part.as_ref());
+    let null = NullPower::new(&after, part.as_ref());
     progress("held-out record: free run");
     let (run_before, run_after) = rayon::join(
-        || free_run::free_run(course, before.windows.rig()),
-        || free_run::free_run(course, after.windows.rig()),
+        || free_run::free_run(record, before.windows.rig()),
+        || free_run::free_run(record, after.windows.rig()),
     );
 
     let lanes = after.windows.lanes().len();
     let models = [&before, &after]
-        .map(|model| Power::new(&power::sums(&model.residual, lanes), &nothing.expected, lanes));
-    let [own_before, own_after] = &models;
-    let levels = levels(&own_before.smaller(own_after), &nothing);
-    let models = [own_before, own_after].map(|power| power.over(&levels));
-    let [own_before, own_after] = &models;
+        .map(|model| Power::new(&power::sums(&model.residual, lanes), &null.expected, lanes));
+    let [power_before, power_after] = &models;
+    let levels = levels(&power_before.smaller(power_after), &null);
+    let models = [power_before, power_after].map(|power| power.over(&levels));
+    let [power_before, power_after] = &models;
 
     let names: Vec<String> = after.windows.lanes().iter().map(|(axis, at)| column(*axis, *at)).collect();
     let mut gap = BTreeMap::new();
     let mut whiteness = BTreeMap::new();
-    let all_kept = kept(&own_after.joint());
+    let all_kept = kept(&power_after.joint());
     for (lane, name) in names.iter().enumerate() {
         let (axis, at) = after.windows.lanes()[lane];
-        let noise = course.noise[axis][at] * levels[lane].sqrt();
-        gap.insert(name.clone(), signal_gap(&models, lane, noise, nothing.spreads[lane]));
+        let noise = record.noise[axis][at] * levels[lane].sqrt();
+        gap.insert(name.clone(), signal_gap(&models, lane, noise, null.spreads[lane]));
         let of = |model: &Model<'_>| power::neighbours(&model.residual, lane, lanes, &all_kept);
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
     let worse = gap.values().any(|gap| gap.after > WORSE * gap.before);
     let verification = Verification {
-        record: course.name.clone(),
-        chi2_before: pooled(&own_before.joint(), &all_kept),
-        chi2_after: pooled(&own_after.joint(), &all_kept),
-        chi2_null: nothing.range,
+        record: record.name.clone(),
+        chi2_before: pooled(&power_before.joint(), &all_kept),
+        chi2_after: pooled(&power_after.joint(), &all_kept),
+        chi2_null: null.range,
         free_run_nrmse_percent: free_run::both(&run_before, &run_after, &column),
         whiteness,
         physical: run_after.unphysical,
-        confirmed: !worse && is_better(own_before, own_after),
+        confirmed: !worse && is_better(power_before, power_after),
     };
     let traces = traces::traces(&before, &after);
     Verified { gap, verification, traces }
@@ -123,8 +123,8 @@ pub(crate) struct Model<'a> {
 
 impl<'a> Model<'a> {
     /// Each model has the freedom of its own windows' starts.
-    fn new(course: &'a Course, rig: &RigParameters) -> Self {
-        let windows = Windows::with_starts_met_best(course, rig);
+    fn new(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
+        let windows = Windows::with_estimated_starts(record, rig);
         let simulated = windows.simulate(rig);
         let residual = windows.residual(&simulated);
         Model { windows, simulated, residual }
@@ -141,14 +141,14 @@ fn column(axis: usize, at: usize) -> String {
 fn signal_gap(models: &[Power; 2], lane: usize, noise: f64, spread: f64) -> Gap {
     let [before, after] = models.each_ref().map(|power| power.lane(lane));
     let kept = kept(&after);
-    let [before_power, after_power] = [&before, &after].map(|own| pooled(own, &kept));
+    let [before_power, after_power] = [&before, &after].map(|squares| pooled(squares, &kept));
     let excess = before_power - 1.0;
-    let told = excess > EXCESS_SPREADS * spread;
+    let is_resolved = excess > EXCESS_SPREADS * spread;
     Gap {
         before: noise * before_power.sqrt(),
         after: noise * after_power.sqrt(),
         floor: noise,
-        closed: told.then(|| (1.0 - (after_power - 1.0) / excess).min(1.0)),
+        closed: is_resolved.then(|| (1.0 - (after_power - 1.0) / excess).min(1.0)),
     }
 }
 

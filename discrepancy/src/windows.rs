@@ -15,16 +15,16 @@
 //!
 //! Source: discrepancy-notes.md, 1 (naming over the length of windows: as good from 100 ms to 2 s), 6.
 
-mod passage;
+mod reference_run;
 mod starts;
 mod whiten;
 
-use crate::course::{CHANNELS, Course, Point};
-use crate::seats::Seats;
-pub use passage::{Passage, Reach};
+use crate::gridded_record::{CHANNELS, GriddedRecord, Point};
+use crate::sensor_inverse::SensorInverse;
 use plant::{Batch, Inputs, Plant, RigParameters};
-use starts::SETTLING;
-pub(crate) use starts::{first_state, seat, seated};
+pub use reference_run::{Reach, ReferenceRun};
+use starts::START_PASSES;
+pub(crate) use starts::{first_state, set_state, state_at};
 use whiten::{SPIKE, drift};
 
 /// Periods of a window.
@@ -37,7 +37,7 @@ const COARSE_SUBSTEPS: u32 = 5;
 /// The windows of a course under a rig, with what their starts explain.
 #[derive(Debug)]
 pub struct Windows<'a> {
-    course: &'a Course,
+    record: &'a GriddedRecord,
     rig: RigParameters,
     /// First period of each window.
     starts: Vec<usize>,
@@ -57,8 +57,8 @@ pub struct Windows<'a> {
 impl<'a> Windows<'a> {
     /// The windows of a course, their starts' sensitivities under a baseline rig.
     #[must_use]
-    pub fn new(course: &'a Course, rig: &RigParameters) -> Self {
-        Self::unsettled(course, rig).settled(0)
+    pub fn new(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
+        Self::with_recorded_starts(record, rig).estimate_starts(0)
     }
 
     /// The same with starts where the readings are met best.
@@ -66,36 +66,36 @@ impl<'a> Windows<'a> {
     /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
     /// window: where the points are far off, as those of a sensor that lags, both need the start itself.
     #[must_use]
-    pub fn with_starts_met_best(course: &'a Course, rig: &RigParameters) -> Self {
-        Self::unsettled(course, rig).settled(SETTLING)
+    pub fn with_estimated_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
+        Self::with_recorded_starts(record, rig).estimate_starts(START_PASSES)
     }
 
-    fn unsettled(course: &'a Course, rig: &RigParameters) -> Self {
-        let measured = (0..2).filter(|axis| course.measured[*axis]);
+    fn with_recorded_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
+        let measured = (0..2).filter(|axis| record.measured[*axis]);
         let lanes: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
         // The first window fills lags and memories, and is not judged [rig-model.md: a record is judged after 0.1 s].
-        let starts: Vec<usize> = (1..course.len() / WINDOW)
+        let starts: Vec<usize> = (1..record.len() / WINDOW)
             .map(|window| window * WINDOW)
-            .filter(|start| !course.gaps[*start..start + WINDOW].contains(&true))
+            .filter(|start| !record.gaps[*start..start + WINDOW].contains(&true))
             .collect();
         let mut readings = Vec::with_capacity(starts.len() * WINDOW * lanes.len());
         let mut valid = Vec::with_capacity(readings.capacity());
         for start in &starts {
-            for samples in &course.samples[*start..start + WINDOW] {
+            for samples in &record.samples[*start..start + WINDOW] {
                 for (axis, at) in &lanes {
                     let sample = samples[*axis][*at];
                     valid.push(sample.is_some());
-                    readings.push(sample.map_or(0.0, |value| value / course.noise[*axis][*at]));
+                    readings.push(sample.map_or(0.0, |value| value / record.noise[*axis][*at]));
                 }
             }
         }
-        let points = (0..course.len() / WINDOW).map(|window| course.points[window * WINDOW]).collect();
+        let points = (0..record.len() / WINDOW).map(|window| record.points[window * WINDOW]).collect();
         let mut drifts = Vec::with_capacity(readings.len());
         for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
-            drifts.extend(lanes.iter().map(|(axis, channel)| drift(course, at, *axis, *channel)));
+            drifts.extend(lanes.iter().map(|(axis, channel)| drift(record, at, *axis, *channel)));
         }
         let (rig, bases) = (rig.clone(), Vec::new());
-        Windows { course, rig, starts, points, lanes, readings, valid, drifts, bases }
+        Windows { record, rig, starts, points, lanes, readings, valid, drifts, bases }
     }
 
     /// The baseline rig.
@@ -106,8 +106,8 @@ impl<'a> Windows<'a> {
 
     /// The course.
     #[must_use]
-    pub fn course(&self) -> &'a Course {
-        self.course
+    pub fn record(&self) -> &'a GriddedRecord {
+        self.record
     }
 
     /// How many windows there are.
@@ -161,23 +161,23 @@ impl<'a> Windows<'a> {
     }
 
     fn plant(&self, rig: &RigParameters) -> Plant {
-        Plant::in_state(rig, &first_state(self.course, rig)).expect("a start state is one of the rig's")
+        Plant::in_state(rig, &first_state(self.record, rig)).expect("a start state is one of the rig's")
     }
 
     fn run(&self, plants: Vec<Plant>) -> Vec<Vec<f64>> {
         let mut simulated = vec![Vec::with_capacity(self.readings.len()); plants.len()];
-        let seats: Vec<Seats> = plants.iter().map(|plant| Seats::of(plant.rig())).collect();
+        let inverse: Vec<SensorInverse> = plants.iter().map(|plant| SensorInverse::of(plant.rig())).collect();
         let mut batch = Batch::new(plants);
         let mut next = 0;
         // Windows that are not judged are simulated as well: memories go on.
-        for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
-            for (at, seats) in seats.iter().enumerate() {
-                let points = seats.points(self.course, start, &self.points[start / WINDOW]);
-                seat(batch.plant_mut(at), self.course, &points);
+        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
+            for (at, inverse) in inverse.iter().enumerate() {
+                let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
+                set_state(batch.plant_mut(at), self.record, &points);
             }
             let judged = self.starts.get(next) == Some(&start);
             next += usize::from(judged);
-            for inputs in &self.course.inputs[start..start + WINDOW] {
+            for inputs in &self.record.inputs[start..start + WINDOW] {
                 if judged {
                     self.read_each(&batch, inputs, &mut simulated);
                 }
@@ -198,7 +198,7 @@ impl<'a> Windows<'a> {
     /// The same with what the starts explain.
     fn raw_residual(&self, simulated: &[f64]) -> Vec<f64> {
         let mut left: Vec<f64> =
-            self.readings.iter().zip(simulated).map(|(reading, own)| reading - own).collect();
+            self.readings.iter().zip(simulated).map(|(reading, simulated)| reading - simulated).collect();
         self.clean(&mut left);
         left
     }
@@ -206,7 +206,7 @@ impl<'a> Windows<'a> {
     /// What one simulation differs from another by, treated as a residual is.
     #[must_use]
     pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
-        let mut differs: Vec<f64> = simulated.iter().zip(from).map(|(own, from)| own - from).collect();
+        let mut differs: Vec<f64> = simulated.iter().zip(from).map(|(value, from)| value - from).collect();
         self.reduce(&mut differs);
         differs
     }
@@ -238,7 +238,7 @@ impl<'a> Windows<'a> {
 
     fn read(&self, plant: &Plant, inputs: &Inputs, into: &mut Vec<f64>) {
         let shown = plant.shown(&plant.truth(inputs));
-        into.extend(self.lanes.iter().map(|(axis, at)| shown[*axis][*at] / self.course.noise[*axis][*at]));
+        into.extend(self.lanes.iter().map(|(axis, at)| shown[*axis][*at] / self.record.noise[*axis][*at]));
     }
 }
 
@@ -246,7 +246,7 @@ impl<'a> Windows<'a> {
 pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
     for direction in basis {
         let share = dot(values, direction);
-        values.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
+        values.iter_mut().zip(direction).for_each(|(value, part)| *value -= share * part);
     }
 }
 

@@ -7,15 +7,14 @@
 //!
 //! Everything but [`Report::gap`] and [`Report::verification`] is done before the held-out record is opened.
 
-mod telling;
-mod told;
+mod findings;
+mod reported;
 
-use crate::balance::is_model_file;
 use crate::candidates::Candidate;
 use crate::check::{Checked, check};
-use crate::course::{Course, searched_share};
 use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, extend};
+use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::locate::locate;
 use crate::name::{name, on_all};
 use crate::next::{self, Explanation, Proposal};
@@ -23,14 +22,15 @@ use crate::outside::outside;
 use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions};
 use crate::report::{self, InputFiles, NamedEffect, Next, Report, Verdict};
+use crate::single_equation::is_model_file;
 use crate::tabulate::{tables, tabulate};
 use crate::verify::verify;
+pub(crate) use findings::empty;
+pub use findings::place_name;
+use findings::{report_of, summary};
 use plant::{Axis, ParameterError, RigParameters};
+pub use reported::{Reported, ReportedOutside};
 use std::path::{Path, PathBuf};
-pub(crate) use telling::empty;
-pub use telling::place_name;
-use telling::{report_of, summary};
-pub use told::{Told, ToldOutside};
 
 /// What the workflow is asked.
 #[derive(Clone, Debug, Default)]
@@ -145,7 +145,7 @@ pub struct Opened {
     /// The check.
     pub checked: Checked,
     /// The course; `None` when the record cannot be used.
-    pub course: Option<Course>,
+    pub gridded: Option<GriddedRecord>,
 }
 
 /// Reads and checks a record.
@@ -156,16 +156,16 @@ pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<O
     let record = records::read(path, options)?;
     let mut checked = check(&record, rig);
     if !checked.report.usable {
-        return Ok(Opened { checked, course: None });
+        return Ok(Opened { checked, gridded: None });
     }
-    let course = match Course::of(&record, &checked, rig) {
-        Ok(course) => Some(course),
+    let gridded = match GriddedRecord::of(&record, &checked, rig) {
+        Ok(gridded) => Some(gridded),
         Err(why) => {
             checked.refuse(why.column(), why.to_string());
             None
         }
     };
-    Ok(Opened { checked, course })
+    Ok(Opened { checked, gridded })
 }
 
 /// Runs the whole workflow.
@@ -182,64 +182,64 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
         train: task.train.iter().map(|path| path.display().to_string()).collect(),
         ..InputFiles::default()
     };
-    let mut courses: Vec<Course> = opened.into_iter().filter_map(|opened| opened.course).collect();
-    if courses.len() < task.train.len() {
+    let mut records: Vec<GriddedRecord> = opened.into_iter().filter_map(|opened| opened.gridded).collect();
+    if records.len() < task.train.len() {
         return Ok(bad_data(inputs, checks));
     }
-    on_shared_axes(&mut courses)?;
-    let shown = Axis::ALL.into_iter().filter(|axis| courses[0].measured[axis.index()]);
+    on_shared_axes(&mut records)?;
+    let shown = Axis::ALL.into_iter().filter(|axis| records[0].measured[axis.index()]);
     inputs.axes = shown.map(|axis| axis.name().to_owned()).collect();
 
-    inputs.searched_share = searched_share(&courses);
-    let part: Option<Vec<Course>> =
-        (inputs.searched_share < 1.0).then(|| parts(&courses, inputs.searched_share));
+    inputs.searched_share = searched_share(&records);
+    let part: Option<Vec<GriddedRecord>> =
+        (inputs.searched_share < 1.0).then(|| parts(&records, inputs.searched_share));
     if part.is_some() {
         progress(&format!("searching {:.0} % of the records", 1e2 * inputs.searched_share));
     }
-    let engine = Engine::new(part.as_ref().unwrap_or(&courses), rig);
-    let linked = courses.iter().any(|course| course.linked);
-    let candidates = Candidate::all(rig, courses[0].measured, linked, &task.without);
+    let engine = Engine::new(part.as_ref().unwrap_or(&records), rig);
+    let linked = records.iter().any(|record| record.linked);
+    let candidates = Candidate::all(rig, records[0].measured, linked, &task.without);
     let mut found = name(&engine, candidates, progress);
     if part.is_some() {
         progress("fitting what was found on all of the records");
-        on_all(&Engine::new(&courses, rig), &mut found);
+        on_all(&Engine::new(&records, rig), &mut found);
     }
     let mut report = report_of(&engine, &found);
     report.inputs = inputs;
     report.checks = checks;
     progress("locating");
-    report.location = Some(locate(rig, &courses, progress).location);
+    report.location = Some(locate(rig, &records, progress).location);
     if report.verdict == Verdict::OutsideCatalogue {
         // Beside what the parameters explain: a wrong mass is no unknown force.
         let calibrated = found.calibrated.rig(rig);
-        let unknowns = locate(&calibrated, &courses, progress).unknowns;
+        let unknowns = locate(&calibrated, &records, progress).unknowns;
         report.outside = outside(&unknowns, progress);
-        if let Some(told) = &mut report.outside {
-            match tabulate(&engine, &found.calibrated, &found.told, told, &unknowns, progress) {
+        if let Some(reported) = &mut report.outside {
+            match tabulate(&engine, &found.calibrated, &found.reported, reported, &unknowns, progress) {
                 Ok(found) => {
-                    told.added = true;
-                    told.tables = found.terms;
-                    told.share_explained = Some(found.share_explained);
+                    reported.added = true;
+                    reported.tables = found.terms;
+                    reported.share_explained = Some(found.share_explained);
                     report.parameters = found.parameters;
                     report.carried.clear();
                 }
-                Err(why_not) => told.why_not = Some(why_not),
+                Err(why_not) => reported.why_not = Some(why_not),
             }
         }
     }
-    let told = Told::from(&report);
+    let reported = Reported::from(&report);
     let mut experiment = None;
     if report.verdict == Verdict::Ambiguous
-        && let Some(proposal) = proposal_for(&rig_file, &told, courses[0].measured, progress)
+        && let Some(proposal) = proposal_for(&rig_file, &reported, records[0].measured, progress)
     {
         experiment = proposal.experiment_toml;
         report.next = Some(proposal.next);
     }
     report.summary = summary(&report);
-    let text = extended(&rig_file, &told)?;
+    let text = extended(&rig_file, &reported)?;
     let after = RigParameters::from_toml(&text, "extended rig.toml")?;
     // What was found stays, whatever the held-out record is like.
-    let (pictures, not_judged) = match held_out(task, rig, &after, &courses, &mut report, progress) {
+    let (pictures, not_judged) = match held_out(task, rig, &after, &records, &mut report, progress) {
         Ok(pictures) => (pictures, None),
         Err(error) => (Pictures::default(), Some(error.to_string())),
     };
@@ -247,8 +247,8 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
 }
 
 /// About this share of each record.
-fn parts(courses: &[Course], share: f64) -> Vec<Course> {
-    courses.iter().map(|course| course.thinned(share).unwrap_or_else(|| course.clone())).collect()
+fn parts(records: &[GriddedRecord], share: f64) -> Vec<GriddedRecord> {
+    records.iter().map(|record| record.thinned(share).unwrap_or_else(|| record.clone())).collect()
 }
 
 /// Judges the extended model on the held-out record, which is opened here and nowhere else; without one, draws the
@@ -257,18 +257,18 @@ fn held_out(
     task: &Task,
     rig: &RigParameters,
     after: &RigParameters,
-    courses: &[Course],
+    records: &[GriddedRecord],
     report: &mut Report,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Pictures, WorkflowError> {
     let Some(test) = &task.test else {
-        let verified = verify(rig, after, &courses[0], progress);
-        return Ok(Pictures { record: courses[0].name.clone(), held_out: false, traces: verified.traces });
+        let verified = verify(rig, after, &records[0], progress);
+        return Ok(Pictures { record: records[0].name.clone(), held_out: false, traces: verified.traces });
     };
     progress(&format!("judging on {}", test.display()));
     let unusable = |why: String| WorkflowError::Unusable { file: test.display().to_string(), why };
     let opened = open(test, &task.options, rig)?;
-    let Some(mut course) = opened.course else {
+    let Some(mut record) = opened.gridded else {
         return Err(unusable(fatal(std::slice::from_ref(&opened.checked.report))));
     };
     if let Some(train) = task.train.iter().find(|train| is_copy(train, test)) {
@@ -277,20 +277,20 @@ fn held_out(
             "it is a copy of {train}: a model is judged on a record that it never saw"
         )));
     }
-    course.measured = judged_axes(&course, courses[0].measured).map_err(unusable)?;
-    let verified = verify(rig, after, &course, progress);
+    record.measured = judged_axes(&record, records[0].measured).map_err(unusable)?;
+    let verified = verify(rig, after, &record, progress);
     report.gap = verified.gap;
     report.verification = Some(verified.verification);
-    Ok(Pictures { record: course.name.clone(), held_out: true, traces: verified.traces })
+    Ok(Pictures { record: record.name.clone(), held_out: true, traces: verified.traces })
 }
 
 /// The axes of a held-out record that the training records show as well: of the others nothing was fitted.
-fn judged_axes(course: &Course, trained: [bool; 2]) -> Result<[bool; 2], String> {
-    let shared = [0, 1].map(|axis| course.measured[axis] && trained[axis]);
+fn judged_axes(record: &GriddedRecord, trained: [bool; 2]) -> Result<[bool; 2], String> {
+    let shared = [0, 1].map(|axis| record.measured[axis] && trained[axis]);
     if shared == [false, false] {
         return Err("it shows no axis that the training records show".to_owned());
     }
-    if course.linked && shared != course.measured {
+    if record.linked && shared != record.measured {
         return Err("its rods are linked, and the training records show one of its axes alone".to_owned());
     }
     Ok(shared)
@@ -298,7 +298,7 @@ fn judged_axes(course: &Course, trained: [bool; 2]) -> Result<[bool; 2], String>
 
 /// Whether two files have the same bytes.
 fn is_copy(one: &Path, other: &Path) -> bool {
-    let length = |file: &Path| std::fs::metadata(file).map(|own| own.len()).ok();
+    let length = |file: &Path| std::fs::metadata(file).map(|metadata| metadata.len()).ok();
     length(one) == length(other)
         && matches!((std::fs::read(one), std::fs::read(other)), (Ok(one), Ok(other)) if one == other)
 }
@@ -307,41 +307,42 @@ fn is_copy(one: &Path, other: &Path) -> bool {
 ///
 /// # Errors
 /// [`ExtendError`] when it names what a rig cannot have.
-pub fn extended(rig_file: &RigFile, told: &Told) -> Result<String, ExtendError> {
-    let additions: Vec<Addition> = told.named.iter().map(addition).collect();
-    let changed = [&told.parameters[..], &told.carried].concat();
-    let weighed = weighed(told.measured());
-    let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, weighed, &told.inputs.train)?;
-    let terms = told.outside.as_ref().map_or(&[][..], |own| &own.tables);
-    add_tables(&text, &rig_file.file, &tables(terms), &told.inputs.train)
+pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, ExtendError> {
+    let additions: Vec<Addition> = reported.named.iter().map(addition).collect();
+    let changed = [&reported.parameters[..], &reported.carried].concat();
+    let weighed = weighed(reported.measured());
+    let text = extend(&rig_file.text, &rig_file.file, &additions, &changed, weighed, &reported.inputs.train)?;
+    let terms = reported.outside.as_ref().map_or(&[][..], |outside| &outside.tables);
+    add_tables(&text, &rig_file.file, &tables(terms), &reported.inputs.train)
 }
 
 /// The experiment that tells apart what a report could not; `None` when there is nothing to tell apart.
 #[must_use]
-pub fn proposal(rig_file: &RigFile, told: &Told, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
-    proposal_for(rig_file, told, told.measured(), progress)
+pub fn proposal(rig_file: &RigFile, reported: &Reported, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
+    proposal_for(rig_file, reported, reported.measured(), progress)
 }
 
 fn proposal_for(
     rig_file: &RigFile,
-    told: &Told,
+    reported: &Reported,
     measured: [bool; 2],
     progress: &mut dyn FnMut(&str),
 ) -> Option<Proposal> {
-    let at = told.named.iter().position(|own| !own.alternatives.is_empty())?;
-    let others = &told.named[at].alternatives;
-    let explanations: Vec<Explanation> = std::iter::once(&told.named[at])
+    let at = reported.named.iter().position(|named| !named.alternatives.is_empty())?;
+    let others = &reported.named[at].alternatives;
+    let explanations: Vec<Explanation> = std::iter::once(&reported.named[at])
         .chain(others)
-        .filter_map(|own| {
-            let mut with = told.clone();
-            with.named[at] = own.clone();
+        .filter_map(|alternative| {
+            let mut with = reported.clone();
+            with.named[at] = alternative.clone();
             let rig = RigParameters::from_toml(&extended(rig_file, &with).ok()?, &rig_file.file).ok()?;
-            let names = with.named.iter().map(|own| format!("{} {}", own.effect, place_name(&own.place)));
+            let names =
+                with.named.iter().map(|named| format!("{} {}", named.effect, place_name(&named.place)));
             Some(Explanation { rig, names: names.collect() })
         })
         .collect();
     if explanations.len() < 2 {
-        let named = &told.named[at];
+        let named = &reported.named[at];
         let reason = format!(
             "{} {} and what explains as much cannot both be written into the rig file beside the rest: nothing can be rehearsed",
             named.effect,
@@ -369,14 +370,15 @@ fn open_all(
 
 /// Takes what all records show: an axis that one of them lacks is left out of the others. Linked rods move together, so that no
 /// axis of theirs can be left out.
-pub(crate) fn on_shared_axes(courses: &mut [Course]) -> Result<(), WorkflowError> {
-    let shared = [0, 1].map(|axis| courses.iter().all(|course| course.measured[axis]));
-    let lacks = |course: &&Course| course.measured != shared && (course.linked || shared == [false, false]);
-    if let Some(course) = courses.iter().find(lacks) {
-        let other = courses.iter().find(|other| other.measured != course.measured).unwrap_or(course);
-        return Err(WorkflowError::Mixed { first: course.name.clone(), other: other.name.clone() });
+pub(crate) fn on_shared_axes(records: &mut [GriddedRecord]) -> Result<(), WorkflowError> {
+    let shared = [0, 1].map(|axis| records.iter().all(|record| record.measured[axis]));
+    let lacks =
+        |record: &&GriddedRecord| record.measured != shared && (record.linked || shared == [false, false]);
+    if let Some(record) = records.iter().find(lacks) {
+        let other = records.iter().find(|other| other.measured != record.measured).unwrap_or(record);
+        return Err(WorkflowError::Mixed { first: record.name.clone(), other: other.name.clone() });
     }
-    courses.iter_mut().for_each(|course| course.measured = shared);
+    records.iter_mut().for_each(|record| record.measured = shared);
     Ok(())
 }
 
@@ -401,8 +403,11 @@ fn bad_data(inputs: InputFiles, checks: Vec<report::RecordCheck>) -> Outcome {
 
 fn addition(named: &NamedEffect) -> Addition {
     let place = place_name(&named.place);
-    let numbers =
-        named.parameters.iter().map(|own| (own.name.clone(), own.value, own.standard_error)).collect();
+    let numbers = named
+        .parameters
+        .iter()
+        .map(|number| (number.name.clone(), number.value, number.standard_error))
+        .collect();
     Addition { effect: named.effect.clone(), place, numbers }
 }
 
@@ -410,8 +415,8 @@ fn addition(named: &NamedEffect) -> Addition {
 mod tests {
     use super::*;
 
-    fn course(name: &str, measured: [bool; 2], linked: bool) -> Course {
-        Course {
+    fn record(name: &str, measured: [bool; 2], linked: bool) -> GriddedRecord {
+        GriddedRecord {
             name: name.to_owned(),
             linked,
             added_mass_kg: 0.0,
@@ -437,15 +442,15 @@ mod tests {
             ([(LOAD, false), (BOTH, false)], LOAD),
             ([(BOTH, true), (BOTH, false)], BOTH),
         ] {
-            let mut courses = records.map(|(measured, linked)| course("a", measured, linked));
-            on_shared_axes(&mut courses).unwrap();
-            assert!(courses.iter().all(|course| course.measured == shared), "{records:?}");
+            let mut records = records.map(|(measured, linked)| record("a", measured, linked));
+            on_shared_axes(&mut records).unwrap();
+            assert!(records.iter().all(|record| record.measured == shared), "{records:?}");
         }
     }
 
     #[test]
     fn a_held_out_record_is_judged_on_what_was_trained() {
-        let judged = |measured, linked, trained| judged_axes(&course("a", measured, linked), trained);
+        let judged = |measured, linked, trained| judged_axes(&record("a", measured, linked), trained);
         assert_eq!(judged(BOTH, false, DRIVE), Ok(DRIVE));
         assert_eq!(judged(DRIVE, false, BOTH), Ok(DRIVE));
         assert_eq!(judged(BOTH, true, BOTH), Ok(BOTH));
@@ -457,8 +462,8 @@ mod tests {
     fn no_axis_of_linked_rods_is_left_out() {
         for records in [[(DRIVE, false), (LOAD, false)], [(DRIVE, false), (BOTH, true)]] {
             let [one, two] = records;
-            let mut courses = [course("one", one.0, one.1), course("two", two.0, two.1)];
-            let error = on_shared_axes(&mut courses).unwrap_err().to_string();
+            let mut records = [record("one", one.0, one.1), record("two", two.0, two.1)];
+            let error = on_shared_axes(&mut records).unwrap_err().to_string();
             assert!(error.contains("one") && error.contains("two"), "{error}");
         }
     }

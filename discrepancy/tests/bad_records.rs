@@ -3,7 +3,7 @@
 //! The records are the rig's own, simulated and then spoiled.
 
 use discrepancy::check::{Checked, check};
-use discrepancy::course::Course;
+use discrepancy::gridded_record::GriddedRecord;
 use discrepancy::records::{Channel, ReadOptions, Record, Signal, read};
 use plant::tables::{CycleRecord, write_measurement, write_measurement_head};
 use plant::{Axis, Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
@@ -344,7 +344,7 @@ fn one_stamp_that_cannot_be_is_left_out_wherever_it_is() {
         assert!(checked.report.usable, "row {wrong}: {}", texts(&checked));
         assert!(kinds(&checked).contains(&"jumping-time"), "row {wrong}: {}", texts(&checked));
         assert!(!checked.is_usable(FORCE, wrong) && unusable(&checked, FORCE) == 1, "row {wrong}");
-        let course = Course::of(&sheet, &checked, &rig).unwrap();
+        let course = GriddedRecord::of(&sheet, &checked, &rig).unwrap();
         assert!((7999..=8000).contains(&course.len()), "row {wrong}: {}", course.len());
     }
 }

@@ -43,10 +43,11 @@ fn a_rig_file_with_equal_points_and_a_volume_at_the_end_of_its_range_is_calibrat
     let hidden = rig.with("friction.viscous_n_per_mm_per_s", &[1.3]).expect("a rig");
     let courses = [course(&hidden, &rig)];
     let found = found(&Engine::new(&courses, &rig));
-    let viscous = found.told.iter().find(|own| own.name == "parameter:viscous-friction").expect("told of");
+    let viscous =
+        found.quantities.iter().find(|own| own.name == "parameter:viscous-friction").expect("told of");
     let error = viscous.standard_error.expect("these strokes tell it");
     assert!((viscous.value - 1.3).abs() < 4.0 * error, "{viscous:?}");
-    let names: Vec<&str> = found.told.iter().map(|own| own.name.as_str()).collect();
+    let names: Vec<&str> = found.quantities.iter().map(|own| own.name.as_str()).collect();
     assert!(
         names.contains(&"valve.kv_supply_m3_per_h[3]") && names.contains(&"valve.kv_exhaust_m3_per_h[5]")
     );
@@ -67,7 +68,7 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
     let engine = Engine::new(&courses, &rig);
     let found = found(&engine);
 
-    let of = |name: &str| found.told.iter().find(|own| own.name == name).expect("it is told of");
+    let of = |name: &str| found.quantities.iter().find(|own| own.name == name).expect("it is told of");
     for (name, truth) in [
         ("cylinder.dead_volume_cm3", 26.0),
         ("valve.kv_supply_m3_per_h[2]", 0.123),

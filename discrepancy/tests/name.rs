@@ -66,8 +66,8 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
     for (at, (factor, error)) in factors(&found).into_iter().enumerate() {
         assert!((factor - 1.0).abs() < 5.0 * error + 0.003, "parameter {at}: {factor} +- {error}");
     }
-    let moved = found.told.factors.iter().filter(|factor| **factor != 1.0).count();
-    assert!(moved <= 2, "what is told moves parameters that nobody misses: {:?}", found.told.factors);
+    let moved = found.reported.factors.iter().filter(|factor| **factor != 1.0).count();
+    assert!(moved <= 2, "what is told moves parameters that nobody misses: {:?}", found.reported.factors);
 
     // A limit is what its name says: half as much again is named, be it noise that set the limit or the least that counts.
     for (effect, place, key) in
@@ -119,7 +119,7 @@ fn an_effect_that_the_rig_file_has_is_named_where_it_is_off_and_only_there() {
     for truth in [0.0, 6.0] {
         let found = found_beside(&rig, &leaking(truth), &[]);
         assert_eq!(names(&found), ["piston-leakage drive"], "{truth}");
-        let placed = &found.told.placed[0];
+        let placed = &found.reported.placed[0];
         let told = placed.candidate.numbers(&placed.coordinates)[0];
         assert!((told - truth).abs() < 0.3, "{told}, in truth {truth}");
         assert_eq!(placed.candidate.baseline(0), Some(3.0));
@@ -135,10 +135,10 @@ fn a_wrong_mass_is_a_parameter_and_no_effect() {
     let (mass, error) = factors(&found)[0];
     assert!((mass - 1.1).abs() < 4.0 * error + 0.005, "{mass} +- {error}");
     // What is told is a fit of its own: the mass is as right without the parameters that went back to what the file says.
-    let told = found.told.factors;
+    let told = found.reported.factors;
     assert!((told[0] - 1.1).abs() < 4.0 * error + 0.005, "{told:?}");
     assert!(told.iter().filter(|factor| **factor == 1.0).count() >= COUNT / 2, "{told:?}");
-    assert!(found.told.loss < found.model.loss + 20.0 * COUNT as f64);
+    assert!(found.reported.loss < found.model.loss + 20.0 * COUNT as f64);
 }
 
 #[test]

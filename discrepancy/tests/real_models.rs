@@ -3,9 +3,9 @@
 //! where the records are not there.
 
 use crate::real::{crate_folder, data};
-use discrepancy::balance::{close, extended_model_text};
 use discrepancy::report::{Report, Verdict};
-use discrepancy::workflow::Told;
+use discrepancy::single_equation::{close, extended_model_text};
+use discrepancy::workflow::Reported;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -104,7 +104,7 @@ fn emps_has_viscous_friction_that_differs_with_the_direction() {
     let told = |report: &Report| serde_json::to_string(&report.candidates).unwrap();
     assert_eq!(told(&alone), told(&report));
     // The extended model lacks nothing.
-    let extended = extended_model_text(&model("emps.toml"), &Told::from(&report)).unwrap();
+    let extended = extended_model_text(&model("emps.toml"), &Reported::from(&report)).unwrap();
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     file.write_all(extended.as_bytes()).unwrap();
     let again = closed(file.path(), &train, &test);

@@ -2,7 +2,7 @@
 
 use crate::record::{STROKES_RAD_PER_S, measurement};
 use discrepancy::report::Verdict;
-use discrepancy::workflow::{Outcome, RigFile, Task, Told, close, extended};
+use discrepancy::workflow::{Outcome, Reported, RigFile, Task, close, extended};
 use plant::RigParameters;
 
 /// Closes on two records of a rig with something hidden in it that is no candidate.
@@ -49,7 +49,7 @@ fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
     assert_eq!(rig.tabulated()[0].value, outside.tables[0].value);
     assert!(text.contains("# Found from ") && text.contains("train.csv"));
     let written = serde_json::to_string(report).expect("a report is JSON");
-    let told: Told = serde_json::from_str(&written).expect("what other steps read");
+    let told: Reported = serde_json::from_str(&written).expect("what other steps read");
     assert_eq!(extended(&rig_file, &told).expect("the same"), text);
 }
 

@@ -9,7 +9,7 @@
 //!
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
-use super::{Calibrated, POINTS, SETTLED, UNTOLD};
+use super::{CONVERGED, Calibrated, POINTS, UNRESOLVED};
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
@@ -41,7 +41,7 @@ struct Number {
 #[derive(Clone, Debug)]
 pub struct Finer {
     /// The parameters, then the numbers, as people read them.
-    pub told: Vec<Quantity>,
+    pub quantities: Vec<Quantity>,
     /// The same as a rig file takes them: points of tables with what they have in common.
     pub changed: Vec<Quantity>,
 }
@@ -50,7 +50,7 @@ pub struct Finer {
 #[must_use]
 pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let rig = engine.rig();
-    let scale = PARAMETERS.iter().position(|own| own.name == KV_SCALE).expect("one of them");
+    let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
     let numbers = numbers(rig, &calibrated.fit.factors);
     let mut ridges = parameter_ridges();
     ridges.extend(numbers.iter().map(|number| number.tolerance.powi(-2)));
@@ -61,11 +61,11 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let mut best: Option<(Vec<f64>, Products, Fit)> = None;
     for _ in 0..POINTS {
         // Where a number came to the end of its range, what was found before stands.
-        let Some((own, columns)) = with(rig, &numbers, &factors).zip(columns(engine, &numbers, &factors))
+        let Some((tried, columns)) = with(rig, &numbers, &factors).zip(columns(engine, &numbers, &factors))
         else {
             break;
         };
-        let residual = engine.residual(&engine.simulate(&own));
+        let residual = engine.residual(&engine.simulate(&tried));
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
         let off: Vec<f64> = factors.iter().map(|factor| factor - 1.0).collect();
@@ -76,7 +76,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
             let at = std::mem::replace(&mut factors, next);
             best = Some((at, products, fit.clone()));
         }
-        if fit.loss > before - SETTLED {
+        if fit.loss > before - CONVERGED {
             break;
         }
     }
@@ -88,22 +88,30 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         .map(|(number, at)| if rig.numbers(number.key).len() > 1 { vec![at, scale] } else { vec![at] });
     let sums: Vec<Vec<usize>> = all.iter().map(|at| vec![*at]).chain(in_file).collect();
     let errors = products.jackknife_of_sums(&all, &fit, &ridges, &sums)?;
-    let (own_errors, file_errors) = errors.split_at(all.len());
+    let (factor_errors, file_errors) = errors.split_at(all.len());
     let factors = moved(rig, &numbers, &at, &fit.coefficients)?;
 
-    let mut own = [1.0; COUNT];
-    own.copy_from_slice(&factors[..COUNT]);
-    let refit = Refit { factors: own, errors: own_errors[..COUNT].to_vec(), ..calibrated.fit.clone() };
+    let mut parameter_factors = [1.0; COUNT];
+    parameter_factors.copy_from_slice(&factors[..COUNT]);
+    let refit = Refit {
+        factors: parameter_factors,
+        errors: factor_errors[..COUNT].to_vec(),
+        ..calibrated.fit.clone()
+    };
     let parameters: Vec<Quantity> = (0..COUNT).map(|at| super::quantity(engine, at, &refit)).collect();
-    let mut told = parameters.clone();
-    let mut changed: Vec<Quantity> =
-        parameters.into_iter().enumerate().filter(|(at, _)| *at != scale).map(|(_, own)| own).collect();
-    changed.retain(|own| own.standard_error.is_some());
-    let is_told = |at: usize| own_errors[COUNT + at] < UNTOLD * numbers[at].tolerance;
+    let mut quantities = parameters.clone();
+    let mut changed: Vec<Quantity> = parameters
+        .into_iter()
+        .enumerate()
+        .filter(|(at, _)| *at != scale)
+        .map(|(_, quantity)| quantity)
+        .collect();
+    changed.retain(|quantity| quantity.standard_error.is_some());
+    let is_resolved = |at: usize| factor_errors[COUNT + at] < UNRESOLVED * numbers[at].tolerance;
     // Points of a table go together, so that it does not fall where one of them is left behind.
     let is_changed = |key: &str| {
-        let any = (0..numbers.len()).any(|at| numbers[at].key == key && is_told(at));
-        any || (rig.numbers(key).len() > 1 && told[scale].standard_error.is_some())
+        let any = (0..numbers.len()).any(|at| numbers[at].key == key && is_resolved(at));
+        any || (rig.numbers(key).len() > 1 && quantities[scale].standard_error.is_some())
     };
     let changes: Vec<bool> = numbers.iter().map(|number| is_changed(number.key)).collect();
     for (at, number) in numbers.iter().enumerate() {
@@ -116,15 +124,15 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
             name: if of_table { format!("{}[{}]", number.key, number.place) } else { number.key.to_owned() },
             value: before * factor,
             unit: key.unit.name().to_owned(),
-            standard_error: is_told(at).then_some(before * file_errors[at]),
+            standard_error: is_resolved(at).then_some(before * file_errors[at]),
             before: Some(before),
         };
         if changes[at] {
             changed.push(quantity.clone());
         }
-        told.push(quantity);
+        quantities.push(quantity);
     }
-    Some(Finer { told, changed })
+    Some(Finer { quantities, changed })
 }
 
 /// Those that are not 0, since at a spool opening without flow the dead zone says it, and that can be changed either way: points
@@ -145,14 +153,16 @@ fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
 
 /// The rig with all factors; `None` where one leaves its range, or a table would fall.
 fn with(rig: &RigParameters, numbers: &[Number], factors: &[f64]) -> Option<RigParameters> {
-    let mut own = [1.0; COUNT];
-    own.copy_from_slice(&factors[..COUNT]);
-    let rig = with_factors(rig, &own);
+    let mut parameter_factors = [1.0; COUNT];
+    parameter_factors.copy_from_slice(&factors[..COUNT]);
+    let rig = with_factors(rig, &parameter_factors);
     let lists: Vec<(&str, Vec<f64>)> = FINER
         .iter()
         .map(|(key, _)| {
             let mut list = rig.numbers(key).to_vec();
-            for (number, factor) in numbers.iter().zip(&factors[COUNT..]).filter(|(own, _)| own.key == *key) {
+            for (number, factor) in
+                numbers.iter().zip(&factors[COUNT..]).filter(|(number, _)| number.key == *key)
+            {
                 list[number.place] *= factor;
             }
             (*key, list)

@@ -55,7 +55,7 @@ pub(super) fn of(values: &[Option<f64>]) -> Option<f64> {
     let also: Vec<Block> = blocks
         .iter()
         .filter(|block| block.drift <= DRIFT * guess)
-        .filter(|block| block.lags.iter().zip(&quiet).all(|(own, quiet)| *own <= ABOVE * quiet))
+        .filter(|block| block.lags.iter().zip(&quiet).all(|(lag, quiet)| *lag <= ABOVE * quiet))
         .copied()
         .collect();
     let noise = if also.len() > first { fitted(&mean(&also)).sqrt() } else { guess };
@@ -70,16 +70,17 @@ fn block(values: &[Option<f64>]) -> Option<Block> {
     }
     let third = values.len() / 3;
     let thirds = [0, 1, 2].map(|part| {
-        let own = &values[part * third..(part + 1) * third];
-        own.iter().flatten().sum::<f64>() / own.iter().flatten().count().max(1) as f64
+        let part = &values[part * third..(part + 1) * third];
+        part.iter().flatten().sum::<f64>() / part.iter().flatten().count().max(1) as f64
     });
     let most = thirds.into_iter().fold(f64::MIN, f64::max);
     let least = thirds.into_iter().fold(f64::MAX, f64::min);
     let lags = LAGS.map(|lag| {
         let (mut sum, mut count) = (0.0, 0_usize);
         for at in lag..values.len() - lag {
-            if let (Some(before), Some(own), Some(after)) = (values[at - lag], values[at], values[at + lag]) {
-                let second = after - 2.0 * own + before;
+            if let (Some(before), Some(here), Some(after)) = (values[at - lag], values[at], values[at + lag])
+            {
+                let second = after - 2.0 * here + before;
                 sum += second * second;
                 count += 1;
             }
@@ -94,7 +95,7 @@ fn without_outliers(blocks: &[Block]) -> Vec<Block> {
     let middle: Vec<f64> = (0..LAGS.len())
         .map(|lag| median(&mut blocks.iter().map(|block| block.lags[lag]).collect::<Vec<_>>()).unwrap_or(0.0))
         .collect();
-    let near = |block: &&Block| block.lags.iter().zip(&middle).all(|(own, middle)| *own <= 2.5 * middle);
+    let near = |block: &&Block| block.lags.iter().zip(&middle).all(|(lag, middle)| *lag <= 2.5 * middle);
     let kept: Vec<Block> = blocks.iter().filter(near).copied().collect();
     if kept.is_empty() { blocks.to_vec() } else { kept }
 }
@@ -171,9 +172,9 @@ mod tests {
     fn white_and_coloured_noise_at_rest_are_found_within_a_tenth() {
         for seed in 0..6 {
             for memory in [0.0, 5.0] {
-                let own = of(&series(seed, memory, |_| 7.0)).unwrap();
+                let found = of(&series(seed, memory, |_| 7.0)).unwrap();
                 // 200 blocks of at least 20 independent samples: 1 % of a standard error.
-                assert!((own - 1.0).abs() < 0.05, "{memory}: {own}");
+                assert!((found - 1.0).abs() < 0.05, "{memory}: {found}");
             }
         }
     }

@@ -27,7 +27,7 @@ impl<'a> Notes<'a> {
     }
 
     /// Writes a finding down; the text gets file, line and column in front.
-    pub(super) fn tell(&mut self, kind: &str, subject: Subject, fatal: bool, text: &str) {
+    pub(super) fn add(&mut self, kind: &str, subject: Subject, fatal: bool, text: &str) {
         let line = subject.row.map(|row| self.record.line(row));
         let column = subject.channel.map(Channel::column);
         let file = self.record.file().display();
@@ -40,8 +40,8 @@ impl<'a> Notes<'a> {
     }
 
     /// The same of time.
-    pub(super) fn tell_time(&mut self, kind: &str, row: Option<usize>, fatal: bool, text: &str) {
-        self.tell(kind, Subject { channel: None, row }, fatal, text);
+    pub(super) fn add_time(&mut self, kind: &str, row: Option<usize>, fatal: bool, text: &str) {
+        self.add(kind, Subject { channel: None, row }, fatal, text);
         if let Some(finding) = self.findings.last_mut() {
             finding.column = Some("time_s".into());
         }

@@ -62,8 +62,8 @@ mod tests {
     fn a_rounded_channel_has_its_step() {
         let step = 0.5 / 65535.0;
         let values: Vec<f64> = wobbles(5000).map(|wobble| (wobble * 300.0).round() * step).collect();
-        let own = of(&values).unwrap();
-        assert!((own / step - 1.0).abs() < 1e-6, "{own}");
+        let found = of(&values).unwrap();
+        assert!((found / step - 1.0).abs() < 1e-6, "{found}");
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
             let text = format!(
                 "the axis stands at the end of its stroke all the time ({level} m): it tells nothing here"
             );
-            notes.tell(PARKED, subject, false, &text);
+            notes.add(PARKED, subject, false, &text);
         } else {
             let share = clipped as f64 / present.len().max(1) as f64;
             let fatal = share > MOST;
@@ -68,7 +68,7 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
                     "they are left out with their neighbours"
                 }
             );
-            notes.tell("clipped", subject, fatal, &text);
+            notes.add("clipped", subject, fatal, &text);
         }
         for place in (0..bad.len()).filter(|place| bad[*place]) {
             let around = place.saturating_sub(NEIGHBOURS)..(place + NEIGHBOURS + 1).min(bad.len());

@@ -72,7 +72,7 @@ fn axis_signs(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis) {
     };
     let (as_is, flow, force) = fits(Reading::AsIs);
     let (Some(flow), Some(force)) = (flow, force) else { return };
-    let own = flow.correlation() + force.correlation();
+    let unswapped = flow.correlation() + force.correlation();
     let best = [Reading::Swapped, Reading::ValveSign, Reading::PositionSign]
         .into_iter()
         .filter_map(|reading| {
@@ -84,15 +84,15 @@ fn axis_signs(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis) {
     let worse = flow.correlation().min(force.correlation()) < HOLDS;
     if let Some((reading, sum)) = best
         && worse
-        && sum > own + CLEARLY
+        && sum > unswapped + CLEARLY
     {
         let row = flow.worst.or(force.worst).and_then(|place| grid.rows[place]);
-        return tell(notes, axis, reading, row, [flow.correlation(), force.correlation()]);
+        return add_finding(notes, axis, reading, row, [flow.correlation(), force.correlation()]);
     }
     force_sign(notes, rig, grid, axis, &as_is);
 }
 
-fn tell(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usize>, balances: [f64; 2]) {
+fn add_finding(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usize>, balances: [f64; 2]) {
     let (kind, signal, text) = match reading {
         Reading::Swapped => (
             "swapped-pressures",
@@ -112,7 +112,7 @@ fn tell(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usize>, bal
         "{text}; flow and force balance correlate by {:.2} and {:.2} as the columns stand, and hold when that is changed",
         balances[0], balances[1]
     );
-    notes.tell(kind, Subject { channel: Some(Channel::Of(axis, signal)), row }, true, &text);
+    notes.add(kind, Subject { channel: Some(Channel::Of(axis, signal)), row }, true, &text);
 }
 
 /// The axis' series, read so.
@@ -282,7 +282,7 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     }
     let moved_kg = mass.carriage_kg + notes.record.setup().added_mass_kg;
     // What lies before the sensor: piston and rod, with all of the axis' friction.
-    let own_kg = if axis == Axis::Drive { mass.drive_kg - mass.carriage_kg } else { mass.load_kg };
+    let moving_kg = if axis == Axis::Drive { mass.drive_kg - mass.carriage_kg } else { mass.load_kg };
     let speeds = slopes(&motion.extension_m, REACH);
     let rates = slopes(&speeds, REACH);
     // Twice the smoothing for the force, as for the acceleration.
@@ -290,9 +290,9 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
     let pairs: Vec<(usize, f64, f64)> = (0..force.len())
         .filter_map(|place| {
             let expected = if linked {
-                let (speed, own) =
+                let (speed, acceleration) =
                     (speeds[place]? / grid.period_s, rates[place]? / (grid.period_s * grid.period_s));
-                gas_n(motion, rig, place)? - own_kg * own - friction_n(rig, speed)
+                gas_n(motion, rig, place)? - moving_kg * acceleration - friction_n(rig, speed)
             } else {
                 moved_kg * rates[place]? / (grid.period_s * grid.period_s)
             };
@@ -315,14 +315,14 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
              multiply the column by -1",
             pairs.correlation()
         );
-        return notes.tell("force-sign", subject, true, &text);
+        return notes.add("force-sign", subject, true, &text);
     }
-    let told = FORCES.into_iter().find(|(_, factor)| (0.8..1.25).contains(&(pairs.slope() * factor)));
-    if let Some((unit, factor)) = told.filter(|_| !linked) {
+    let conversion = FORCES.into_iter().find(|(_, factor)| (0.8..1.25).contains(&(pairs.slope() * factor)));
+    if let Some((unit, factor)) = conversion.filter(|_| !linked) {
         let text = format!(
             "a share of {:.4} of what {by} would have it be: it reads as {unit}: multiply the column by {factor}",
             pairs.slope()
         );
-        notes.tell("wrong-unit", subject, true, &text);
+        notes.add("wrong-unit", subject, true, &text);
     }
 }

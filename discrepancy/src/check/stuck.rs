@@ -46,11 +46,11 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
             }
             None => continue,
         };
-        tell(notes, grid, channel, &values, &stuck);
+        add_finding(notes, grid, channel, &values, &stuck);
     }
 }
 
-fn tell(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>], stuck: &[Run]) {
+fn add_finding(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>], stuck: &[Run]) {
     let present = values.iter().flatten().count();
     let samples: usize = stuck.iter().map(|run| run.samples).sum();
     let fatal = samples as f64 > MOST * present as f64;
@@ -62,10 +62,10 @@ fn tell(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Option<f64>]
                 1e3 * grid.period_s * run.places.len() as f64,
                 if fatal { "look at the sensor and its cable, and record again" } else { "left out there" }
             );
-            notes.tell("stuck", Subject { channel: Some(channel), row }, fatal, &text);
+            notes.add("stuck", Subject { channel: Some(channel), row }, fatal, &text);
         } else if number == TOLD {
             let text = format!("stuck {} more times: left out there", stuck.len() - TOLD);
-            notes.tell("stuck", Subject { channel: Some(channel), row }, fatal, &text);
+            notes.add("stuck", Subject { channel: Some(channel), row }, fatal, &text);
         }
         grid.rows[run.places.clone()].iter().flatten().for_each(|row| notes.leave_out(channel, *row));
     }

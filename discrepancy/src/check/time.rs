@@ -6,7 +6,7 @@
 use super::grid::{SPARSEST, period_s};
 use super::notes::Notes;
 use super::smooth::quantile;
-use crate::course::{HELD_LONGEST, SHORTEST};
+use crate::gridded_record::{HELD_LONGEST, SHORTEST};
 use crate::records::{Channel, Signal};
 use plant::{Axis, PERIOD_S};
 
@@ -17,7 +17,7 @@ pub(crate) const FEWEST_ROWS: usize = 50;
 /// Rows missing in a row that are a hole and not lost samples; a command is held over the latter.
 const HOLE: usize = HELD_LONGEST + 1;
 /// Holes that are told one by one.
-const HOLES_TOLD: usize = 20;
+const HOLES_LISTED: usize = 20;
 /// Part of a period by which times must differ to be two.
 const SAME: f64 = 0.01;
 /// Share of lost rows beyond which nothing is left to use.
@@ -32,12 +32,12 @@ const JITTER: [f64; 2] = [0.02, 0.25];
 pub(super) fn check(notes: &mut Notes) {
     let record = notes.record;
     if record.is_empty() {
-        return notes.tell_time("empty", None, true, "there is no row of data: record again");
+        return notes.add_time("empty", None, true, "there is no row of data: record again");
     }
     let of_rig = Axis::ALL.into_iter().any(|axis| notes.is_of_rig(axis));
     let times = record.time_s();
     let Some(period) = period_s(times) else {
-        return notes.tell_time("too-short", Some(0), true, "time never grows: record again");
+        return notes.add_time("too-short", Some(0), true, "time never grows: record again");
     };
     order(notes, period);
     let nominal = record.nominal_period_s().or(of_rig.then_some(PERIOD_S)).unwrap_or(period);
@@ -55,7 +55,7 @@ pub(super) fn check(notes: &mut Notes) {
             format!("{FEWEST_ROWS} rows are needed")
         };
         let text = format!("{} rows over {length_s:.3} s are too short: at least {least}", times.len());
-        notes.tell_time("too-short", Some(0), true, &text);
+        notes.add_time("too-short", Some(0), true, &text);
     }
     if !(0.9..=1.1).contains(&ratio) {
         // Commands act over a whole period: a slower record does not say what acted in between.
@@ -66,7 +66,7 @@ pub(super) fn check(notes: &mut Notes) {
             1e3 * nominal,
             if fatal { "record at the rig's period" } else { "periods without a row are left open" }
         );
-        notes.tell_time("wrong-period", Some(0), fatal, &text);
+        notes.add_time("wrong-period", Some(0), fatal, &text);
     }
     lost(notes, period);
     jitter(notes, period);
@@ -81,7 +81,7 @@ fn unit_of_time(notes: &mut Notes, ratio: f64) -> bool {
         return false;
     };
     let text = format!("time reads as {unit}: divide it by {factor} so that it is in s");
-    notes.tell_time("wrong-unit", Some(0), true, &text);
+    notes.add_time("wrong-unit", Some(0), true, &text);
     true
 }
 
@@ -110,7 +110,7 @@ fn order(notes: &mut Notes, period_s: f64) {
     }
     if let Some(first) = repeated.first() {
         let text = format!("{} rows repeat the time of a neighbour: they are left out", repeated.len());
-        notes.tell_time("repeated-time", Some(*first), repeated.len() * 2 > times.len(), &text);
+        notes.add_time("repeated-time", Some(*first), repeated.len() * 2 > times.len(), &text);
     }
     if let Some(first) = jumping.first() {
         let fatal = jumping.len() as f64 > MOST_JUMPING * times.len() as f64;
@@ -120,7 +120,7 @@ fn order(notes: &mut Notes, period_s: f64) {
             jumping.len(),
             if fatal { "cut the file there, or mend their time" } else { "they are left out" }
         );
-        notes.tell_time("jumping-time", Some(*first), fatal, &text);
+        notes.add_time("jumping-time", Some(*first), fatal, &text);
     }
 }
 
@@ -187,27 +187,27 @@ fn lost(notes: &mut Notes, period_s: f64) {
                 "they are left open, and the command before goes on"
             }
         );
-        notes.tell_time("lost-samples", Some(first), fatal, &text);
+        notes.add_time("lost-samples", Some(first), fatal, &text);
     }
     // A record with a pause is as good as its parts.
     let fatal = missing as f64 > FARTHEST * rows.len() as f64;
-    for (row, gone) in holes.iter().take(HOLES_TOLD) {
+    for (row, gone) in holes.iter().take(HOLES_LISTED) {
         let text = format!(
             "a hole of {:.1} ms before {:.3} s: {}",
             1e3 * period_s * *gone as f64,
             times[*row],
             if fatal { "mend the time, or cut the file there" } else { "nothing is simulated across it" }
         );
-        notes.tell_time("gap", Some(*row), fatal, &text);
+        notes.add_time("gap", Some(*row), fatal, &text);
     }
-    if let Some((row, _)) = holes.get(HOLES_TOLD) {
-        let rest: usize = holes[HOLES_TOLD..].iter().map(|(_, gone)| gone).sum();
+    if let Some((row, _)) = holes.get(HOLES_LISTED) {
+        let rest: usize = holes[HOLES_LISTED..].iter().map(|(_, gone)| gone).sum();
         let text = format!(
             "{} more holes of {:.1} ms in all",
-            holes.len() - HOLES_TOLD,
+            holes.len() - HOLES_LISTED,
             1e3 * period_s * rest as f64
         );
-        notes.tell_time("gap", Some(*row), fatal, &text);
+        notes.add_time("gap", Some(*row), fatal, &text);
     }
 }
 
@@ -227,18 +227,18 @@ fn jitter(notes: &mut Notes, period_s: f64) {
         .collect();
     let [Some(low), Some(high)] = [quantile(&mut steps, 0.16), quantile(&mut steps, 0.84)] else { return };
     let spread = 0.5 * (high - low) / std::f64::consts::SQRT_2;
-    let told = 1e3 * spread * period_s;
+    let jitter_ms = 1e3 * spread * period_s;
     if spread > JITTER[1] {
         let text = format!(
-            "the rows come irregularly, by {told:.3} ms rms: speeds taken from them are as uncertain"
+            "the rows come irregularly, by {jitter_ms:.3} ms rms: speeds taken from them are as uncertain"
         );
-        notes.tell_time("irregular-sampling", Some(0), false, &text);
+        notes.add_time("irregular-sampling", Some(0), false, &text);
     } else if spread > JITTER[0] {
-        notes.tell_time(
+        notes.add_time(
             "jitter",
             Some(0),
             false,
-            &format!("the rows jitter by {told:.3} ms rms: that is borne"),
+            &format!("the rows jitter by {jitter_ms:.3} ms rms: that is borne"),
         );
     }
 }
@@ -261,7 +261,7 @@ fn absent(notes: &mut Notes) {
             1e2 * share,
             if fatal { "too many, record again" } else { "they are left open" }
         );
-        notes.tell("absent-values", super::notes::Subject { channel: Some(channel), row }, fatal, &text);
+        notes.add("absent-values", super::notes::Subject { channel: Some(channel), row }, fatal, &text);
     }
 }
 

@@ -38,9 +38,9 @@ fn spread(notes: &Notes, channel: Channel) -> Option<[f64; 3]> {
     Some([low?, middle?, high?])
 }
 
-fn tell(notes: &mut Notes, channel: Channel, beyond: impl Fn(f64) -> bool, text: &str) {
+fn add_finding(notes: &mut Notes, channel: Channel, beyond: impl Fn(f64) -> bool, text: &str) {
     let row = (0..notes.record.len()).find(|row| notes.value(channel, *row).is_some_and(&beyond));
-    notes.tell("wrong-unit", Subject { channel: Some(channel), row }, true, text);
+    notes.add("wrong-unit", Subject { channel: Some(channel), row }, true, text);
 }
 
 fn pressure(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
@@ -55,7 +55,7 @@ fn pressure(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
     if let Some((unit, factor)) = PRESSURES.into_iter().find(|(_, factor)| fits(low * factor, high * factor))
     {
         let text = format!("{middle} Pa cannot be, it reads as {unit}: multiply the column by {factor}");
-        return tell(notes, channel, beyond, &text);
+        return add_finding(notes, channel, beyond, &text);
     }
     let atmosphere = supply.atmospheric_pressure_pa;
     if let Some((unit, factor)) = [("Pa", 1.0)].into_iter().chain(PRESSURES).find(|(_, factor)| {
@@ -64,13 +64,13 @@ fn pressure(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
         let text = format!(
             "down to {low}: it reads as a gauge pressure in {unit}: multiply the column by {factor} and add {atmosphere} Pa"
         );
-        return tell(notes, channel, beyond, &text);
+        return add_finding(notes, channel, beyond, &text);
     }
     let text = format!(
         "{low} to {high} Pa cannot be with a supply of {} Pa: look at unit and scale",
         supply.pressure_pa
     );
-    tell(notes, channel, beyond, &text);
+    add_finding(notes, channel, beyond, &text);
 }
 
 fn position(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
@@ -90,7 +90,7 @@ fn position(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
         }
         None => format!("{low} to {high} m cannot be on a stroke of {stroke} m: look at unit and zero"),
     };
-    tell(notes, channel, |value| !fits(value), &text);
+    add_finding(notes, channel, |value| !fits(value), &text);
 }
 
 fn valve(notes: &mut Notes, channel: Channel) {
@@ -112,5 +112,5 @@ fn valve(notes: &mut Notes, channel: Channel) {
     } else {
         format!("up to {size}: a command lies between -1 and 1: look at its scale")
     };
-    tell(notes, channel, |value| value.abs() > 1.05, &text);
+    add_finding(notes, channel, |value| value.abs() > 1.05, &text);
 }

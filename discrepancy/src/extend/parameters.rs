@@ -1,7 +1,7 @@
 //! `parameter:` names and the keys of the rig file that they scale; numbers of the file by their own keys.
 
 use super::edits::Edits;
-use super::{ExtendError, told, written};
+use super::{ExtendError, quantity_text, written};
 use crate::parameters::PARAMETERS;
 use crate::report::Quantity;
 use plant::Axis;
@@ -104,31 +104,31 @@ pub(super) fn change(
             done.push(&quantity.name);
             let Some(spots) = spots(&document, path) else { continue };
             let Some(span) = spots.values.get(place) else { continue };
-            let told = told(quantity.value, quantity.standard_error, &quantity.unit);
+            let new = quantity_text(quantity.value, quantity.standard_error, &quantity.unit);
             edits.comment_above(
                 spots.key.start,
-                &format!("was {}; {told}, by {}{from}", &text[span.clone()], quantity.name),
+                &format!("was {}; {new}, by {}{from}", &text[span.clone()], quantity.name),
             );
             edits.replace(span.clone(), written(quantity.value));
             continue;
         }
         let (keys, factor) = scaling(quantity, weighed, number_of)?;
         for (at, path) in keys.into_iter().enumerate() {
-            if done.iter().any(|own| own.split('[').next() == Some(path)) {
+            if done.iter().any(|key| key.split('[').next() == Some(path)) {
                 return Err(ExtendError::Twice { what: path.to_owned() });
             }
             done.push(path);
             let Some(spots) = spots(&document, path) else { continue };
             let is_own = at == 0 && !quantity.unit.is_empty();
             let unit = if is_own { quantity.unit.as_str() } else { "" };
-            let told = if is_own {
-                told(quantity.value, quantity.standard_error, unit)
+            let new = if is_own {
+                quantity_text(quantity.value, quantity.standard_error, unit)
             } else {
                 let error =
                     quantity.standard_error.map(|error| error * factor.unwrap_or(1.0) / quantity.value);
-                format!("times {}", told(factor.unwrap_or(1.0), error, ""))
+                format!("times {}", quantity_text(factor.unwrap_or(1.0), error, ""))
             };
-            let comment = format!("was {}; {told}, by {}{from}", spots.written(text), quantity.name);
+            let comment = format!("was {}; {new}, by {}{from}", spots.written(text), quantity.name);
             edits.comment_above(spots.key.start, &comment);
             for span in &spots.values {
                 let Some(old) = number(text, span) else { continue };

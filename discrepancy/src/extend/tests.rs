@@ -300,9 +300,9 @@ fn a_records_name_cannot_break_out_of_its_comment() {
 
 #[test]
 fn comments_are_rounded_to_the_second_digit_of_the_error() {
-    assert_eq!(told(2.513_17, Some(0.0412), "N"), "2.513 +- 0.041 N");
-    assert_eq!(told(412_500.3, Some(1234.0), ""), "412500 +- 1234");
-    assert_eq!(told(7.0, None, "bar"), "7 bar, not bounded by the records");
+    assert_eq!(quantity_text(2.513_17, Some(0.0412), "N"), "2.513 +- 0.041 N");
+    assert_eq!(quantity_text(412_500.3, Some(1234.0), ""), "412500 +- 1234");
+    assert_eq!(quantity_text(7.0, None, "bar"), "7 bar, not bounded by the records");
 }
 
 #[test]

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! r residuals over the noise of their channel, J sensitivities by finite differences, L weak priors (L_u those of the unknown
-//! inputs). Coloured noise is made white ([`super::colour`]). Where constants do not describe a window, its deviations are
+//! inputs). Coloured noise is made white ([`super::noise_colour`]). Where constants do not describe a window, its deviations are
 //! widened by what is left, sqrt(chi2 / degrees of freedom) [Birge 1932]: a break-away inside it is no force. At rest a force
 //! moves nothing, and a window whose posterior is no tighter than a tenth of the prior tells nothing of that input. The ramp
 //! takes up what a force does within a window; it is not reported.
@@ -20,11 +20,11 @@
 //!
 //! Source: discrepancy-notes.md, 2; Kay 1993, Fundamentals of Statistical Signal Processing I, 4.5 and 11.5.
 
-use super::colour::colours;
+use super::noise_colour::colours;
 use super::regime::Regimes;
 use super::simulated::{Nudge, Pass, Readings};
 use super::{NORMAL_LITRES_PER_MINUTE, UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
-use crate::course::{CHANNELS, Course};
+use crate::gridded_record::{CHANNELS, GriddedRecord};
 use nalgebra::{SMatrix, SVector};
 use plant::{Axis, PERIOD_S, RigParameters};
 
@@ -105,35 +105,35 @@ struct Solution {
 }
 
 /// Estimates the unknown inputs of a record and appends them.
-pub(super) fn estimate(rig: &RigParameters, course: &Course, record: usize, unknowns: &mut Unknowns) {
-    let Some(mut pass) = Pass::new(rig, course) else { return };
-    let axes: Vec<usize> = (0..2).filter(|axis| course.measured[*axis]).collect();
+pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, record: usize, unknowns: &mut Unknowns) {
+    let Some(mut pass) = Pass::new(rig, gridded) else { return };
+    let axes: Vec<usize> = (0..2).filter(|axis| gridded.measured[*axis]).collect();
     let colours =
-        [0, 1].map(|axis| if course.measured[axis] { colours(course, axis) } else { [0.0; CHANNELS] });
+        [0, 1].map(|axis| if gridded.measured[axis] { colours(gridded, axis) } else { [0.0; CHANNELS] });
     let nudges = nudges();
     let mut solved: [Vec<Solved>; 2] = [Vec::new(), Vec::new()];
     let mut filled = 0;
     // The last window needs a period behind it.
-    for window in 0..(course.len() - 1) / WINDOW {
+    for window in 0..(gridded.len() - 1) / WINDOW {
         let from = window * WINDOW;
-        let whole = !course.gaps[from..=from + WINDOW].iter().any(|gap| *gap);
+        let whole = !gridded.gaps[from..=from + WINDOW].iter().any(|gap| *gap);
         filled = if whole { filled + 1 } else { 0 };
         if filled > FILLING
             && let Some(looks) = pass.look(from, &nudges)
         {
             for axis in &axes {
-                let seen = Seen { course, axis: *axis, from, colours: &colours[*axis], looks: &looks };
+                let seen = Seen { gridded, axis: *axis, from, colours: &colours[*axis], looks: &looks };
                 solved[*axis].extend(seen.solve());
             }
         }
         pass.go_on(from, WINDOW);
     }
     for axis in axes {
-        gather(rig, course, record, axis, &solved[axis], &mut unknowns.axes[axis]);
+        gather(rig, gridded, record, axis, &solved[axis], &mut unknowns.axes[axis]);
     }
     linkage::gather(
         rig,
-        course,
+        gridded,
         record,
         pass.contact_n(),
         [colours[0][0], colours[1][0]],
@@ -159,7 +159,7 @@ fn nudges() -> Vec<Nudge> {
 
 /// A window of an axis beside its looks.
 struct Seen<'a> {
-    course: &'a Course,
+    gridded: &'a GriddedRecord,
     axis: usize,
     from: usize,
     colours: &'a [f64; CHANNELS],
@@ -182,19 +182,19 @@ impl Seen<'_> {
                     before = None;
                     continue;
                 };
-                let (mut own, mut left, mut one) = (row, residual, 1.0 / self.noise(channel));
+                let (mut whitened, mut left, mut one) = (row, residual, 1.0 / self.noise(channel));
                 if let Some((row, residual)) = before {
-                    own = (own - row * phi) / white;
+                    whitened = (whitened - row * phi) / white;
                     left = (left - phi * residual) / white;
                     one *= (1.0 - phi) / white;
                 }
                 before = Some((row, residual));
-                normal.syger(1.0, &own, &own, 1.0);
-                right += own * left;
+                normal.syger(1.0, &whitened, &whitened, 1.0);
+                right += whitened * left;
                 squares += left * left;
                 used += 1;
                 if channel >= 2 {
-                    pressure[channel - 2] += own * one;
+                    pressure[channel - 2] += whitened * one;
                 }
             }
         }
@@ -217,8 +217,8 @@ impl Seen<'_> {
 
     /// A reading's sensitivities and residual over its noise.
     fn row(&self, at: usize, channel: usize) -> Option<(Theta, f64)> {
-        let sample = self.course.samples[self.from + at][self.axis][channel]?;
-        let rests = self.course.points[self.from][self.axis].rod_velocity_m_per_s == 0.0;
+        let sample = self.gridded.samples[self.from + at][self.axis][channel]?;
+        let rests = self.gridded.points[self.from][self.axis].rod_velocity_m_per_s == 0.0;
         let weight = 1.0 / self.noise(channel);
         let baseline = self.looks[0][self.axis][at][channel];
         let mut row = Theta::zeros();
@@ -250,12 +250,12 @@ impl Seen<'_> {
     }
 
     fn noise(&self, channel: usize) -> f64 {
-        self.course.noise[self.axis][channel]
+        self.gridded.noise[self.axis][channel]
     }
 
     /// Whether the contact's force is what this axis' sensor read: then it tells nothing else.
     fn force_is_input(&self) -> bool {
-        self.course.linked && self.axis == usize::from(self.course.measured[1])
+        self.gridded.linked && self.axis == usize::from(self.gridded.measured[1])
     }
 }
 
@@ -295,7 +295,7 @@ impl Equations {
 /// Appends what the windows of an axis tell.
 fn gather(
     rig: &RigParameters,
-    course: &Course,
+    gridded: &GriddedRecord,
     record: usize,
     axis: usize,
     solved: &[Solved],
@@ -303,20 +303,20 @@ fn gather(
 ) {
     let offsets: Vec<f64> = solved
         .iter()
-        .filter(|solved| tells(&solved.free, OFFSET))
+        .filter(|solved| is_informative(&solved.free, OFFSET))
         .map(|solved| solved.free.theta[OFFSET] / solved.free.deviation[OFFSET])
         .collect();
     let squares = offsets.iter().map(|offset| offset * offset).sum::<f64>() / offsets.len().max(1) as f64;
     let faulty = squares.sqrt() > OFFSET_OVER_NOISE;
     for Solved { from, smooth, baseline_force_n, free, bound } in solved {
         let best = if faulty { free } else { bound };
-        let regimes = Regimes::of(rig, course, axis, *from);
+        let regimes = Regimes::of(rig, gridded, axis, *from);
         let places = [(best, FLOW_A), (best, FLOW_B), (best, FORCE), (free, OFFSET)];
         for (balance, (solution, number)) in places.into_iter().enumerate() {
-            if !tells(solution, number) || !smooth && number != OFFSET {
+            if !is_informative(solution, number) || !smooth && number != OFFSET {
                 continue;
             }
-            let mut variables = variables(course, axis, *from, balance);
+            let mut variables = variables(gridded, axis, *from, balance);
             if balance == 3 {
                 // Over what the sensor reads itself, its every error would be a law.
                 variables[super::FORCE] = *baseline_force_n;
@@ -336,26 +336,31 @@ fn gather(
 }
 
 /// Whether a window tells something of an unknown input.
-fn tells(solution: &Solution, number: usize) -> bool {
+fn is_informative(solution: &Solution, number: usize) -> bool {
     solution.posterior[number] < NOTHING * PRIORS[number] && solution.deviation[number] > 0.0
 }
 
 /// The variables of a window, in the order of [`VARIABLES`].
-pub(super) fn variables(course: &Course, axis: usize, from: usize, balance: usize) -> [f64; VARIABLES.len()] {
-    let points = &course.points[from..from + WINDOW];
+pub(super) fn variables(
+    gridded: &GriddedRecord,
+    axis: usize,
+    from: usize,
+    balance: usize,
+) -> [f64; VARIABLES.len()] {
+    let points = &gridded.points[from..from + WINDOW];
     let n = WINDOW as f64;
     let mean = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(of).sum::<f64>() / n;
     let x = mean(&|at| points[at][axis].extension_m);
     let v = mean(&|at| points[at][axis].rod_velocity_m_per_s);
     let [a, b] = [0, 1].map(|chamber| mean(&|at| points[at][axis].pressures_pa[chamber]));
-    let command = |at: usize| course.inputs[at].valve[axis];
+    let command = |at: usize| gridded.inputs[at].valve[axis];
     let u = mean(&|at| command(from + at));
     let before = from.saturating_sub(1);
     let rate = (command(from + WINDOW - 1) - command(before)) / (n * PERIOD_S);
     let forces: Vec<f64> =
-        course.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][1]).collect();
+        gridded.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][1]).collect();
     let force = if forces.is_empty() { 0.0 } else { forces.iter().sum::<f64>() / forces.len() as f64 };
-    let end = &course.points[from + WINDOW][axis];
+    let end = &gridded.points[from + WINDOW][axis];
     let slope =
         |chamber: usize| (end.pressures_pa[chamber] - points[0][axis].pressures_pa[chamber]) / (n * PERIOD_S);
     let dp = match balance {

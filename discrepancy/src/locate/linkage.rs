@@ -10,11 +10,11 @@
 //!
 //! Source: rig-model.md, Masses and linkage.
 
-use super::colour::widens;
 use super::estimate::variables;
+use super::noise_colour::widens;
 use super::regime::Regimes;
 use super::{UnknownPoint, VARIABLES, WINDOW};
-use crate::course::Course;
+use crate::gridded_record::GriddedRecord;
 use plant::{PERIOD_S, RigParameters};
 
 /// Force above which the rods touch beyond doubt, over the noise of its sensor.
@@ -23,30 +23,30 @@ const TOUCHING: f64 = 10.0;
 /// Appends the linkage's windows of a record with both axes.
 pub(super) fn gather(
     rig: &RigParameters,
-    course: &Course,
+    gridded: &GriddedRecord,
     record: usize,
     contact_n: &[f64],
     position_colours: [f64; 2],
     points: &mut Vec<UnknownPoint>,
 ) {
-    if !course.linked || course.measured != [true, true] {
+    if !gridded.linked || gridded.measured != [true, true] {
         return;
     }
     let linkage = rig.linkage();
-    let least_n = TOUCHING * course.noise[1][1];
-    for window in 0..(course.len() - 1) / WINDOW {
+    let least_n = TOUCHING * gridded.noise[1][1];
+    for window in 0..(gridded.len() - 1) / WINDOW {
         let from = window * WINDOW;
         let forces = &contact_n[from..from + WINDOW];
         let side = forces[0].signum();
         let touching = forces.iter().all(|force| force * side > least_n);
-        if !touching || course.gaps[from..=from + WINDOW].iter().any(|gap| *gap) {
+        if !touching || gridded.gaps[from..=from + WINDOW].iter().any(|gap| *gap) {
             continue;
         }
         let mut sum_n = 0.0;
         let mut count = 0.0;
         let mut ends_m = Vec::with_capacity(WINDOW);
         for (at, force_n) in forces.iter().enumerate() {
-            let samples = &course.samples[from + at];
+            let samples = &gridded.samples[from + at];
             let (Some(drive_m), Some(load_m)) = (samples[0][0], samples[1][0]) else { continue };
             let distance_m = load_m - drive_m;
             ends_m.push(distance_m);
@@ -57,23 +57,23 @@ pub(super) fn gather(
             continue;
         }
         let parted_m_per_s = slope(&ends_m) / PERIOD_S;
-        let [drive_m, load_m] = [0, 1].map(|axis| course.noise[axis][0] * widens(position_colours[axis]));
+        let [drive_m, load_m] = [0, 1].map(|axis| gridded.noise[axis][0] * widens(position_colours[axis]));
         let noise_m = drive_m.hypot(load_m);
         let n = count;
         // The damping takes the slope of the same distances; both are independent about the middle of a window.
         let slope_noise_m_per_s = noise_m * (12.0 / (n * n * n)).sqrt() / PERIOD_S;
         let stiff_n = linkage.stiffness_n_per_m * noise_m / n.sqrt();
         let damped_n = linkage.damping_n_s_per_m * slope_noise_m_per_s;
-        let mut variables: [f64; VARIABLES.len()] = variables(course, 0, from, 2);
+        let mut variables: [f64; VARIABLES.len()] = variables(gridded, 0, from, 2);
         variables[super::FORCE] = forces.iter().sum::<f64>() / WINDOW as f64;
         points.push(UnknownPoint {
             record,
             window,
             value: sum_n / count - linkage.damping_n_s_per_m * parted_m_per_s,
-            deviation: stiff_n.hypot(damped_n).hypot(course.noise[1][1] / n.sqrt()),
+            deviation: stiff_n.hypot(damped_n).hypot(gridded.noise[1][1] / n.sqrt()),
             variables,
             per_pressure_offset: [0.0; 2],
-            regimes: Regimes::of(rig, course, 0, from),
+            regimes: Regimes::of(rig, gridded, 0, from),
         });
     }
 }

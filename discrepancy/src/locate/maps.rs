@@ -39,15 +39,15 @@ pub fn map(series: &UnknownSeries, variable: usize) -> Curve {
     };
     let places = bins(&series.points.iter().map(|point| point.variables[variable]).collect::<Vec<_>>());
     for bin in 0..BINS {
-        let own: Vec<_> = series
+        let binned: Vec<_> = series
             .points
             .iter()
             .zip(&places)
             .filter(|(_, place)| **place == bin)
             .map(|(point, _)| point)
             .collect();
-        let Some((value, band)) = told(&own) else { continue };
-        curve.at.push(mean(&own, |point| point.variables[variable]));
+        let Some((value, band)) = mean_and_band(&binned) else { continue };
+        curve.at.push(mean(&binned, |point| point.variables[variable]));
         curve.value.push(value);
         curve.band.push(band);
     }
@@ -67,23 +67,25 @@ pub fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
     };
     // Values that many points share leave bins empty.
     let kept = [0, 1].map(|side| {
-        let there = |own: &usize| !of(&|at| bin(at, side) == *own).is_empty();
+        let there = |place: &usize| !of(&|at| bin(at, side) == *place).is_empty();
         (0..SURFACE[side]).filter(there).collect::<Vec<_>>()
     });
     let at = [0, 1].map(|side| {
-        let middle =
-            |own: &usize| mean(&of(&|at| bin(at, side) == *own), |point| point.variables[variables[side]]);
+        let middle = |place: &usize| {
+            mean(&of(&|at| bin(at, side) == *place), |point| point.variables[variables[side]])
+        };
         kept[side].iter().map(middle).collect()
     });
     let cells: Vec<Vec<Option<(f64, f64)>>> = kept[1]
         .iter()
         .map(|second| {
-            let cell = |first: &usize| told(&of(&|at| bin(at, 0) == *first && bin(at, 1) == *second));
+            let cell =
+                |first: &usize| mean_and_band(&of(&|at| bin(at, 0) == *first && bin(at, 1) == *second));
             kept[0].iter().map(cell).collect()
         })
         .collect();
     let rows = |of: fn((f64, f64)) -> f64| {
-        cells.iter().map(|row| row.iter().map(|own| own.map(of)).collect()).collect()
+        cells.iter().map(|row| row.iter().map(|cell| cell.map(of)).collect()).collect()
     };
     Surface {
         variables: variables.map(|variable| VARIABLES[variable].name.to_owned()),
@@ -102,7 +104,7 @@ fn mean(points: &[&UnknownPoint], of: impl Fn(&UnknownPoint) -> f64) -> f64 {
 }
 
 /// Their value and two standard errors of it; `None` of too few.
-fn told(points: &[&UnknownPoint]) -> Option<(f64, f64)> {
+fn mean_and_band(points: &[&UnknownPoint]) -> Option<(f64, f64)> {
     if points.len() < LEAST {
         return None;
     }
@@ -121,10 +123,10 @@ pub fn bins(values: &[f64]) -> Vec<usize> {
     let mut places = vec![0; values.len()];
     let mut last: Option<(f64, usize)> = None;
     for (rank, at) in order.into_iter().enumerate() {
-        let own = rank * BINS / values.len();
+        let even = rank * BINS / values.len();
         let bin = match last {
             Some((value, bin)) if value == values[at] => bin,
-            _ => own,
+            _ => even,
         };
         places[at] = bin;
         last = Some((values[at], bin));
@@ -139,8 +141,8 @@ pub fn few_bins(values: &[f64], most: usize) -> Vec<usize> {
     apart.sort_unstable_by(f64::total_cmp);
     apart.dedup();
     let place = |(value, bin): (&f64, usize)| {
-        let own = apart.partition_point(|other| other < value);
-        if apart.len() <= most { own } else { bin * most / BINS }
+        let rank = apart.partition_point(|other| other < value);
+        if apart.len() <= most { rank } else { bin * most / BINS }
     };
     values.iter().zip(bins(values)).map(place).collect()
 }
@@ -191,7 +193,7 @@ mod tests {
         };
         let points = (0..1200)
             .map(point)
-            .filter(|own| own.variables[DIRECTION] >= 0.0 || own.variables[POSITION] < 0.35)
+            .filter(|point| point.variables[DIRECTION] >= 0.0 || point.variables[POSITION] < 0.35)
             .collect();
         let series = UnknownSeries { balance: "drive.force".to_owned(), unit: "N", points };
         let surface = surface(&series, [POSITION, DIRECTION]);

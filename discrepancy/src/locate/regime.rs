@@ -3,7 +3,7 @@
 //! A window is in one of hold, onset, motion-out and motion-in, and besides in near-ends and valve-edge where it is so.
 
 use super::WINDOW;
-use crate::course::{Course, Point};
+use crate::gridded_record::{GriddedRecord, Point};
 use plant::RigParameters;
 
 /// The regimes, in the order of the report.
@@ -25,15 +25,15 @@ pub struct Regimes {
 
 impl Regimes {
     /// The regimes of an axis in a window that starts at a period.
-    pub(super) fn of(rig: &RigParameters, course: &Course, axis: usize, from: usize) -> Self {
-        let point = |period: usize| -> &Point { &course.points[period.min(course.len() - 1)][axis] };
+    pub(super) fn of(rig: &RigParameters, record: &GriddedRecord, axis: usize, from: usize) -> Self {
+        let point = |period: usize| -> &Point { &record.points[period.min(record.len() - 1)][axis] };
         let rests = |period: usize| point(period).rod_velocity_m_per_s == 0.0;
         let hold = (from..=from + WINDOW).all(rests);
         let onset = !hold && (from.saturating_sub(ONSET)..from + WINDOW).any(rests);
         let out = point(from + WINDOW / 2).rod_velocity_m_per_s >= 0.0;
         let middle_m = point(from + WINDOW / 2).extension_m;
         let near = middle_m.min(rig.cylinder().stroke_m - middle_m) < NEAR_M;
-        let command = |period: usize| course.inputs[period].valve[axis];
+        let command = |period: usize| record.inputs[period].valve[axis];
         let edge = (from.saturating_sub(AFTER_EDGE).max(1)..from + WINDOW)
             .any(|period| (command(period) - command(period - 1)).abs() > EDGE);
         let moving = !hold && !onset;

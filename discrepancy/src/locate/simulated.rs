@@ -9,8 +9,8 @@
 //! stored air at the end of each period.
 
 use super::WINDOW;
-use crate::course::{CHANNELS, Course};
-use crate::windows::seated;
+use crate::gridded_record::{CHANNELS, GriddedRecord};
+use crate::windows::state_at;
 use plant::{Inputs, PERIOD_S, Plant, RigParameters, Setup};
 
 /// Readings of a window, as whoever has no noise sees them.
@@ -31,22 +31,22 @@ pub(super) struct Nudge {
 
 /// The plant that goes along a record.
 pub(super) struct Pass<'a> {
-    course: &'a Course,
+    record: &'a GriddedRecord,
     contact_n: Vec<f64>,
     plant: Plant,
 }
 
 impl<'a> Pass<'a> {
     /// A plant at the beginning of a record; `None` when the rig cannot be in such a state.
-    pub(super) fn new(rig: &RigParameters, course: &'a Course) -> Option<Self> {
-        let setup = Setup { added_mass_kg: course.added_mass_kg, ..Setup::default() };
+    pub(super) fn new(rig: &RigParameters, record: &'a GriddedRecord) -> Option<Self> {
+        let setup = Setup { added_mass_kg: record.added_mass_kg, ..Setup::default() };
         let mut plant = Plant::new(rig, &setup).ok()?;
         let mut state = *plant.state();
-        for (axis, own) in state.axes.iter_mut().enumerate() {
-            own.spool = course.inputs[0].valve[axis];
+        for (axis, axis_state) in state.axes.iter_mut().enumerate() {
+            axis_state.spool = record.inputs[0].valve[axis];
         }
         plant.go_on_in(&state).ok()?;
-        Some(Pass { course, contact_n: contact_forces(rig, course), plant })
+        Some(Pass { record, contact_n: contact_forces(rig, record), plant })
     }
 
     /// F_c over the record, N, in +x on the carriage; all 0 when not linked.
@@ -62,7 +62,7 @@ impl<'a> Pass<'a> {
     fn run(&self, from: usize, nudge: &Nudge) -> Option<Readings> {
         let mut plant = self.plant.clone();
         let points = [0, 1].map(|axis| {
-            let mut point = self.course.points[from][axis];
+            let mut point = self.record.points[from][axis];
             let [x, v, a, b] = nudge.start[axis];
             point.extension_m += x;
             point.rod_velocity_m_per_s += v;
@@ -70,10 +70,10 @@ impl<'a> Pass<'a> {
             point.pressures_pa[1] += b;
             point
         });
-        plant.go_on_in(&seated(&plant, &points, self.course.measured)).ok()?;
+        plant.go_on_in(&state_at(&plant, &points, self.record.measured)).ok()?;
         let flows = nudge.flows_m3_per_s.iter().flatten().any(|flow| *flow != 0.0);
         let mut read = [[[0.0; CHANNELS]; 2]; WINDOW];
-        for (at, own) in read.iter_mut().enumerate() {
+        for (at, readings) in read.iter_mut().enumerate() {
             let share = (at as f64 + 0.5) / WINDOW as f64 * 2.0 - 1.0;
             let forces = [0, 1].map(|axis| nudge.force_n[axis] + nudge.ramp_n[axis] * share);
             let inputs = self.inputs(from + at, forces);
@@ -84,26 +84,26 @@ impl<'a> Pass<'a> {
                 hand_force_load_n: -contact_n - forces[1],
                 ..inputs
             };
-            *own = plant.shown(&plant.truth(&instant));
-            own.iter_mut().zip(forces).for_each(|(reading, force_n)| reading[1] += force_n);
+            *readings = plant.shown(&plant.truth(&instant));
+            readings.iter_mut().zip(forces).for_each(|(reading, force_n)| reading[1] += force_n);
             plant.step(&inputs);
             if flows {
                 let mut state = *plant.state();
-                for (own, flow) in state.axes.iter_mut().zip(nudge.flows_m3_per_s) {
+                for (axis_state, flow) in state.axes.iter_mut().zip(nudge.flows_m3_per_s) {
                     let air_j = plant.rig().gas().normal_pressure_pa * PERIOD_S;
-                    own.stored_air_a_j += air_j * flow[0];
-                    own.stored_air_b_j += air_j * flow[1];
+                    axis_state.stored_air_a_j += air_j * flow[0];
+                    axis_state.stored_air_b_j += air_j * flow[1];
                 }
                 plant.go_on_in(&state).ok()?;
             }
         }
-        Some([0, 1].map(|axis| read.map(|own| own[axis])))
+        Some([0, 1].map(|axis| read.map(|readings| readings[axis])))
     }
 
     /// Goes on to the next window, seated where the record was.
     pub(super) fn go_on(&mut self, from: usize, periods: usize) {
-        if !self.course.gaps[from] {
-            let start = seated(&self.plant, &self.course.points[from], self.course.measured);
+        if !self.record.gaps[from] {
+            let start = state_at(&self.plant, &self.record.points[from], self.record.measured);
             // Points that the rig cannot have come of a broken record; the plant then goes on alone.
             let _ = self.plant.go_on_in(&start);
         }
@@ -117,7 +117,7 @@ impl<'a> Pass<'a> {
     fn inputs(&self, at: usize, forces_n: [f64; 2]) -> Inputs {
         let contact_n = 0.5 * (self.contact_n[at] + self.contact_n[(at + 1).min(self.contact_n.len() - 1)]);
         Inputs {
-            valve: self.course.inputs[at].valve,
+            valve: self.record.inputs[at].valve,
             hand_force_carriage_n: contact_n + forces_n[0],
             hand_force_load_n: -contact_n - forces_n[1],
         }
@@ -125,25 +125,25 @@ impl<'a> Pass<'a> {
 }
 
 /// The contact's force from what the sensors read: -F of the load, or of the drive without what its carriage takes.
-fn contact_forces(rig: &RigParameters, course: &Course) -> Vec<f64> {
-    if !course.linked {
-        return vec![0.0; course.len()];
+fn contact_forces(rig: &RigParameters, record: &GriddedRecord) -> Vec<f64> {
+    if !record.linked {
+        return vec![0.0; record.len()];
     }
-    let axis = usize::from(course.measured[1]);
-    let behind_kg = rig.mass().carriage_kg + course.added_mass_kg;
+    let axis = usize::from(record.measured[1]);
+    let behind_kg = rig.mass().carriage_kg + record.added_mass_kg;
     let mut last_n = 0.0;
-    (0..course.len())
+    (0..record.len())
         .map(|at| {
-            let inertia_n = if axis == 0 { behind_kg * acceleration(course, at) } else { 0.0 };
-            last_n = course.samples[at][axis][1].map_or(last_n, |force_n| inertia_n - force_n);
+            let inertia_n = if axis == 0 { behind_kg * acceleration(record, at) } else { 0.0 };
+            last_n = record.samples[at][axis][1].map_or(last_n, |force_n| inertia_n - force_n);
             last_n
         })
         .collect()
 }
 
 /// Acceleration of the drive from the speeds 5 ms before and after, m/s^2.
-fn acceleration(course: &Course, at: usize) -> f64 {
-    let (from, to) = (at.saturating_sub(5), (at + 5).min(course.len() - 1));
-    let speed = |at: usize| course.points[at][0].rod_velocity_m_per_s;
+fn acceleration(record: &GriddedRecord, at: usize) -> f64 {
+    let (from, to) = (at.saturating_sub(5), (at + 5).min(record.len() - 1));
+    let speed = |at: usize| record.points[at][0].rod_velocity_m_per_s;
     (speed(to) - speed(from)) / ((to - from) as f64 * PERIOD_S)
 }

@@ -19,18 +19,18 @@ const PITCHES: u32 = 40;
 const PROBE: f64 = 0.3;
 
 /// The model with the ripple of its last effect where it explains most, if that explains more; other effects have none.
-pub(super) fn at_best_pitch(engine: &Engine<'_>, own: &Refit) -> Refit {
-    best(engine, own).filter(|other| other.loss < own.loss).unwrap_or_else(|| own.clone())
+pub(super) fn at_best_pitch(engine: &Engine<'_>, model: &Refit) -> Refit {
+    best(engine, model).filter(|other| other.loss < model.loss).unwrap_or_else(|| model.clone())
 }
 
-fn best(engine: &Engine<'_>, own: &Refit) -> Option<Refit> {
-    let candidate = own.placed.last()?.candidate;
+fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
+    let candidate = model.placed.last()?.candidate;
     let key_of = |name: &str| candidate.sheet.keys.iter().position(|key| key.name == name);
     let (ripple, pitch) = (key_of("ripple_n")?, key_of("pitch_mm")?);
-    let mut plain = own.placed.clone();
+    let mut plain = model.placed.clone();
     let last = plain.len() - 1;
     plain[last].coordinates[ripple] = 0.0;
-    let rig = rig_of(engine.rig(), &plain, &own.factors)?;
+    let rig = rig_of(engine.rig(), &plain, &model.factors)?;
     let [simulated, coarse] = [engine.simulate(&rig), engine.simulate_coarsely(&rig)];
     let [least, most] = candidate.sheet.keys[pitch].drawn;
     let step = (1.0 / least - 1.0 / most) / f64::from(PITCHES - 1);
@@ -44,12 +44,12 @@ fn best(engine: &Engine<'_>, own: &Refit) -> Option<Refit> {
     let ripples: Vec<Vec<f64>> = pitches
         .par_iter()
         .map(|at| {
-            let rig = rig_of(engine.rig(), &with(PROBE, *at), &own.factors)?;
+            let rig = rig_of(engine.rig(), &with(PROBE, *at), &model.factors)?;
             Some(engine.difference(&engine.simulate_coarsely(&rig), &coarse))
         })
         .collect::<Option<_>>()?;
-    let around = around_of(engine, own);
-    let numbers = coordinate_columns(engine, &own.factors, &plain, &simulated)?;
+    let around = around_of(engine, model);
+    let numbers = coordinate_columns(engine, &model.factors, &plain, &simulated)?;
     let always = COUNT + numbers.len();
     let columns: Vec<&[f64]> =
         around.columns.iter().chain(&numbers).chain(&ripples).map(Vec::as_slice).collect();

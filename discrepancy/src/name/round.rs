@@ -5,11 +5,11 @@
 //!                                                                            their own, at their pitch, from their own home
 //! ```
 
-use super::home::{Placement, at_home, gap_start};
-use super::joined::same;
+use super::elimination::same;
+use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
-use super::settle::ended;
-use super::{EXCESS, NUMBER_COSTS, STEPS, WORTH_A_FIT, is_large, refine};
+use super::start_states::{Restarted, gap_start, refit_with_starts};
+use super::{EXCESS, NUMBER_COSTS, STEPS, WORTH_A_FIT, is_large, relinearise};
 use crate::engine::Engine;
 use crate::refit::{Around, Placed, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
@@ -36,7 +36,7 @@ const BACKLASH: &str = "coupling-backlash";
 /// Candidates that are worth a fit.
 pub(super) struct Contenders {
     /// Loss of the model without any of them, as screening sees it.
-    nothing: f64,
+    null_loss: f64,
     /// The one that gains most first.
     best: Vec<Screened>,
     /// A gap between linked rods, however little screening sees of it.
@@ -49,7 +49,7 @@ impl Contenders {
     /// The last round's threshold is that of a residual in which much was still missing: it tells when to stop looking, not what
     /// to refuse.
     pub(super) fn of(
-        (nothing, screened): (f64, Vec<Screened>),
+        (null_loss, screened): (f64, Vec<Screened>),
         engine: &Engine<'_>,
         columns: &Columns,
         model: &Refit,
@@ -58,15 +58,15 @@ impl Contenders {
         let taken = |screened: &Screened| model.placed.iter().any(|placed| same(placed, &screened.start));
         let mut best: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
         best.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        let most = nothing - best.first()?.loss;
+        let most = null_loss - best.first()?.loss;
         if most < WORTH_A_FIT.max(LOOKED_FOR * threshold) {
             return None;
         }
-        let is_gap = |own: &&Screened| columns.candidates[own.at].sheet.name == BACKLASH;
+        let is_gap = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
         let gap = if engine.is_linked() { best.iter().find(is_gap).cloned() } else { None };
         best.truncate(CONTENDERS);
-        best.retain(|screened| nothing - screened.loss > CONTENDS * most);
-        Some(Self { nothing, best, gap })
+        best.retain(|screened| null_loss - screened.loss > CONTENDS * most);
+        Some(Self { null_loss, best, gap })
     }
 
     pub(super) fn count(&self) -> usize {
@@ -79,7 +79,7 @@ pub(super) struct Round<'a> {
     /// The best first.
     pub(super) fits: Vec<Refit>,
     /// Those of them that were fitted again, each with its home.
-    at_home: Vec<Placement<'a>>,
+    restarted: Vec<Restarted<'a>>,
 }
 
 impl<'a> Round<'a> {
@@ -92,26 +92,28 @@ impl<'a> Round<'a> {
         contenders: &Contenders,
         progress: &mut dyn FnMut(&str),
     ) -> Option<Self> {
-        let Contenders { nothing, best, gap } = contenders;
+        let Contenders { null_loss, best, gap } = contenders;
         let mut fits: Vec<Refit> = best
             .par_iter()
             .filter_map(|screened| {
-                let start = best_start(engine, point, &model.placed, screened, *nothing);
+                let start = best_start(engine, point, &model.placed, screened, *null_loss);
                 refit_steps(engine, point, &start, NUMBER_COSTS, STEPS)
             })
             .collect();
         sort(&mut fits);
         // Sensitivities of the parameters were those of the model before: the best get their own. What they gain is held against
         // what the parameters alone reach with the same sensitivities.
-        let gain = nothing - fits.first()?.loss;
-        let near = fits.iter().take(REFINED).filter(|own| nothing - own.loss >= 0.5 * gain).count().max(1);
-        let at_home = fits[..near]
+        let gain = null_loss - fits.first()?.loss;
+        let near = fits.iter().take(REFINED).filter(|fit| null_loss - fit.loss >= 0.5 * gain).count().max(1);
+        let restarted = fits[..near]
             .par_iter()
-            .map(|own| at_home(engine, &refine(engine, &at_best_pitch(engine, own)), NUMBER_COSTS))
+            .map(|fit| {
+                refit_with_starts(engine, &relinearise(engine, &at_best_pitch(engine, fit)), NUMBER_COSTS)
+            })
             .collect();
-        let mut round = Self { fits, at_home };
-        round.fits.splice(..near, round.at_home.iter().map(|own| own.fit.clone()));
-        let least = round.fits.iter().map(|own| own.loss).fold(model.loss, f64::min);
+        let mut round = Self { fits, restarted };
+        round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
+        let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
         if let Some(gap) = gap
             && least > EXCESS * engine.freedom().iter().sum::<f64>()
         {
@@ -126,13 +128,13 @@ impl<'a> Round<'a> {
     /// Where others come close to the best, fits all of them in the simulator to the end: with straight lines of the parameters,
     /// one that leads all of them far from the file may pass the one that is right.
     fn run_off(&mut self, engine: &Engine<'a>, model: &Refit) {
-        let Some(best) = self.fits.first().map(|own| own.loss) else { return };
-        let is_close = |own: &&Refit| own.loss - best < CLOSE * (model.loss - best);
+        let Some(best) = self.fits.first().map(|fit| fit.loss) else { return };
+        let is_close = |fit: &&Refit| fit.loss - best < CLOSE * (model.loss - best);
         let close = self.fits.iter().take(REFINED).filter(is_close).count();
         if close < 2 || engine.is_linked() {
             return;
         }
-        let fits: Vec<Refit> = self.fits[..close].par_iter().map(|own| ended(engine, own)).collect();
+        let fits: Vec<Refit> = self.fits[..close].par_iter().map(|fit| fit_all(engine, fit)).collect();
         self.fits.splice(..close, fits);
         sort(&mut self.fits);
     }
@@ -140,26 +142,29 @@ impl<'a> Round<'a> {
     /// Fits a gap from another width than the one that screening says.
     fn with_gap(&mut self, engine: &Engine<'a>, point: &Around, model: &Refit, gap: &Screened) {
         let start = gap_start(engine, point, &model.placed, &gap.start);
-        let Some(own) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
-        let own = at_home(engine, &refine(engine, &own), NUMBER_COSTS);
+        let Some(fit) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
+        let restarted = refit_with_starts(engine, &relinearise(engine, &fit), NUMBER_COSTS);
         // The one fitted from where screening said is the same effect, and no alternative to it.
-        let is_gap = |other: &Refit| other.placed.last().is_some_and(|own| same(own, &gap.start));
-        if self.fits.iter().filter(|other| is_gap(other)).all(|other| own.fit.loss < other.loss) {
+        let is_gap = |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &gap.start));
+        if self.fits.iter().filter(|other| is_gap(other)).all(|other| restarted.fit.loss < other.loss) {
             self.fits.retain(|other| !is_gap(other));
-            self.fits.push(own.fit.clone());
-            self.at_home.push(own);
+            self.fits.push(restarted.fit.clone());
+            self.restarted.push(restarted);
         }
     }
 
     /// What is smaller than what occurs is no explanation, however well it fits.
     pub(super) fn keep_large(&mut self) {
-        self.fits.retain(|own| own.placed.last().is_some_and(is_large));
+        self.fits.retain(|fit| fit.placed.last().is_some_and(is_large));
     }
 
     /// The records as the best model meets them, where it has a home of its own.
-    pub(super) fn take_home(&mut self) -> Option<Engine<'a>> {
+    pub(super) fn take_engine(&mut self) -> Option<Engine<'a>> {
         let best = self.fits.first()?;
-        self.at_home.iter_mut().find(|own| own.fit.loss == best.loss).and_then(|own| own.home.take())
+        self.restarted
+            .iter_mut()
+            .find(|restarted| restarted.fit.loss == best.loss)
+            .and_then(|restarted| restarted.engine.take())
     }
 }
 
@@ -174,23 +179,25 @@ fn best_start(
     point: &Around,
     model: &[Placed],
     screened: &Screened,
-    nothing: f64,
+    null_loss: f64,
 ) -> Vec<Placed> {
     let with = |amplitude: f64| {
         let mut placed = model.to_vec();
-        let mut own = screened.start.clone();
-        own.coordinates[0] = amplitude;
-        placed.push(own);
+        let mut effect = screened.start.clone();
+        effect.coordinates[0] = amplitude;
+        placed.push(effect);
         placed
     };
-    let told = screened.start.coordinates[0];
-    let own = loss_at(engine, point, &with(told));
-    if own < screened.loss + BELIEVED * (nothing - screened.loss) {
-        return with(told);
+    let screened_z = screened.start.coordinates[0];
+    let loss = loss_at(engine, point, &with(screened_z));
+    if loss < screened.loss + BELIEVED * (null_loss - screened.loss) {
+        return with(screened_z);
     }
     let [least, most] = screened.start.candidate.range(0);
-    let tried = AMPLITUDES.iter().map(|size| size * told.signum()).filter(|z| *z >= least && *z <= most);
+    let tried =
+        AMPLITUDES.iter().map(|size| size * screened_z.signum()).filter(|z| *z >= least && *z <= most);
     let losses = tried.map(|z| (loss_at(engine, point, &with(z)), z));
-    let (_, best) = losses.chain([(own, told)]).min_by(|a, b| a.0.total_cmp(&b.0)).expect("one at least");
+    let (_, best) =
+        losses.chain([(loss, screened_z)]).min_by(|a, b| a.0.total_cmp(&b.0)).expect("one at least");
     with(best)
 }

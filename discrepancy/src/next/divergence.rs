@@ -22,10 +22,10 @@
 //! Source: discrepancy-notes.md, 1 and pipeline 9; Hunter and Reiner 1965, Technometrics 7(3): designs for discriminating
 //! between two rival models.
 
-use super::driven::Driven;
+use super::closed_loop::ClosedLoopRun;
 use super::nuisance::Product;
-use crate::course::{CHANNELS, Point};
-use crate::windows::{FORCE, dot, project, seated};
+use crate::gridded_record::{CHANNELS, Point};
+use crate::windows::{FORCE, dot, project, state_at};
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
 /// Share of a signature that forms and numbers leave unexplained: 25 = (1 - 0.95^2) / e^2.
@@ -39,7 +39,7 @@ const RANK: f64 = 1e-6;
 
 /// What rigs read in the windows of a run.
 struct Observer<'a> {
-    driven: &'a Driven,
+    driven: &'a ClosedLoopRun,
     measured: Vec<usize>,
     noise: [f64; CHANNELS],
 }
@@ -73,7 +73,7 @@ impl Divergence {
 /// are off by a prior standard deviation each.
 #[must_use]
 pub fn divergences(
-    driven: &Driven,
+    driven: &ClosedLoopRun,
     baseline: &RigParameters,
     rigs: &[&RigParameters],
     numbers: &[RigParameters],
@@ -83,11 +83,11 @@ pub fn divergences(
     let signatures = signatures(driven, baseline, &all, measured);
     let (signatures, numbers) = signatures.split_at(rigs.len());
     let product = Product::new(numbers);
-    let Some((own, rivals)) = signatures.split_first() else { return Vec::new() };
-    let square = product.of(own, own).max(0.0);
+    let Some((truth, rivals)) = signatures.split_first() else { return Vec::new() };
+    let square = product.of(truth, truth).max(0.0);
     let from = |rival: &Vec<f64>| {
         let lengths = (square * product.of(rival, rival).max(0.0)).sqrt();
-        let cosine = if lengths > 0.0 { (product.of(own, rival) / lengths).clamp(0.0, 1.0) } else { 0.0 };
+        let cosine = if lengths > 0.0 { (product.of(truth, rival) / lengths).clamp(0.0, 1.0) } else { 0.0 };
         Divergence { square, cosine }
     };
     rivals.iter().map(from).collect()
@@ -95,7 +95,7 @@ pub fn divergences(
 
 /// M J of each rig.
 fn signatures(
-    driven: &Driven,
+    driven: &ClosedLoopRun,
     baseline: &RigParameters,
     rigs: &[&RigParameters],
     measured: [bool; 2],
@@ -105,7 +105,7 @@ fn signatures(
     let runs: Vec<Run> = rigs.iter().map(|rig| observer.run(rig)).collect();
     let mut left: Vec<Vec<f64>> = runs
         .iter()
-        .map(|run| run.readings.iter().zip(&base.readings).map(|(own, base)| own - base).collect())
+        .map(|run| run.readings.iter().zip(&base.readings).map(|(value, base)| value - base).collect())
         .collect();
     let rows = observer.rows();
     for signature in &mut left {
@@ -116,21 +116,21 @@ fn signatures(
         let span = window * rows..(window + 1) * rows;
         let mut out = base.jumps[span.clone()].to_vec();
         for run in &runs {
-            out.iter_mut().zip(&run.jumps[span.clone()]).for_each(|(all, own)| *all |= own);
+            out.iter_mut().zip(&run.jumps[span.clone()]).for_each(|(all, jump)| *all |= jump);
         }
         let columns = observer.sensitivities(baseline, &base, window, &mut out);
         let basis = basis(columns, &out);
         for signature in &mut left {
-            let own = &mut signature[span.clone()];
-            own.iter_mut().zip(&out).filter(|(_, out)| **out).for_each(|(own, _)| *own = 0.0);
-            project(own, &basis);
+            let part = &mut signature[span.clone()];
+            part.iter_mut().zip(&out).filter(|(_, out)| **out).for_each(|(value, _)| *value = 0.0);
+            project(part, &basis);
         }
     }
     left
 }
 
 impl<'a> Observer<'a> {
-    fn new(driven: &'a Driven, rig: &RigParameters, measured: [bool; 2]) -> Self {
+    fn new(driven: &'a ClosedLoopRun, rig: &RigParameters, measured: [bool; 2]) -> Self {
         let sensors = rig.sensors();
         let with_rounding = |noise: f64, step: f64| (noise * noise + step * step / 12.0).sqrt();
         let pressure = with_rounding(sensors.pressure_noise_pa, sensors.pressure_step_pa());
@@ -170,7 +170,7 @@ impl<'a> Observer<'a> {
         let mut plant = plant_in(rig, &self.driven.start);
         let mut run = Run { readings: Vec::new(), jumps: Vec::new(), starts: Vec::new() };
         for window in 0..self.windows() {
-            let start = seated(&plant, &self.points(window), [true; 2]);
+            let start = state_at(&plant, &self.points(window), [true; 2]);
             plant.go_on_in(&start).expect("a state of a run is one that the rig can be in");
             run.starts.push(start);
             self.read(&mut plant, window, &mut run.readings, &mut run.jumps);
@@ -196,8 +196,8 @@ impl<'a> Observer<'a> {
         jumps.resize(readings.len(), false);
         for (lane, axis) in self.measured.iter().enumerate() {
             for at in 0..WINDOW {
-                let own = phases[at][*axis];
-                let jump = phases[at.saturating_sub(1)][*axis] != own || phases[at + 1][*axis] != own;
+                let now = phases[at][*axis];
+                let jump = phases[at.saturating_sub(1)][*axis] != now || phases[at + 1][*axis] != now;
                 jumps[from + at * self.width() + lane * CHANNELS + FORCE] = jump;
             }
         }
@@ -227,12 +227,13 @@ impl<'a> Observer<'a> {
                 }
                 let mut plant = plant_in(rig, &base.starts[window]);
                 plant
-                    .go_on_in(&seated(&plant, &points, [true; 2]))
+                    .go_on_in(&state_at(&plant, &points, [true; 2]))
                     .expect("a nudge leaves the rig in a state of its own");
                 let (mut nudged, mut jumps) = (Vec::with_capacity(self.rows()), Vec::new());
                 self.read(&mut plant, window, &mut nudged, &mut jumps);
-                out.iter_mut().zip(&jumps).for_each(|(all, own)| *all |= own);
-                let change: Vec<f64> = nudged.iter().zip(baseline).map(|(own, base)| own - base).collect();
+                out.iter_mut().zip(&jumps).for_each(|(all, jump)| *all |= jump);
+                let change: Vec<f64> =
+                    nudged.iter().zip(baseline).map(|(value, base)| value - base).collect();
                 if self.driven.linked {
                     columns.push(change);
                 } else {
@@ -270,13 +271,13 @@ fn phase(truth: &Truth, axis: usize) -> (i8, bool) {
 fn basis(columns: Vec<Vec<f64>>, out: &[bool]) -> Vec<Vec<f64>> {
     let mut kept: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for mut column in columns {
-        column.iter_mut().zip(out).filter(|(_, out)| **out).for_each(|(own, _)| *own = 0.0);
+        column.iter_mut().zip(out).filter(|(_, out)| **out).for_each(|(value, _)| *value = 0.0);
         let before = dot(&column, &column).sqrt();
         project(&mut column, &kept);
         project(&mut column, &kept);
         let left = dot(&column, &column).sqrt();
         if left > RANK * before {
-            column.iter_mut().for_each(|own| *own /= left);
+            column.iter_mut().for_each(|value| *value /= left);
             kept.push(column);
         }
     }

@@ -76,7 +76,7 @@ fn a_run_that_does_not_end_or_comes_near_an_end_of_the_stroke_is_none_for_this_r
     let stroke_m = rig.cylinder().stroke_m;
     let good = drive(&MENU[0], &rig, &rig).expect("it can be rehearsed");
     assert!(good.ends_well(stroke_m));
-    let changed = |change: &dyn Fn(&mut driven::Driven)| {
+    let changed = |change: &dyn Fn(&mut closed_loop::ClosedLoopRun)| {
         let mut run = good.clone();
         change(&mut run);
         run.ends_well(stroke_m)
@@ -97,8 +97,14 @@ fn an_explanation_does_not_differ_from_itself_and_differs_from_another() {
     let other = explained(&[("piston-leakage", "drive", &[("leakage_nl_per_min", 2.0)])]);
     let rig = RigParameters::baseline();
     let judged = judge(entry, &rig, &[one, twice, other], [true, false]).expect("it can be rehearsed");
-    let of = |own, rival| {
-        judged.pairs.iter().find(|pair| (pair.0, pair.1) == (own, rival)).expect("a pair").2.in_repetitions(1)
+    let of = |truth, rival| {
+        judged
+            .pairs
+            .iter()
+            .find(|pair| (pair.0, pair.1) == (truth, rival))
+            .expect("a pair")
+            .2
+            .in_repetitions(1)
     };
     // Another amplitude of the same effect is refitted; what is left comes from stick and slip.
     assert!(of(0, 1) < 0.2 * of(0, 2), "{} and {}", of(0, 1), of(0, 2));

@@ -40,14 +40,14 @@ impl Bins {
     /// Bins of a variable.
     #[must_use]
     pub fn of(sample: &Sample, variable: usize) -> Self {
-        let values: Vec<f64> = sample.variables.iter().map(|own| own[variable]).collect();
+        let values: Vec<f64> = sample.variables.iter().map(|variables| variables[variable]).collect();
         Bins { places: bins(&values), count: BINS }
     }
 
     /// Bins of equal width: a pulse that few windows have stands in bins of its own.
     #[must_use]
     pub fn even(sample: &Sample, variable: usize) -> Self {
-        let values = || sample.variables.iter().map(|own| own[variable]);
+        let values = || sample.variables.iter().map(|variables| variables[variable]);
         let least = values().fold(f64::INFINITY, f64::min);
         let width = (values().fold(f64::NEG_INFINITY, f64::max) - least) / BINS as f64;
         let place = |value: f64| if width > 0.0 { ((value - least) / width) as usize } else { 0 };
@@ -58,7 +58,10 @@ impl Bins {
     #[must_use]
     pub fn of_pair(sample: &Sample, left: usize, right: usize) -> Self {
         let of = |variable: usize| {
-            few_bins(&sample.variables.iter().map(|own| own[variable]).collect::<Vec<_>>(), PAIR_BINS)
+            few_bins(
+                &sample.variables.iter().map(|variables| variables[variable]).collect::<Vec<_>>(),
+                PAIR_BINS,
+            )
         };
         let both = of(left).into_iter().zip(of(right));
         Bins {
@@ -87,7 +90,7 @@ impl Sample {
             .iter()
             .zip(&self.weights)
             .zip(&self.variables)
-            .map(|((value, weight), own)| (*value, *weight, own))
+            .map(|((value, weight), variables)| (*value, *weight, variables))
     }
 
     /// R2 over a variable, its p value, and by how many standard deviations it stands out of shifted ones.
@@ -127,10 +130,10 @@ impl Sample {
         for at in 0..n {
             let (value, weight) = (self.values[from(at)], self.weights[from(at)]);
             let other = 1 - self.folds[at];
-            let own = &sums[bins.places[at]][other];
+            let bin = &sums[bins.places[at]][other];
             let middle = mean(&all[other]);
-            let told = if own[1] > 0.0 { mean(own) } else { middle };
-            left += weight * (value - told).powi(2);
+            let predicted = if bin[1] > 0.0 { mean(bin) } else { middle };
+            left += weight * (value - predicted).powi(2);
             whole += weight * (value - middle).powi(2);
         }
         if whole > 0.0 { 1.0 - left / whole } else { 0.0 }

@@ -72,13 +72,13 @@ fn binned(sample: &Sample) -> f64 {
 fn forms() -> Vec<Form> {
     let mut forms = vec![form(1, "", "", true, |_| 0.0)];
     for at in (0..VARIABLES.len()).filter(|at| *at != TIME) {
-        let WindowVariable { name, unit, nodes: own, .. } = VARIABLES[at];
+        let WindowVariable { name, unit, nodes, .. } = VARIABLES[at];
         let text = if name == "p_a-p_b" { "(p_a-p_b)" } else { name };
-        forms.push(form(2 + own, text, unit, false, move |variables| variables[at]));
-        if own <= 2 {
-            forms.push(form(4 + own, text, unit, true, move |variables| variables[at]));
+        forms.push(form(2 + nodes, text, unit, false, move |variables| variables[at]));
+        if nodes <= 2 {
+            forms.push(form(4 + nodes, text, unit, true, move |variables| variables[at]));
         }
-        if own == 1 && at != VELOCITY {
+        if nodes == 1 && at != VELOCITY {
             let product = format!("sign(v)*{text}");
             forms.push(form(5, &product, unit, false, move |variables| variables[DIRECTION] * variables[at]));
         }

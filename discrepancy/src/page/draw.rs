@@ -3,7 +3,7 @@
 //! Every drawing is [`WIDTH`] wide and stands in a column of at most twice a telephone's width, so that its letters are about as
 //! large as the text's on any screen. Drawings have a title and a description for who does not see them.
 
-use super::thin::Column;
+use super::decimate::Column;
 use super::words;
 use bench::page_style::escaped;
 use std::fmt::Write as _;
@@ -213,8 +213,8 @@ pub(super) fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
         body += &text("name", (8.0, top + 14.0), &bar.label);
         body += &text("end name", (WIDTH - 8.0, top + 14.0), &bar.text);
     }
-    let told: Vec<String> = bars.iter().map(|bar| format!("{}: {}.", bar.label, bar.text)).collect();
-    svg(identifier, bottom + 24.0, title, &told.join(" "), &body)
+    let described: Vec<String> = bars.iter().map(|bar| format!("{}: {}.", bar.label, bar.text)).collect();
+    svg(identifier, bottom + 24.0, title, &described.join(" "), &body)
 }
 
 fn svg(identifier: &str, height: f64, title: &str, description: &str, body: &str) -> String {

@@ -169,7 +169,7 @@ fn table_added(outside: &Outside) -> String {
     let tables: Vec<String> = outside
         .tables
         .iter()
-        .map(|own| format!("{} over {}", words::balance(&own.balance), own.variable))
+        .map(|table| format!("{} over {}", words::balance(&table.balance), table.variable))
         .collect();
     let share = outside.share_explained.map_or(String::new(), |share| {
         format!("; that takes {} of the disagreement of the training records", words::percent(share))
@@ -236,12 +236,12 @@ pub(super) fn curve_figure(identifier: &str, caption: &str, curve: &Curve) -> St
     plot.band(&at, &low, &high);
     plot.level(0.0);
     plot.line("line s0", at.iter().copied().zip(value.iter().copied()));
-    let told = format!("{} values.", at.len());
+    let count = format!("{} values.", at.len());
     figure(
         caption,
         "",
         &[(Sample::Line("line s0"), "unknown input"), (Sample::Area("area"), "\u{b1} 2 standard errors")],
-        &plot.drawn(identifier, caption, &told),
+        &plot.drawn(identifier, caption, &count),
     )
 }
 

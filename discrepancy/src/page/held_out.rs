@@ -72,11 +72,11 @@ fn signals(errors: &BTreeMap<String, BeforeAfter>, whiteness: &BTreeMap<String, 
     names.sort();
     names.dedup();
     let two = |pair: Option<&BeforeAfter>, unit: &str| {
-        let told = |value: fn(&BeforeAfter) -> f64| {
+        let figures = |value: fn(&BeforeAfter) -> f64| {
             let text = pair.map_or_else(|| words::NOTHING.to_owned(), |pair| words::short(value(pair)));
             number(if pair.is_some() { words::with_unit(&text, unit) } else { text })
         };
-        [told(|pair| pair.before), told(|pair| pair.after)]
+        [figures(|pair| pair.before), figures(|pair| pair.after)]
     };
     let rows = names.into_iter().map(|name| {
         let cells = two(errors.get(name), "%").into_iter().chain(two(whiteness.get(name), ""));

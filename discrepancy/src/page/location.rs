@@ -1,9 +1,9 @@
 //! Where the disagreement is: bars over the balances, cells over the regimes, maps over variables, unknown inputs over time.
 
+use super::decimate::{COLUMNS, columns};
 use super::draw::{Bar, Plot, Sample, bars, figure, range};
 use super::finding::curve_figure;
 use super::markup::{Cell, charts, folded, heading, paragraph, table, words as said};
-use super::thin::{COLUMNS, columns};
 use super::words;
 use crate::locate::regime::REGIMES;
 use crate::report::{Location, Report, UnknownInput};

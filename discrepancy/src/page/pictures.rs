@@ -3,9 +3,9 @@
 //! The difference is drawn in units of the sensor's noise, since a gap that nobody would see beside the whole stroke may be a
 //! hundred times what the sensor can tell apart. Before and after share their axes.
 
+use super::decimate::{COLUMNS, columns};
 use super::draw::{Plot, Sample, figure, range};
 use super::markup::{charts, folded, paragraph};
-use super::thin::{COLUMNS, columns};
 use super::words;
 use super::{Pictures, Trace};
 use crate::report::{Report, Verdict};
@@ -132,13 +132,13 @@ fn close(report: &Report, trace: &Trace, model: Model) -> String {
     };
     let id = identifier(trace, model, "close");
     let title = format!("{}: measured and {name}", words::signal(&trace.signal));
-    let told =
+    let scaled =
         format!("From {} to {} s.", words::fixed(time_s[0], 2), words::fixed(time_s[time_s.len() - 1], 2));
     figure(
         &format!("{}, where they differ most", words::signal(&trace.signal)),
-        &told,
+        &scaled,
         &[(Sample::Line("line s0"), "measured"), (Sample::Line(class), name)],
-        &plot.drawn(&id, &title, &told),
+        &plot.drawn(&id, &title, &scaled),
     )
 }
 
@@ -160,9 +160,9 @@ fn difference(trace: &Trace) -> (String, f64) {
 fn whole(report: &Report, trace: &Trace, model: Model) -> String {
     let (unit, factor) = difference(trace);
     let has_noise = trace.noise > 0.0;
-    let told = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value * factor).collect() };
+    let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value * factor).collect() };
     let first = if report.verdict == Verdict::NothingMissing { "measured minus simulated" } else { "before" };
-    let (before, after) = (told(&trace.before_residual), told(&trace.after_residual));
+    let (before, after) = (scaled(&trace.before_residual), scaled(&trace.after_residual));
     let (low, high) = range(before.iter().chain(&after).copied()).unwrap_or((-1.0, 1.0));
     let reach = low.abs().max(high.abs()).max(if has_noise { 4.0 } else { f64::MIN_POSITIVE });
     let x = (trace.time_s[0], trace.time_s[trace.time_s.len() - 1]);

@@ -61,8 +61,8 @@ pub(super) fn head(report: &Report) -> String {
 
 /// A name and, as weighty as it, what explains the records as well.
 fn named(named: &NamedEffect) -> Vec<String> {
-    let own = one(named, "");
-    std::iter::once(own).chain(named.alternatives.iter().map(|other| one(other, "<i>or</i> "))).collect()
+    let line = one(named, "");
+    std::iter::once(line).chain(named.alternatives.iter().map(|other| one(other, "<i>or</i> "))).collect()
 }
 
 fn one(named: &NamedEffect, before: &str) -> String {

@@ -201,9 +201,9 @@ mod tests {
 
     #[test]
     fn numbers_have_the_digits_that_count() {
-        let told = [0.0, 1234.5, 0.01234, -2.5, 1.5e-6, 3e6, f64::NAN].map(short);
+        let shown = [0.0, 1234.5, 0.01234, -2.5, 1.5e-6, 3e6, f64::NAN].map(short);
         assert_eq!(
-            told,
+            shown,
             [
                 "0",
                 "1234",

@@ -56,8 +56,8 @@ impl Acting {
                 let valves = |logged: &Logged| {
                     matches!(logged.frame, Frame::DriveValveCommand(_) | Frame::LoadValveCommand(_))
                 };
-                let told = self.holders.contains(&true) || !self.waiting.iter().all(valves);
-                self.stopped_before = status.emergency_stop && (self.stopped_before || !told);
+                let holder_known = self.holders.contains(&true) || !self.waiting.iter().all(valves);
+                self.stopped_before = status.emergency_stop && (self.stopped_before || !holder_known);
             }
             Frame::DriveValveCommand(_)
             | Frame::LoadValveCommand(_)

@@ -86,14 +86,14 @@ fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, R
 /// When cycles begin, by the log's clock.
 enum Begins {
     /// The run's summary says when cycle 0 began.
-    Told { zero_ns: u64 },
+    Reported { zero_ns: u64 },
     /// From the sensors that left soonest, by blocks of cycles.
     Estimated { blocks: BTreeMap<u64, u64> },
 }
 
 impl Begins {
     fn of(file: &Path, log: &[Logged], cycles: &Cycles, logged_by: LoggedBy) -> Self {
-        let told = (logged_by == LoggedBy::Rig).then(|| told_zero_ns(file)).flatten();
+        let reported = (logged_by == LoggedBy::Rig).then(|| reported_zero_ns(file)).flatten();
         let mut blocks: BTreeMap<u64, u64> = BTreeMap::new();
         for (logged, cycle) in log.iter().zip(&cycles.of) {
             let Some(cycle) = cycle else { continue };
@@ -105,12 +105,12 @@ impl Begins {
         let fits = |zero_ns: &u64| {
             blocks.values().all(|block| *block + 1000 >= *zero_ns && block - zero_ns.min(block) < CYCLE_NS)
         };
-        told.filter(fits).map_or(Self::Estimated { blocks }, |zero_ns| Self::Told { zero_ns })
+        reported.filter(fits).map_or(Self::Estimated { blocks }, |zero_ns| Self::Reported { zero_ns })
     }
 
     fn begin_ns(&self, cycle: u64) -> u64 {
         let zero_ns = match self {
-            Self::Told { zero_ns } => *zero_ns,
+            Self::Reported { zero_ns } => *zero_ns,
             Self::Estimated { blocks } => {
                 let block = cycle / BLOCK;
                 let near =
@@ -124,7 +124,7 @@ impl Begins {
 }
 
 /// When cycle 0 began, from `summary.json` beside a run's `bus.log`.
-fn told_zero_ns(file: &Path) -> Option<u64> {
+fn reported_zero_ns(file: &Path) -> Option<u64> {
     let text = std::fs::read_to_string(file.parent()?.join("summary.json")).ok()?;
     let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
     let zero_s = summary.get("bus_log_cycle_zero_s")?.as_f64()?;
@@ -220,7 +220,7 @@ fn rows(
             record.put(Channel::SupplyPressure, pressure_pa);
         }
     }
-    tell(record, log, begins, cycles, lost, &acting);
+    add_warnings(record, log, begins, cycles, lost, &acting);
     Ok(())
 }
 
@@ -296,7 +296,7 @@ impl Statuses {
     }
 }
 
-fn tell(
+fn add_warnings(
     record: &mut Record,
     log: &[Logged],
     begins: &Begins,

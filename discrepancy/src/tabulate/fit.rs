@@ -14,7 +14,7 @@ use crate::fit::{Products, loss};
 use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
-use crate::windows::{Passage, Reach, dot};
+use crate::windows::{Reach, ReferenceRun, dot};
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
@@ -31,7 +31,7 @@ const ALONG: usize = 3;
 /// Shortened steps that are tried.
 const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 /// Fall of the loss below which a fit has settled.
-const SETTLED: f64 = 1.0;
+const CONVERGED: f64 = 1.0;
 /// Parts of the records that are left out in turn, to see what a model only learned.
 const FOLDS: usize = 5;
 
@@ -93,8 +93,8 @@ impl Model {
 
     fn moved(&self) -> Vec<Coordinate> {
         let factors = (0..COUNT).filter(|at| self.free[*at]).map(Coordinate::Factor);
-        let values = self.tables.iter().enumerate().flat_map(|(at, own)| {
-            (0..if own.is_constant { 1 } else { own.table.at.len() })
+        let values = self.tables.iter().enumerate().flat_map(|(at, tied)| {
+            (0..if tied.is_constant { 1 } else { tied.table.at.len() })
                 .map(move |point| Coordinate::Value(at, point))
         });
         factors.chain(values).collect()
@@ -107,13 +107,13 @@ impl Model {
                 model.factors[at] = (model.factors[at] + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
             }
             Coordinate::Value(at, point) => {
-                let own = &mut model.tables[at];
-                let most = own.table.balance.most();
-                let value = (own.table.value[point] + change).clamp(-most, most);
-                if own.is_constant {
-                    own.table.value.fill(value);
+                let tied = &mut model.tables[at];
+                let most = tied.table.balance.most();
+                let value = (tied.table.value[point] + change).clamp(-most, most);
+                if tied.is_constant {
+                    tied.table.value.fill(value);
                 } else {
-                    own.table.value[point] = value;
+                    tied.table.value[point] = value;
                 }
             }
         }
@@ -158,7 +158,8 @@ impl Model {
     fn costs(&self) -> f64 {
         let factors: f64 =
             (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].tolerance).powi(2)).sum();
-        let points = self.moved().iter().filter(|own| matches!(own, Coordinate::Value(..))).count();
+        let points =
+            self.moved().iter().filter(|coordinate| matches!(coordinate, Coordinate::Value(..))).count();
         factors + NUMBER_COSTS * points as f64
     }
 }
@@ -176,7 +177,8 @@ impl Point {
     /// `None` where no rig can be so.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
-        let squares: Vec<f64> = residual.chunks_exact(engine.rows()).map(|own| dot(own, own)).collect();
+        let squares: Vec<f64> =
+            residual.chunks_exact(engine.rows()).map(|window| dot(window, window)).collect();
         let loss = loss(&squares, engine.freedom()) + model.costs();
         loss.is_finite().then_some(Point { model, residual, loss })
     }
@@ -186,13 +188,13 @@ impl Point {
         let moved = self.model.moved();
         let mut errors = vec![f64::INFINITY; COUNT];
         let products = Products::new(&self.residual, &lines.with(&[]), engine.freedom(), engine.rows());
-        let ridges: Vec<f64> = moved.iter().map(|own| self.model.ridge(*own)).collect();
+        let ridges: Vec<f64> = moved.iter().map(|coordinate| self.model.ridge(*coordinate)).collect();
         let chosen: Vec<usize> = (0..moved.len()).collect();
         let fit = products.fit(&chosen, &ridges);
         if let Some(covariance) = products.covariance(&chosen, &fit, &ridges) {
             for (at, coordinate) in moved.iter().enumerate() {
-                if let Coordinate::Factor(own) = coordinate {
-                    errors[*own] = covariance[(at, at)].max(0.0).sqrt();
+                if let Coordinate::Factor(factor) = coordinate {
+                    errors[*factor] = covariance[(at, at)].max(0.0).sqrt();
                 }
             }
         }
@@ -206,9 +208,9 @@ fn columns(
     engine: &Engine<'_>,
     model: &Model,
     moved: &[Coordinate],
-    passed: &[Passage],
+    passed: &[ReferenceRun],
 ) -> Option<Vec<Vec<f64>>> {
-    let from: Vec<f64> = passed.iter().flat_map(Passage::simulated).copied().collect();
+    let from: Vec<f64> = passed.iter().flat_map(ReferenceRun::simulated).copied().collect();
     moved
         .par_iter()
         .map(|coordinate| {
@@ -217,12 +219,12 @@ fn columns(
             let simulated = match coordinate {
                 Coordinate::Factor(_) => engine.simulate_coarsely(&rig),
                 Coordinate::Value(at, point) => {
-                    let own = &model.tables[*at];
-                    engine.simulate_where(&rig, passed, |reach| own.acts(*point, reach))
+                    let tied = &model.tables[*at];
+                    engine.simulate_where(&rig, passed, |reach| tied.acts(*point, reach))
                 }
             };
             let mut column = engine.difference(&simulated, &from);
-            column.iter_mut().for_each(|own| *own /= change);
+            column.iter_mut().for_each(|value| *value /= change);
             Some(column)
         })
         .collect()
@@ -231,19 +233,19 @@ fn columns(
 /// Straight lines around a model: what each of its coordinates changes.
 pub(super) struct Lines {
     model: Model,
-    passed: Vec<Passage>,
+    passed: Vec<ReferenceRun>,
     columns: Vec<Vec<f64>>,
 }
 
 /// A table of zeros, which changes nothing yet, and what each of its values would change.
 pub(super) struct Beside {
-    own: Tied,
+    tied: Tied,
     columns: Vec<Vec<f64>>,
 }
 
 impl Beside {
     pub(super) fn balance(&self) -> Balance {
-        self.own.table.balance
+        self.tied.table.balance
     }
 }
 
@@ -262,11 +264,11 @@ impl Lines {
     }
 
     /// The lines of one more table, all zeros; `None` where no rig can have it.
-    pub(super) fn beside(&self, engine: &Engine<'_>, own: Tied) -> Option<Beside> {
+    pub(super) fn beside(&self, engine: &Engine<'_>, tied: Tied) -> Option<Beside> {
         let mut model = self.model.clone();
-        model.tables.push(own.clone());
+        model.tables.push(tied.clone());
         let moved = model.moved().split_off(self.columns.len());
-        Some(Beside { own, columns: columns(engine, &model, &moved, &self.passed)? })
+        Some(Beside { tied, columns: columns(engine, &model, &moved, &self.passed)? })
     }
 
     /// The loss of the windows of each fold by what the other folds say of the model: what it costs is no part of it.
@@ -274,18 +276,18 @@ impl Lines {
         let columns = self.with(&[]);
         let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
         let moved = self.model.moved();
-        let ridges: Vec<f64> = moved.iter().map(|own| self.model.ridge(*own)).collect();
-        let from: Vec<f64> = moved.iter().map(|own| self.model.off(*own)).collect();
+        let ridges: Vec<f64> = moved.iter().map(|coordinate| self.model.ridge(*coordinate)).collect();
+        let from: Vec<f64> = moved.iter().map(|coordinate| self.model.off(*coordinate)).collect();
         products.unseen_loss(&(0..columns.len()).collect::<Vec<_>>(), &ridges, &from, FOLDS)
     }
 
     /// The loss that the lines promise of the model, `point`, with some tables more.
     pub(super) fn promised(&self, engine: &Engine<'_>, point: &Point, tables: &[&Beside]) -> f64 {
         let mut model = self.model.clone();
-        model.tables.extend(tables.iter().map(|beside| beside.own.clone()));
+        model.tables.extend(tables.iter().map(|beside| beside.tied.clone()));
         let columns = self.with(tables);
         let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
-        let ridges: Vec<f64> = model.moved().iter().map(|own| model.ridge(*own)).collect();
+        let ridges: Vec<f64> = model.moved().iter().map(|coordinate| model.ridge(*coordinate)).collect();
         products.fit(&(0..columns.len()).collect::<Vec<_>>(), &ridges).loss + model.costs()
     }
 }
@@ -328,7 +330,7 @@ pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
         let Some(lines) = Lines::of(engine, point.model.clone()) else { break };
         let before = point.loss;
         point = self::steps(engine, point, &lines.with(&[]));
-        if before - point.loss < SETTLED {
+        if before - point.loss < CONVERGED {
             break;
         }
     }
@@ -338,14 +340,14 @@ pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
 /// Some steps along the same straight lines, one for each coordinate that the model moves.
 pub(super) fn steps(engine: &Engine<'_>, start: Point, lines: &[&[f64]]) -> Point {
     let moved = start.model.moved();
-    let ridges: Vec<f64> = moved.iter().map(|own| start.model.ridge(*own)).collect();
+    let ridges: Vec<f64> = moved.iter().map(|coordinate| start.model.ridge(*coordinate)).collect();
     let mut products = Products::new(&start.residual, lines, engine.freedom(), engine.rows());
     let mut point = start;
     for _ in 0..ALONG {
         let Some(tried) = along(engine, &point, &moved, &products, &ridges) else { break };
-        let settled = point.loss - tried.loss < SETTLED;
+        let converged = point.loss - tried.loss < CONVERGED;
         point = tried;
-        if settled {
+        if converged {
             break;
         }
         products.set_residual(&point.residual, lines, engine.rows());
@@ -364,8 +366,9 @@ fn along(
     let joint = products.fit(&(0..moved.len()).collect::<Vec<_>>(), ridges);
     SHARES.iter().find_map(|share| {
         let changes = moved.iter().zip(&joint.coefficients);
-        let model =
-            changes.fold(point.model.clone(), |model, (own, change)| model.moved_by(*own, share * change));
+        let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {
+            model.moved_by(*coordinate, share * change)
+        });
         Point::of(engine, model).filter(|tried| tried.loss < point.loss)
     })
 }

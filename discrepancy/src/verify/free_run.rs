@@ -1,8 +1,8 @@
 //! The whole record in open loop: started from its first samples at rest, moved by its commands, judged after 0.1 s.
 
-use crate::course::{CHANNELS, Course, Point};
+use crate::gridded_record::{CHANNELS, GriddedRecord, Point};
 use crate::report::BeforeAfter;
-use crate::windows::{first_state, seat};
+use crate::windows::{first_state, set_state};
 use plant::{Axis, PERIOD_S, Plant, RigParameters};
 use std::collections::BTreeMap;
 
@@ -23,29 +23,29 @@ pub(super) struct FreeRun {
 }
 
 /// Runs a record freely.
-pub(super) fn free_run(course: &Course, rig: &RigParameters) -> FreeRun {
+pub(super) fn free_run(record: &GriddedRecord, rig: &RigParameters) -> FreeRun {
     let mut plant =
-        Plant::in_state(rig, &first_state(course, rig)).expect("a start state is one of the rig's");
-    let at_rest = course.points[0].map(|point| Point { rod_velocity_m_per_s: 0.0, ..point });
-    seat(&mut plant, course, &at_rest);
+        Plant::in_state(rig, &first_state(record, rig)).expect("a start state is one of the rig's");
+    let at_rest = record.points[0].map(|point| Point { rod_velocity_m_per_s: 0.0, ..point });
+    set_state(&mut plant, record, &at_rest);
     let stroke_m = rig.cylinder().stroke_m;
     let highest_pa = HIGHEST * plant.supply_pressure_pa();
     let mut errors = [[(0.0, 0_usize); CHANNELS]; 2];
     let mut ranges = [[[f64::INFINITY, f64::NEG_INFINITY]; CHANNELS]; 2];
     let mut unphysical: BTreeMap<(usize, &str), usize> = BTreeMap::new();
-    for (period, (inputs, samples)) in course.inputs.iter().zip(&course.samples).enumerate() {
+    for (period, (inputs, samples)) in record.inputs.iter().zip(&record.samples).enumerate() {
         let truth = plant.truth(inputs);
         let shown = plant.shown(&truth);
-        for i in (0..2).filter(|i| course.measured[*i]) {
+        for i in (0..2).filter(|i| record.measured[*i]) {
             let axis = &truth.axes[i];
             let extension_m = plant.state().axes[i].extension_m;
             let pressures_pa = [axis.pressure_a_pa, axis.pressure_b_pa];
             let found = [
                 ("not finite", !plant.state().is_finite()),
-                ("a pressure not above zero", pressures_pa.iter().any(|own| *own <= 0.0)),
+                ("a pressure not above zero", pressures_pa.iter().any(|pressure_pa| *pressure_pa <= 0.0)),
                 (
                     "a pressure more than a tenth above the supply's",
-                    pressures_pa.iter().any(|own| *own > highest_pa),
+                    pressures_pa.iter().any(|pressure_pa| *pressure_pa > highest_pa),
                 ),
                 ("the piston beyond its stroke", !(-BEYOND_M..=stroke_m + BEYOND_M).contains(&extension_m)),
             ];

@@ -1,7 +1,7 @@
 //! What residuals have in each window and lane, over what noise alone gives there.
 
 use super::LEVELS;
-use super::nothing::Nothing;
+use super::null_power::NullPower;
 use crate::windows::WINDOW;
 
 /// Share of the windows that is left out, the worst of the extended model.
@@ -13,14 +13,14 @@ const QUIET: f64 = 0.1;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Squares {
     /// Sum of squared residuals, in squares of the noise.
-    pub(super) own: f64,
+    pub(super) sum: f64,
     /// Mean of the same for noise; 0 where there are no samples.
     pub(super) expected: f64,
 }
 
 impl Squares {
     pub(super) fn over(self) -> f64 {
-        self.own / self.expected
+        self.sum / self.expected
     }
 }
 
@@ -35,7 +35,8 @@ pub(super) struct Power {
 pub(super) fn sums(residual: &[f64], lanes: usize) -> Vec<f64> {
     let mut sums = Vec::with_capacity(residual.len() / WINDOW);
     for window in residual.chunks_exact(WINDOW * lanes) {
-        let lane = |lane: usize| window.iter().skip(lane).step_by(lanes).map(|own| own * own).sum::<f64>();
+        let lane =
+            |lane: usize| window.iter().skip(lane).step_by(lanes).map(|value| value * value).sum::<f64>();
         sums.extend((0..lanes).map(lane));
     }
     sums
@@ -47,7 +48,7 @@ impl Power {
         let squares = sums
             .iter()
             .zip(expected)
-            .map(|(own, expected)| Squares { own: *own, expected: *expected })
+            .map(|(sum, expected)| Squares { sum: *sum, expected: *expected })
             .collect();
         Power { lanes, squares }
     }
@@ -58,7 +59,7 @@ impl Power {
             .squares
             .iter()
             .zip(&other.squares)
-            .map(|(own, other)| Squares { own: own.own.min(other.own), ..*own })
+            .map(|(one, other)| Squares { sum: one.sum.min(other.sum), ..*one })
             .collect();
         Power { lanes: self.lanes, squares }
     }
@@ -69,7 +70,7 @@ impl Power {
             .squares
             .iter()
             .zip(levels.iter().cycle())
-            .map(|(own, level)| Squares { own: own.own / level, ..*own })
+            .map(|(squares, level)| Squares { sum: squares.sum / level, ..*squares })
             .collect();
         Power { lanes: self.lanes, squares }
     }
@@ -82,9 +83,9 @@ impl Power {
     /// All lanes together, window by window.
     pub(super) fn joint(&self) -> Vec<Squares> {
         let sum = |lanes: &[Squares]| {
-            lanes.iter().fold(Squares::default(), |sum, own| Squares {
-                own: sum.own + own.own,
-                expected: sum.expected + own.expected,
+            lanes.iter().fold(Squares::default(), |total, lane| Squares {
+                sum: total.sum + lane.sum,
+                expected: total.expected + lane.expected,
             })
         };
         self.squares.chunks_exact(self.lanes).map(sum).collect()
@@ -94,20 +95,24 @@ impl Power {
     pub(super) fn quiet(&self) -> Vec<f64> {
         (0..self.lanes)
             .map(|lane| {
-                let own = self.lane(lane);
-                let mut own: Vec<f64> =
-                    own.into_iter().filter(|own| own.expected > 0.0).map(Squares::over).collect();
-                own.sort_unstable_by(f64::total_cmp);
-                own.get((QUIET * own.len() as f64) as usize).copied().unwrap_or(1.0)
+                let squares = self.lane(lane);
+                let mut ratios: Vec<f64> =
+                    squares.into_iter().filter(|window| window.expected > 0.0).map(Squares::over).collect();
+                ratios.sort_unstable_by(f64::total_cmp);
+                ratios.get((QUIET * ratios.len() as f64) as usize).copied().unwrap_or(1.0)
             })
             .collect()
     }
 }
 
 /// Level of each lane's noise, as a factor on its power.
-pub(super) fn levels(power: &Power, nothing: &Nothing) -> Vec<f64> {
+pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
     let quiet = power.quiet();
-    quiet.iter().zip(&nothing.quiet).map(|(own, mean)| (own / mean).clamp(LEVELS[0], LEVELS[1])).collect()
+    quiet
+        .iter()
+        .zip(&null.quiet)
+        .map(|(quantile, mean)| (quantile / mean).clamp(LEVELS[0], LEVELS[1]))
+        .collect()
 }
 
 /// Which windows are judged: without the worst.
@@ -116,7 +121,7 @@ pub(super) fn kept(squares: &[Squares]) -> Vec<bool> {
     // A stable sort: equal windows stay in their order.
     order.sort_by(|left, right| squares[*right].over().total_cmp(&squares[*left].over()));
     let out = (LEFT_OUT * order.len() as f64).ceil() as usize;
-    let mut kept: Vec<bool> = squares.iter().map(|own| own.expected > 0.0).collect();
+    let mut kept: Vec<bool> = squares.iter().map(|squares| squares.expected > 0.0).collect();
     // One window is judged however few there are.
     for at in order.iter().take(out.min(order.len().saturating_sub(1))) {
         kept[*at] = false;
@@ -126,21 +131,21 @@ pub(super) fn kept(squares: &[Squares]) -> Vec<bool> {
 
 /// Power over that of noise, of the windows that are judged; 0 without any.
 pub(super) fn pooled(squares: &[Squares], kept: &[bool]) -> f64 {
-    let (own, expected) = squares
+    let (sum, expected) = squares
         .iter()
         .zip(kept)
         .filter(|(_, kept)| **kept)
-        .fold((0.0, 0.0), |sum, (own, _)| (sum.0 + own.own, sum.1 + own.expected));
-    if expected > 0.0 { own / expected } else { 0.0 }
+        .fold((0.0, 0.0), |total, (window, _)| (total.0 + window.sum, total.1 + window.expected));
+    if expected > 0.0 { sum / expected } else { 0.0 }
 }
 
 /// Lag-1 autocorrelation of a lane within the windows that are judged.
 pub(super) fn neighbours(residual: &[f64], lane: usize, lanes: usize, kept: &[bool]) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
     for (window, _) in residual.chunks_exact(WINDOW * lanes).zip(kept).filter(|(_, kept)| **kept) {
-        let own: Vec<f64> = window.iter().skip(lane).step_by(lanes).copied().collect();
-        products += own.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
-        squares += own.iter().map(|own| own * own).sum::<f64>();
+        let series: Vec<f64> = window.iter().skip(lane).step_by(lanes).copied().collect();
+        products += series.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
+        squares += series.iter().map(|value| value * value).sum::<f64>();
     }
     if squares > 0.0 { products / squares } else { 0.0 }
 }

@@ -1,12 +1,12 @@
 //! What a held-out record says of models that are known to be right, wrong or nothing.
 
 use super::*;
-use crate::course::Point;
+use crate::gridded_record::Point;
 use crate::windows::first_state;
 use plant::{Inputs, Plant, Sensors};
 
 /// A record of 3 s made by a rig: the drive, out and back by half-open valves, with its sensors' noise.
-fn course(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> Course {
+fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRecord {
     const PERIODS: usize = 3000;
     let sensors = baseline.sensors();
     let with_rounding = |noise: f64, step: f64| noise.hypot(step / 12.0_f64.sqrt());
@@ -17,7 +17,7 @@ fn course(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> Course {
         pressure,
         pressure,
     ];
-    let mut course = Course {
+    let mut record = GriddedRecord {
         name: "made".to_owned(),
         linked: false,
         added_mass_kg: 0.0,
@@ -30,32 +30,33 @@ fn course(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> Course {
         jitter_s: 0.0,
         gaps: vec![false; PERIODS],
     };
-    for (period, inputs) in course.inputs.iter_mut().enumerate() {
+    for (period, inputs) in record.inputs.iter_mut().enumerate() {
         inputs.valve[0] =
             plant::quantise_valve(0.5 * (period as f64 * 1e-3 * std::f64::consts::TAU / 0.75).sin());
     }
-    let mut plant = Plant::in_state(rig, &first_state(&course, rig)).unwrap();
+    let mut plant = Plant::in_state(rig, &first_state(&record, rig)).unwrap();
     let mut sampled = Sensors::new(rig, seed);
-    course.points.clear();
-    for inputs in &course.inputs {
+    record.points.clear();
+    for inputs in &record.inputs {
         let axis = plant.truth(inputs).axes[0];
-        let own = sampled.sample(&plant, inputs)[0];
-        let samples = [own.position, own.force, own.pressure_a, own.pressure_b].map(|own| Some(own.value));
-        course.samples.push([samples, [None; CHANNELS]]);
+        let reading = sampled.sample(&plant, inputs)[0];
+        let samples = [reading.position, reading.force, reading.pressure_a, reading.pressure_b]
+            .map(|reading| Some(reading.value));
+        record.samples.push([samples, [None; CHANNELS]]);
         let point = Point {
             extension_m: axis.position_m,
             rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
             or_else_m_per_s: None,
             pressures_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
         };
-        course.points.push([point, Point::default()]);
+        record.points.push([point, Point::default()]);
         plant.step(inputs);
     }
-    course
+    record
 }
 
-fn judged(before: &RigParameters, after: &RigParameters, course: &Course) -> Verified {
-    verify(before, after, course, &mut |_| ())
+fn judged(before: &RigParameters, after: &RigParameters, record: &GriddedRecord) -> Verified {
+    verify(before, after, record, &mut |_| ())
 }
 
 fn inclined(rig: &RigParameters, force_n: f64) -> RigParameters {
@@ -65,7 +66,7 @@ fn inclined(rig: &RigParameters, force_n: f64) -> RigParameters {
 #[test]
 fn where_nothing_is_missing_nothing_changes() {
     let rig = RigParameters::baseline();
-    let verified = judged(&rig, &rig, &course(&rig, &rig, 1));
+    let verified = judged(&rig, &rig, &record(&rig, &rig, 1));
     let seen = &verified.verification;
     assert!(!seen.confirmed);
     assert_eq!(seen.chi2_before.to_bits(), seen.chi2_after.to_bits());
@@ -85,18 +86,22 @@ fn where_nothing_is_missing_nothing_changes() {
 fn the_true_model_closes_the_gap_and_a_wrong_sign_does_not() {
     let rig = RigParameters::baseline();
     let truth = inclined(&rig, 20.0);
-    let course = course(&truth, &rig, 2);
-    let verified = judged(&rig, &truth, &course);
+    let record = record(&truth, &rig, 2);
+    let verified = judged(&rig, &truth, &record);
     let seen = &verified.verification;
     assert!(seen.confirmed, "{seen:?}");
-    let told: Vec<f64> = verified.gap.values().filter_map(|gap| gap.closed).collect();
-    assert!(!told.is_empty() && told.iter().all(|closed| *closed > 0.95), "{:?}", verified.gap);
+    let closed_shares: Vec<f64> = verified.gap.values().filter_map(|gap| gap.closed).collect();
+    assert!(
+        !closed_shares.is_empty() && closed_shares.iter().all(|closed| *closed > 0.95),
+        "{:?}",
+        verified.gap
+    );
     let run = seen.free_run_nrmse_percent["drive_position_m"];
     assert!(run.after < 0.2 * run.before, "{run:?}");
     let white = seen.whiteness["drive_position_m"];
     assert!(white.before > 0.3 && white.after.abs() < 0.1, "{white:?}");
 
-    let wrong = judged(&rig, &inclined(&rig, -20.0), &course);
+    let wrong = judged(&rig, &inclined(&rig, -20.0), &record);
     assert!(!wrong.verification.confirmed);
     assert!(wrong.verification.chi2_after > wrong.verification.chi2_before);
 }
@@ -105,7 +110,7 @@ fn the_true_model_closes_the_gap_and_a_wrong_sign_does_not() {
 fn a_hidden_leak_is_closed_by_itself() {
     let rig = RigParameters::baseline();
     let truth = rig.with_effect("rod-leakage", "drive.b", &[("leakage_nl_per_min", 20.0)]).unwrap();
-    let verified = judged(&rig, &truth, &course(&truth, &rig, 3));
+    let verified = judged(&rig, &truth, &record(&truth, &rig, 3));
     assert!(verified.verification.confirmed, "{:?}", verified.verification);
     let closed: Vec<f64> = verified.gap.values().filter_map(|gap| gap.closed).collect();
     assert!(!closed.is_empty() && closed.iter().all(|closed| *closed > 0.95), "{:?}", verified.gap);
@@ -114,13 +119,13 @@ fn a_hidden_leak_is_closed_by_itself() {
 #[test]
 fn traces_hold_the_whole_record_and_nothing_where_it_is_not_judged() {
     let rig = RigParameters::baseline();
-    let mut course = course(&rig, &rig, 4);
-    course.samples[555][0][2] = None;
-    course.gaps[1010] = true;
-    let traces = judged(&rig, &rig, &course).traces;
+    let mut record = record(&rig, &rig, 4);
+    record.samples[555][0][2] = None;
+    record.gaps[1010] = true;
+    let traces = judged(&rig, &rig, &record).traces;
     assert_eq!(traces.len(), CHANNELS);
     let pressure = traces.iter().find(|trace| trace.signal == "drive_pressure_a_Pa").unwrap();
-    assert_eq!((pressure.time_s.len(), pressure.before.len()), (course.len(), course.len()));
+    assert_eq!((pressure.time_s.len(), pressure.before.len()), (record.len(), record.len()));
     assert!(pressure.before[50].is_nan() && pressure.before[1050].is_nan());
     assert!(pressure.measured[555].is_nan() && pressure.after_residual[555].is_nan());
     assert!(!pressure.before[555].is_nan());

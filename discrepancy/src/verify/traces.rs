@@ -8,42 +8,46 @@ use plant::{Axis, PERIOD_S};
 /// One trace for each lane, over the whole record; what no window has is NaN.
 pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {
     let windows = &after.windows;
-    let course = windows.course();
+    let record = windows.record();
     let lanes = windows.lanes();
     let load_offset_m = windows.rig().sensors().load_position_offset_m;
     lanes
         .iter()
         .enumerate()
         .map(|(lane, (axis, at))| {
-            let noise = course.noise[*axis][*at];
+            let noise = record.noise[*axis][*at];
             // As the record has it.
             let offset = if *at == 0 && Axis::ALL[*axis] == Axis::Load { load_offset_m } else { 0.0 };
             let joined = |values: &[f64], offset: f64| {
-                let mut own = vec![f64::NAN; course.len()];
+                let mut series = vec![f64::NAN; record.len()];
                 for (start, window) in windows.starts().iter().zip(values.chunks_exact(WINDOW * lanes.len()))
                 {
                     let lane = window.iter().skip(lane).step_by(lanes.len());
-                    own[*start..].iter_mut().zip(lane).for_each(|(own, value)| *own = value * noise + offset);
+                    series[*start..]
+                        .iter_mut()
+                        .zip(lane)
+                        .for_each(|(entry, value)| *entry = value * noise + offset);
                 }
-                own
+                series
             };
-            let measured: Vec<f64> = course
+            let measured: Vec<f64> = record
                 .samples
                 .iter()
                 .map(|samples| samples[*axis][*at].map_or(f64::NAN, |value| value + offset))
                 .collect();
             let residual = |model: &Model<'_>| {
-                let mut own = joined(&model.residual, 0.0);
-                own.iter_mut()
+                let mut series = joined(&model.residual, 0.0);
+                series
+                    .iter_mut()
                     .zip(&measured)
                     .filter(|(_, measured)| measured.is_nan())
-                    .for_each(|(own, _)| *own = f64::NAN);
-                own
+                    .for_each(|(value, _)| *value = f64::NAN);
+                series
             };
             Trace {
                 signal: column(*axis, *at),
                 unit: ["m", "N", "Pa", "Pa"][*at].to_owned(),
-                time_s: (0..course.len()).map(|period| period as f64 * PERIOD_S).collect(),
+                time_s: (0..record.len()).map(|period| period as f64 * PERIOD_S).collect(),
                 before: joined(&before.simulated, offset),
                 after: joined(&after.simulated, offset),
                 before_residual: residual(before),

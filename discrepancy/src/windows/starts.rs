@@ -1,7 +1,7 @@
 //! Where windows begin: what a start explains, and starts that are moved to where their readings are met best.
 
 use super::{COARSE_SUBSTEPS, WINDOW, Windows, dot, project};
-use crate::course::{Course, Point};
+use crate::gridded_record::{GriddedRecord, Point};
 use nalgebra::{DMatrix, DVector};
 use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
 use rand_pcg::Pcg64;
@@ -20,7 +20,7 @@ const LINKED_PASSES: usize = 3;
 /// Shifts of the pistons against each other that are searched, either way: as far as two sensors' noise, then nearer.
 const SHIFTS_M: [[f64; 3]; 2] = [[30e-6, 70e-6, 120e-6], [5e-6, 12e-6, 25e-6]];
 /// The same of others, where it is asked for.
-pub(super) const SETTLING: usize = 2;
+pub(super) const START_PASSES: usize = 2;
 /// Standard deviations by which a nudge changes a reading of the force at most; more is a jump.
 const JUMP: f64 = 0.5;
 /// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
@@ -31,17 +31,17 @@ const LEAST_PA: f64 = 1e4;
 
 impl Windows<'_> {
     /// Starts where the readings are met best after so many passes, as linked ones have them anyway, and what they explain.
-    pub(super) fn settled(mut self, passes: usize) -> Self {
+    pub(super) fn estimate_starts(mut self, passes: usize) -> Self {
         self.choose_rates();
-        if self.course.linked {
+        if self.record.linked {
             // A micrometre of the eye in its gap is two newtons: the record's points are too coarse. First the side of the gap
             // on which each window is met best, then from there.
             for shifts_m in SHIFTS_M {
                 self.shift_linked(&shifts_m);
-                self.settle(LINKED_PASSES);
+                self.improve_starts(LINKED_PASSES);
             }
         } else {
-            self.settle(passes);
+            self.improve_starts(passes);
         }
         self.bases = self.sensitivities().into_iter().map(orthonormal).collect();
         self
@@ -78,7 +78,7 @@ impl Windows<'_> {
 
     /// Moves each window's start to where its readings say that it was; steps that meet them worse, as around a break-away, are
     /// taken back and made shorter.
-    fn settle(&mut self, passes: usize) {
+    fn improve_starts(&mut self, passes: usize) {
         if passes == 0 {
             return;
         }
@@ -105,9 +105,9 @@ impl Windows<'_> {
     /// Moves them by shares of the way, one for each window, given what is left of the readings.
     fn move_starts(&mut self, left: &[f64], shares: &[f64]) {
         let rows = self.rows();
-        let measured: Vec<usize> = (0..2).filter(|axis| self.course.measured[*axis]).collect();
+        let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
         for (at, columns) in self.sensitivities().iter().enumerate() {
-            let own = &left[at * rows..][..rows];
+            let residual = &left[at * rows..][..rows];
             let count = columns.len();
             // What is known of a start beforehand, in units of its doubt.
             let mut matrix = DMatrix::<f64>::identity(count, count);
@@ -116,11 +116,11 @@ impl Windows<'_> {
                     matrix[(row, column)] += dot(&columns[row], &columns[column]);
                 }
             }
-            let right = DVector::from_iterator(count, columns.iter().map(|column| dot(column, own)));
+            let right = DVector::from_iterator(count, columns.iter().map(|column| dot(column, residual)));
             let Some(moved) = matrix.cholesky().map(|factor| factor.solve(&right)) else { continue };
             for (place, axis) in measured.iter().enumerate() {
                 let part = |number: usize| {
-                    let most = if self.course.linked { FARTHEST[number] } else { DOUBT[number] };
+                    let most = if self.record.linked { FARTHEST[number] } else { DOUBT[number] };
                     shares[at]
                         * (moved[place * Point::NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
                 };
@@ -142,10 +142,10 @@ impl Windows<'_> {
         let points = self.points.clone();
         let mut squares = self.raw_squares();
         let mut best = vec![0.0; self.starts.len()];
-        for shift_m in shifts_m.iter().flat_map(|own| [-own, *own]) {
-            for (own, from) in self.points.iter_mut().zip(&points) {
+        for shift_m in shifts_m.iter().flat_map(|size_m| [-size_m, *size_m]) {
+            for (moved, from) in self.points.iter_mut().zip(&points) {
                 for axis in 0..2 {
-                    own[axis].extension_m = from[axis].extension_m + 0.5 * shift_m;
+                    moved[axis].extension_m = from[axis].extension_m + 0.5 * shift_m;
                 }
             }
             for ((best, least), new) in best.iter_mut().zip(&mut squares).zip(self.raw_squares()) {
@@ -168,7 +168,7 @@ impl Windows<'_> {
     }
 
     fn squares_of(&self, simulated: &[f64]) -> Vec<f64> {
-        self.raw_residual(simulated).chunks_exact(self.rows()).map(|own| dot(own, own)).collect()
+        self.raw_residual(simulated).chunks_exact(self.rows()).map(|window| dot(window, window)).collect()
     }
 
     /// The same windows of a record that this rig would have left, with noise: it began where these windows begin, of which the
@@ -176,10 +176,10 @@ impl Windows<'_> {
     #[must_use]
     pub fn redrawn(&self, simulated: &[f64], random: &mut Pcg64) -> Self {
         let noise = self.raw_noise(random);
-        let readings = simulated.iter().zip(&noise).map(|(own, noise)| own + noise).collect();
-        let points = (0..self.points.len()).map(|window| self.course.points[window * WINDOW]).collect();
+        let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + noise).collect();
+        let points = (0..self.points.len()).map(|window| self.record.points[window * WINDOW]).collect();
         let windows = Windows {
-            course: self.course,
+            record: self.record,
             rig: self.rig.clone(),
             starts: self.starts.clone(),
             points,
@@ -189,16 +189,16 @@ impl Windows<'_> {
             drifts: self.drifts.clone(),
             bases: Vec::new(),
         };
-        windows.settled(SETTLING)
+        windows.estimate_starts(START_PASSES)
     }
 
     /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
-    fn seat(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
+    fn set_state(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
         let mut points = self.points[start / WINDOW];
         if let Some((axis, number)) = nudged {
             points[axis] = points[axis].nudged(number);
         }
-        seat(plant, self.course, &points);
+        set_state(plant, self.record, &points);
     }
 
     /// What a change of each number of a window's start changes, by as much as it is doubted.
@@ -206,19 +206,19 @@ impl Windows<'_> {
         let mut plant = self.plant(&self.rig).with_substeps(COARSE_SUBSTEPS);
         let rows = self.rows();
         let nudges: Vec<(usize, usize)> = (0..2)
-            .filter(|axis| self.course.measured[*axis])
+            .filter(|axis| self.record.measured[*axis])
             .flat_map(|axis| (0..Point::NUDGES.len()).map(move |number| (axis, number)))
             .collect();
         let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
-        for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
+        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             let judged = self.starts.get(all.len()) == Some(&start);
             let mut plants = vec![plant; 1 + if judged { nudges.len() } else { 0 }];
             for (plant, nudged) in plants.iter_mut().zip(once(None).chain(nudges.iter().copied().map(Some))) {
-                self.seat(plant, start, nudged);
+                self.set_state(plant, start, nudged);
             }
             let mut read = vec![Vec::with_capacity(rows); plants.len()];
             let mut batch = Batch::new(plants);
-            for inputs in &self.course.inputs[start..start + WINDOW] {
+            for inputs in &self.record.inputs[start..start + WINDOW] {
                 self.read_each(&batch, inputs, &mut read);
                 batch.step_alike(inputs);
             }
@@ -228,16 +228,16 @@ impl Windows<'_> {
             }
             let valid = &self.valid[all.len() * rows..][..rows];
             let straight = read.remove(0);
-            let columns = read.into_iter().zip(&nudges).map(|(mut own, (_, number))| {
-                for ((own, straight), valid) in own.iter_mut().zip(&straight).zip(valid) {
-                    *own = if *valid { *own - straight } else { 0.0 };
+            let columns = read.into_iter().zip(&nudges).map(|(mut column, (_, number))| {
+                for ((value, straight), valid) in column.iter_mut().zip(&straight).zip(valid) {
+                    *value = if *valid { *value - straight } else { 0.0 };
                 }
                 // Before the small change is scaled up: a jump that moves by a sample is no part of it.
-                self.flatten(&mut own, JUMP);
+                self.flatten(&mut column, JUMP);
                 let scale = DOUBT[*number] / Point::NUDGES[*number];
-                own.iter_mut().for_each(|own| *own *= scale);
-                self.whiten(all.len(), &mut own);
-                own
+                column.iter_mut().for_each(|value| *value *= scale);
+                self.whiten(all.len(), &mut column);
+                column
             });
             let columns = columns.collect();
             all.push(columns);
@@ -248,17 +248,17 @@ impl Windows<'_> {
 
 /// The state in which a simulation of a course begins: as a run starts, with the record's set-up.
 #[must_use]
-pub(crate) fn first_state(course: &Course, rig: &RigParameters) -> State {
+pub(crate) fn first_state(record: &GriddedRecord, rig: &RigParameters) -> State {
     let stroke_m = rig.cylinder().stroke_m;
-    let drive_m = if course.measured[0] { course.points[0][0].extension_m } else { 0.1 };
+    let drive_m = if record.measured[0] { record.points[0][0].extension_m } else { 0.1 };
     let setup = Setup {
         carriage_position_m: drive_m.clamp(0.0, stroke_m),
-        linked: course.linked,
-        added_mass_kg: course.added_mass_kg,
+        linked: record.linked,
+        added_mass_kg: record.added_mass_kg,
     };
     let plant = Plant::new(rig, &setup).expect("the set-up was checked");
     let mut state = *plant.state();
-    for (axis, inputs) in state.axes.iter_mut().zip(course.inputs[0].valve) {
+    for (axis, inputs) in state.axes.iter_mut().zip(record.inputs[0].valve) {
         axis.spool = inputs;
     }
     state
@@ -266,42 +266,42 @@ pub(crate) fn first_state(course: &Course, rig: &RigParameters) -> State {
 
 /// A plant's state with these points on the measured axes; the rest stays its own.
 #[must_use]
-pub(crate) fn seated(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
+pub(crate) fn state_at(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
     let mut state = *plant.state();
     let truth = plant.truth(&Inputs::default());
     let cylinder = plant.rig().cylinder();
     for i in (0..2).filter(|i| measured[*i]) {
-        let (own, point, axis) = (&mut state.axes[i], &points[i], &truth.axes[i]);
-        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+        let (axis_state, point, axis) = (&mut state.axes[i], &points[i], &truth.axes[i]);
+        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - axis_state.extension_m;
         // The volumes are the plant's own: an effect may have changed them.
         let volume_a_m3 = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
         let volume_b_m3 = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
         // Rounding may leave the stroke by a bit.
-        own.extension_m = (own.extension_m + way_m).clamp(0.0, cylinder.stroke_m);
-        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
-        own.stored_air_a_j = point.pressures_pa[0].max(LEAST_PA) * volume_a_m3;
-        own.stored_air_b_j = point.pressures_pa[1].max(LEAST_PA) * volume_b_m3;
+        axis_state.extension_m = (axis_state.extension_m + way_m).clamp(0.0, cylinder.stroke_m);
+        axis_state.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
+        axis_state.stored_air_a_j = point.pressures_pa[0].max(LEAST_PA) * volume_a_m3;
+        axis_state.stored_air_b_j = point.pressures_pa[1].max(LEAST_PA) * volume_b_m3;
     }
     state
 }
 
 /// Puts the measured axes of a plant at these points.
-pub(crate) fn seat(plant: &mut Plant, course: &Course, points: &[Point; 2]) {
-    let state = seated(plant, points, course.measured);
+pub(crate) fn set_state(plant: &mut Plant, record: &GriddedRecord, points: &[Point; 2]) {
+    let state = state_at(plant, points, record.measured);
     plant.go_on_in(&state).expect("the points of a record are states of the rig");
 }
 
 /// An orthonormal basis of some columns, those left out that are worth less than one standard deviation.
 pub(super) fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
-    for mut own in columns {
+    for mut column in columns {
         // Twice, as rounding asks for.
-        project(&mut own, &basis);
-        project(&mut own, &basis);
-        let length = dot(&own, &own).sqrt();
+        project(&mut column, &basis);
+        project(&mut column, &basis);
+        let length = dot(&column, &column).sqrt();
         if length > 1.0 {
-            own.iter_mut().for_each(|own| *own /= length);
-            basis.push(own);
+            column.iter_mut().for_each(|value| *value /= length);
+            basis.push(column);
         }
     }
     basis

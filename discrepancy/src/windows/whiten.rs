@@ -2,7 +2,7 @@
 //! draws of it.
 
 use super::{FORCE, WINDOW, Windows, dot};
-use crate::course::Course;
+use crate::gridded_record::GriddedRecord;
 use plant::PERIOD_S;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
@@ -26,17 +26,17 @@ impl Windows<'_> {
     pub(super) fn raw_noise(&self, random: &mut Pcg64) -> Vec<f64> {
         let width = self.lanes.len();
         let memories: Vec<f64> =
-            self.lanes.iter().map(|(axis, channel)| self.course.memory[*axis][*channel]).collect();
+            self.lanes.iter().map(|(axis, channel)| self.record.memory[*axis][*channel]).collect();
         let mut noise = Vec::with_capacity(self.readings.len());
         for drifts in self.drifts.chunks_exact(self.rows().max(1)) {
-            let mut own = vec![0.0; width];
+            let mut coloured = vec![0.0; width];
             for (period, drifts) in drifts.chunks_exact(width).enumerate() {
-                for (own, memory) in own.iter_mut().zip(&memories) {
+                for (coloured, memory) in coloured.iter_mut().zip(&memories) {
                     let kept = if period == 0 { 0.0 } else { *memory };
-                    *own = kept * *own + (1.0 - kept * kept).sqrt() * gaussian(random);
+                    *coloured = kept * *coloured + (1.0 - kept * kept).sqrt() * gaussian(random);
                 }
                 let instant = gaussian(random);
-                noise.extend(own.iter().zip(drifts).map(|(own, drift)| own + drift * instant));
+                noise.extend(coloured.iter().zip(drifts).map(|(coloured, drift)| coloured + drift * instant));
             }
         }
         noise
@@ -47,15 +47,15 @@ impl Windows<'_> {
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
         let width = self.lanes.len();
         let drifts = &self.drifts[at * self.rows()..][..self.rows()];
-        for (own, drift) in window.chunks_exact_mut(width).zip(drifts.chunks_exact(width)) {
+        for (readings, drift) in window.chunks_exact_mut(width).zip(drifts.chunks_exact(width)) {
             let square = dot(drift, drift);
             if square > 1e-6 {
-                let share = dot(own, drift) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
-                own.iter_mut().zip(drift).for_each(|(own, drift)| *own -= share * drift);
+                let share = dot(readings, drift) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
+                readings.iter_mut().zip(drift).for_each(|(reading, drift)| *reading -= share * drift);
             }
         }
         for (lane, (axis, channel)) in self.lanes.iter().enumerate() {
-            let memory = self.course.memory[*axis][*channel];
+            let memory = self.record.memory[*axis][*channel];
             if memory == 0.0 {
                 continue;
             }
@@ -65,8 +65,9 @@ impl Windows<'_> {
                     continue;
                 }
                 // Where the instants are off, the noise of neighbours has less in common.
-                let own = memory / (1.0 + drifts[place] * drifts[place]);
-                window[place] = (window[place] - own * window[before]) / (1.0 - own * own).sqrt();
+                let correlation = memory / (1.0 + drifts[place] * drifts[place]);
+                window[place] =
+                    (window[place] - correlation * window[before]) / (1.0 - correlation * correlation).sqrt();
             }
         }
     }
@@ -76,16 +77,16 @@ impl Windows<'_> {
     pub(super) fn flatten(&self, values: &mut [f64], limit: f64) {
         let width = self.lanes.len();
         for lane in (0..width).filter(|lane| self.lanes[*lane].1 == FORCE) {
-            let own: Vec<f64> = values.iter().skip(lane).step_by(width).copied().collect();
-            for at in 0..own.len() {
+            let series: Vec<f64> = values.iter().skip(lane).step_by(width).copied().collect();
+            for at in 0..series.len() {
                 let mut near = [0.0; 2 * SPIKE_REACH + 1];
                 let from = at.saturating_sub(SPIKE_REACH);
-                let to = (at + SPIKE_REACH + 1).min(own.len());
+                let to = (at + SPIKE_REACH + 1).min(series.len());
                 let near = &mut near[..to - from];
-                near.copy_from_slice(&own[from..to]);
+                near.copy_from_slice(&series[from..to]);
                 near.sort_unstable_by(f64::total_cmp);
                 let median = near[near.len() / 2];
-                if (own[at] - median).abs() > limit {
+                if (series[at] - median).abs() > limit {
                     values[at * width + lane] = median;
                 }
             }
@@ -94,31 +95,31 @@ impl Windows<'_> {
 }
 
 /// Rate of a reading times the error of the sampling instant, over its noise.
-pub(super) fn drift(course: &Course, at: usize, axis: usize, channel: usize) -> f64 {
-    if course.jitter_s == 0.0 {
+pub(super) fn drift(record: &GriddedRecord, at: usize, axis: usize, channel: usize) -> f64 {
+    if record.jitter_s == 0.0 {
         return 0.0;
     }
-    let (before, after) = (at.saturating_sub(1), (at + 1).min(course.len() - 1));
+    let (before, after) = (at.saturating_sub(1), (at + 1).min(record.len() - 1));
     if channel == FORCE {
         // Contacts of linked rods are shorter than a period: their difference is no rate.
-        if course.linked {
+        if record.linked {
             return 0.0;
         }
         // No parabola follows it; its readings' own noise is a few hundredths of what counts here.
-        let [before, after] = [before, after].map(|at| course.samples[at][axis][FORCE]);
+        let [before, after] = [before, after].map(|at| record.samples[at][axis][FORCE]);
         let change = after.zip(before).map_or(0.0, |(after, before)| after - before);
-        return change / (2.0 * PERIOD_S) * course.jitter_s / course.noise[axis][FORCE];
+        return change / (2.0 * PERIOD_S) * record.jitter_s / record.noise[axis][FORCE];
     }
-    let [before, own, after] = [before, at, after].map(|at| course.points[at][axis]);
+    let [before, here, after] = [before, at, after].map(|at| record.points[at][axis]);
     let rate = match channel {
-        0 if axis == 0 => own.rod_velocity_m_per_s,
-        0 => -own.rod_velocity_m_per_s,
+        0 if axis == 0 => here.rod_velocity_m_per_s,
+        0 => -here.rod_velocity_m_per_s,
         channel => {
             let [before, after] = [before, after].map(|point| point.pressures_pa[channel - 2]);
             (after - before) / (2.0 * PERIOD_S)
         }
     };
-    rate * course.jitter_s / course.noise[axis][channel]
+    rate * record.jitter_s / record.noise[axis][channel]
 }
 
 /// A number of mean 0 and variance 1 [Box, Muller 1958, Ann. Math. Stat. 29(2), eq. 1].

@@ -22,11 +22,11 @@ impl Study {
         };
         let breaks = breaks(run, range);
         let drawn = |value: &dyn Fn(usize) -> f64, at_break: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            let own = range.clone().flat_map(|row| {
+            let points = range.clone().flat_map(|row| {
                 let gap = breaks.contains(&(row - range.start)).then(|| at_break(row));
                 gap.into_iter().chain([value(row)])
             });
-            own.collect()
+            points.collect()
         };
         let shown = |value: &dyn Fn(usize) -> f64| drawn(&|row| factor * value(row), &|_| f64::NAN);
         let time_s = |row: usize| run.time_s[run.kept[row - range.start]];

@@ -114,24 +114,24 @@ const ELSE: &str = "a larger amplitude: what differs here lies below the sensors
 /// What would separate these pairs, each remedy once; `None` without pairs.
 #[must_use]
 pub fn of_pairs(explanations: &[Explanation], pairs: &[(usize, usize)]) -> Option<String> {
-    let mut told: Vec<&str> = Vec::new();
+    let mut remedies: Vec<&str> = Vec::new();
     for (one, other) in pairs {
         let what = of_pair(&explanations[*one].names, &explanations[*other].names);
-        if !told.contains(&what) {
-            told.push(what);
+        if !remedies.contains(&what) {
+            remedies.push(what);
         }
     }
-    (!told.is_empty()).then(|| told.join("; "))
+    (!remedies.is_empty()).then(|| remedies.join("; "))
 }
 
 /// What would separate two explanations.
 #[must_use]
 pub fn of_pair(one: &[String], other: &[String]) -> &'static str {
-    let own = |these: &[String], those: &[String]| -> Vec<String> {
+    let only = |these: &[String], those: &[String]| -> Vec<String> {
         let effect = |name: &String| name.split(' ').next().unwrap_or_default().to_owned();
         these.iter().filter(|name| !those.contains(name)).map(effect).collect()
     };
-    let (left, right) = (own(one, other), own(other, one));
+    let (left, right) = (only(one, other), only(other, one));
     let knows = |remedy: &&Remedy, side: &[String]| {
         !side.is_empty() && side.iter().all(|effect| remedy.among.contains(&effect.as_str()))
     };

@@ -11,7 +11,7 @@
 //! Source: Box, Jenkins, Reinsel 2008, Time Series Analysis, 3.2.
 
 use super::WINDOW;
-use crate::course::{CHANNELS, Course};
+use crate::gridded_record::{CHANNELS, GriddedRecord};
 
 /// Resting windows that an estimate needs.
 const LEAST: usize = 15;
@@ -25,16 +25,16 @@ const ALIKE: f64 = 0.2;
 const MOST: f64 = 0.95;
 
 /// phi of each channel of an axis.
-pub(super) fn colours(course: &Course, axis: usize) -> [f64; CHANNELS] {
+pub(super) fn colours(record: &GriddedRecord, axis: usize) -> [f64; CHANNELS] {
     let mut windows: [Vec<[f64; 2]>; CHANNELS] = Default::default();
-    for from in (0..course.len().saturating_sub(WINDOW)).step_by(WINDOW) {
-        let command = |at: usize| course.inputs[at].valve[axis];
+    for from in (0..record.len().saturating_sub(WINDOW)).step_by(WINDOW) {
+        let command = |at: usize| record.inputs[at].valve[axis];
         let since = from.saturating_sub(2 * WINDOW);
-        if !(since..from + WINDOW).all(|at| !course.gaps[at] && command(at) == command(since)) {
+        if !(since..from + WINDOW).all(|at| !record.gaps[at] && command(at) == command(since)) {
             continue;
         }
         for (channel, windows) in windows.iter_mut().enumerate() {
-            let sample = |at: usize| course.samples[from + at][axis][channel];
+            let sample = |at: usize| record.samples[from + at][axis][channel];
             let steps: Vec<Option<f64>> = (1..WINDOW).map(|at| Some(sample(at)? - sample(at - 1)?)).collect();
             let bends: Vec<Option<f64>> = steps.windows(2).map(|pair| Some(pair[1]? - pair[0]?)).collect();
             windows.push(

@@ -7,7 +7,7 @@ use super::BalanceError;
 use super::model::TermEntry;
 use super::terms::{shown, term};
 use crate::report::Quantity;
-use crate::workflow::Told;
+use crate::workflow::Reported;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 
@@ -15,7 +15,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, val
 ///
 /// # Errors
 /// [`BalanceError`] when the model file cannot be read.
-pub fn extended_model_text(model_file: &Path, told: &Told) -> Result<String, BalanceError> {
+pub fn extended_model_text(model_file: &Path, reported: &Reported) -> Result<String, BalanceError> {
     let open = |reason: String| BalanceError::Open { file: model_file.into(), reason };
     let text = std::fs::read_to_string(model_file).map_err(|error| open(error.to_string()))?;
     let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| {
@@ -34,11 +34,11 @@ pub fn extended_model_text(model_file: &Path, told: &Told) -> Result<String, Bal
         let reason = "terms are written as [[terms]]".into();
         return Err(BalanceError::Syntax { file: model_file.into(), reason });
     };
-    let records = told.inputs.train.join(", ");
-    for effect in &told.named {
+    let records = reported.inputs.train.join(", ");
+    for effect in &reported.named {
         terms.push(entry(&effect.effect, &effect.parameters, &records));
     }
-    for quantity in &told.parameters {
+    for quantity in &reported.parameters {
         terms.push(entry(&quantity.name, std::slice::from_ref(quantity), &records));
     }
     Ok(document.to_string())

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::report::Verdict;
-use crate::workflow::Told;
+use crate::workflow::Reported;
 use plant::{Inputs, Plant, Sensors, Setup, quantise_valve};
 use std::fmt::Write;
 
@@ -50,7 +50,7 @@ fn drawn(report: &Report, pictures: &Pictures) {
     let [trace] = &pictures.traces[..] else { panic!("{} signals", pictures.traces.len()) };
     assert!(pictures.held_out && pictures.record.ends_with("2.csv"), "{}", pictures.record);
     let left =
-        |values: &[f64]| rms(&values.iter().copied().filter(|own| own.is_finite()).collect::<Vec<_>>());
+        |values: &[f64]| rms(&values.iter().copied().filter(|value| value.is_finite()).collect::<Vec<_>>());
     let [before, after] = [left(&trace.before_residual), left(&trace.after_residual)];
     assert!(after < if report.named.is_empty() { 1.001 } else { 0.9 } * before, "{before}, {after}");
     assert!(trace.time_s.windows(2).all(|pair| pair[0] <= pair[1]));
@@ -68,7 +68,7 @@ fn closed(rig: &RigParameters) -> (Report, String) {
     let model = model(folder.path());
     let Closed { report, pictures, .. } = close(&model, &files[..1], &[&files[1]], &mut |_| {}).unwrap();
     drawn(&report, &pictures);
-    let extended = extended_model_text(&model, &Told::from(&report)).unwrap();
+    let extended = extended_model_text(&model, &Reported::from(&report)).unwrap();
     std::fs::write(folder.path().join("extended.toml"), &extended).unwrap();
     let again = close(&folder.path().join("extended.toml"), &files[..1], &[], &mut |_| {}).unwrap().report;
     assert!(again.named.is_empty(), "the extended model lacks {:?}", again.named);
@@ -170,10 +170,10 @@ fn mass(folder: &Path, change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> (PathBuf
 
 /// Whether the mass that a report tells is this, within a hundredth.
 fn is_near(report: &Report, mass_kg: f64) -> bool {
-    let told = report.summary.split("mass ").nth(1).and_then(|rest| rest.split(' ').next());
-    let told: f64 =
-        told.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{}", report.summary));
-    (told / mass_kg - 1.0).abs() < 0.01
+    let reported = report.summary.split("mass ").nth(1).and_then(|rest| rest.split(' ').next());
+    let reported: f64 =
+        reported.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{}", report.summary));
+    (reported / mass_kg - 1.0).abs() < 0.01
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What stays of the effects that joined a model, and what would take their place as well.
 
-use super::nothing::Nothing;
-use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, around_of, refine};
+use super::null_distribution::NullDistribution;
+use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, around_of, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
 use crate::refit::{Placed, Refit, refit_steps};
@@ -48,7 +48,7 @@ pub(super) fn swap(
         .into_iter()
         .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
     let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
-    let best = refine(engine, &best);
+    let best = relinearise(engine, &best);
     // Beside the other effects the one that came in explains more; the one that went stays as an alternative where it is as good.
     let refits = &mut rounds[at];
     let came = refits.remove(rank);
@@ -73,7 +73,7 @@ pub(super) fn drop_unneeded<'a>(
 ) {
     while !model.placed.is_empty() {
         let around = around_of(engine, model);
-        let left = Nothing::new(engine, columns, &around, model);
+        let left = NullDistribution::new(engine, columns, &around, model);
         let threshold = left.threshold();
         let without: Vec<Option<Refit>> = (0..model.placed.len())
             .into_par_iter()
@@ -89,17 +89,17 @@ pub(super) fn drop_unneeded<'a>(
         let least = without
             .into_iter()
             .enumerate()
-            .filter_map(|(at, own)| Some((at, own?)))
+            .filter_map(|(at, fit)| Some((at, fit?)))
             .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
-        let Some((at, own)) = least else { break };
-        let missed = left.missed(engine, &own, model);
-        let safety = if own.placed.is_empty() { SAFETY } else { SAFETY_BESIDE };
+        let Some((at, fit)) = least else { break };
+        let missed = left.missed(engine, &fit, model);
+        let safety = if fit.placed.is_empty() { SAFETY } else { SAFETY_BESIDE };
         let share = missed / (calibrated.fit.loss - model.loss).max(1e-9);
         if missed > safety * threshold && share > 0.002 {
             break;
         }
         rounds.remove(at.min(rounds.len() - 1));
-        *model = own;
+        *model = fit;
     }
 }
 
@@ -123,15 +123,15 @@ pub(super) fn alternatives(
         return Vec::new();
     };
     let best = &refits[0];
-    let is_new = |own: &Refit| {
-        own.placed.last().is_some_and(|other| !model.placed.iter().any(|placed| same(placed, other)))
+    let is_new = |fit: &Refit| {
+        fit.placed.last().is_some_and(|other| !model.placed.iter().any(|placed| same(placed, other)))
     };
     refits[1..]
         .iter()
-        .filter(|own| own.loss - best.loss < alike(best, calibrated) && is_new(own))
-        .map(|own| {
-            let less = (own.loss - best.loss) / calibrated.fit.loss.max(1e-9);
-            Alternative { fit: own.clone(), share: (share - less).clamp(0.0, 1.0) }
+        .filter(|fit| fit.loss - best.loss < alike(best, calibrated) && is_new(fit))
+        .map(|fit| {
+            let less = (fit.loss - best.loss) / calibrated.fit.loss.max(1e-9);
+            Alternative { fit: fit.clone(), share: (share - less).clamp(0.0, 1.0) }
         })
         .collect()
 }
@@ -145,7 +145,7 @@ pub(super) fn shares(model: &Refit, rounds: &[Vec<Refit>], calibrated: &Calibrat
         .iter()
         .enumerate()
         .map(|(at, _)| {
-            let after = rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |own| own.loss);
+            let after = rounds.get(at).and_then(|refits| refits.first()).map_or(model.loss, |fit| fit.loss);
             let share = (before - after) / excess * whole;
             before = after;
             share.clamp(0.0, 1.0)

@@ -42,8 +42,8 @@ impl<'a> Still<'a> {
         // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
         let n = POSITION_REACH as f64;
         let slope_error = noise_m * (3.0 / (n * (n + 1.0) * (2.0 * n + 1.0))).sqrt();
-        let slow = |own: &Parabola| own.slope.abs() < SLOW_ERRORS * slope_error;
-        let slow: Vec<bool> = parabolas.iter().map(|own| own.as_ref().is_some_and(slow)).collect();
+        let slow = |parabola: &Parabola| parabola.slope.abs() < SLOW_ERRORS * slope_error;
+        let slow: Vec<bool> = parabolas.iter().map(|parabola| parabola.as_ref().is_some_and(slow)).collect();
         let mut still = Still { parabolas, positions, noise_m, slow, rests: Vec::new() };
         still.rests = (0..positions.len()).map(|place| still.rest(place)).collect();
         still
@@ -57,15 +57,15 @@ impl<'a> Still<'a> {
     /// Position and rate; `None` where no parabola is.
     pub(super) fn rate(&self, place: usize) -> Option<Rate> {
         let Parabola { value, slope } = self.parabolas[place]?;
-        let told = |position_m: f64, rate_m_per_s: f64, or_else_m_per_s: Option<f64>| {
+        let rate_of = |position_m: f64, rate_m_per_s: f64, or_else_m_per_s: Option<f64>| {
             Some(Rate { position_m, rate_m_per_s, or_else_m_per_s })
         };
         let Some(rest_m) = self.rests[place] else {
-            return told(value, slope / PERIOD_S, self.slow[place].then_some(0.0));
+            return rate_of(value, slope / PERIOD_S, self.slow[place].then_some(0.0));
         };
         match CREEP_REACHES.into_iter().find_map(|reach| self.creep_evenly(place, reach)) {
-            Some(creep_m_per_s) => told(value, creep_m_per_s, Some(0.0)),
-            None => told(rest_m, 0.0, self.creep(place)),
+            Some(creep_m_per_s) => rate_of(value, creep_m_per_s, Some(0.0)),
+            None => rate_of(rest_m, 0.0, self.creep(place)),
         }
     }
 
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     /// What is told of the middle of a course.
-    fn told(way: &dyn Fn(f64) -> f64) -> Rate {
+    fn rate_of(way: &dyn Fn(f64) -> f64) -> Rate {
         // Micrometres of scatter, as a wide sensor's: 20 um rms.
         let scatter = |at: f64| 28e-6 * (0.9 * at).sin();
         let positions: Vec<_> =
@@ -138,28 +138,28 @@ mod tests {
 
     #[test]
     fn what_goes_evenly_one_way_creeps_and_may_yet_rest() {
-        let own = told(&|t| 1e-6 * t);
-        assert!((own.rate_m_per_s - 1e-3).abs() < 1e-4 && own.or_else_m_per_s == Some(0.0), "{own:?}");
+        let rate = rate_of(&|t| 1e-6 * t);
+        assert!((rate.rate_m_per_s - 1e-3).abs() < 1e-4 && rate.or_else_m_per_s == Some(0.0), "{rate:?}");
     }
 
     #[test]
     fn what_stands_rests_for_sure() {
-        let own = told(&|_| 0.2);
-        assert_eq!((own.rate_m_per_s, own.or_else_m_per_s), (0.0, None));
-        let moves = told(&|t| 1e-4 * ((t - 60.0).max(0.0) + (t + 60.0).min(0.0)));
+        let rate = rate_of(&|_| 0.2);
+        assert_eq!((rate.rate_m_per_s, rate.or_else_m_per_s), (0.0, None));
+        let moves = rate_of(&|t| 1e-4 * ((t - 60.0).max(0.0) + (t + 60.0).min(0.0)));
         assert_eq!((moves.rate_m_per_s, moves.or_else_m_per_s), (0.0, None));
     }
 
     #[test]
     fn what_seems_at_rest_but_is_soon_under_way_may_creep() {
-        let own = told(&|t| 1e-7 * (t - 15.0).max(0.0).powi(2));
-        assert_eq!(own.rate_m_per_s, 0.0);
-        assert!(own.or_else_m_per_s.unwrap() > 2e-4, "{own:?}");
+        let rate = rate_of(&|t| 1e-7 * (t - 15.0).max(0.0).powi(2));
+        assert_eq!(rate.rate_m_per_s, 0.0);
+        assert!(rate.or_else_m_per_s.unwrap() > 2e-4, "{rate:?}");
     }
 
     #[test]
     fn what_is_slow_beside_a_motion_may_rest() {
-        let own = told(&|t| 3e-5 * (t - 8.0).max(0.0));
-        assert!(own.rate_m_per_s.abs() < 5e-3 && own.or_else_m_per_s == Some(0.0), "{own:?}");
+        let rate = rate_of(&|t| 3e-5 * (t - 8.0).max(0.0));
+        assert!(rate.rate_m_per_s.abs() < 5e-3 && rate.or_else_m_per_s == Some(0.0), "{rate:?}");
     }
 }

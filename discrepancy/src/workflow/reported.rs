@@ -5,7 +5,7 @@ use plant::Axis;
 
 /// What a report says of effects and parameters, as other steps need it.
 #[derive(Clone, Debug, serde::Deserialize)]
-pub struct Told {
+pub struct Reported {
     /// Effects, the best first.
     pub named: Vec<NamedEffect>,
     /// Parameters that were off.
@@ -17,33 +17,36 @@ pub struct Told {
     pub inputs: InputFiles,
     /// What the catalogue does not have.
     #[serde(default)]
-    pub outside: Option<ToldOutside>,
+    pub outside: Option<ReportedOutside>,
 }
 
-impl From<&Report> for Told {
+impl From<&Report> for Reported {
     fn from(report: &Report) -> Self {
-        Told {
+        Reported {
             named: report.named.clone(),
             parameters: report.parameters.clone(),
             carried: report.carried.clone(),
             inputs: report.inputs.clone(),
-            outside: report.outside.as_ref().map(|own| ToldOutside { tables: own.tables.clone() }),
+            outside: report
+                .outside
+                .as_ref()
+                .map(|outside| ReportedOutside { tables: outside.tables.clone() }),
         }
     }
 }
 
 /// The tables of what the catalogue does not have.
 #[derive(Clone, Debug, Default, serde::Deserialize)]
-pub struct ToldOutside {
+pub struct ReportedOutside {
     /// Terms that were added.
     #[serde(default)]
     pub tables: Vec<TableTerm>,
 }
 
-impl Told {
+impl Reported {
     /// Which axes the training records showed.
     #[must_use]
     pub fn measured(&self) -> [bool; 2] {
-        Axis::ALL.map(|axis| self.inputs.axes.iter().any(|own| own == axis.name()))
+        Axis::ALL.map(|axis| self.inputs.axes.iter().any(|name| name == axis.name()))
     }
 }

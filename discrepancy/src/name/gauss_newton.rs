@@ -8,7 +8,7 @@
 //! line promised is not what the simulator leaves.
 
 use super::NUMBER_COSTS;
-use super::nothing::FAR_OFF;
+use super::null_distribution::FAR_OFF;
 use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
@@ -27,14 +27,14 @@ const SHORTER: f64 = 0.4;
 const DOUBTS: usize = 4;
 const BROKEN: f64 = 6.0;
 /// Fall of the loss below which a fit has settled.
-const SETTLED: f64 = 0.3;
+const CONVERGED: f64 = 0.3;
 
 /// Shares of the parameters' way that are tried where straight lines may have led too far.
 const WAYS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
 /// The parameters of a model, as far as the simulator goes along with what straight lines promised of them: beside an effect that
 /// is still missing they may be led where nothing is right any more.
-pub(super) fn grounded(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
+pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = WAYS.map(|way| model.factors.map(|factor| 1.0 + way * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {
         point(engine, model.placed.clone(), *factors).map_or(f64::INFINITY, |point| point.loss)
@@ -45,10 +45,10 @@ pub(super) fn grounded(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
 }
 
 /// A model fitted in the simulator to the end, all parameters beside, with what its numbers cost; itself where that is no better.
-pub(super) fn ended(engine: &Engine<'_>, model: &Refit) -> Refit {
-    let Some(mut own) = settled(engine, model, &[true; COUNT]) else { return model.clone() };
-    own.loss += costs(numbers(&own.placed).len(), &own.factors, NUMBER_COSTS);
-    if own.loss < model.loss { own } else { model.clone() }
+pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
+    let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
+    fit.loss += costs(numbers(&fit.placed).len(), &fit.factors, NUMBER_COSTS);
+    if fit.loss < model.loss { fit } else { model.clone() }
 }
 
 /// A model where the simulator was asked.
@@ -65,7 +65,7 @@ struct Point {
 
 /// Fits a model in the simulator, parameters that are not `needed` held at what the file says; `None` where the rig cannot
 /// have it.
-pub(super) fn settled(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
+pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
     let mut factors = model.factors;
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
         *factor = 1.0;
@@ -81,7 +81,7 @@ pub(super) fn settled(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]
         let Some(tried) = tried else { break };
         let fell = point.loss - tried.loss;
         point = tried;
-        if fell < SETTLED {
+        if fell < CONVERGED {
             last = None;
             break;
         }
@@ -98,15 +98,15 @@ pub(super) fn settled(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]
 fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Option<Point> {
     let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
     let residual = engine.residual(&simulated);
-    let squares: Vec<f64> = residual.chunks_exact(engine.rows()).map(|own| dot(own, own)).collect();
+    let squares: Vec<f64> = residual.chunks_exact(engine.rows()).map(|window| dot(window, window)).collect();
     let believed = |ridge: f64, off: f64| ridge * off * off;
     let loss = loss(&squares, engine.freedom())
         + parameter_ridges()
             .iter()
             .zip(&factors)
-            .map(|(ridge, own)| believed(*ridge, own - 1.0))
+            .map(|(ridge, factor)| believed(*ridge, factor - 1.0))
             .sum::<f64>()
-        + numbers(&placed).iter().map(|(ridge, own)| believed(*ridge, *own)).sum::<f64>();
+        + numbers(&placed).iter().map(|(ridge, z)| believed(*ridge, *z)).sum::<f64>();
     Some(Point { placed, factors, simulated, residual, squares, loss })
 }
 
@@ -114,8 +114,12 @@ fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Opt
 fn numbers(placed: &[Placed]) -> Vec<(f64, f64)> {
     placed
         .iter()
-        .flat_map(|own| {
-            own.coordinates.iter().enumerate().map(|(key, z)| (coordinate_ridge(&own.candidate, key), *z))
+        .flat_map(|effect| {
+            effect
+                .coordinates
+                .iter()
+                .enumerate()
+                .map(|(key, z)| (coordinate_ridge(&effect.candidate, key), *z))
         })
         .collect()
 }
@@ -148,8 +152,8 @@ fn around(engine: &Engine<'_>, point: &Point) -> Option<Lines> {
     let rig = rig_of(engine.rig(), &point.placed, &[1.0; COUNT])?;
     let mut columns = engine.parameter_columns(&rig, &point.factors);
     columns.extend(coordinate_columns(engine, &point.factors, &point.placed, &point.simulated)?);
-    let (own, places): (Vec<f64>, Vec<f64>) = numbers(&point.placed).into_iter().unzip();
-    let ridges = [parameter_ridges(), own].concat();
+    let (coordinate_ridges, places): (Vec<f64>, Vec<f64>) = numbers(&point.placed).into_iter().unzip();
+    let ridges = [parameter_ridges(), coordinate_ridges].concat();
     let from = point.factors.iter().map(|factor| factor - 1.0).chain(places).collect();
     Some(Lines { columns, ridges, from })
 }
@@ -204,16 +208,16 @@ fn along(
 fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share: f64) -> Option<Point> {
     let (mut placed, mut factors) = (from.placed.clone(), from.factors);
     let mut changes = vec![0.0; COUNT + numbers(&placed).len()];
-    chosen.iter().zip(&step.coefficients).for_each(|(at, own)| changes[*at] = share * own);
+    chosen.iter().zip(&step.coefficients).for_each(|(at, coefficient)| changes[*at] = share * coefficient);
     for (factor, change) in factors.iter_mut().zip(&changes) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
     let mut changes = changes[COUNT..].iter();
-    for own in &mut placed {
-        for key in 0..own.coordinates.len() {
-            let [least, most] = own.candidate.reach(key);
-            own.coordinates[key] =
-                (own.coordinates[key] + changes.next().expect("one each")).clamp(least, most);
+    for effect in &mut placed {
+        for key in 0..effect.coordinates.len() {
+            let [least, most] = effect.candidate.reach(key);
+            effect.coordinates[key] =
+                (effect.coordinates[key] + changes.next().expect("one each")).clamp(least, most);
         }
     }
     point(engine, placed, factors)
@@ -227,7 +231,7 @@ fn errors(engine: &Engine<'_>, lines: &Lines, point: &Point) -> Vec<f64> {
     let weights = products.weights(&point.squares);
     let stays =
         Fit { coefficients: vec![0.0; all.len()], loss: point.loss, squares: point.squares.clone(), weights };
-    let own =
+    let errors =
         products.jackknife(&all, &stays, &lines.ridges).unwrap_or_else(|| vec![f64::INFINITY; all.len()]);
-    [&own[COUNT..], &own[..COUNT]].concat()
+    [&errors[COUNT..], &errors[..COUNT]].concat()
 }

@@ -4,9 +4,9 @@
 //!   |......|lead|judged judged judged judged judged|............|lead|judged ...
 //! ```
 //!
-//! The first window of a block only fills lags and memories, as after a hole, and counts as one ([`Course::gaps`]).
+//! The first window of a block only fills lags and memories, as after a hole, and counts as one ([`GriddedRecord::gaps`]).
 
-use super::Course;
+use super::GriddedRecord;
 use crate::windows::WINDOW;
 
 /// Windows of a block, its first one included.
@@ -17,23 +17,23 @@ pub const SEARCHED_S: f64 = 20.0;
 
 /// Share of some records that is searched.
 #[must_use]
-pub fn searched_share(courses: &[Course]) -> f64 {
-    let axes = |course: &Course| course.measured.iter().filter(|measured| **measured).count();
+pub fn searched_share(records: &[GriddedRecord]) -> f64 {
+    let axes = |record: &GriddedRecord| record.measured.iter().filter(|measured| **measured).count();
     let all_s: f64 =
-        courses.iter().map(|course| course.len() as f64 * plant::PERIOD_S * axes(course) as f64).sum();
+        records.iter().map(|record| record.len() as f64 * plant::PERIOD_S * axes(record) as f64).sum();
     (SEARCHED_S / all_s).min(1.0)
 }
 
-impl Course {
+impl GriddedRecord {
     /// About this share of the record; `None` where that is all of it, or where it has too few blocks to choose from.
     #[must_use]
-    pub fn thinned(&self, share: f64) -> Option<Course> {
+    pub fn thinned(&self, share: f64) -> Option<GriddedRecord> {
         let blocks = self.len() / (BLOCK * WINDOW);
         let wanted = (share * blocks as f64).round().max(1.0) as usize;
         if share >= 1.0 || wanted >= blocks {
             return None;
         }
-        let mut part = Course {
+        let mut part = GriddedRecord {
             inputs: Vec::new(),
             samples: Vec::new(),
             points: Vec::new(),
@@ -60,9 +60,9 @@ mod tests {
     use super::*;
     use plant::Inputs;
 
-    fn course(periods: usize) -> Course {
+    fn record(periods: usize) -> GriddedRecord {
         let inputs = |at: usize| Inputs { valve: [at as f64, 0.0], ..Inputs::default() };
-        Course {
+        GriddedRecord {
             name: "a".to_owned(),
             linked: false,
             added_mass_kg: 0.0,
@@ -79,11 +79,12 @@ mod tests {
 
     #[test]
     fn a_part_is_whole_blocks_from_everywhere_each_with_a_lead_in() {
-        let all = course(48_000);
+        let all = record(48_000);
         assert_eq!(searched_share(std::slice::from_ref(&all)), 20.0 / 96.0);
         let part = all.thinned(0.2).unwrap();
         assert_eq!(part.len(), 4 * BLOCK * WINDOW);
-        let began: Vec<f64> = part.inputs.iter().step_by(BLOCK * WINDOW).map(|own| own.valve[0]).collect();
+        let began: Vec<f64> =
+            part.inputs.iter().step_by(BLOCK * WINDOW).map(|inputs| inputs.valve[0]).collect();
         assert_eq!(began, [4800.0, 16_800.0, 28_800.0, 40_800.0]);
         let lead_in = part.gaps.iter().filter(|gap| **gap).count();
         assert_eq!(lead_in, 4 * WINDOW);
@@ -92,8 +93,8 @@ mod tests {
 
     #[test]
     fn a_short_record_is_taken_whole() {
-        assert!(course(20_000).thinned(1.0).is_none());
-        assert!(course(2_400).thinned(0.5).is_none());
-        assert_eq!(searched_share(&[course(10_000)]), 1.0);
+        assert!(record(20_000).thinned(1.0).is_none());
+        assert!(record(2_400).thinned(0.5).is_none());
+        assert_eq!(searched_share(&[record(10_000)]), 1.0);
     }
 }

@@ -12,23 +12,26 @@ const MOVES: usize = 3;
 const MOVED: f64 = 0.05;
 
 /// A model, and the records as they are met best by it; `None` where its own starts make no difference.
-pub(super) struct Placement<'a> {
-    pub(super) home: Option<Engine<'a>>,
+pub(super) struct Restarted<'a> {
+    pub(super) engine: Option<Engine<'a>>,
     pub(super) fit: Refit,
 }
 
 /// Fits a model again from where it says itself that the pistons were, where that matters.
-pub(super) fn at_home<'a>(engine: &Engine<'a>, own: &Refit, penalty: f64) -> Placement<'a> {
-    let mut best = Placement { home: None, fit: own.clone() };
+pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty: f64) -> Restarted<'a> {
+    let mut best = Restarted { engine: None, fit: model.clone() };
     for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
         let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
-        let home = engine.settled_at(&rig);
-        let Some(fit) = refit(&home, &around_of(&home, &best.fit), &best.fit.placed, penalty) else { break };
-        let settled = best.home.is_some() && fit.loss > best.fit.loss - MOVED * best.fit.loss.abs();
-        if best.home.is_none() || fit.loss < best.fit.loss {
-            best = Placement { home: Some(home), fit };
+        let restarted = engine.with_starts_under(&rig);
+        let Some(fit) = refit(&restarted, &around_of(&restarted, &best.fit), &best.fit.placed, penalty)
+        else {
+            break;
+        };
+        let converged = best.engine.is_some() && fit.loss > best.fit.loss - MOVED * best.fit.loss.abs();
+        if best.engine.is_none() || fit.loss < best.fit.loss {
+            best = Restarted { engine: Some(restarted), fit };
         }
-        if settled {
+        if converged {
             break;
         }
     }
@@ -44,23 +47,23 @@ pub(super) fn gap_start(
     start: &Placed,
 ) -> Vec<Placed> {
     let [least, most] = start.candidate.range(0);
-    let told = start.coordinates[0];
+    let screened_z = start.coordinates[0];
     let tried: Vec<Vec<Placed>> = AMPLITUDES
         .iter()
-        .map(|own| own * told.signum())
-        .filter(|own| *own >= least && *own <= most)
-        .chain([told])
+        .map(|size| size * screened_z.signum())
+        .filter(|size| *size >= least && *size <= most)
+        .chain([screened_z])
         .map(|amplitude| {
-            let mut own = start.clone();
-            own.coordinates[0] = amplitude;
-            [model, &[own]].concat()
+            let mut effect = start.clone();
+            effect.coordinates[0] = amplitude;
+            [model, &[effect]].concat()
         })
         .collect();
     let losses: Vec<f64> = tried
         .par_iter()
         .map(|placed| {
             rig_of(engine.rig(), placed, &point.factors)
-                .map_or(f64::INFINITY, |rig| loss_at(&engine.settled_at(&rig), point, placed))
+                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), point, placed))
         })
         .collect();
     let best = (0..tried.len()).min_by(|left, right| losses[*left].total_cmp(&losses[*right]));

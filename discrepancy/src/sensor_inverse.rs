@@ -8,7 +8,7 @@
 //! somewhere else: the start is moved by what is known of the sensor, so that the readings, and not the truth, begin at the
 //! record's. Source: effects.md, Sensors.
 
-use crate::course::{Course, Point};
+use crate::gridded_record::{GriddedRecord, Point};
 use plant::effects::sheet::{Element, Part};
 use plant::{Axis, PERIOD_S, RigParameters};
 
@@ -30,13 +30,13 @@ impl Reading {
 
 /// The readings of position and both pressures of each axis.
 #[derive(Clone, Copy, Debug)]
-pub struct Seats {
+pub struct SensorInverse {
     axes: [[Reading; 3]; 2],
     stroke_m: f64,
     is_true: bool,
 }
 
-impl Seats {
+impl SensorInverse {
     /// What the sensors of a rig do.
     #[must_use]
     pub fn of(rig: &RigParameters) -> Self {
@@ -68,13 +68,13 @@ impl Seats {
             }
         }
         let is_true = axes.iter().flatten().all(|reading| *reading == Reading::TRUE);
-        Seats { axes, stroke_m: rig.cylinder().stroke_m, is_true }
+        SensorInverse { axes, stroke_m: rig.cylinder().stroke_m, is_true }
     }
 
     /// The points from which the readings begin as the record's at a period; `own` are the record's points there, made better.
     #[must_use]
-    pub fn points(&self, course: &Course, period: usize, own: &[Point; 2]) -> [Point; 2] {
-        let mut points = *own;
+    pub fn points(&self, record: &GriddedRecord, period: usize, starts: &[Point; 2]) -> [Point; 2] {
+        let mut points = *starts;
         if self.is_true {
             return points;
         }
@@ -82,8 +82,8 @@ impl Seats {
             let i = axis.index();
             let [position, a, b] = self.axes[i];
             let later = |reading: Reading, of: &dyn Fn(&Point) -> f64| {
-                let (then, now) = (at(course, i, period, reading.delay_s, of), of(&course.points[period][i]));
-                of(&own[i]) + then - now
+                let (then, now) = (at(record, i, period, reading.delay_s, of), of(&record.points[period][i]));
+                of(&starts[i]) + then - now
             };
             let extension_m = later(position, &|point| point.extension_m);
             let rate = later(position, &|point| point.rod_velocity_m_per_s);
@@ -102,11 +102,11 @@ impl Seats {
 }
 
 /// A number of the record's points some time after a period.
-fn at(course: &Course, axis: usize, period: usize, delay_s: f64, of: &dyn Fn(&Point) -> f64) -> f64 {
-    let place = (period as f64 + delay_s / PERIOD_S).min((course.len() - 1) as f64);
+fn at(record: &GriddedRecord, axis: usize, period: usize, delay_s: f64, of: &dyn Fn(&Point) -> f64) -> f64 {
+    let place = (period as f64 + delay_s / PERIOD_S).min((record.len() - 1) as f64);
     let (before, share) = (place.floor() as usize, place.fract());
-    let after = (before + 1).min(course.len() - 1);
-    let [before, after] = [before, after].map(|place| of(&course.points[place][axis]));
+    let after = (before + 1).min(record.len() - 1);
+    let [before, after] = [before, after].map(|place| of(&record.points[place][axis]));
     // Between rest and motion there is no half-way.
     if share == 0.0 || before == 0.0 || after == 0.0 {
         return if share < 0.5 { before } else { after };

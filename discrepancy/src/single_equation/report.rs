@@ -7,7 +7,7 @@
 use super::fit::{clustered_t, rms};
 use super::model::{Kind, TermEntry};
 use super::runs::Run;
-use super::select::{Judged, told};
+use super::select::{Judged, describe};
 use super::terms::{self, shape_unit, shown};
 use super::{Fitted, Study};
 use crate::report::{
@@ -39,7 +39,7 @@ impl Study {
         let other =
             |effect: &NamedEffect| effect.alternatives.iter().any(|twin| twin.effect != effect.effect);
         let checks = self.checks();
-        if let Some(fatal) = checks.iter().flat_map(|check| &check.findings).find(|own| own.fatal) {
+        if let Some(fatal) = checks.iter().flat_map(|check| &check.findings).find(|finding| finding.fatal) {
             let summary = format!("{}: a record cannot be used: {}", self.model.name, fatal.text);
             return Report { inputs: self.inputs(model_file), checks, ..empty(Verdict::BadData, summary) };
         }
@@ -106,7 +106,7 @@ impl Study {
     /// The baseline's numbers beside what was taken, in words.
     fn baseline_numbers(&self) -> String {
         let columns = terms::baseline(&self.model);
-        let each = columns.iter().zip(&self.own_fit.numbers);
+        let each = columns.iter().zip(&self.extended_fit.numbers);
         let each: Vec<String> = each
             .map(|(column, number)| match column.name {
                 // Newton per pascal is square metres; people know square millimetres.
@@ -146,9 +146,9 @@ impl Study {
             "dead-volume" => self.rig.as_ref().map(|rig| rig.cylinder().dead_volume_m3 * factor),
             _ => None,
         };
-        let told = value * factor + before.unwrap_or(0.0);
+        let describe = value * factor + before.unwrap_or(0.0);
         let error = Some(error * factor);
-        all.push(Quantity { before, ..quantity(name, unit, told, error) });
+        all.push(Quantity { before, ..quantity(name, unit, describe, error) });
         all.extend(entry.shape.iter().map(|(key, value)| quantity(key, shape_unit(key), *value, None)));
         all
     }
@@ -162,7 +162,7 @@ impl Study {
     }
 
     fn named(&self) -> Vec<NamedEffect> {
-        let errors = self.errors(&self.own, &self.own_fit);
+        let errors = self.errors(&self.extended, &self.extended_fit);
         let (mut first, mut named) = (self.base.len(), Vec::new());
         for taken in &self.found.taken {
             let judged = &taken.judged;
@@ -178,13 +178,13 @@ impl Study {
                 forms.chain(taken.alternatives.iter().copied()).map(|twin| self.alternative(twin)).collect();
             alternatives.extend(alias(
                 entry,
-                &self.quantities(entry, at, &self.own_fit.numbers, &errors),
+                &self.quantities(entry, at, &self.extended_fit.numbers, &errors),
                 self,
             ));
             named.push(NamedEffect {
                 effect: entry.effect.clone(),
                 place: place(&entry.effect),
-                parameters: finite(self.quantities(entry, at, &self.own_fit.numbers, &errors)),
+                parameters: finite(self.quantities(entry, at, &self.extended_fit.numbers, &errors)),
                 share_explained: judged.share,
                 alternatives,
             });
@@ -212,15 +212,16 @@ impl Study {
     }
 
     fn parameters(&self) -> Vec<Quantity> {
-        let errors = self.errors(&self.own, &self.own_fit);
+        let errors = self.errors(&self.extended, &self.extended_fit);
         let (mut first, mut parameters) = (self.base.len(), Vec::new());
         for taken in &self.found.taken {
             let prepared = &self.families[taken.judged.place];
             let entry = &prepared.family.variants[taken.judged.variant];
             if entry.effect.starts_with("parameter:") {
-                let own = self.quantities(entry, first, &self.own_fit.numbers, &errors);
-                let own = finite(own).into_iter().take(1);
-                parameters.extend(own.map(|quantity| Quantity { name: entry.effect.clone(), ..quantity }));
+                let numbers = self.quantities(entry, first, &self.extended_fit.numbers, &errors);
+                let numbers = finite(numbers).into_iter().take(1);
+                parameters
+                    .extend(numbers.map(|quantity| Quantity { name: entry.effect.clone(), ..quantity }));
             }
             first += prepared.columns[taken.judged.variant].len();
         }
@@ -228,7 +229,9 @@ impl Study {
     }
 
     fn candidates(&self) -> Vec<Candidate> {
-        let taken = |own: &Judged| self.found.taken.iter().position(|taken| taken.judged.place == own.place);
+        let taken = |candidate: &Judged| {
+            self.found.taken.iter().position(|taken| taken.judged.place == candidate.place)
+        };
         let mut candidates: Vec<Candidate> = self
             .found
             .first
@@ -241,15 +244,15 @@ impl Study {
                     (Some(round), _) => {
                         let ordinal = ["first", "second", "third"]
                             .get(round)
-                            .map_or_else(|| format!("as number {}", round + 1), |own| (*own).to_owned());
-                        format!("taken {ordinal} ({})", told(entry))
+                            .map_or_else(|| format!("as number {}", round + 1), |name| (*name).to_owned());
+                        format!("taken {ordinal} ({})", describe(entry))
                     }
                     (None, Some(last)) if last.passes => {
-                        format!("passes, but another was better ({})", told(entry))
+                        format!("passes, but another was better ({})", describe(entry))
                     }
                     (None, Some(last)) => {
                         let entry = &self.families[last.place].family.variants[last.variant];
-                        format!("rejected: {} ({})", last.gate, told(entry))
+                        format!("rejected: {} ({})", last.gate, describe(entry))
                     }
                     (None, None) => "not tried".to_owned(),
                 };
@@ -270,14 +273,14 @@ impl Study {
 
     /// Families that no fit can tell from the baseline.
     fn not_excited(&self) -> Vec<EffectPlace> {
-        let told = self.found.first.iter().filter(|judged| !judged.is_excited);
-        let effects = told.map(|judged| self.families[judged.place].family.variants[0].effect.clone());
+        let describe = self.found.first.iter().filter(|judged| !judged.is_excited);
+        let effects = describe.map(|judged| self.families[judged.place].family.variants[0].effect.clone());
         effects.map(|effect| EffectPlace { place: place(&effect), effect }).collect()
     }
 
     /// The number that would take the asked share of what is left now.
     fn detection_limits(&self) -> Vec<DetectionLimit> {
-        let power = self.rows.power(&self.own_fit.residual);
+        let power = self.rows.power(&self.extended_fit.residual);
         let mut limits = Vec::new();
         for judged in &self.found.last {
             let prepared = &self.families[judged.place];
@@ -288,10 +291,10 @@ impl Study {
             }
             let column =
                 super::Rows { target: prepared.columns[judged.variant][0].clone(), ..self.rows.clone() };
-            let Some(alone) = column.fit(&self.own) else { continue };
-            let own = column.power(&alone.residual);
-            if own > 0.0 {
-                let value = (self.model.selection.share_floor * power / own).sqrt() * factor;
+            let Some(alone) = column.fit(&self.extended) else { continue };
+            let alone_power = column.power(&alone.residual);
+            if alone_power > 0.0 {
+                let value = (self.model.selection.share_floor * power / alone_power).sqrt() * factor;
                 limits.push(DetectionLimit {
                     effect: entry.effect.clone(),
                     place: place(&entry.effect),
@@ -381,7 +384,7 @@ impl Study {
             Kind::Chamber => "drive_flow_a_m3_per_s".to_owned(),
             _ => self.model.channels["force"].column(),
         };
-        let [before_rms, after_rms] = [before, after].map(|own| rms(own));
+        let [before_rms, after_rms] = [before, after].map(|values| rms(values));
         let closed = (before_rms > 0.0).then(|| 1.0 - (after_rms / before_rms).powi(2));
         report.gap.insert(signal.clone(), Gap { before: before_rms, after: after_rms, floor: 0.0, closed });
         let cut = rows.in_time(self.model.selection.blocks);
@@ -390,13 +393,17 @@ impl Study {
         };
         let differences: Vec<f64> =
             squares(before).iter().zip(squares(after)).map(|(before, after)| before - after).collect();
-        let trained = rms(&self.own_fit.residual).powi(2).max(f64::MIN_POSITIVE);
+        let trained = rms(&self.extended_fit.residual).powi(2).max(f64::MIN_POSITIVE);
         let lag = |residual: &[f64]| {
             let products: f64 = residual.windows(2).map(|pair| pair[0] * pair[1]).sum();
             products / residual.iter().map(|r| r * r).sum::<f64>().max(f64::MIN_POSITIVE)
         };
-        let mut folds: Vec<f64> =
-            self.time.folds.iter().map(|fold| fold_power(&self.own_fit.residual, fold) / trained).collect();
+        let mut folds: Vec<f64> = self
+            .time
+            .folds
+            .iter()
+            .map(|fold| fold_power(&self.extended_fit.residual, fold) / trained)
+            .collect();
         folds.sort_by(f64::total_cmp);
         report.verification = Some(Verification {
             record: runs.iter().map(|run| run.name.clone()).collect::<Vec<_>>().join(", "),
@@ -424,7 +431,7 @@ fn finite(mut quantities: Vec<Quantity>) -> Vec<Quantity> {
 }
 
 /// What is the same column by construction, and so told without a fit.
-fn alias(entry: &TermEntry, own: &[Quantity], study: &Study) -> Vec<NamedEffect> {
+fn alias(entry: &TermEntry, numbers: &[Quantity], study: &Study) -> Vec<NamedEffect> {
     let named = |effect: &str, parameters: Vec<Quantity>| NamedEffect {
         effect: effect.into(),
         place: place(effect),
@@ -432,7 +439,7 @@ fn alias(entry: &TermEntry, own: &[Quantity], study: &Study) -> Vec<NamedEffect>
         share_explained: 0.0,
         alternatives: Vec::new(),
     };
-    match (entry.effect.as_str(), &study.rig, own.first()) {
+    match (entry.effect.as_str(), &study.rig, numbers.first()) {
         ("dead-volume", Some(rig), Some(volume)) => {
             // A position that is read o too long makes the volume A o too large.
             let per_mm_cm3 = rig.cylinder().piston_area_m2 * 1e3;

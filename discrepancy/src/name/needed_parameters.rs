@@ -9,7 +9,7 @@
 //! the largest of them would be none of a fit: what is told, what the extended file has and what is judged is one model.
 
 use super::around_of;
-use super::settle::settled;
+use super::gauss_newton::fit_selected;
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS};
@@ -21,10 +21,10 @@ const NEEDED: f64 = 12.0;
 /// The model with only the parameters that it needs, fitted in the simulator to the end; with all, where it cannot do without the
 /// others.
 pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
-    let Some(all) = settled(engine, model, &[true; COUNT]) else { return model.clone() };
+    let Some(all) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
     let Some(needed) = needed(engine, &all) else { return all };
     let held = needed.iter().filter(|needed| !**needed).count();
-    match settled(engine, &all, &needed) {
+    match fit_selected(engine, &all, &needed) {
         Some(fewer) if fewer.loss < all.loss + NEEDED * held as f64 => fewer,
         _ => all,
     }
@@ -38,7 +38,7 @@ fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
     let mut residual = engine.residual(&simulated);
     // From where the file is: what is fitted then is how far each parameter is off.
     for (column, factor) in around.columns.iter().zip(model.factors) {
-        residual.iter_mut().zip(column).for_each(|(own, column)| *own += (factor - 1.0) * column);
+        residual.iter_mut().zip(column).for_each(|(value, column)| *value += (factor - 1.0) * column);
     }
     let columns: Vec<&[f64]> = around.columns.iter().chain(&coordinates).map(Vec::as_slice).collect();
     let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
@@ -52,7 +52,7 @@ fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
         products.fit(&chosen, &ridges).loss
     };
     let mut needed = [true; COUNT];
-    let mut own = loss(&needed);
+    let mut current = loss(&needed);
     loop {
         let least = (0..PARAMETERS.len())
             .filter(|at| needed[*at])
@@ -63,7 +63,7 @@ fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
             })
             .min_by(|left, right| left.0.total_cmp(&right.0));
         match least {
-            Some((without, fewer)) if without - own < NEEDED => (own, needed) = (without, fewer),
+            Some((without, fewer)) if without - current < NEEDED => (current, needed) = (without, fewer),
             _ => break,
         }
     }

@@ -100,8 +100,8 @@ impl Rows {
         let scales = scales(columns);
         let all = normal(columns, &scales, &self.target, 0..self.target.len());
         let each = cut.folds.iter().map(|fold| {
-            let own = normal(columns, &scales, &self.target, fold.iter().copied());
-            let rest = Normal { gram: &all.gram - own.gram, right: &all.right - own.right };
+            let held_out = normal(columns, &scales, &self.target, fold.iter().copied());
+            let rest = Normal { gram: &all.gram - held_out.gram, right: &all.right - held_out.right };
             let numbers = rest.inverse(self.target.len() - fold.len())? * &rest.right;
             let judged = fold.iter().filter(|row| self.judged[**row]);
             Some(

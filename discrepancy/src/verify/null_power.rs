@@ -18,7 +18,7 @@ const TWO_SIDED: f64 = 1.96;
 
 /// Figures of noise alone.
 #[derive(Debug)]
-pub(super) struct Nothing {
+pub(super) struct NullPower {
     /// Mean sum of squares of each window and lane, window by window.
     pub(super) expected: Vec<f64>,
     /// Mean of [`Power::quiet`], of each lane.
@@ -29,21 +29,21 @@ pub(super) struct Nothing {
     pub(super) range: [f64; 2],
 }
 
-impl Nothing {
+impl NullPower {
     /// Of a model on a record; of a long one, what records that the model left would show is drawn of a `part` of it alone, whose
     /// spread is larger as it has fewer windows.
     pub(super) fn new(model: &Model<'_>, part: Option<&Model<'_>>) -> Self {
-        let (mut nothing, of_noise) = Self::of_noise(&model.windows);
+        let (mut null, of_noise) = Self::of_noise(&model.windows);
         let (mean, of_records) = match part {
-            None => nothing.of_records(model),
+            None => null.of_records(model),
             Some(part) => {
                 let (mean, deviation) = Self::of_noise(&part.windows).0.of_records(part);
                 (mean, deviation * (part.windows.count() as f64 / model.windows.count() as f64).sqrt())
             }
         };
         let deviation = of_noise.max(of_records) * (1.0 + 1.0 / RECORDS as f64).sqrt();
-        nothing.range = [mean - TWO_SIDED * deviation, mean + TWO_SIDED * deviation];
-        nothing
+        null.range = [mean - TWO_SIDED * deviation, mean + TWO_SIDED * deviation];
+        null
     }
 
     /// Everything but the range, and the deviation of the joint power of noise.
@@ -56,24 +56,24 @@ impl Nothing {
         // Windows differ in their directions of freedom; lanes without samples have nothing.
         let mut expected = vec![0.0; windows.count() * lanes];
         for draw in &draws {
-            expected.iter_mut().zip(draw).for_each(|(sum, own)| *sum += own / DRAWS as f64);
+            expected.iter_mut().zip(draw).for_each(|(sum, value)| *sum += value / DRAWS as f64);
         }
         let powers: Vec<Power> = draws.iter().map(|draw| Power::new(draw, &expected, lanes)).collect();
         let quiet = (0..lanes)
             .map(|lane| powers.iter().map(|power| power.quiet()[lane]).sum::<f64>() / DRAWS as f64)
             .collect();
-        let mut nothing = Nothing { expected, quiet, spreads: Vec::new(), range: [1.0; 2] };
+        let mut null = NullPower { expected, quiet, spreads: Vec::new(), range: [1.0; 2] };
         // Every draw is treated as a record is: its levels are told from itself, its worst windows are left out.
-        let powers: Vec<Power> = powers.iter().map(|power| power.over(&levels(power, &nothing))).collect();
+        let powers: Vec<Power> = powers.iter().map(|power| power.over(&levels(power, &null))).collect();
         let of_lane = |power: &Power, lane: usize| {
-            let own = power.lane(lane);
-            pooled(&own, &kept(&own))
+            let squares = power.lane(lane);
+            pooled(&squares, &kept(&squares))
         };
-        nothing.spreads = (0..lanes)
+        null.spreads = (0..lanes)
             .map(|lane| spread(&powers.iter().map(|power| of_lane(power, lane)).collect::<Vec<_>>()).1)
             .collect();
         let (_, of_noise) = spread(&powers.iter().map(joint).collect::<Vec<_>>());
-        (nothing, of_noise)
+        (null, of_noise)
     }
 
     /// Mean and deviation of the joint power of records that the model would have left: around a stop or a break-away a start
@@ -84,8 +84,8 @@ impl Nothing {
             .into_par_iter()
             .map(|draw| {
                 let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw));
-                let own = model.windows.redrawn(&model.simulated, &mut random);
-                let residual = own.residual(&own.simulate(own.rig()));
+                let windows = model.windows.redrawn(&model.simulated, &mut random);
+                let residual = windows.residual(&windows.simulate(windows.rig()));
                 let power = Power::new(&sums(&residual, lanes), &self.expected, lanes);
                 joint(&power.over(&levels(&power, self)))
             })
@@ -95,14 +95,14 @@ impl Nothing {
 }
 
 fn joint(power: &Power) -> f64 {
-    let own = power.joint();
-    pooled(&own, &kept(&own))
+    let squares = power.joint();
+    pooled(&squares, &kept(&squares))
 }
 
 /// Mean and standard deviation.
 fn spread(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
     (mean, variance.sqrt())
 }

@@ -18,7 +18,7 @@ const OFF_LEAST: f64 = 0.01;
 /// What naming found, as a report.
 pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     let named = named(found);
-    let (parameters, carried) = parameters(engine, &found.told);
+    let (parameters, carried) = parameters(engine, &found.reported);
     let verdict = if found.inadequate {
         Verdict::OutsideCatalogue
     } else if named.iter().any(|named| !named.alternatives.is_empty()) {
@@ -47,9 +47,9 @@ fn named(found: &Found) -> Vec<NamedEffect> {
     let mut at = 0;
     let mut all = Vec::new();
     for ((placed, share), alternatives) in
-        found.told.placed.iter().zip(&found.shares).zip(&found.alternatives)
+        found.reported.placed.iter().zip(&found.shares).zip(&found.alternatives)
     {
-        let errors = &found.told.errors[at..at + placed.coordinates.len()];
+        let errors = &found.reported.errors[at..at + placed.coordinates.len()];
         at += placed.coordinates.len();
         let alternatives = alternatives
             .iter()
@@ -98,26 +98,26 @@ fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantit
     let (off, carried): (Vec<usize>, Vec<usize>) = (0..COUNT)
         .filter(|at| by(*at) > 0.0)
         .partition(|at| by(*at) > OFF_LEAST && by(*at) > OFF_ERRORS * errors[*at]);
-    let told = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, model)).collect();
-    (told(off), told(carried))
+    let quantities = |all: Vec<usize>| all.into_iter().map(|at| quantity(engine, at, model)).collect();
+    (quantities(off), quantities(carried))
 }
 
 fn candidates(found: &Found) -> Vec<report::Candidate> {
-    let nothing = found.nothing;
+    let null_loss = found.null_loss;
     found
         .screened
         .iter()
         .map(|screened| {
             let placed = &screened.start;
             let candidate = &placed.candidate;
-            let is_it = |own: &Placed| same(own, placed);
-            let is_last = |own: &&Refit| own.placed.last().is_some_and(is_it);
-            let alone = found.fitted.iter().filter(|own| own.placed.len() == 1).find(is_last);
+            let is_it = |other: &Placed| same(other, placed);
+            let is_last = |fit: &&Refit| fit.placed.last().is_some_and(is_it);
+            let alone = found.fitted.iter().filter(|fit| fit.placed.len() == 1).find(is_last);
             let is_named = found.model.placed.iter().any(is_it);
-            let is_alike = found.alternatives.iter().flatten().any(|own| is_last(&&own.fit));
-            let shown = alone.map_or(placed, |own| &own.placed[0]);
-            let share = alone.map(|own| {
-                ((found.calibrated.fit.loss - own.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
+            let is_alike = found.alternatives.iter().flatten().any(|alternative| is_last(&&alternative.fit));
+            let shown = alone.map_or(placed, |fit| &fit.placed[0]);
+            let share = alone.map(|fit| {
+                ((found.calibrated.fit.loss - fit.loss) / found.calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0)
             });
             let fate = if is_named && !found.inadequate {
                 "named"
@@ -127,7 +127,7 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
                 "explains as much as what is named"
             } else if alone.is_some() {
                 "fitted, and others explain more"
-            } else if found.fitted.iter().any(|own| is_last(&own)) {
+            } else if found.fitted.iter().any(|fit| is_last(&fit)) {
                 "fitted beside what was named first, and others explain more"
             } else {
                 "not among the best of the screening"
@@ -135,7 +135,7 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
             report::Candidate {
                 effect: candidate.sheet.name.to_owned(),
                 place: Where::from(candidate.place),
-                score: (nothing - screened.loss) / found.threshold.max(1e-9),
+                score: (null_loss - screened.loss) / found.threshold.max(1e-9),
                 share_explained: share,
                 amplitude: candidate.numbers(&shown.coordinates)[0],
                 unit: candidate.sheet.keys[0].unit.name().to_owned(),
@@ -198,8 +198,9 @@ pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
 
 /// The verdict in a sentence or two.
 pub(super) fn summary(report: &Report) -> String {
-    let one = |own: &NamedEffect| format!("{} ({})", own.effect, place_name(&own.place));
-    let parameters = report.parameters.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+    let one = |effect: &NamedEffect| format!("{} ({})", effect.effect, place_name(&effect.place));
+    let parameters =
+        report.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>().join(", ");
     let off =
         if parameters.is_empty() { String::new() } else { format!(" Off in the rig file: {parameters}.") };
     match report.verdict {
@@ -211,12 +212,12 @@ pub(super) fn summary(report: &Report) -> String {
             format!("Missing: {}.{off}", report.named.iter().map(one).collect::<Vec<_>>().join(" and "))
         }
         Verdict::Ambiguous => {
-            let told = report.named.iter().map(|own| {
-                std::iter::once(own).chain(&own.alternatives).map(one).collect::<Vec<_>>().join(" or ")
+            let quantities = report.named.iter().map(|named| {
+                std::iter::once(named).chain(&named.alternatives).map(one).collect::<Vec<_>>().join(" or ")
             });
             format!(
                 "Missing, and not to be told apart by these records: {}.{off}",
-                told.collect::<Vec<_>>().join("; and ")
+                quantities.collect::<Vec<_>>().join("; and ")
             )
         }
         Verdict::OutsideCatalogue => match &report.outside {
@@ -224,7 +225,7 @@ pub(super) fn summary(report: &Report) -> String {
                 let on = outside
                     .variables
                     .first()
-                    .map_or("nothing that was measured", |own| own.variable.as_str());
+                    .map_or("nothing that was measured", |dependence| dependence.variable.as_str());
                 format!("Not in the catalogue: something in {} that depends on {on}.{off}", outside.balance)
             }
             None => format!("Something is missing that the catalogue does not explain.{off}"),

@@ -91,10 +91,10 @@ impl Run {
                 let other_pa = smooth(values("other_pressure")?);
                 let commands = values("valve")?;
                 let flow = smooth(modelled_flow(rig, &commands, &pa, &other_pa, period_s)?);
-                let (area_m2, own_m3) = (rig.cylinder().piston_area_m2, rig.cylinder().dead_volume_m3);
+                let (area_m2, dead_m3) = (rig.cylinder().piston_area_m2, rig.cylinder().dead_volume_m3);
                 let normal_pa = rig.gas().normal_pressure_pa;
                 let stored_j: Vec<f64> =
-                    pa.iter().zip(&x_m).map(|(p, x)| p * (area_m2 * x + own_m3)).collect();
+                    pa.iter().zip(&x_m).map(|(p, x)| p * (area_m2 * x + dead_m3)).collect();
                 let stored = gradient(&stored_j, period_s);
                 let target =
                     stored.iter().zip(&flow).map(|(rate_w, flow)| rate_w / normal_pa - flow).collect();

@@ -5,21 +5,21 @@
 //! ```
 //!
 //! Rows are put on the grid by their nearest millisecond; a period without a row has no samples, and its command is that before.
-//! A window that lacks more than a few commands in a row is not simulated ([`Course::gaps`]).
+//! A window that lacks more than a few commands in a row is not simulated ([`GriddedRecord::gaps`]).
 //!
 //! The points are where windows start; what is left of their noise is estimated with each window. At rest the speed is zero and
 //! nothing else (`course/still.rs`).
 //!
 //! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
 
-mod still;
-mod thinned;
+mod rest;
+mod subsample;
 
 use crate::check::Checked;
 use crate::records::{Channel, Record, Signal};
 use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
-use still::{Rate, Still};
-pub use thinned::{SEARCHED_S, searched_share};
+use rest::{Rate, Still};
+pub use subsample::{SEARCHED_S, searched_share};
 
 /// Channels of an axis that are simulated: position, force, pressures a and b.
 pub const CHANNELS: usize = 4;
@@ -44,7 +44,7 @@ pub(crate) const HELD_LONGEST: usize = 3;
 
 /// A record on its grid.
 #[derive(Clone, Debug)]
-pub struct Course {
+pub struct GriddedRecord {
     /// File of the record.
     pub name: String,
     /// Whether the load's eye sat in the carriage.
@@ -88,19 +88,19 @@ impl Point {
 
     /// The point with one of its numbers nudged, in the order of [`Point::NUDGES`].
     pub(crate) fn nudged(mut self, number: usize) -> Self {
-        let own = match number {
+        let value = match number {
             0 => &mut self.extension_m,
             1 => &mut self.rod_velocity_m_per_s,
             _ => &mut self.pressures_pa[number - 2],
         };
-        *own += Point::NUDGES[number];
+        *value += Point::NUDGES[number];
         self
     }
 }
 
 /// Why a record cannot be simulated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CourseError {
+pub enum GriddingError {
     /// A signal that the simulation needs is not there.
     #[error(
         "{file}: no column {column}: the simulation of an axis needs valve, position, force and both pressures"
@@ -129,13 +129,13 @@ pub enum CourseError {
     },
 }
 
-impl CourseError {
+impl GriddingError {
     /// The column that it is about.
     #[must_use]
     pub fn column(&self) -> Option<&str> {
         match self {
-            CourseError::Missing { column, .. } => Some(column),
-            CourseError::NoAxis { .. } | CourseError::Short { .. } => None,
+            GriddingError::Missing { column, .. } => Some(column),
+            GriddingError::NoAxis { .. } | GriddingError::Short { .. } => None,
         }
     }
 }
@@ -143,12 +143,16 @@ impl CourseError {
 /// Shortest record, periods.
 pub(crate) const SHORTEST: usize = 1000;
 
-impl Course {
+impl GriddedRecord {
     /// Puts a checked record on its grid.
     ///
     /// # Errors
-    /// [`CourseError`] when a signal is missing or the record is too short.
-    pub fn of(record: &Record, checked: &Checked, rig: &RigParameters) -> Result<Course, CourseError> {
+    /// [`GriddingError`] when a signal is missing or the record is too short.
+    pub fn of(
+        record: &Record,
+        checked: &Checked,
+        rig: &RigParameters,
+    ) -> Result<GriddedRecord, GriddingError> {
         let file = record.file().display().to_string();
         // A load that is parked and not linked shows nothing, and its position may be at the end of the sensor's range.
         let measured = Axis::ALL.map(|axis| {
@@ -156,22 +160,22 @@ impl Course {
                 && (record.setup().linked || !checked.is_parked(axis))
         });
         if measured == [false, false] {
-            return Err(CourseError::NoAxis { file });
+            return Err(GriddingError::NoAxis { file });
         }
         for axis in Axis::ALL.into_iter().filter(|axis| measured[axis.index()]) {
             for signal in [Signal::Valve].into_iter().chain(SIGNALS) {
                 let channel = Channel::Of(axis, signal);
                 if record.channel(channel).is_none() {
-                    return Err(CourseError::Missing { file, column: channel.column() });
+                    return Err(GriddingError::Missing { file, column: channel.column() });
                 }
             }
         }
         let places = places(record, checked);
         let length = places.last().map_or(0, |last| last + 1);
         if length < SHORTEST {
-            return Err(CourseError::Short { file, length_ms: length, least_ms: SHORTEST });
+            return Err(GriddingError::Short { file, length_ms: length, least_ms: SHORTEST });
         }
-        let mut course = Course {
+        let mut gridded = GriddedRecord {
             name: file,
             linked: record.setup().linked,
             added_mass_kg: record.setup().added_mass_kg,
@@ -186,10 +190,10 @@ impl Course {
         };
         for axis in Axis::ALL {
             if measured[axis.index()] {
-                course.fill(axis, record, checked, rig, &places);
+                gridded.fill(axis, record, checked, rig, &places);
             }
         }
-        Ok(course)
+        Ok(gridded)
     }
 
     /// Periods.
@@ -249,9 +253,9 @@ impl Course {
             sensors.pressure_noise_pa,
         ];
         for at in 0..CHANNELS {
-            let own = checked.noise(Channel::Of(axis, SIGNALS[at])).unwrap_or(specified[at]);
+            let noise = checked.noise(Channel::Of(axis, SIGNALS[at])).unwrap_or(specified[at]);
             // A record that shows less than its rounding has the rounding's.
-            self.noise[i][at] = own.max(steps[at] / 12.0_f64.sqrt());
+            self.noise[i][at] = noise.max(steps[at] / 12.0_f64.sqrt());
         }
         hold(&mut commands, &mut self.gaps);
         for (inputs, command) in self.inputs.iter_mut().zip(&commands) {
@@ -270,7 +274,7 @@ impl Course {
             still = Still::new(&position, &positions, lasting_m);
         }
         for place in 0..self.len() {
-            let pressures = pressures.each_ref().map(|own| own[place].map(|own| own.value));
+            let pressures = pressures.each_ref().map(|column| column[place].map(|parabola| parabola.value));
             let (Some(rate), [Some(a), Some(b)]) = (still.rate(place), pressures) else {
                 self.gaps[place] = true;
                 continue;
@@ -304,7 +308,7 @@ fn memory(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
                 .collect();
             let differences = differences?;
             let mean = differences.iter().sum::<f64>() / MEMORY_BLOCK as f64;
-            let squares: f64 = differences.iter().map(|own| (own - mean).powi(2)).sum();
+            let squares: f64 = differences.iter().map(|difference| (difference - mean).powi(2)).sum();
             Some(squares / (MEMORY_BLOCK as f64 - 1.0))
         })
         .collect();
@@ -322,9 +326,9 @@ fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: 
     let squares = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
         let mut blocks: Vec<f64> = (0..positions.len() / JITTER_BLOCK)
             .filter_map(|block| {
-                let own: Option<Vec<f64>> =
+                let values: Option<Vec<f64>> =
                     (block * JITTER_BLOCK..(block + 1) * JITTER_BLOCK).map(of).collect();
-                own.map(|own| own.iter().sum::<f64>() / JITTER_BLOCK as f64)
+                values.map(|values| values.iter().sum::<f64>() / JITTER_BLOCK as f64)
             })
             .collect();
         blocks.sort_unstable_by(f64::total_cmp);
@@ -430,7 +434,7 @@ fn solve(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
             if row != pivot {
                 let factor = rows[row][pivot] / rows[pivot][pivot];
                 let pivot_row = rows[pivot];
-                rows[row].iter_mut().zip(pivot_row).for_each(|(own, other)| *own -= factor * other);
+                rows[row].iter_mut().zip(pivot_row).for_each(|(value, other)| *value -= factor * other);
             }
         }
     }
@@ -446,9 +450,9 @@ mod tests {
         let values: Vec<_> = (0..50)
             .map(|at| (at % 7 != 3).then_some(2.0 + 0.5 * f64::from(at) - 0.1 * f64::from(at * at)))
             .collect();
-        let own = parabolas(&values, 10)[20].unwrap();
-        assert!((own.value - (2.0 + 10.0 - 40.0)).abs() < 1e-9, "{own:?}");
-        assert!((own.slope - (0.5 - 4.0)).abs() < 1e-9, "{own:?}");
+        let parabola = parabolas(&values, 10)[20].unwrap();
+        assert!((parabola.value - (2.0 + 10.0 - 40.0)).abs() < 1e-9, "{parabola:?}");
+        assert!((parabola.slope - (0.5 - 4.0)).abs() < 1e-9, "{parabola:?}");
     }
 
     #[test]

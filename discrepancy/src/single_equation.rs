@@ -17,21 +17,21 @@
 //! | `terms` | columns of baseline, candidates and decoys |
 //! | `fit` | least squares, folds, clustered errors |
 //! | `select` | which terms are taken |
-//! | `checked` | whether the records can be used |
-//! | `tell` | the report |
+//! | `record_checks` | whether the records can be used |
+//! | `report` | the report |
 //! | `extended` | the model file with what was found |
 //!
 //! Keys, processing and figures on real records: `discrepancy/docs/one-balance.md`.
 
-mod checked;
 mod extended;
 mod filter;
 mod fit;
 pub mod model;
 mod pictures;
+mod record_checks;
+mod report;
 mod runs;
 mod select;
-mod tell;
 mod terms;
 
 pub use extended::extended_model_text;
@@ -225,8 +225,8 @@ struct Study {
     families: Vec<Prepared>,
     found: Found,
     /// Columns of the baseline and of what was taken.
-    own: Columns,
-    own_fit: Fit,
+    extended: Columns,
+    extended_fit: Fit,
 }
 
 impl Study {
@@ -281,12 +281,25 @@ impl Study {
             families.push(Prepared { columns: columns.collect::<Result<_, _>>()?, family });
         }
         let found = select::search(&rows, &cuts, [&plain, &base], &families, &selection, progress);
-        let mut own = base.clone();
+        let mut extended = base.clone();
         for taken in &found.taken {
-            own.extend(families[taken.judged.place].columns[taken.judged.variant].iter().cloned());
+            extended.extend(families[taken.judged.place].columns[taken.judged.variant].iter().cloned());
         }
-        let own_fit = rows.fit(&own).unwrap_or_else(|| base_fit.clone());
-        Ok(Self { model, rig, records, runs, rows, base, base_fit, time, families, found, own, own_fit })
+        let extended_fit = rows.fit(&extended).unwrap_or_else(|| base_fit.clone());
+        Ok(Self {
+            model,
+            rig,
+            records,
+            runs,
+            rows,
+            base,
+            base_fit,
+            time,
+            families,
+            found,
+            extended,
+            extended_fit,
+        })
     }
 
     /// Opens the held-out records, and compares both models on them; without one, draws the training record.
@@ -318,7 +331,7 @@ impl Study {
     }
 
     fn trained_pictures(&self) -> Pictures {
-        let residuals = [self.base_fit.residual.clone(), self.own_fit.residual.clone()];
+        let residuals = [self.base_fit.residual.clone(), self.extended_fit.residual.clone()];
         self.pictures(&self.runs, &Fitted { rows: self.rows.clone(), residuals }, false)
     }
 
@@ -331,13 +344,13 @@ impl Study {
             let entry = &self.families[taken.judged.place].family.variants[taken.judged.variant];
             columns.extend(term_columns(&self.model, entry, runs)?);
         }
-        let after = residual(&rows.target, &columns, &self.own_fit.numbers);
+        let after = residual(&rows.target, &columns, &self.extended_fit.numbers);
         Ok(Fitted { rows, residuals: [before, after] })
     }
 
     /// rms of the residual of baseline and extended model on the training records, ends included.
     fn trained_rms(&self) -> [f64; 2] {
-        [rms(&self.base_fit.residual), rms(&self.own_fit.residual)]
+        [rms(&self.base_fit.residual), rms(&self.extended_fit.residual)]
     }
 }
 

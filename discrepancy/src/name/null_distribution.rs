@@ -24,14 +24,14 @@ pub(super) const FAR_OFF: f64 = 3.0;
 const FEW: f64 = 0.05;
 
 /// What a model leaves, against all candidates, window by window.
-pub(super) struct Nothing {
+pub(super) struct NullDistribution {
     /// Windows that are far off, where they are few: they count neither here nor for what is missed.
     far: Vec<usize>,
     /// Of each probe: candidate, coordinate of the amplitude, scores of the windows, information.
     probes: Vec<(usize, f64, Vec<f64>, f64)>,
 }
 
-impl Nothing {
+impl NullDistribution {
     pub(super) fn new(engine: &Engine<'_>, columns: &Columns, around: &Around, model: &Refit) -> Self {
         let rig =
             rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
@@ -54,19 +54,19 @@ impl Nothing {
         let probes = of
             .into_iter()
             .zip(scores)
-            .map(|((at, z, _), (mut scores, own))| {
+            .map(|((at, z, _), (mut scores, information))| {
                 far.iter().for_each(|window| scores[*window] = 0.0);
-                (at, z, scores, own)
+                (at, z, scores, information)
             })
             .collect();
-        Nothing { far, probes }
+        NullDistribution { far, probes }
     }
 
     /// By how much a fit that lacks something is worse, windows that are far off left out.
     pub(super) fn missed(&self, engine: &Engine<'_>, without: &Refit, model: &Refit) -> f64 {
         let of = |window: &usize| {
-            let [without, own] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
-            engine.freedom()[*window] * (without / own).ln()
+            let [without, with] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
+            engine.freedom()[*window] * (without / with).ln()
         };
         without.loss - model.loss - self.far.iter().map(of).sum::<f64>()
     }
@@ -83,7 +83,7 @@ impl Nothing {
                 self.probes
                     .iter()
                     .map(|(_, _, scores, information)| {
-                        let sum: f64 = scores.iter().zip(&signs).map(|(own, sign)| own * sign).sum();
+                        let sum: f64 = scores.iter().zip(&signs).map(|(score, sign)| score * sign).sum();
                         sum * sum / information
                     })
                     .fold(0.0, f64::max)
@@ -98,7 +98,7 @@ impl Nothing {
         let mut limits: Vec<Option<f64>> = vec![None; candidates];
         for (at, z, _, information) in self.probes.iter().filter(|(_, z, _, _)| *z != 0.0) {
             let limit = z.abs() * (gain / information).sqrt();
-            if limit.is_finite() && limits[*at].is_none_or(|own| limit < own) {
+            if limit.is_finite() && limits[*at].is_none_or(|least| limit < least) {
                 limits[*at] = Some(limit);
             }
         }
@@ -108,7 +108,7 @@ impl Nothing {
 
 /// Windows that are far off, where they are few.
 fn far_off(residual: &[f64], rows: usize, freedom: &[f64]) -> Vec<usize> {
-    let squares = residual.chunks_exact(rows).map(|own| dot(own, own));
+    let squares = residual.chunks_exact(rows).map(|window| dot(window, window));
     let off = squares.zip(freedom).enumerate();
     let far: Vec<usize> =
         off.filter(|(_, (square, freedom))| square > &(FAR_OFF * **freedom)).map(|(at, _)| at).collect();

@@ -121,7 +121,7 @@ pub(super) fn search(
             return found;
         }
         let entry = &families[best.place].family.variants[best.variant];
-        progress(&format!("takes {} ({:.0} % of the power left out)", told(entry), best.share * 100.0));
+        progress(&format!("takes {} ({:.0} % of the power left out)", describe(entry), best.share * 100.0));
         let alternatives = round
             .iter()
             .filter(|other| other.place != best.place && other.passes && !families[other.place].is_decoy())
@@ -145,8 +145,9 @@ impl Excess {
 
     /// A power as a share of it; of `left` where the baseline's own columns cannot be told on this cut.
     fn share(&self, cut: &Cut, power: f64, left: f64) -> f64 {
-        let own = self.0.iter().find(|(name, _)| *name == cut.name).map_or(left, |(_, own)| *own);
-        power / own.max(f64::MIN_POSITIVE)
+        let reference =
+            self.0.iter().find(|(name, _)| *name == cut.name).map_or(left, |(_, reference)| *reference);
+        power / reference.max(f64::MIN_POSITIVE)
     }
 }
 
@@ -160,7 +161,7 @@ fn apart(best: &Judged, other: &Judged) -> bool {
 }
 
 /// A term in words.
-pub(super) fn told(entry: &TermEntry) -> String {
+pub(super) fn describe(entry: &TermEntry) -> String {
     let shape: Vec<String> = entry.shape.iter().map(|(key, value)| format!("{key} {value:.4}")).collect();
     let parts = [entry.effect.clone(), entry.form.clone(), shape.join(", ")];
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
@@ -220,7 +221,7 @@ fn judge(
         vec![*best]
     };
     let variant = ties.remove(0);
-    let (_, fit, power) = tried.iter().find(|(own, ..)| *own == variant).expect("it was tried");
+    let (_, fit, power) = tried.iter().find(|(place, ..)| *place == variant).expect("it was tried");
     let number = amplitude(&family.variants[variant], &fit.numbers[columns.len()..]);
     let power_before = rows.power(&before.residual);
     let more = variants[variant].len() as f64;
@@ -229,7 +230,7 @@ fn judge(
     let gain = effective * (power_before / power.max(f64::MIN_POSITIVE)).ln();
     let penalty = more * effective.ln() + 2.0 * (tried_in_all as f64).ln();
     let mut gates = vec![(gain / penalty, format!("likelihood gain {gain:.1}, penalty {penalty:.1}"))];
-    let own = with(variant);
+    let extended = with(variant);
     let mut left = Vec::new();
     let mut share = 0.0;
     let asked = [
@@ -239,7 +240,7 @@ fn judge(
     ];
     for (cut, applies, floor, t_floor) in asked {
         let Some(cut) = cut.filter(|_| applies) else { continue };
-        let (Some(before), Some(after)) = (rows.left_out(columns, cut), rows.left_out(&own, cut)) else {
+        let (Some(before), Some(after)) = (rows.left_out(columns, cut), rows.left_out(&extended, cut)) else {
             gates.push((0.0, format!("folds in {}: the rest cannot tell it", cut.name)));
             continue;
         };

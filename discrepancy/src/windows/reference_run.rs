@@ -1,7 +1,7 @@
 //! One simulation kept with where it went, so that a neighbour of its rig is simulated only in the windows where they differ.
 //!
 //! ```text
-//!   rig ──► passage: readings, the state that each window begins in, how far each variable reaches in it
+//!   rig ──► reference_run: readings, the state that each window begins in, how far each variable reaches in it
 //!   rig with one point of a table moved ──► windows that reach the point anew, each from its state; the others are known
 //! ```
 //!
@@ -9,20 +9,20 @@
 //! rig without effects knows of what went before is its state.
 
 use super::{COARSE_SUBSTEPS, WINDOW, Windows};
-use crate::seats::Seats;
+use crate::sensor_inverse::SensorInverse;
 use plant::effects::tabulated::Variable;
 use plant::{Axis, Plant, RigParameters, State};
 
 /// What a rig shows in the windows of a record, and where it went.
 #[derive(Clone, Debug)]
-pub struct Passage {
+pub struct ReferenceRun {
     simulated: Vec<f64>,
     /// The state that each judged window begins in; empty where states do not tell all, as with effects that remember.
     states: Vec<State>,
     reaches: Vec<Reach>,
 }
 
-impl Passage {
+impl ReferenceRun {
     /// Readings over their noise, as [`Windows::simulate_coarsely`] gives them.
     #[must_use]
     pub fn simulated(&self) -> &[f64] {
@@ -51,7 +51,7 @@ impl Reach {
     /// Whether a variable of an axis is anywhere between two values.
     #[must_use]
     pub fn meets(&self, axis: Axis, variable: Variable, between: [f64; 2]) -> bool {
-        let place = Variable::ALL.iter().position(|own| *own == variable).expect("all of them");
+        let place = Variable::ALL.iter().position(|known| *known == variable).expect("all of them");
         let [least, most] = self.0[axis.index()][place];
         least < between[1] && most > between[0]
     }
@@ -60,37 +60,37 @@ impl Reach {
 impl Windows<'_> {
     /// Simulates a rig in longer steps and keeps where it went.
     #[must_use]
-    pub fn pass(&self, rig: &RigParameters) -> Passage {
+    pub fn pass(&self, rig: &RigParameters) -> ReferenceRun {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
-        let seats = Seats::of(rig);
+        let inverse = SensorInverse::of(rig);
         let remembers = !rig.effects().is_empty();
-        let mut passage = Passage {
+        let mut reference_run = ReferenceRun {
             simulated: Vec::with_capacity(self.readings.len()),
             states: Vec::new(),
             reaches: Vec::new(),
         };
-        for start in (0..self.course.len() / WINDOW).map(|window| window * WINDOW) {
-            let points = seats.points(self.course, start, &self.points[start / WINDOW]);
-            super::seat(&mut plant, self.course, &points);
-            let judged = self.starts.get(passage.reaches.len()) == Some(&start);
+        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
+            let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
+            super::set_state(&mut plant, self.record, &points);
+            let judged = self.starts.get(reference_run.reaches.len()) == Some(&start);
             let state = *plant.state();
             let mut reach = Reach::NOTHING;
-            for inputs in &self.course.inputs[start..start + WINDOW] {
+            for inputs in &self.record.inputs[start..start + WINDOW] {
                 if judged {
-                    self.read(&plant, inputs, &mut passage.simulated);
+                    self.read(&plant, inputs, &mut reference_run.simulated);
                     reach.add(&plant);
                 }
                 plant.step(inputs);
             }
             if judged {
                 reach.add(&plant);
-                passage.reaches.push(reach);
+                reference_run.reaches.push(reach);
                 if !remembers {
-                    passage.states.push(state);
+                    reference_run.states.push(state);
                 }
             }
         }
-        passage
+        reference_run
     }
 
     /// What a neighbour of the rig that passed shows: it differs in windows of which `differs` is true alone, and in nothing that
@@ -99,24 +99,24 @@ impl Windows<'_> {
     pub fn simulate_where(
         &self,
         rig: &RigParameters,
-        passage: &Passage,
+        reference_run: &ReferenceRun,
         differs: impl Fn(&Reach) -> bool,
     ) -> Vec<f64> {
-        if passage.states.is_empty() {
+        if reference_run.states.is_empty() {
             return self.simulate_coarsely(rig);
         }
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
-        let mut simulated = Vec::with_capacity(passage.simulated.len());
-        let known = passage.simulated.chunks_exact(self.rows());
+        let mut simulated = Vec::with_capacity(reference_run.simulated.len());
+        let known = reference_run.simulated.chunks_exact(self.rows());
         for ((start, known), (state, reach)) in
-            self.starts.iter().zip(known).zip(passage.states.iter().zip(&passage.reaches))
+            self.starts.iter().zip(known).zip(reference_run.states.iter().zip(&reference_run.reaches))
         {
             if !differs(reach) {
                 simulated.extend_from_slice(known);
                 continue;
             }
             plant.go_on_in(state).expect("a state of a rig is one of its neighbour's");
-            for inputs in &self.course.inputs[*start..start + WINDOW] {
+            for inputs in &self.record.inputs[*start..start + WINDOW] {
                 self.read(&plant, inputs, &mut simulated);
                 plant.step(inputs);
             }

@@ -8,7 +8,7 @@
 //! controllers do then is part of what it shows. The sensors' noise is that of one seed.
 
 use super::menu::{Entry, program};
-use crate::course::Point;
+use crate::gridded_record::Point;
 use controller::axis::AxisRecord;
 use controller::rehearsal::{Rehearsal, RehearsalParts};
 use controller::run::RunError;
@@ -36,7 +36,7 @@ const UNSETTLED: [&str; 6] = [
 
 /// Why an experiment cannot be rehearsed.
 #[derive(Debug, thiserror::Error)]
-pub enum DriveError {
+pub enum ClosedLoopError {
     /// The experiment or a program is none.
     #[error(transparent)]
     Files(#[from] RunError),
@@ -50,7 +50,7 @@ pub enum DriveError {
 
 /// What a run left.
 #[derive(Clone, Debug)]
-pub struct Driven {
+pub struct ClosedLoopRun {
     /// Whether the rods were linked.
     pub linked: bool,
     /// State at the start.
@@ -65,7 +65,7 @@ pub struct Driven {
     pub done: bool,
 }
 
-impl Driven {
+impl ClosedLoopRun {
     /// Whether the experiment is one for this rig: it begins, it ends, and no rod that it moves comes near an end of its stroke.
     #[must_use]
     pub fn ends_well(&self, stroke_m: f64) -> bool {
@@ -83,8 +83,12 @@ impl Driven {
 /// Drives `rig` through an experiment; the controllers have the baseline's numbers.
 ///
 /// # Errors
-/// [`DriveError`]
-pub fn drive(entry: &Entry, baseline: &RigParameters, rig: &RigParameters) -> Result<Driven, DriveError> {
+/// [`ClosedLoopError`]
+pub fn drive(
+    entry: &Entry,
+    baseline: &RigParameters,
+    rig: &RigParameters,
+) -> Result<ClosedLoopRun, ClosedLoopError> {
     let file = format!("{}.toml", entry.name);
     let nominal = baseline.without_effects();
     let files = Files::of_texts(&nominal, (&file, entry.toml), program, &UNSETTLED)?;
@@ -107,7 +111,7 @@ pub fn drive(entry: &Entry, baseline: &RigParameters, rig: &RigParameters) -> Re
         points.push(points_of(&cycle.truth, stroke_m));
     }
     let done = rehearsal.station().done();
-    Ok(Driven { linked: scene.linked, start, inputs, points, began, done })
+    Ok(ClosedLoopRun { linked: scene.linked, start, inputs, points, began, done })
 }
 
 /// Where both axes are.

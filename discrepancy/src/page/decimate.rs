@@ -29,13 +29,13 @@ pub(super) fn columns(time_s: &[f64], values: &[f64], most: usize) -> Vec<Vec<Co
             continue;
         }
         let (time, value) = *point;
-        let own = if count <= 2 * most { usize::MAX } else { place(time) };
+        let bin = if count <= 2 * most { usize::MAX } else { place(time) };
         let joins = before.is_some_and(|(earlier, _)| time - earlier <= PAUSE * step_s.max(0.0));
         if !joins {
             pieces.push(Vec::new());
         }
-        let shares = joins && own != usize::MAX && before.is_some_and(|(_, column)| column == own);
-        before = Some((time, own));
+        let shares = joins && bin != usize::MAX && before.is_some_and(|(_, column)| column == bin);
+        before = Some((time, bin));
         let Some(piece) = pieces.last_mut() else { continue };
         match piece.last_mut().filter(|_| shares) {
             Some(column) => {

@@ -146,10 +146,10 @@ mod tests {
         (b[..=filter.order].to_vec(), a[..=filter.order].to_vec())
     }
 
-    fn near(own: &[f64], other: &[f64], tolerance: f64) {
-        assert_eq!(own.len(), other.len());
-        for (own, other) in own.iter().zip(other) {
-            assert!((own - other).abs() < tolerance * other.abs().max(1.0), "{own} is not {other}");
+    fn near(computed: &[f64], other: &[f64], tolerance: f64) {
+        assert_eq!(computed.len(), other.len());
+        for (computed, other) in computed.iter().zip(other) {
+            assert!((computed - other).abs() < tolerance * other.abs().max(1.0), "{computed} is not {other}");
         }
     }
 
@@ -157,9 +157,9 @@ mod tests {
     fn the_designs_are_those_of_an_independent_tool() {
         // scipy.signal 1.17.1: butter(4, 0.2), cheby1(4, 0.5, 0.04), butter(3, 0.3), cheby1(3, 1, 0.25), as printed.
         let check = |filter: LowPass, b: &[f64], a: &[f64]| {
-            let (own_b, own_a) = polynomials(&filter);
-            near(&own_b, b, 1e-8);
-            near(&own_a, a, 1e-8);
+            let (computed_b, computed_a) = polynomials(&filter);
+            near(&computed_b, b, 1e-8);
+            near(&computed_a, a, 1e-8);
         };
         check(
             LowPass::butterworth(4, 0.2),
@@ -210,18 +210,18 @@ mod tests {
                 ],
             ),
         ] {
-            let own = filter.zero_phase(&samples);
+            let computed = filter.zero_phase(&samples);
             // The polynomials of the other tool lose some digits at an edge of 0.04.
-            near(&[0, 1, 20, 58, 59].map(|at| own[at]), &expected, 1e-8);
+            near(&[0, 1, 20, 58, 59].map(|at| computed[at]), &expected, 1e-8);
         }
     }
 
     #[test]
     fn a_constant_and_a_straight_line_stay_what_they_are_to_the_very_ends() {
         let line: Vec<f64> = (0..400).map(|at| 3.0 + 0.5 * f64::from(at)).collect();
-        let own = LowPass::butterworth(4, 0.3).zero_phase(&line);
+        let computed = LowPass::butterworth(4, 0.3).zero_phase(&line);
         // Ripples of the ends' reflections have decayed to nothing in a filter that settles within 20 samples.
-        near(&own[50..350], &line[50..350], 1e-9);
+        near(&computed[50..350], &line[50..350], 1e-9);
         near(&LowPass::butterworth(4, 0.3).zero_phase(&[7.0; 50]), &[7.0; 50], 1e-12);
     }
 
