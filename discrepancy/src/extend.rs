@@ -12,7 +12,7 @@
 //! are. Old values stay as comments. New numbers are written in full, so that the emulator computes with the bits that were
 //! verified; their comments are rounded to what the standard error leaves of them.
 //!
-//! What a `parameter:` name scales is what the records of the study scale [tests/src/record_maker/numbers.rs].
+//! What a `parameter:` name scales is what the records of the study scale [tests/record-maker/src/numbers.rs].
 
 mod edits;
 mod parameters;

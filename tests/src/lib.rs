@@ -20,9 +20,6 @@
 //!   noise ── a node that babbles, and whether it was ever obeyed
 //!   pairs ─── runs with something and without, in turns, and the table of what it costs
 //!   viewers ─ ten of the live page, for scripts/viewers
-//!   record_maker  blind records for the study of the workflow, from a simulation of its own
-//!   study ─── the judge of the discrepancy workflow, for scripts/study
-//!   tune ──── figures and margins of the programs, for scripts/tune and scripts/better
 //! ```
 //!
 //! Nothing here waits without a limit; what is waited for, and what the programs said, stands in the panic. Programs are
@@ -50,13 +47,10 @@ pub mod own;
 pub mod pairs;
 pub mod peer;
 pub mod process;
-pub mod record_maker;
 pub mod records;
 pub mod scene;
 pub mod skip;
 pub mod small_disk;
-pub mod study;
-pub mod tune;
 pub mod turn;
 pub mod viewers;
 pub mod xcp;

@@ -5,6 +5,7 @@
 //! The record is the record maker's, whose integrator and laws are not the plant's.
 
 use plant::RigParameters;
+use record_maker::{Experiment, Hidden, Recipe, simulate, write};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::ffi::OsStr;
@@ -16,7 +17,6 @@ use system_tests::binaries::{Build, Program, executable};
 use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::launch::Pace;
 use system_tests::process::{Ended, Running};
-use system_tests::record_maker::{Experiment, Hidden, Recipe, simulate, write};
 use system_tests::records::json;
 use system_tests::scene::{SHORT, Scene};
 use tempfile::TempDir;

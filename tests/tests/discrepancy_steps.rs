@@ -2,11 +2,11 @@
 //! an experiment.
 
 use plant::{Axis, RigParameters};
+use record_maker::{Recipe, simulate, write};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::discrepancy::{discrepancy, rig};
-use system_tests::record_maker::{Recipe, simulate, write};
 use system_tests::records::json;
 
 const GOOD: i32 = 0;

@@ -1,7 +1,5 @@
 //! The whole-system tests, one executable: a test is a module here, not a link of its own.
 
-#[path = "../examples/shared/cases.rs"]
-mod cases;
 #[path = "../../realtime/tests/common/mod.rs"]
 mod hlog;
 mod malformed_table;
@@ -10,7 +8,6 @@ mod tidy_rules;
 mod allocations;
 mod campaign;
 mod check_controller;
-mod claims;
 mod cli;
 mod confinement;
 mod controller_timing;
@@ -55,7 +52,6 @@ mod sealed;
 mod sensor_loss;
 mod set_points_by_hand;
 mod soak;
-mod study;
 mod telemetry;
 mod tidy;
 mod two_processes;

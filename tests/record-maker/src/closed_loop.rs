@@ -1,0 +1,368 @@
+//! The rig of a recipe under the real controllers, and the record that comes of it.
+
+use super::axis::{AIR, FLOW, NORMAL, SPOOL, V, X};
+use super::noise::Stream;
+use super::numbers::Numbers;
+use super::rig::{Evaluated, Rig, STEPS_PER_MS, State, drift};
+use super::sensing::Sensing;
+use super::{Experiment, MakeError, ROWS, Recipe, Record, Row, TrueAxis, hidden};
+use controller::axis::AxisController;
+use controller::cli::FileArguments;
+use controller::rehearsal::{Rehearsal, SimulatedRig, Standing};
+use controller::setup::{Inputs, Mode};
+use plant::scene::{Holder, Outcome, RigCall};
+use plant::{Axis, AxisReadings, RigParameters, Scene};
+use std::path::{Path, PathBuf};
+
+/// Rms and largest error of a sampling instant, s.
+const JITTER_S: f64 = 1e-4;
+const MOST_JITTER_S: f64 = 4e-4;
+/// The experiment begins when the initial positioning is over, whatever a hidden effect does to standstill and error: all records
+/// of an experiment are driven at the same times.
+const UNSETTLED: [&str; 3] = ["still_m=0.1", "position_error_m=0.5", "force_error_n=2000"];
+/// Longest run of an experiment that somebody proposes: six repetitions of half a minute.
+const MOST_ROWS: usize = 180_000;
+/// Streams of random numbers: 0 to 7 are the sensors'.
+const JITTER_STREAM: u64 = 8;
+
+/// Makes a record in memory: the recipe's rig under the controllers of its experiment, [`ROWS`] rows.
+///
+/// `rig` is what the controllers, and whoever gets the record, take the rig for; effects in it are left out.
+///
+/// # Errors
+/// [`MakeError`] when the recipe is none, or the run does not last.
+pub fn simulate(recipe: &Recipe, rig: &RigParameters) -> Result<Record, MakeError> {
+    run(recipe, rig, [ROWS, STEPS_PER_MS])
+}
+
+/// The first rows of a record, with so many steps in a millisecond.
+pub(super) fn run(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    [rows, steps_per_ms]: [usize; 2],
+) -> Result<Record, MakeError> {
+    let (inputs, scene) = read(recipe, rig)?;
+    let made = Made::new(recipe, rig, &scene, steps_per_ms)?;
+    let mut rehearsal = Rehearsal::with_rig(made, controllers(&inputs)?);
+    let mut record = record(recipe, &scene, rows);
+    for _ in 0..rows {
+        record.rows.push(next_row(&mut rehearsal)?);
+    }
+    Ok(record)
+}
+
+/// Makes a record under an experiment that somebody proposes, given as its file's name and its text, from its start to its end.
+///
+/// Both axes move as the experiment says, linked or not. Recorded are the recipe's axes, and both where the rods are linked:
+/// there one axis alone tells nothing. The recipe's own experiment is not driven.
+///
+/// # Errors
+/// [`MakeError`] when recipe or experiment are none, or the run does not come to its end.
+pub fn simulate_proposed(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    (file, toml): (&str, &str),
+) -> Result<Record, MakeError> {
+    let nominal = rig.without_effects();
+    let program = |name: &str| {
+        std::fs::read_to_string(workspace().join(format!("controller/programs/{name}.toml"))).ok()
+    };
+    let experiment = Inputs::of_texts(&nominal, (file, toml), program, &[])?.experiment;
+    let driven = [experiment.drive.is_some(), experiment.load.is_some()];
+    let set = unsettled(Axis::ALL.into_iter().filter(|axis| driven[axis.index()]));
+    let set: Vec<&str> = set.iter().map(String::as_str).collect();
+    let inputs = Inputs::of_texts(&nominal, (file, toml), program, &set)?;
+    let scene = scene(toml, file, rig)?;
+    let moved = Recipe { both_axes: true, ..recipe.clone() };
+    let made = Made::new(&moved, rig, &scene, STEPS_PER_MS)?;
+    let mut rehearsal = Rehearsal::with_rig(made, controllers(&inputs)?);
+    let recorded = Recipe { both_axes: recipe.both_axes || scene.linked, ..recipe.clone() };
+    let mut record = record(&recorded, &scene, ROWS);
+    while !rehearsal.ended() && record.rows.len() < MOST_ROWS {
+        record.rows.push(next_row(&mut rehearsal)?);
+    }
+    if rehearsal.station().done() {
+        Ok(record)
+    } else {
+        Err(MakeError::Unfinished { file: file.to_owned(), length_s: record.rows.len() as f64 / 1000.0 })
+    }
+}
+
+fn controllers(inputs: &Inputs) -> Result<Vec<AxisController>, MakeError> {
+    let mode = Mode { partner_needed: true, real_time: false, forever: false };
+    Ok(Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?)
+}
+
+fn next_row(rehearsal: &mut Rehearsal<Made>) -> Result<Row, MakeError> {
+    let row = rehearsal.step(|_, _| {}).cycle;
+    if rehearsal.rig().stopped {
+        return Err(MakeError::Stopped { at_s: row.time_s });
+    }
+    check(&row)?;
+    Ok(row)
+}
+
+/// The recipe's rig under given valve commands of drive and load, one pair for each row: what the record would have been with
+/// other hidden effects under the same inputs. The valve of an axis that rests stays shut.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn replay(recipe: &Recipe, rig: &RigParameters, valves: &[[f64; 2]]) -> Result<Record, MakeError> {
+    replay_with(recipe, rig, valves, STEPS_PER_MS)
+}
+
+/// The same with another number of steps in a millisecond.
+pub(super) fn replay_with(
+    recipe: &Recipe,
+    rig: &RigParameters,
+    valves: &[[f64; 2]],
+    steps_per_ms: usize,
+) -> Result<Record, MakeError> {
+    let (_, scene) = read(recipe, rig)?;
+    let mut made = Made::new(recipe, rig, &scene, steps_per_ms)?;
+    let mut record = record(recipe, &scene, valves.len());
+    for (cycle, valve) in valves.iter().enumerate() {
+        let valve = [0, 1].map(|i| if made.rig.active[i] { valve[i] } else { 0.0 });
+        made.sample(cycle as u64, valve, &mut |_| {});
+        let row = made.step(cycle as u64, valve);
+        check(&row)?;
+        record.rows.push(row);
+    }
+    Ok(record)
+}
+
+/// The commands of a null record again with another number of steps in a millisecond, in windows of so many rows that each begin
+/// with the true state.
+///
+/// # Errors
+/// As [`simulate`].
+pub(super) fn replay_windows(
+    record: &Record,
+    rig: &RigParameters,
+    [window, steps_per_ms]: [usize; 2],
+) -> Result<Vec<Row>, MakeError> {
+    let (_, scene) = read(&record.recipe, rig)?;
+    let mut made = Made::new(&record.recipe, rig, &scene, steps_per_ms)?;
+    let mut rows = Vec::with_capacity(record.rows.len());
+    for (cycle, row) in record.rows.iter().enumerate() {
+        if cycle % window == 0 {
+            made.rig.set(&mut made.state, &row.axes);
+        }
+        made.sample(cycle as u64, row.valve, &mut |_| {});
+        rows.push(made.step(cycle as u64, row.valve));
+    }
+    Ok(rows)
+}
+
+fn record(recipe: &Recipe, scene: &Scene, rows: usize) -> Record {
+    let (linked, added_mass_kg) = (scene.linked, scene.added_mass_kg);
+    Record { recipe: recipe.clone(), linked, added_mass_kg, rows: Vec::with_capacity(rows) }
+}
+
+fn check(row: &Row) -> Result<(), MakeError> {
+    for (axis, name) in row.axes.iter().zip(["drive", "load"]) {
+        let [a, b] = axis.pressure_pa;
+        let finite = axis.extension_m.is_finite() && axis.rod_velocity_m_per_s.is_finite();
+        if !(finite && a > 0.0 && b > 0.0 && a.is_finite() && b.is_finite() && axis.spool.is_finite()) {
+            return Err(MakeError::NoState { axis: name, at_s: row.time_s });
+        }
+    }
+    Ok(())
+}
+
+/// The checkout, whose experiments and programs are driven.
+fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("two folders below the checkout")
+}
+
+/// File of an experiment.
+fn experiment_file(recipe: &Recipe) -> Result<PathBuf, MakeError> {
+    let axes = match (recipe.both_axes, recipe.axis) {
+        (true, _) => "linked",
+        (false, Axis::Drive) => "drive",
+        (false, Axis::Load) => "load",
+    };
+    let name = match recipe.experiment {
+        Experiment::Train => "train",
+        Experiment::HeldOut(0) => "point-to-point",
+        Experiment::HeldOut(1) => "random-steps",
+        Experiment::HeldOut(number) => return Err(MakeError::Experiment { number }),
+    };
+    Ok(workspace().join(format!("tests/experiments-study/{name}-{axes}.toml")))
+}
+
+fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeError> {
+    let experiment = experiment_file(recipe)?;
+    let file = experiment.display().to_string();
+    let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
+    let set = unsettled(moved);
+    let files = FileArguments {
+        parameters: None,
+        rig: workspace().join("plant/rig.toml"),
+        experiment,
+        out: PathBuf::new(),
+        programs: Some(workspace().join("controller/programs")),
+        drive_program: None,
+        load_program: None,
+        set,
+        repeat: false,
+        after_emergency_stop: None,
+    };
+    let mut inputs = Inputs::read(&files)?;
+    inputs.rig = rig.without_effects();
+    let scene = scene(&inputs.experiment_toml, &file, rig)?;
+    Ok((inputs, scene))
+}
+
+fn unsettled(axes: impl Iterator<Item = Axis>) -> Vec<String> {
+    axes.flat_map(|axis| UNSETTLED.map(|what| format!("{}.settled.{what}", axis.name()))).collect()
+}
+
+fn scene(experiment_toml: &str, file: &str, rig: &RigParameters) -> Result<Scene, MakeError> {
+    let scene = Scene::from_toml(experiment_toml, file, rig)?;
+    if scene.hand.is_empty() && scene.event.is_empty() {
+        Ok(scene)
+    } else {
+        Err(MakeError::People { file: file.to_owned() })
+    }
+}
+
+/// The rig of a recipe as a rehearsal moves it.
+pub(super) struct Made {
+    pub(super) rig: Rig,
+    pub(super) state: State,
+    pub(super) sensing: [Sensing; 2],
+    foreign: bool,
+    jitter: Option<Stream>,
+    linked: bool,
+    row: Option<Row>,
+    stopped: bool,
+}
+
+impl Made {
+    pub(super) fn new(
+        recipe: &Recipe,
+        rig: &RigParameters,
+        scene: &Scene,
+        steps_per_ms: usize,
+    ) -> Result<Self, MakeError> {
+        let numbers = Numbers::new(rig, scene.added_mass_kg, &recipe.wrong_parameters)?;
+        let stroke_m = numbers.stroke_m;
+        let (mut made, laws) = hidden::rig(recipe, numbers, steps_per_ms)?;
+        // Both axes may move without being linked.
+        made.coupling = made.coupling.filter(|_| scene.linked);
+        let mut axis = 0;
+        let sensing = laws.map(|laws| {
+            let streams = |channel| Stream::new(recipe.seed, (4 * axis + channel) as u64);
+            let noise = (recipe.noise, recipe.coloured_noise);
+            let sensing = Sensing::new(laws, rig.sensors(), axis, made.step_s(), streams, noise);
+            axis += 1;
+            sensing
+        });
+        let carriage_m = scene.carriage_position_m;
+        let load_m = if scene.linked { stroke_m - carriage_m } else { 0.0 };
+        let mut extension_m = [carriage_m, load_m];
+        for (extension_m, axis) in extension_m.iter_mut().zip(&made.axes) {
+            *extension_m = axis.motion.beside_the_stops(*extension_m);
+        }
+        let state = made.start(extension_m);
+        let mut sensing: [Sensing; 2] = sensing;
+        for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| !made.active[*i]) {
+            // An axis that rests is seen once.
+            let mut evaluated = Evaluated::NONE;
+            evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
+            sensing.see(made.sensed(&state, &evaluated, i));
+        }
+        Ok(Made {
+            rig: made,
+            state,
+            sensing,
+            foreign: recipe.foreign_form,
+            jitter: recipe.jitter.then(|| Stream::new(recipe.seed, JITTER_STREAM)),
+            linked: scene.linked,
+            row: None,
+            stopped: false,
+        })
+    }
+}
+
+/// True states at the start of a period.
+fn truth(rig: &Rig, state: &State, evaluated: &Evaluated) -> [TrueAxis; 2] {
+    [0, 1].map(|i| {
+        let (axis, y) = (&rig.axes[i], &state.y[i]);
+        let air = if rig.active[i] { evaluated.air[i] } else { axis.air(y, state.supply_pa) };
+        let temperature = |chamber: usize| {
+            let nominal_k = axis.numbers.temperature_k;
+            let has_own = axis.laws.heat_w_per_m2_k.is_some();
+            if has_own { nominal_k * y[AIR + chamber] / y[NORMAL + chamber] } else { nominal_k }
+        };
+        TrueAxis {
+            extension_m: y[X],
+            rod_velocity_m_per_s: y[V],
+            rod_acceleration_m_per_s2: evaluated.rates[i][V],
+            spool: y[SPOOL],
+            pressure_pa: air.pressure_pa,
+            stored_air_j: [y[AIR], y[AIR + 1]],
+            temperature_k: [temperature(0), temperature(1)],
+            flow_m3_per_s: [y[FLOW], y[FLOW + 1]],
+            edge_flow_m3_per_s: air.edge_flow,
+            exhaust_pressure_pa: air.exhaust_pa,
+            pneumatic_force_n: air.force_n,
+            friction_n: evaluated.friction_n[i],
+        }
+    })
+}
+
+impl SimulatedRig for Made {
+    type Cycle = Row;
+
+    fn sample(&mut self, cycle: u64, acting: [f64; 2], _tell: &mut dyn FnMut(Outcome)) -> [AxisReadings; 2] {
+        let at = cycle as usize * self.rig.steps_per_ms;
+        let time_s = cycle as f64 / 1000.0;
+        let (rig, sensing) = (&self.rig, &mut self.sensing);
+        let mut start = None;
+        rig.advance(&mut self.state, acting, sensing, |state, evaluated| {
+            start = Some((truth(rig, state, evaluated), state.supply_pa, evaluated.contact_n));
+        });
+        let (axes, supply_pressure_pa, contact_force_n) = start.expect("a period has a first step");
+        let jitter_s = self
+            .jitter
+            .as_mut()
+            .map_or(0.0, |jitter| (JITTER_S * jitter.normal()).clamp(-MOST_JITTER_S, MOST_JITTER_S));
+        let drift = if self.foreign { drift(time_s) } else { 1.0 };
+        let without_noise = [0, 1].map(|i| sensing[i].without_noise(at, 0.0, drift));
+        let readings = [0, 1].map(|i| {
+            let values = sensing[i].without_noise(at, jitter_s, drift);
+            sensing[i].read(values)
+        });
+        let row =
+            Row { time_s, valve: acting, readings, without_noise, axes, supply_pressure_pa, contact_force_n };
+        self.row = Some(row);
+        readings
+    }
+
+    fn rig_call(&mut self, _cycle: u64) -> Option<RigCall> {
+        None
+    }
+
+    /// The record maker has no emergency stop: the record is refused.
+    fn emergency_stop(&mut self, _holder: Holder, release: bool) -> Option<Outcome> {
+        self.stopped |= !release;
+        None
+    }
+
+    fn standing(&self) -> Standing {
+        Standing {
+            supply_pressure_pa: self.state.supply_pa,
+            linked: self.linked,
+            emergency_stop: false,
+            check_valves_shut: false,
+        }
+    }
+
+    fn step(&mut self, _cycle: u64, valve: [f64; 2]) -> Row {
+        let row = self.row.take().expect("sampled before");
+        assert_eq!(row.valve, valve, "commands act as the rehearsal said before the cycle was sampled");
+        row
+    }
+}

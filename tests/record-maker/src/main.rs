@@ -1,0 +1,221 @@
+//! Makes one record of the study by hand, and the tables of docs/record-maker.md; without arguments it says how.
+#![allow(clippy::print_stdout)] // This is what it is for.
+
+use plant::effects::SHEETS;
+use plant::{Axis, RigParameters};
+use record_maker::{Experiment, Hidden, ROWS, Recipe, comparison, simulate, write};
+use std::error::Error;
+use std::path::PathBuf;
+use std::time::Instant;
+
+const USAGE: &str =
+    "record-maker make --out FOLDER --truth FOLDER [--seed N] [--axis drive|load] [--both-axes]
+    [--effect NAME --place PLACE --value V[,V...]]... [--foreign-form] [--wrong parameter:NAME=FACTOR]...
+    [--coloured-noise] [--jitter] [--noise N] [--experiment train|held-out-0|held-out-1]
+record-maker list
+record-maker compare
+record-maker forms
+record-maker steps
+record-maker agree";
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    match arguments.next().as_deref() {
+        Some("make") => make(arguments),
+        Some("list") => {
+            for sheet in SHEETS {
+                let keys: Vec<_> =
+                    sheet.keys.iter().map(|key| format!("{} {}", key.name, key.range())).collect();
+                println!("{} at {}: {}", sheet.name, sheet.place.names().join(", "), keys.join(", "));
+            }
+            Ok(())
+        }
+        Some("compare") => compare(),
+        Some("forms") => forms(),
+        Some("steps") => steps(),
+        Some("agree") => agree(),
+        _ => Err(USAGE.into()),
+    }
+}
+
+/// Each effect in the record maker against the same effect in the plant, as Markdown: free runs, in units of the noise.
+fn agree() -> Result<(), Box<dyn Error>> {
+    const ROWS_COMPARED: [usize; 3] = [2000, 6000, 10_000];
+    let rig = RigParameters::baseline();
+    println!(
+        "| effect | end | without it, 10 s: x, F, p_a, p_b | with it, 2 s | 6 s | 10 s |\n|---|---|---|---|---|---|"
+    );
+    for sheet in SHEETS {
+        for end in [0, 1] {
+            let place = sheet.place.places()[0];
+            let both_axes = sheet.name.starts_with("coupling");
+            let numbers: Vec<f64> = sheet.keys.iter().map(|key| key.drawn[end]).collect();
+            let keys: Vec<_> =
+                sheet.keys.iter().zip(&numbers).map(|(key, number)| (key.name, *number)).collect();
+            let with_it = rig.with_effect(sheet.name, &place.to_string(), &keys)?;
+            let hidden = vec![Hidden { name: sheet.name, place, numbers }];
+            let record = simulate(&Recipe { hidden, both_axes, ..Recipe::default() }, &rig)?;
+            let cell = |rig: &RigParameters, rows: usize| {
+                let rms = comparison::with_effects(&record, rig, rows);
+                rms.map_or_else(
+                    |error| error.to_string(),
+                    |rms| rms[0].map(|rms| format!("{rms:.2}")).join(", "),
+                )
+            };
+            let without = cell(&rig, ROWS_COMPARED[2]);
+            let with = ROWS_COMPARED.map(|rows| cell(&with_it, rows)).join(" | ");
+            println!("| {} | {end} | {without} | {with} |", sheet.name);
+        }
+    }
+    Ok(())
+}
+
+/// What halving the step changes, as Markdown.
+fn steps() -> Result<(), Box<dyn Error>> {
+    let rig = RigParameters::baseline();
+    println!("| step | record | position | force | pressure a | pressure b |\n|---|---|---|---|---|---|");
+    for (axis, both_axes) in [(Axis::Drive, false), (Axis::Drive, true)] {
+        for steps_per_ms in [12, 25, 50, 100, 200] {
+            let recipe = Recipe { axis, both_axes, ..Recipe::default() };
+            let halved = comparison::of_halved_step(&recipe, &rig, [ROWS, steps_per_ms])?;
+            let cells = halved[0].map(|rms| format!("{rms:.4}")).join(" | ");
+            let name = if both_axes { "linked, drive" } else { "drive" };
+            println!("| {:.1} us | {name} | {cells} |", 1000.0 / steps_per_ms as f64);
+        }
+    }
+    Ok(())
+}
+
+/// Both forms of all effects at both ends of their range, as Markdown.
+fn forms() -> Result<(), Box<dyn Error>> {
+    let rig = RigParameters::baseline();
+    let null = [false, true]
+        .map(|both_axes| simulate(&Recipe { both_axes, ..Recipe::default() }, &rig).expect("null"));
+    println!("| effect | end | catalogue | foreign | cosine |\n|---|---|---|---|---|");
+    for sheet in SHEETS {
+        for end in [0, 1] {
+            let place = sheet.place.places()[0];
+            let both_axes = sheet.name.starts_with("coupling");
+            let numbers: Vec<f64> = sheet.keys.iter().map(|key| key.drawn[end]).collect();
+            let hidden = vec![Hidden { name: sheet.name, place, numbers }];
+            let recipe = Recipe { hidden, both_axes, ..Recipe::default() };
+            let made = simulate(&recipe, &rig);
+            let foreign = simulate(&Recipe { foreign_form: true, ..recipe }, &rig);
+            match (made, foreign) {
+                (Ok(made), Ok(foreign)) => {
+                    let null = &null[usize::from(both_axes)];
+                    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+                    for ((one, other), base) in made.rows.iter().zip(&foreign.rows).zip(&null.rows) {
+                        for signal in 0..4 {
+                            let noise = [2e-5, 0.5, 400.0, 400.0][signal];
+                            let zero = base.without_noise[0][signal];
+                            let a = (one.without_noise[0][signal] - zero) / noise;
+                            let b = (other.without_noise[0][signal] - zero) / noise;
+                            (aa, bb, ab) = (aa + a * a, bb + b * b, ab + a * b);
+                        }
+                    }
+                    let n = 80000.0_f64;
+                    println!(
+                        "| {} | {end} | {:.2} | {:.2} | {:.2} |",
+                        sheet.name,
+                        (aa / n).sqrt(),
+                        (bb / n).sqrt(),
+                        ab / (aa * bb).sqrt()
+                    );
+                }
+                (made, foreign) => {
+                    println!("| {} | {end} | {:?} | {:?} |", sheet.name, made.err(), foreign.err())
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Null records of all experiments against the plant, as Markdown.
+fn compare() -> Result<(), Box<dyn Error>> {
+    let rig = RigParameters::baseline();
+    println!("| record | signal | rms | window 50 % | 90 % | 99 % | worst | left out | free run |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for (axis, both_axes) in [(Axis::Drive, false), (Axis::Load, false), (Axis::Drive, true)] {
+        for experiment in [Experiment::Train, Experiment::HeldOut(0), Experiment::HeldOut(1)] {
+            let record = simulate(&Recipe { axis, both_axes, experiment, ..Recipe::default() }, &rig)?;
+            let windows = comparison::against_plant(&record, &rig, comparison::WINDOW)?;
+            let free = comparison::against_plant(&record, &rig, record.rows.len())?;
+            for axis in Axis::ALL.into_iter().filter(|own| both_axes || *own == axis) {
+                let linked = if both_axes { "linked, " } else { "" };
+                for (signal, name) in comparison::SIGNALS.iter().enumerate() {
+                    let difference = &windows[axis.index()][signal];
+                    let [half, most, nearly, worst] =
+                        [50.0, 90.0, 99.0, 100.0].map(|p| difference.percentile(p));
+                    let [left_out, all] = difference.left_out;
+                    println!(
+                        "| {linked}{} {experiment:?} | {name} | {:.3} | {half:.4} | {most:.3} | {nearly:.3} | {worst:.2} | \
+                         {left_out} of {all} | {:.2} |",
+                        axis.name(),
+                        difference.rms(),
+                        free[axis.index()][signal].rms(),
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn make(mut arguments: impl Iterator<Item = String>) -> Result<(), Box<dyn Error>> {
+    let (mut recipe, mut out, mut truth) = (Recipe::default(), None, None);
+    let (mut name, mut place) = (None, None);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{argument} needs a value\n{USAGE}"));
+        match argument.as_str() {
+            "--out" => out = Some(PathBuf::from(value()?)),
+            "--truth" => truth = Some(PathBuf::from(value()?)),
+            "--seed" => recipe.seed = value()?.parse()?,
+            "--axis" => recipe.axis = if value()? == "load" { Axis::Load } else { Axis::Drive },
+            "--both-axes" => recipe.both_axes = true,
+            "--foreign-form" => recipe.foreign_form = true,
+            "--coloured-noise" => recipe.coloured_noise = true,
+            "--jitter" => recipe.jitter = true,
+            "--noise" => recipe.noise = value()?.parse()?,
+            "--experiment" => {
+                recipe.experiment = match value()?.as_str() {
+                    "train" => Experiment::Train,
+                    "held-out-0" => Experiment::HeldOut(0),
+                    "held-out-1" => Experiment::HeldOut(1),
+                    other => return Err(format!("--experiment {other}\n{USAGE}").into()),
+                }
+            }
+            "--wrong" => {
+                let text = value()?;
+                let (name, factor) = text.split_once('=').ok_or(USAGE)?;
+                recipe.wrong_parameters.push((name.to_owned(), factor.parse()?));
+            }
+            "--effect" => name = Some(value()?),
+            "--place" => place = Some(value()?),
+            "--value" => {
+                let (name, place) = (name.take().ok_or(USAGE)?, place.take().ok_or(USAGE)?);
+                recipe.hidden.push(hidden(&name, &place, &value()?)?);
+            }
+            other => return Err(format!("{other}?\n{USAGE}").into()),
+        }
+    }
+    let (out, truth) = (out.ok_or(USAGE)?, truth.ok_or(USAGE)?);
+    let began = Instant::now();
+    let record = simulate(&recipe, &RigParameters::baseline())?;
+    println!("{} rows in {:.2} s", record.rows.len(), began.elapsed().as_secs_f64());
+    write(&record, &out, &truth)?;
+    Ok(())
+}
+
+/// An effect by its place's name; keys that are not given have their defaults.
+fn hidden(name: &str, place: &str, values: &str) -> Result<Hidden, Box<dyn Error>> {
+    let sheet = plant::effects::sheet(name).ok_or_else(|| format!("no effect {name}; see `list`"))?;
+    let place = sheet.place_named(place).ok_or_else(|| format!("{name} is not at {place}; see `list`"))?;
+    let given = values.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>()?;
+    let number = |(index, key): (usize, &plant::effects::sheet::EffectKey)| {
+        given.get(index).copied().or(key.default).ok_or_else(|| format!("{name}: {} is missing", key.name))
+    };
+    let numbers = sheet.keys.iter().enumerate().map(number).collect::<Result<_, _>>()?;
+    Ok(Hidden { name: sheet.name, place, numbers })
+}

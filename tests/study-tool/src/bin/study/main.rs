@@ -1,0 +1,128 @@
+//! The study's commands, for `scripts/study`: draws, limits, cosines, one, score, compare, curve, resolve.
+
+mod cli;
+mod one;
+mod scores;
+
+use clap::Parser;
+use cli::{Cli, Command, CosinesArguments, DrawsArguments, LimitsArguments, ResolveArguments};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use study::classes::{Classes, DrawClasses};
+use study::draws::Draw;
+use study::folder::{Study, read, write_whole};
+use study::resolve::Table;
+use study::{compute, document};
+
+/// Exit code of a study that was told to stop: everything that is done is kept.
+const INTERRUPTED: u8 = 130;
+
+fn main() -> ExitCode {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // A second one ends the study at once; its folder stays good.
+        let registered =
+            signal_hook::flag::register_conditional_shutdown(signal, INTERRUPTED.into(), Arc::clone(&stop))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)));
+        if let Err(error) = registered {
+            eprintln!("study: signals cannot be caught: {error}");
+        }
+    }
+    let done = match Cli::parse().command {
+        Command::One(arguments) => return one::one(&arguments, &stop),
+        Command::Draws(arguments) => draws(&arguments),
+        Command::Limits(arguments) => limits(&arguments),
+        Command::Cosines(arguments) => cosines(&arguments, &stop),
+        Command::Score(arguments) => scores::score(&arguments),
+        Command::Compare(arguments) => scores::compare(&arguments),
+        Command::Curve(arguments) => scores::curve(&arguments),
+        Command::Resolve(arguments) => resolve(&arguments),
+    };
+    match done {
+        Ok(()) if stop.load(Ordering::Relaxed) => ExitCode::from(INTERRUPTED),
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("study: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+type Done = Result<(), Box<dyn Error>>;
+
+fn say(line: &str) {
+    eprintln!("study: {line}");
+}
+
+/// Where the committed files are.
+fn committed(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)
+}
+
+const PAGE: &str = "docs/study.md";
+const LIMITS: &str = "study/limits.json";
+const CLASSES: &str = "study/classes.json";
+const EXPECTED: &str = "study/outside-expected.json";
+
+fn draws(arguments: &DrawsArguments) -> Done {
+    let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
+    say(&format!("{} draws in {}", study.draws.len(), arguments.out.display()));
+    Ok(())
+}
+
+fn limits(arguments: &LimitsArguments) -> Done {
+    let limits = compute::limits(arguments.seed, &say)?;
+    let text = document::limit_table(&limits);
+    if arguments.write {
+        write_whole(&committed(LIMITS), format!("{:#}\n", serde_json::json!(limits)).as_bytes())?;
+        document::put(&committed(PAGE), "limits", &text)?;
+    } else {
+        say(&format!("\n{text}"));
+    }
+    Ok(())
+}
+
+fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
+    let study = Study::open(&arguments.out)?;
+    compute::classes(&study, arguments.jobs, stop, &say)?;
+    if arguments.write && !stop.load(Ordering::Relaxed) {
+        let classes = compute::collected(&study)?;
+        let text = document::twin_table(&classes);
+        write_whole(&committed(CLASSES), compute::classes_text(&classes).as_bytes())?;
+        document::put(&committed(PAGE), "twins", &text)?;
+    }
+    Ok(())
+}
+
+fn resolve(arguments: &ResolveArguments) -> Done {
+    let study = Study::open(&arguments.out)?;
+    let table = Table::of(&study, &arguments.label)?;
+    let text = table.markdown();
+    let path = |extension: &str| study.root.join(format!("resolve-{}.{extension}", arguments.label));
+    write_whole(&path("json"), format!("{:#}\n", serde_json::json!(table)).as_bytes())?;
+    write_whole(&path("md"), text.as_bytes())?;
+    if arguments.write {
+        document::put(&committed(PAGE), "resolve", &text)?;
+    }
+    say(&format!("\n{text}"));
+    say(&path("json").display().to_string());
+    Ok(())
+}
+
+/// The committed classes of these draws, by their numbers.
+fn known_classes(draws: &[Draw]) -> Result<BTreeMap<usize, DrawClasses>, Box<dyn Error>> {
+    let classes = read_if_there::<Classes>(&committed(CLASSES))?;
+    Ok(classes.map_or_else(BTreeMap::new, |classes| classes.of_draws(draws)))
+}
+
+fn read_if_there<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, Box<dyn Error>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = read(path)?;
+    serde_json::from_str(&text).map(Some).map_err(|error| format!("{}: {error}", path.display()).into())
+}

@@ -1,0 +1,128 @@
+//! A step with one draw, as the program of a campaign.
+//!
+//! ```text
+//! stdin   {"run": 17, "draw": 17, …}; with "again": true also what was done is done again
+//! stdout  {"kind": "single", "hidden": "valve-offset", "called": "valve-offset", "right": true, …}
+//! exit    0; 1 a record cannot be made; 75 nothing was tried, and the campaign ends; 130 stopped
+//! ```
+
+use crate::cli::{Deed, OneArguments};
+use crate::{EXPECTED, INTERRUPTED, LIMITS, committed, known_classes, read_if_there};
+use campaign::command::NOT_TRIED;
+use serde_json::{Value, json};
+use std::error::Error;
+use std::io::{self, BufRead, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+use study::classes::read_draw;
+use study::draws::{Draw, Kind};
+use study::folder::Study;
+use study::leave_out::{Expectations, left_out};
+use study::limits::Limits;
+use study::program::Program;
+use study::resolve::{self, Found};
+use study::score::{self, Known};
+use study::step::{Step, StepError, make_record};
+use study::{answer, report};
+
+/// Exit code of a draw whose record cannot be made: a failed run, the others need not wait for it.
+const UNMADE: u8 = 1;
+
+pub(crate) fn one(arguments: &OneArguments, stop: &AtomicBool) -> ExitCode {
+    match take(arguments, stop) {
+        Ok(Some(answer)) => match writeln!(io::stdout(), "{answer}") {
+            Ok(()) => ExitCode::SUCCESS,
+            // Who asked is gone.
+            Err(_) => ExitCode::from(INTERRUPTED),
+        },
+        Ok(None) => ExitCode::from(INTERRUPTED),
+        Err(error) => {
+            eprintln!("study: {error}");
+            let unmade = error.downcast_ref().is_some_and(|own| matches!(own, StepError::Make { .. }));
+            ExitCode::from(if unmade { UNMADE } else { NOT_TRIED as u8 })
+        }
+    }
+}
+
+/// Takes the step; `None` when it was told to stop in its midst.
+fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Box<dyn Error>> {
+    let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
+    let (number, again) = arguments.draw.map_or_else(asked, |draw| Ok((draw, true)))?;
+    let draw = study.draws.get(number).ok_or_else(|| {
+        let all = study.draws.len();
+        format!("draw {number}: this study has {all}, from 0; its campaign file needs draws = {all}")
+    })?;
+    let classes = known_classes(std::slice::from_ref(draw))?;
+    let mut step = Step {
+        study: &study,
+        label: &arguments.label,
+        make: &make_record,
+        without: None,
+        keep_truth: arguments.keep_truth,
+        drop_records: arguments.drop_records,
+        again,
+        least_free_mib: arguments.least_free,
+        stop,
+    };
+    if arguments.deed == Deed::Records {
+        step.records(draw)?;
+        return Ok(Some(json!({"kind": draw.kind})));
+    }
+    let program = program(arguments)?;
+    if arguments.deed == Deed::Resolve {
+        let found = resolve::run(&step, &program, draw)?;
+        return Ok(found.map(|found| answer::of_found(&found, outcome(&step, draw, &found))));
+    }
+    if arguments.deed == Deed::LeaveOut {
+        if draw.kind != Kind::Single {
+            return Ok(Some(json!({"kind": draw.kind})));
+        }
+        let path = study.class(number);
+        let own = if path.exists() { Some(read_draw(&path, number)?) } else { None };
+        step.without = Some(left_out(draw, classes.get(&number).or(own.as_ref())));
+    }
+    if step.run(draw, &program)?.is_none() {
+        return Ok(None);
+    }
+    let limits: Option<Limits> = read_if_there(&committed(LIMITS))?;
+    let expectations: Option<Expectations> = read_if_there(&committed(EXPECTED))?;
+    let known =
+        Known { limits: limits.as_ref(), classes: Some(&classes), expectations: expectations.as_ref() };
+    Ok(Some(answer::of_case(&score::one(&study, draw, &arguments.label, known)?)))
+}
+
+/// The draw that the campaign asks for, and whether again.
+fn asked() -> Result<(usize, bool), Box<dyn Error>> {
+    let mut line = String::new();
+    io::stdin().lock().read_line(&mut line)?;
+    let question: Value = serde_json::from_str(&line).map_err(|error| {
+        format!("standard input: {error}; a campaign tells its run there, or give --draw")
+    })?;
+    let draw = question["draw"].as_u64().ok_or("standard input: no draw in it")?;
+    Ok((usize::try_from(draw)?, question["again"] == true))
+}
+
+fn program(arguments: &OneArguments) -> Result<Program, Box<dyn Error>> {
+    let name = arguments.program.as_ref().ok_or("--program is missing: the program that is judged")?;
+    let limit = Duration::from_secs_f64(arguments.time_limit.max(0.001));
+    let program = Program::new(&found(name), arguments.arguments.clone(), limit);
+    Ok(program.map_err(|error| format!("--program {}: {error}", name.display()))?)
+}
+
+/// A name is looked for as a shell does.
+fn found(name: &Path) -> PathBuf {
+    let path = std::env::var_os("PATH").filter(|_| name.components().count() == 1).unwrap_or_default();
+    let mut places = std::env::split_paths(&path).map(|folder| folder.join(name));
+    places.find(|place| place.is_file()).unwrap_or_else(|| name.to_owned())
+}
+
+/// What came of the experiment that was measured.
+fn outcome(step: &Step<'_>, draw: &Draw, found: &Found) -> Option<resolve::Outcome> {
+    let Found::Measured(resolution) = found else { return None };
+    let folder = step.study.run(&resolve::label(step.label), draw.number);
+    let report = report::read(&folder.join("report.json"));
+    let judged = resolution.taken.map(|taken| resolve::judge(&draw.recipe.hidden[0], &taken, &report));
+    Some(judged.unwrap_or(resolve::Outcome::Error))
+}

@@ -1,0 +1,79 @@
+//! The commands that score: one label as a page, several side by side, several over their noise.
+
+use crate::cli::{Column, CompareArguments, CurveArguments, ScoreArguments};
+use crate::{Done, EXPECTED, LIMITS, PAGE, committed, known_classes, read_if_there, say};
+use std::error::Error;
+use std::path::PathBuf;
+use study::curve::Curves;
+use study::folder::{Study, write_whole};
+use study::leave_out::Expectations;
+use study::limits::Limits;
+use study::score::{Known, Score};
+use study::{compare, document, page, score};
+
+pub(crate) fn score(arguments: &ScoreArguments) -> Done {
+    let score = scored(&arguments.folders, &arguments.label)?;
+    let folder = arguments.to.as_ref().unwrap_or(&arguments.folders[0]);
+    let path = |extension: &str| folder.join(format!("score-{}.{extension}", arguments.label));
+    write_whole(&path("json"), format!("{:#}\n", serde_json::json!(score)).as_bytes())?;
+    write_whole(&path("html"), page::page(&score).as_bytes())?;
+    for line in &score.tables.headline {
+        let rate = &line.rate;
+        say(&format!("{}: {} of {} (wanted: {})", line.name, rate.count, rate.of, line.wanted));
+    }
+    say(&path("html").display().to_string());
+    Ok(())
+}
+
+pub(crate) fn compare(arguments: &CompareArguments) -> Done {
+    let scores = all(&arguments.columns)?;
+    let text = compare::markdown(&scores)?;
+    if let Some(path) = &arguments.to {
+        write_whole(path, text.as_bytes())?;
+    }
+    if arguments.write {
+        let is_left_out = scores.iter().any(|score| score.leave_out.is_some());
+        document::put(&committed(PAGE), if is_left_out { "leave-out" } else { "compare" }, &text)?;
+    }
+    if arguments.to.is_none() && !arguments.write {
+        say(&format!("\n{text}"));
+    }
+    Ok(())
+}
+
+pub(crate) fn curve(arguments: &CurveArguments) -> Done {
+    let scores = all(&arguments.columns)?;
+    let curves = Curves::new(&scores)?;
+    let (text, picture) = (curves.markdown(), curves.svg()?);
+    let name = format!("curve-{}", arguments.columns[0].label);
+    write_whole(&arguments.to.join(format!("{name}.md")), text.as_bytes())?;
+    write_whole(&arguments.to.join(format!("{name}.svg")), picture.as_bytes())?;
+    if arguments.write {
+        document::put(
+            &committed(PAGE),
+            "curve",
+            &format!("{text}\n![rates over noise and amplitude](curve.svg)"),
+        )?;
+        write_whole(&committed("docs/curve.svg"), picture.as_bytes())?;
+    }
+    say(&arguments.to.join(format!("{name}.svg")).display().to_string());
+    Ok(())
+}
+
+fn all(columns: &[Column]) -> Result<Vec<Score>, Box<dyn Error>> {
+    columns.iter().map(|column| scored(&column.folders, &column.label)).collect()
+}
+
+/// Scores results with all that is committed about their draws.
+fn scored(folders: &[PathBuf], label: &str) -> Result<Score, Box<dyn Error>> {
+    let limits: Option<Limits> = read_if_there(&committed(LIMITS))?;
+    let expectations: Option<Expectations> = read_if_there(&committed(EXPECTED))?;
+    let mut draws = Vec::new();
+    for folder in folders {
+        draws.extend(Study::open(folder)?.draws);
+    }
+    let classes = known_classes(&draws)?;
+    let known =
+        Known { limits: limits.as_ref(), classes: Some(&classes), expectations: expectations.as_ref() };
+    Ok(score::score(folders, label, known)?)
+}

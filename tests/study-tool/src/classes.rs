@@ -1,0 +1,282 @@
+//! Which effects leave the same signature in a record: arithmetic in place of taste.
+//!
+//! ```text
+//! cosine = |M J_true . M J_other| / (|M J_true| |M J_other|)         above 0.95 the two count as one class in this record
+//! ```
+//!
+//! J_true is the hidden effect at its drawn numbers, in the catalogue's form; J_other each other effect, and the same one at
+//! other places of the measured axes, at the geometric mean of its drawn range with the shapes' defaults. The windows start
+//! from the truth of the very record ([`super::signature`]). Union is by draw: what is alike in one record need not be in
+//! another.
+//!
+//! Parameters of the baseline are compared too, by 5 %. A wrong parameter is no missing effect, so such a twin is told but is not
+//! in the class.
+
+use crate::SCHEMA_VERSION;
+use crate::draws::{Draw, axis_of};
+use crate::folder::{FolderError, Plan, read};
+use crate::limits::threshold;
+use crate::signature::{Observer, alike, length};
+use crate::trajectory::TrueTrajectory;
+use plant::effects::SHEETS;
+use plant::effects::sheet::{Place, Sheet};
+use plant::{ParameterError, RigParameters};
+use record_maker::{PARAMETERS, Recipe};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Cosine above which two effects count as one class.
+pub const TWIN_COSINE: f64 = 0.95;
+/// Cosine above which a pair is worth telling.
+const TOLD_COSINE: f64 = 0.8;
+/// What a parameter of the baseline is off by when it is compared.
+const PARAMETER_FACTOR: f64 = 1.05;
+
+/// Another effect, or a parameter, and how alike it is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Member {
+    /// Name of the effect, or `parameter:…`.
+    pub effect: String,
+    /// Where it is; nothing for a parameter.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// |cosine| of the two signatures.
+    pub cosine: f64,
+}
+
+/// What resembles one hidden effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HiddenClass {
+    /// Its name.
+    pub effect: String,
+    /// Where it is.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// |M J| in this record over what an ideal observer needs.
+    pub strength: f64,
+    /// What is more than 0.8 alike, the most alike first; the first in any case.
+    pub members: Vec<Member>,
+}
+
+/// The classes of one draw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrawClasses {
+    /// Of [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Number of the draw.
+    pub number: usize,
+    /// One for each hidden effect.
+    pub hidden: Vec<HiddenClass>,
+}
+
+/// The classes of a whole study, as `tests/study/classes.json` holds them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Classes {
+    /// Which study.
+    pub plan: Plan,
+    /// One for each draw that hides something.
+    pub draws: Vec<DrawClasses>,
+}
+
+impl Classes {
+    /// Those of these draws, by their numbers there: the same draw has another number in a study of another shape.
+    ///
+    /// Noise of another size scales all signatures alike, but for the rounding of the sensors: the classes stay, and a strength
+    /// is the one at the noise of this study, as the committed limits are.
+    #[must_use]
+    pub fn of_draws(&self, draws: &[Draw]) -> BTreeMap<usize, DrawClasses> {
+        let own = self.plan.draws();
+        let recipe_of = |number: usize| own.get(number).map(|draw| &draw.recipe);
+        let by_seed: BTreeMap<u64, &DrawClasses> =
+            self.draws.iter().filter_map(|own| Some((recipe_of(own.number)?.seed, own))).collect();
+        let of_draw = |draw: &Draw| {
+            let known = *by_seed.get(&draw.recipe.seed)?;
+            let recipe = recipe_of(known.number)?;
+            let same = *recipe == Recipe { noise: recipe.noise, ..draw.recipe.clone() };
+            same.then(|| (draw.number, DrawClasses { number: draw.number, ..known.clone() }))
+        };
+        draws.iter().filter_map(of_draw).collect()
+    }
+}
+
+/// The classes of a draw in its train record.
+///
+/// # Errors
+/// [`ParameterError`] when a drawn effect is refused: a bug of the catalogue.
+pub fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<DrawClasses, ParameterError> {
+    let measured = trajectory.measured;
+    let observer = Observer::new(trajectory);
+    let rig = observer.rig();
+    let mut others: Vec<(String, String, Vec<f64>)> = Vec::new();
+    for sheet in SHEETS {
+        for place in sheet.place.places().iter().filter(|place| is_measured(**place, measured)) {
+            let other = rig.with_effect(sheet.name, &place.to_string(), &nominal(sheet))?;
+            others.push((sheet.name.to_owned(), place.to_string(), observer.signature(&other)));
+        }
+    }
+    for name in PARAMETERS {
+        let other = with_parameter(rig, name, PARAMETER_FACTOR)?;
+        others.push((name.to_owned(), String::new(), observer.signature(&other)));
+    }
+    let mut hidden_classes = Vec::new();
+    for hidden in &draw.recipe.hidden {
+        let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
+        let place = hidden.place.to_string();
+        let numbers: Vec<_> =
+            sheet.keys.iter().map(|key| key.name).zip(hidden.numbers.iter().copied()).collect();
+        let own = observer.signature(&rig.with_effect(sheet.name, &place, &numbers)?);
+        let other = others.iter().filter(|(effect, at, _)| effect != hidden.name || *at != place);
+        let mut members: Vec<_> = other
+            .map(|(effect, at, signature)| Member {
+                effect: effect.clone(),
+                place: at.clone(),
+                // Four digits are more than the comparison is worth, and the file stays small.
+                cosine: (alike(&own, signature) * 1e4).round() / 1e4,
+            })
+            .collect();
+        members.sort_by(|left, right| right.cosine.total_cmp(&left.cosine));
+        let told = members.iter().take_while(|member| member.cosine > TOLD_COSINE).count();
+        members.truncate(told.max(1));
+        let two_sided = sheet.keys[0].signed;
+        let strength = length(&own) / threshold(two_sided);
+        hidden_classes.push(HiddenClass { effect: hidden.name.to_owned(), place, strength, members });
+    }
+    Ok(DrawClasses { schema_version: SCHEMA_VERSION, number: draw.number, hidden: hidden_classes })
+}
+
+/// Whether something at this place could be seen in a record of these axes.
+fn is_measured(place: Place, measured: [bool; 2]) -> bool {
+    axis_of(place).map_or(measured == [true, true], |axis| measured[axis.index()])
+}
+
+/// The middle of what is drawn.
+fn nominal(sheet: &Sheet) -> Vec<(&'static str, f64)> {
+    let key = &sheet.keys[0];
+    let mean = (key.drawn[0] * key.drawn[1]).sqrt();
+    // The middle must not be the baseline itself.
+    let value = if key.neutral.is_some_and(|neutral| (mean / neutral).ln().abs() < 0.1) {
+        key.drawn[1]
+    } else {
+        mean
+    };
+    vec![(key.name, value)]
+}
+
+/// A rig one of whose parameters is off by a factor.
+///
+/// # Errors
+/// [`ParameterError`] when the rig file would not take it.
+///
+/// # Panics
+/// For a name that is none of [`PARAMETERS`].
+pub fn with_parameter(rig: &RigParameters, name: &str, factor: f64) -> Result<RigParameters, ParameterError> {
+    let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect::<Vec<_>>();
+    let (friction, cylinder, valve) = (rig.friction(), rig.cylinder(), rig.valve());
+    match name {
+        "parameter:mass" => rig
+            .with("mass.drive_kg", &[rig.mass().drive_kg * factor])?
+            .with("mass.carriage_kg", &[rig.mass().carriage_kg * factor])?
+            .with("mass.load_kg", &[rig.mass().load_kg * factor]),
+        "parameter:viscous-friction" => {
+            rig.with("friction.viscous_n_per_mm_per_s", &[friction.viscous_n_s_per_m / 1e3 * factor])
+        }
+        "parameter:sliding-friction" => {
+            rig.with("friction.sliding_force_n", &[friction.sliding_force_n * factor])
+        }
+        "parameter:break-away-force" => {
+            rig.with("friction.break_away_force_n", &[friction.break_away_force_n * factor])
+        }
+        "parameter:supply-pressure" => {
+            rig.with("supply.pressure_bar", &[rig.supply().pressure_pa / 1e5 * factor])
+        }
+        "parameter:spool-time-constant" => {
+            rig.with("valve.spool_time_constant_ms", &[valve.spool_time_constant_s * 1e3 * factor])
+        }
+        "parameter:flow-lag" => {
+            rig.with("valve.flow_lag_time_constant_ms", &[valve.flow_lag_time_constant_s * 1e3 * factor])
+        }
+        "parameter:kv-scale" => rig
+            .with("valve.kv_supply_m3_per_h", &scaled(&valve.kv_supply_m3_per_h))?
+            .with("valve.kv_exhaust_m3_per_h", &scaled(&valve.kv_exhaust_m3_per_h)),
+        "parameter:piston-area" => {
+            let areas = [cylinder.piston_area_m2, cylinder.annulus_area_m2].map(|area| area * 1e6 * factor);
+            rig.with("cylinder.piston_area_mm2", &areas[..1])?.with("cylinder.annulus_area_mm2", &areas[1..])
+        }
+        _ => panic!("{name} is no parameter of the study"),
+    }
+}
+
+/// Reads the classes of a draw.
+///
+/// # Errors
+/// [`FolderError`] when the file is none of this version.
+pub fn read_draw(path: &Path, number: usize) -> Result<DrawClasses, FolderError> {
+    let classes: DrawClasses = serde_json::from_str(&read(path)?)
+        .map_err(|error| FolderError::content(path, format!("holds no classes of this version: {error}")))?;
+    if classes.schema_version != SCHEMA_VERSION || classes.number != number {
+        return Err(FolderError::content(
+            path,
+            "holds the classes of another draw: delete it and compute it again",
+        ));
+    }
+    Ok(classes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_of_the_study_can_be_off() {
+        let rig = RigParameters::baseline();
+        for name in PARAMETERS {
+            for factor in [0.85, 1.15] {
+                let own = with_parameter(&rig, name, factor);
+                // The break-away force cannot fall below the sliding force, nor the other way round.
+                assert!(own.is_ok(), "{name} {factor}: {own:?}");
+                assert_ne!(own.unwrap(), rig, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_committed_classes_are_found_by_the_draw_and_not_by_its_number() {
+        use crate::draws::Shape;
+        let text = include_str!("../../study/classes.json");
+        let classes: Classes = serde_json::from_str(text).unwrap();
+        let of = |seed, shape| classes.of_draws(&Plan::new(seed, shape).draws());
+        // Fewer of each effect, more of others, other noise: all single draws are still those of the committed study.
+        let shape = Shape {
+            each: 2,
+            nulls: 3,
+            parameters: 1,
+            pairs: 2,
+            triples: 1,
+            noise_factor: 4.0,
+            weaker_factor: 1.0,
+        };
+        let found = of(1, shape);
+        assert_eq!(found.keys().copied().collect::<Vec<_>>(), (0..2 * SHEETS.len()).collect::<Vec<_>>());
+        for (number, own) in &found {
+            assert_eq!(own.number, *number);
+            assert_eq!(own.hidden[0].effect, SHEETS[number / 2].name);
+        }
+        assert_eq!(found[&3].hidden, classes.draws[7].hidden);
+        assert!(of(5, shape).is_empty());
+    }
+
+    #[test]
+    fn the_middle_of_what_is_drawn_is_not_the_baseline() {
+        for sheet in SHEETS {
+            let [(_, value)] = nominal(sheet)[..] else { panic!("{}: one amplitude", sheet.name) };
+            let key = &sheet.keys[0];
+            assert!((key.drawn[0]..=key.drawn[1]).contains(&value), "{}", sheet.name);
+            assert_ne!(Some(value), key.neutral, "{}", sheet.name);
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! What is computed before any program is judged: limits and classes, from records whose truth is known.
+
+use crate::SCHEMA_VERSION;
+use crate::classes::{Classes, DrawClasses, classes_of, read_draw};
+use crate::draws::Draw;
+use crate::folder::{FolderError, Study, write_whole};
+use crate::limits::{Limits, Measured, limits_in};
+use crate::signature::Observer;
+use crate::trajectory::{Point, TrueTrajectory, WINDOW};
+use plant::{Axis, AxisState, Inputs, ParameterError, RigParameters, State};
+use rayon::prelude::*;
+use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
+use record_maker::{MakeError, Recipe, Record, simulate};
+use serde_json::json;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Why limits or classes cannot be computed.
+#[derive(Debug, thiserror::Error)]
+pub enum ComputeError {
+    /// A record cannot be made.
+    #[error("draw {number}: {error}")]
+    Make {
+        /// Number of the draw.
+        number: usize,
+        /// What the record maker says.
+        error: MakeError,
+    },
+    /// A sheet's own range is refused: a bug of the catalogue.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// A file of the study.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The threads.
+    #[error("no threads: {0}")]
+    Threads(#[from] ThreadPoolBuildError),
+    /// Draws have no classes.
+    #[error("{count} draws have no classes yet: run the command to its end")]
+    Missing {
+        /// How many.
+        count: usize,
+    },
+}
+
+/// The limits of all effects at all places, from train records with nothing hidden.
+///
+/// # Errors
+/// [`ComputeError`] when a record cannot be made or an effect is refused.
+pub fn limits(seed: u64, say: &(dyn Fn(&str) + Sync)) -> Result<Limits, ComputeError> {
+    let rig = RigParameters::baseline();
+    let mut limits = Vec::new();
+    for measured in [Measured::One(Axis::Drive), Measured::One(Axis::Load), Measured::Both] {
+        let axis = if let Measured::One(axis) = measured { axis } else { Axis::Drive };
+        let recipe = Recipe { seed, axis, both_axes: measured == Measured::Both, ..Recipe::default() };
+        let record = simulate(&recipe, &rig).map_err(|error| ComputeError::Make { number: 0, error })?;
+        let observer = Observer::new(trajectory(&record, &rig));
+        limits.extend(limits_in(&observer, measured, say)?);
+    }
+    Ok(Limits { schema_version: SCHEMA_VERSION, window_ms: WINDOW as u32, seed, limits })
+}
+
+/// The trajectory of a record for an observer with this rig file.
+#[must_use]
+pub fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory {
+    let (both, axis) = (record.recipe.both_axes, record.recipe.axis);
+    let row = &record.rows[0];
+    let state_of = |i: usize| {
+        let own = &row.axes[i];
+        let volume = |area_m2: f64, way_m: f64| rig.cylinder().dead_volume_m3 + area_m2 * way_m;
+        let cylinder = rig.cylinder();
+        AxisState {
+            extension_m: own.extension_m.clamp(0.0, cylinder.stroke_m),
+            rod_velocity_m_per_s: 0.0,
+            spool: 0.0,
+            stored_air_a_j: own.pressure_pa[0] * volume(cylinder.piston_area_m2, own.extension_m),
+            stored_air_b_j: own.pressure_pa[1]
+                * volume(cylinder.annulus_area_m2, cylinder.stroke_m - own.extension_m),
+            flow_a_m3_per_s: 0.0,
+            flow_b_m3_per_s: 0.0,
+        }
+    };
+    TrueTrajectory {
+        rig: rig.clone(),
+        measured: Axis::ALL.map(|own| both || own == axis),
+        start: State {
+            axes: [state_of(0), state_of(1)],
+            supply_pressure_pa: rig.supply().pressure_pa,
+            emergency_stop: false,
+            linked: record.linked,
+            added_mass_kg: record.added_mass_kg,
+        },
+        inputs: record.rows.iter().map(|row| Inputs { valve: row.valve, ..Inputs::default() }).collect(),
+        points: record.rows.iter().map(|row| row.axes.map(|axis| point(&axis))).collect(),
+    }
+}
+
+fn point(axis: &record_maker::TrueAxis) -> Point {
+    Point {
+        extension_m: axis.extension_m,
+        rod_velocity_m_per_s: axis.rod_velocity_m_per_s,
+        pressures_pa: axis.pressure_pa,
+    }
+}
+
+/// Computes the classes of all draws that hide something and have none yet.
+///
+/// # Errors
+/// [`ComputeError`] with the first draw that failed.
+pub fn classes(
+    study: &Study,
+    jobs: usize,
+    stop: &AtomicBool,
+    say: &(dyn Fn(&str) + Sync),
+) -> Result<(), ComputeError> {
+    let missing: Vec<&Draw> = hiding(study).filter(|draw| !study.class(draw.number).exists()).collect();
+    let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build()?;
+    let done = AtomicUsize::new(0);
+    let all = missing.len();
+    pool.install(|| {
+        missing.into_par_iter().with_max_len(1).try_for_each(|draw| {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            one(study, draw)?;
+            say(&format!("classes {} of {all}", done.fetch_add(1, Ordering::Relaxed) + 1));
+            Ok(())
+        })
+    })
+}
+
+fn hiding(study: &Study) -> impl Iterator<Item = &Draw> {
+    study.draws.iter().filter(|draw| !draw.recipe.hidden.is_empty())
+}
+
+fn one(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
+    let (number, rig) = (draw.number, RigParameters::baseline());
+    let record = simulate(&draw.recipe, &rig).map_err(|error| ComputeError::Make { number, error })?;
+    let classes = classes_of(draw, trajectory(&record, &rig))?;
+    write_whole(&study.class(number), format!("{:#}\n", json!(classes)).as_bytes())?;
+    Ok(())
+}
+
+/// The classes of a study whose draws all have them.
+///
+/// # Errors
+/// [`ComputeError::Missing`] when some are missing.
+pub fn collected(study: &Study) -> Result<Classes, ComputeError> {
+    let count = hiding(study).filter(|draw| !study.class(draw.number).exists()).count();
+    if count > 0 {
+        return Err(ComputeError::Missing { count });
+    }
+    let read = |draw: &Draw| read_draw(&study.class(draw.number), draw.number);
+    let draws = hiding(study).map(read).collect::<Result<Vec<DrawClasses>, _>>()?;
+    Ok(Classes { plan: study.plan, draws })
+}
+
+/// The text of committed classes: a line for each draw, so that a change is seen in a difference of files.
+#[must_use]
+pub fn classes_text(classes: &Classes) -> String {
+    let draws: Vec<_> = classes.draws.iter().map(|draw| json!(draw).to_string()).collect();
+    format!("{{\"plan\": {},\n\"draws\": [\n{}\n]}}\n", json!(classes.plan), draws.join(",\n"))
+}

@@ -1,0 +1,303 @@
+//! The files of a study's folder; each is whole or absent, so that a study can be killed at any time and goes on where it was.
+//!
+//! ```text
+//! OUT/draws.json               schema version, seed, shape, all recipes
+//! OUT/records/0007/            train, held-out-0, held-out-1: each with measurement.csv
+//! OUT/truth/0007/              the same folders with truth.json (and truth.csv, if it is kept)
+//! OUT/runs/LABEL/0007/         result.json, report.json, stderr.txt of the program with this label, and next-*.toml
+//! OUT/runs/LABEL-resolve/0007/ resolution.json, and the same of the program that was given that experiment's record
+//! OUT/classes/0007.json        which effects leave the same signature
+//! OUT/score-LABEL.json, .html  the score
+//! OUT/resolve-LABEL.json, .md  what the proposed experiments resolve
+//! ```
+//!
+//! `draws.json` is written for people and other programs. It is never read back: the draws follow from seed and shape, and the
+//! file must be what this program would write, else it stems from another version and is refused.
+
+use crate::SCHEMA_VERSION;
+use crate::draws::{Draw, Shape, draws};
+use campaign::parts;
+use record_maker::{Hidden, Recipe};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::fs;
+use std::io;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A study with its folder.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Where it is.
+    pub root: PathBuf,
+    /// What defines it.
+    pub plan: Plan,
+    /// Its draws.
+    pub draws: Vec<Draw>,
+}
+
+/// What defines a study.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Of [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Of all random numbers; below 2^53, as JSON is read.
+    pub seed: u64,
+    /// How many draws of what.
+    pub shape: Shape,
+}
+
+impl Plan {
+    /// The plan of a study.
+    #[must_use]
+    pub fn new(seed: u64, shape: Shape) -> Self {
+        Plan { schema_version: SCHEMA_VERSION, seed, shape }
+    }
+
+    /// Its draws.
+    #[must_use]
+    pub fn draws(&self) -> Vec<Draw> {
+        draws(self.seed, &self.shape)
+    }
+
+    fn text(&self) -> String {
+        let mut file = json!(self);
+        file["draws"] = self.draws().iter().map(draw_as_json).collect();
+        format!("{file:#}\n")
+    }
+}
+
+/// Why a study's folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// A file cannot be read or written.
+    #[error("{path}: {error}")]
+    File {
+        /// Which.
+        path: String,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// A file is not what this program writes.
+    #[error("{path}: {what}")]
+    Content {
+        /// Which.
+        path: String,
+        /// What is wrong and what to do.
+        what: String,
+    },
+}
+
+impl FolderError {
+    fn file(path: &Path) -> impl Fn(io::Error) -> Self {
+        move |error| FolderError::File { path: path.display().to_string(), error }
+    }
+
+    /// A file whose content is wrong.
+    pub(crate) fn content(path: &Path, what: impl ToString) -> Self {
+        FolderError::Content { path: path.display().to_string(), what: what.to_string() }
+    }
+}
+
+impl Study {
+    /// Begins a study, or opens the same one again.
+    ///
+    /// # Errors
+    /// [`FolderError`] when the folder holds another study or cannot be written.
+    pub fn begin(root: &Path, plan: &Plan) -> Result<Self, FolderError> {
+        let path = root.join("draws.json");
+        if path.exists() {
+            let study = Study::open(root)?;
+            if study.plan != *plan {
+                let what = format!("holds another study ({:?}): give another folder", study.plan);
+                return Err(FolderError::content(&path, what));
+            }
+            return Ok(study);
+        }
+        fs::create_dir_all(root).map_err(FolderError::file(root))?;
+        write_whole(&path, plan.text().as_bytes())?;
+        Ok(Study { root: root.to_owned(), plan: *plan, draws: plan.draws() })
+    }
+
+    /// Opens a study.
+    ///
+    /// # Errors
+    /// [`FolderError`] when there is none, or one of another version of this program.
+    pub fn open(root: &Path) -> Result<Self, FolderError> {
+        let path = root.join("draws.json");
+        let text = read(&path)?;
+        let plan: Plan = serde_json::from_str(&text)
+            .map_err(|error| FolderError::content(&path, format!("is no list of draws: {error}")))?;
+        if plan.schema_version != SCHEMA_VERSION || plan.text() != text {
+            let what =
+                "is not what this program draws from the same seed: use the version that began this study";
+            return Err(FolderError::content(&path, what));
+        }
+        Ok(Study { root: root.to_owned(), plan, draws: plan.draws() })
+    }
+
+    /// Folder of a draw's records.
+    #[must_use]
+    pub fn records(&self, number: usize) -> PathBuf {
+        self.root.join("records").join(name(number))
+    }
+
+    /// Folder of a draw's truth.
+    #[must_use]
+    pub fn truth(&self, number: usize) -> PathBuf {
+        self.root.join("truth").join(name(number))
+    }
+
+    /// Folder of what a program made of a draw.
+    #[must_use]
+    pub fn run(&self, label: &str, number: usize) -> PathBuf {
+        self.root.join("runs").join(label).join(name(number))
+    }
+
+    /// File of a draw's classes.
+    #[must_use]
+    pub fn class(&self, number: usize) -> PathBuf {
+        self.root.join("classes").join(format!("{}.json", name(number)))
+    }
+}
+
+fn name(number: usize) -> String {
+    format!("{number:04}")
+}
+
+/// A draw as `draws.json` and `score.json` hold it.
+#[must_use]
+pub fn draw_as_json(draw: &Draw) -> Value {
+    let Recipe { seed, axis, both_axes, hidden, foreign_form, wrong_parameters, .. } = &draw.recipe;
+    let wrong = |(name, factor): &(String, f64)| json!({"name": name, "factor": factor});
+    json!({
+        "number": draw.number,
+        "kind": draw.kind,
+        "seed": seed,
+        "axis": axis.name(),
+        "both_axes": both_axes,
+        "hidden": hidden.iter().map(hidden_as_json).collect::<Vec<_>>(),
+        "foreign_form": foreign_form,
+        "wrong_parameters": wrong_parameters.iter().map(wrong).collect::<Vec<_>>(),
+        "coloured_noise": draw.recipe.coloured_noise,
+        "jitter": draw.recipe.jitter,
+        "noise_factor": draw.recipe.noise,
+    })
+}
+
+fn hidden_as_json(hidden: &Hidden) -> Value {
+    let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
+    let numbers: serde_json::Map<_, _> = sheet
+        .keys
+        .iter()
+        .zip(&hidden.numbers)
+        .map(|(key, number)| (key.name.to_owned(), json!(number)))
+        .collect();
+    json!({"effect": hidden.name, "where": hidden.place.to_string(), "numbers": numbers})
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// [`FolderError`] with its path.
+pub fn read(path: &Path) -> Result<String, FolderError> {
+    fs::read_to_string(path).map_err(FolderError::file(path))
+}
+
+/// Writes a file so that it is whole or absent.
+///
+/// # Errors
+/// [`FolderError`] with its path.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
+    parts::write_whole(path, bytes).map_err(FolderError::file(path))
+}
+
+/// Makes a folder so that it is whole or absent: `fill` fills another one, which then gets the name. When two starts are at the
+/// same folder, the first that is done has made it.
+///
+/// # Errors
+/// Those of `fill`, and [`FolderError`] with the path.
+pub fn make_whole<T, E: From<FolderError>>(
+    path: &Path,
+    fill: impl FnOnce(&Path) -> Result<T, E>,
+) -> Result<T, E> {
+    let is_made_again = path.exists();
+    let beside = beside(path).map_err(FolderError::file(path))?;
+    let filled = fill(beside.path())?;
+    if is_made_again {
+        fs::remove_dir_all(path).map_err(FolderError::file(path))?;
+    }
+    match fs::rename(beside.path(), path) {
+        Ok(()) => {
+            let _ = beside.keep();
+            Ok(filled)
+        }
+        Err(_) if !is_made_again && path.exists() => Ok(filled),
+        Err(error) => Err(FolderError::file(path)(error).into()),
+    }
+}
+
+/// The unfinished twin of a folder: hidden, and each start's own.
+fn beside(path: &Path) -> io::Result<TempDir> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let readable = fs::Permissions::from_mode(0o777); // less what the umask takes
+    tempfile::Builder::new()
+        .prefix(&format!(".{name}."))
+        .suffix(".unfinished")
+        .permissions(readable)
+        .tempdir_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHAPE: Shape = Shape {
+        each: 1,
+        nulls: 2,
+        parameters: 1,
+        pairs: 1,
+        triples: 1,
+        noise_factor: 1.0,
+        weaker_factor: 1.0,
+    };
+
+    #[test]
+    fn a_study_opens_as_it_was_begun_and_no_other_begins_in_its_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = Plan::new(7, SHAPE);
+        let begun = Study::begin(folder.path(), &plan).unwrap();
+        assert_eq!(Study::open(folder.path()).unwrap().draws, begun.draws);
+        assert_eq!(Study::begin(folder.path(), &plan).unwrap().draws, begun.draws);
+        let other = Study::begin(folder.path(), &Plan::new(8, SHAPE)).unwrap_err();
+        assert!(other.to_string().contains("another folder"), "{other}");
+    }
+
+    #[test]
+    fn draws_that_this_program_does_not_draw_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        Study::begin(folder.path(), &Plan::new(7, SHAPE)).unwrap();
+        let path = folder.path().join("draws.json");
+        let text =
+            fs::read_to_string(&path).unwrap().replace("\"foreign_form\": false", "\"foreign_form\": true");
+        fs::write(&path, text).unwrap();
+        let error = Study::open(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("use the version that began this study"), "{error}");
+    }
+
+    #[test]
+    fn a_folder_whose_making_fails_is_absent() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("0001");
+        let full = make_whole(&path, |folder| {
+            fs::write(folder.join("half"), "x").unwrap();
+            Err::<(), _>(FolderError::content(folder, "full"))
+        });
+        assert!(full.is_err() && !path.exists());
+        make_whole(&path, |_| Ok::<_, FolderError>(())).unwrap();
+        assert!(path.exists() && !path.join("half").exists());
+    }
+}

@@ -1,0 +1,268 @@
+//! Leave one out: what a program says of an effect that its catalogue does not have.
+//!
+//! ```text
+//! hidden effect + its class in this record ──► PROGRAM close ... --without A --without B ──► report.json
+//! outside-expected.json: balances, variables ──────────────────────────────────────────────► right, or not
+//! ```
+//!
+//! An effect is left out as a whole, at all its places, and with it every effect that is its twin in this very record
+//! ([`super::classes`]); where the classes of a draw are not known, only the effect itself. The rules, from issue 6:
+//!
+//! - *No wrong name*: there is a good report and nothing of the catalogue is named in it. A parameter of the baseline is no name.
+//! - The *balance* is right when it is one that `outside-expected.json` has for the effect, on the axis that the effect is at;
+//!   what acts on both axes may be seen on either.
+//! - The *variable* is right when one of the first two is expected.
+//! - The gap *still closes* for effects without memory: a term over what is measured can stand in for them. With memory are those
+//!   for which the plant keeps something from step to step (`plant/src/effects/memory.rs`).
+//!
+//! Source: issue 6, What must be seen, 4; `discrepancy/docs/outside-expected.md`.
+
+use crate::classes::DrawClasses;
+use crate::draws::{Draw, axis_of};
+use crate::report::{Report, Verdict};
+use plant::effects::sheet::Place;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+pub mod tables;
+
+pub use tables::Tables;
+
+/// Effects for which the plant keeps something from step to step.
+pub const WITH_MEMORY: [&str; 13] = [
+    "valve-hysteresis",
+    "spool-second-order",
+    "spool-rate-limit",
+    "line-delay",
+    "silencer-back-pressure",
+    "supply-droop",
+    "command-dead-time",
+    "heat-exchange",
+    "presliding",
+    "rest-time-dependent-break-away",
+    "position-sensor-lag",
+    "pressure-sensor-lag",
+    "time-skew",
+];
+
+/// Variables of a report that are looked at.
+const FIRST: usize = 2;
+
+/// What must show when an effect is left out.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expected {
+    /// Balances without their axis, as `flow-a`.
+    pub balances: Vec<String>,
+    /// Variables, as `p_a-p_b`.
+    pub variables: Vec<String>,
+}
+
+/// What must show, by the name of the effect: `tests/study/outside-expected.json`.
+pub type Expectations = BTreeMap<String, Expected>;
+
+/// What a program said without the hidden effect in its catalogue.
+#[derive(Debug, Clone, Serialize)]
+pub struct LeftOut {
+    /// Effects that it had to do without.
+    pub without: Vec<String>,
+    /// Its verdict, or `error`.
+    pub verdict: &'static str,
+    /// Whether there is a good report that names nothing.
+    pub no_wrong_name: bool,
+    /// The balance it told.
+    pub balance: Option<String>,
+    /// All variables it told, the strongest first.
+    pub variables: Vec<String>,
+    /// The formula it told.
+    pub formula: Option<String>,
+    /// Whether the balance is right.
+    pub balance_right: bool,
+    /// Whether one of the first two variables is right.
+    pub variable_right: bool,
+    /// Whether the effect remembers.
+    pub with_memory: bool,
+}
+
+/// Effects to leave out for a draw: those that are hidden, and all that are of their classes.
+#[must_use]
+pub fn left_out(draw: &Draw, classes: Option<&DrawClasses>) -> Vec<String> {
+    let hidden = draw.recipe.hidden.iter().map(|hidden| hidden.name.to_owned());
+    let members = classes.into_iter().flat_map(|classes| &classes.hidden).flat_map(|own| &own.members);
+    let twins = members.filter(|member| member.is_twin()).map(|member| member.effect.clone());
+    hidden.chain(twins).collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+/// The arguments of a program that has to do without effects.
+#[must_use]
+pub fn arguments(without: &[String]) -> Vec<String> {
+    without.iter().flat_map(|name| ["--without".to_owned(), name.clone()]).collect()
+}
+
+/// Judges what a program said about a draw of one effect, if its report is good.
+#[must_use]
+pub fn judge(
+    draw: &Draw,
+    without: &[String],
+    expectations: &Expectations,
+    report: Option<&Report>,
+) -> LeftOut {
+    let hidden = draw.recipe.hidden.first();
+    let expected = hidden.and_then(|hidden| expectations.get(hidden.name));
+    let outside = report.and_then(|report| report.outside.as_ref());
+    let variables: Vec<String> = outside
+        .map_or(&[][..], |outside| &outside.variables)
+        .iter()
+        .map(|own| own.variable.clone())
+        .collect();
+    let balance_right = |place: Place| {
+        let (outside, expected) = (outside?, expected?);
+        Some(is_expected(&outside.balance, place, &expected.balances))
+    };
+    let variable_right =
+        expected.is_some_and(|own| variables.iter().take(FIRST).any(|told| own.variables.contains(told)));
+    LeftOut {
+        without: without.to_vec(),
+        verdict: report.map_or("error", |report| verdict_name(report.verdict)),
+        no_wrong_name: report.is_some_and(|report| report.named.is_empty()),
+        balance: outside.map(|outside| outside.balance.clone()),
+        formula: outside.and_then(|outside| outside.formula.clone()),
+        balance_right: hidden.and_then(|hidden| balance_right(hidden.place)).unwrap_or(false),
+        variable_right,
+        variables,
+        with_memory: hidden.is_some_and(|hidden| WITH_MEMORY.contains(&hidden.name)),
+    }
+}
+
+/// Whether a balance as `drive.flow-a` is one of those expected, on the axis of a place.
+fn is_expected(balance: &str, place: Place, expected: &[String]) -> bool {
+    let (axis, name) = balance.split_once('.').map_or((None, balance), |(axis, name)| (Some(axis), name));
+    let on_axis = match (axis, axis_of(place)) {
+        (Some(told), Some(own)) => told == own.name(),
+        _ => true,
+    };
+    on_axis && expected.iter().any(|own| own == name)
+}
+
+fn verdict_name(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingMissing => "nothing-missing",
+        Verdict::ParametersOnly => "parameters-only",
+        Verdict::Named => "named",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::OutsideCatalogue => "outside-catalogue",
+        Verdict::BadData => "bad-data",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::classes::{HiddenClass, Member};
+    use crate::draws::{Kind, Shape, draws};
+    use crate::report::parse;
+    use plant::effects::SHEETS;
+    use record_maker::Hidden;
+
+    const TABLE: &str = include_str!("../../study/outside-expected.json");
+
+    fn expectations() -> Expectations {
+        serde_json::from_str(TABLE).unwrap()
+    }
+
+    /// A draw of this effect at its first place, or at one of the load.
+    fn draw(effect: &str, place: &str) -> Draw {
+        let shape = Shape {
+            each: 1,
+            nulls: 0,
+            parameters: 0,
+            pairs: 0,
+            triples: 0,
+            noise_factor: 1.0,
+            weaker_factor: 1.0,
+        };
+        let sheet = plant::effects::sheet(effect).unwrap();
+        let mut draw = draws(1, &shape).into_iter().find(|draw| draw.kind == Kind::Single).unwrap();
+        let numbers = sheet.keys.iter().map(|key| key.drawn[1]).collect();
+        draw.recipe.hidden =
+            vec![Hidden { name: sheet.name, place: sheet.place_named(place).unwrap(), numbers }];
+        draw
+    }
+
+    fn said(verdict: &str, balance: &str, variables: &[&str]) -> Report {
+        let variables: Vec<_> = variables
+            .iter()
+            .map(|name| serde_json::json!({"variable": name, "r2": 0.5, "p_value": 0.005}))
+            .collect();
+        let text = serde_json::json!({"verdict": verdict, "outside": {"balance": balance, "variables": variables,
+            "formula": "2 x"}});
+        parse(text.to_string().as_bytes()).unwrap()
+    }
+
+    #[test]
+    fn every_effect_of_the_catalogue_has_an_expectation_and_memory_is_told_of_real_ones() {
+        let table = expectations();
+        assert!(SHEETS.iter().all(|sheet| table.contains_key(sheet.name)) && table.len() == SHEETS.len());
+        assert!(WITH_MEMORY.iter().all(|name| plant::effects::sheet(name).is_some()));
+    }
+
+    #[test]
+    fn the_class_is_left_out_with_the_effect_and_parameters_are_not() {
+        let draw = draw("position-sensor-lag", "drive");
+        assert_eq!(left_out(&draw, None), ["position-sensor-lag"]);
+        let member = |effect: &str, place: &str, cosine| Member {
+            effect: effect.to_owned(),
+            place: place.to_owned(),
+            cosine,
+        };
+        let members = vec![
+            member("time-skew", "drive.position", 0.999),
+            member("time-skew", "drive.a", 0.96),
+            member("parameter:mass", "", 0.96),
+            member("inclination", "drive", 0.94),
+        ];
+        let (effect, place) = ("position-sensor-lag".to_owned(), "drive".to_owned());
+        let classes = DrawClasses {
+            schema_version: 1,
+            number: draw.number,
+            hidden: vec![HiddenClass { effect, place, strength: 9.0, members }],
+        };
+        let without = left_out(&draw, Some(&classes));
+        assert_eq!(without, ["position-sensor-lag", "time-skew"]);
+        assert_eq!(arguments(&without), ["--without", "position-sensor-lag", "--without", "time-skew"]);
+    }
+
+    #[test]
+    fn balance_and_variable_are_right_by_the_table_alone() {
+        let table = expectations();
+        let judged = |effect, place, balance, variables: &[&str]| {
+            let report = said("outside-catalogue", balance, variables);
+            let judged = judge(&draw(effect, place), &[], &table, Some(&report));
+            assert!(judged.no_wrong_name && judged.verdict == "outside-catalogue");
+            (judged.balance_right, judged.variable_right)
+        };
+        let inclination = |balance, variables: &[&str]| judged("inclination", "load", balance, variables);
+        assert_eq!(inclination("load.force", &["constant"]), (true, true));
+        assert_eq!(inclination("load.force", &["v", "constant"]), (true, true));
+        assert_eq!(inclination("load.force", &["v", "x", "constant"]), (true, false));
+        assert_eq!(inclination("drive.force", &["constant"]), (false, true));
+        assert_eq!(inclination("load.flow-a", &[]), (false, false));
+        // What acts on both axes may be seen on either.
+        assert_eq!(judged("supply-droop", "supply", "load.flow-b", &["u"]), (true, true));
+        assert_eq!(judged("coupling-compliance", "linkage", "linkage", &["F"]), (true, true));
+        assert_eq!(judged("force-sensor-gain", "drive", "linkage", &["F"]), (true, true));
+    }
+
+    #[test]
+    fn a_name_is_wrong_and_so_is_no_report() {
+        let text =
+            br#"{"verdict": "named", "named": [{"effect": "valve-offset", "where": {"axis": "drive"}}]}"#;
+        let (draw, table) = (draw("valve-hysteresis", "drive"), expectations());
+        let named = judge(&draw, &[], &table, Some(&parse(text).unwrap()));
+        assert!(!named.no_wrong_name && !named.balance_right && !named.variable_right && named.with_memory);
+        let error = judge(&draw, &[], &table, None);
+        assert!(!error.no_wrong_name && error.verdict == "error");
+        let silent = judge(&draw, &[], &table, Some(&parse(br#"{"verdict": "nothing-missing"}"#).unwrap()));
+        assert!(silent.no_wrong_name && !silent.balance_right);
+    }
+}

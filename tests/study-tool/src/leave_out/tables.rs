@@ -1,0 +1,129 @@
+//! What all cases with an effect left out say together.
+
+use super::LeftOut;
+use crate::interval::Rate;
+use crate::score::Case;
+use crate::score::tables::{Line, Spread, hidden, parts};
+use plant::effects::SHEETS;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Share of the gap that must close for effects without memory.
+const STILL_CLOSED: f64 = 0.6;
+
+/// All tables of this mode.
+#[derive(Debug, Serialize)]
+pub struct Tables {
+    /// By memory, amplitude and difficulties.
+    pub splits: Vec<Split>,
+    /// Effect by effect.
+    pub effects: Vec<Split>,
+}
+
+/// Rates of a part of the cases.
+#[derive(Debug, Clone, Serialize)]
+pub struct Split {
+    /// Which part.
+    pub name: String,
+    /// Nothing of the catalogue is named.
+    pub no_wrong_name: Rate,
+    /// The balance is right.
+    pub balance_right: Rate,
+    /// One of the first two variables is right.
+    pub variable_right: Rate,
+    /// Both are.
+    pub both_right: Rate,
+    /// Share of the gap that the program claims to have closed, the worst signal.
+    pub claimed_closed_ratio: Spread,
+    /// The same of all signals together, each in units of its noise.
+    pub claimed_joint_ratio: Spread,
+    /// How often which verdict.
+    pub verdicts: BTreeMap<&'static str, usize>,
+}
+
+impl Tables {
+    /// The tables of all cases; those with the whole catalogue are none of them.
+    #[must_use]
+    pub fn of(cases: &[Case]) -> Self {
+        let pairs = || cases.iter().filter_map(|case| Some((case, case.left_out.as_ref()?)));
+        let split = |name: &str, is: &dyn Fn(&Case, &LeftOut) -> bool| {
+            split(name, &pairs().filter(|(case, left)| is(case, left)).collect::<Vec<_>>())
+        };
+        let mut splits = vec![
+            split("without memory", &|_, left| !left.with_memory),
+            split("with memory", &|_, left| left.with_memory),
+        ];
+        splits.extend(parts().iter().map(|(name, is)| split(name, &|case, _| is(case))));
+        let of_sheet = |name: &'static str| split(name, &|case, _| hidden(case).effect == name);
+        Tables { splits, effects: SHEETS.iter().map(|sheet| of_sheet(sheet.name)).collect() }
+    }
+}
+
+fn split(name: &str, cases: &[(&Case, &LeftOut)]) -> Split {
+    let rate = |is: &dyn Fn(&LeftOut) -> bool| Rate::of(cases, |(_, left)| is(left));
+    let mut verdicts = BTreeMap::new();
+    for (_, left) in cases {
+        *verdicts.entry(left.verdict).or_default() += 1;
+    }
+    let claims = || cases.iter().map(|(case, _)| &case.judgement);
+    Split {
+        name: name.to_owned(),
+        no_wrong_name: rate(&|left| left.no_wrong_name),
+        balance_right: rate(&|left| left.balance_right),
+        variable_right: rate(&|left| left.variable_right),
+        both_right: rate(&|left| left.balance_right && left.variable_right),
+        claimed_closed_ratio: Spread::of(claims().filter_map(|claim| claim.claimed_closed_ratio)),
+        claimed_joint_ratio: Spread::of(claims().filter_map(|claim| claim.claimed_joint_ratio)),
+        verdicts,
+    }
+}
+
+/// The lines that the targets are about.
+#[must_use]
+pub fn headline(cases: &[Case]) -> Vec<Line> {
+    let left = || cases.iter().filter_map(|case| case.left_out.as_ref());
+    let line = |name: &str, wanted, rate| Line { name: name.to_owned(), rate, wanted };
+    let no_memory =
+        || cases.iter().filter(|case| case.left_out.as_ref().is_some_and(|left| !left.with_memory));
+    let closed = |claim: &dyn Fn(&Case) -> Option<f64>| {
+        Rate::of(no_memory().filter_map(claim), |closed| closed >= STILL_CLOSED)
+    };
+    vec![
+        line(
+            "one effect left out: no wrong name",
+            "at least 85 %",
+            Rate::of(left(), |left| left.no_wrong_name),
+        ),
+        line(
+            "the same: right balance, and right variable among the first two",
+            "at least 85 %",
+            Rate::of(left(), |left| left.balance_right && left.variable_right),
+        ),
+        line("the same: right balance", "no target", Rate::of(left(), |left| left.balance_right)),
+        line(
+            "the same: right variable among the first two",
+            "no target",
+            Rate::of(left(), |left| left.variable_right),
+        ),
+        line(
+            "effects without memory: a gap told",
+            "all",
+            Rate::of(no_memory(), |case| case.judgement.claimed_closed_ratio.is_some()),
+        ),
+        line(
+            "the same, gap told: all signals together closed by at least 60 %",
+            "all",
+            closed(&|case| case.judgement.claimed_joint_ratio),
+        ),
+        line(
+            "the same, gap told: every signal closed by at least 60 %",
+            "no target",
+            closed(&|case| case.judgement.claimed_closed_ratio),
+        ),
+        line(
+            "no good report (crash, time limit, bad JSON, refused)",
+            "none",
+            Rate::of(cases, |case| case.judgement.error.is_some()),
+        ),
+    ]
+}

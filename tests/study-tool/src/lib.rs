@@ -1,0 +1,56 @@
+//! The study: judges a program that names missing effects, on records whose truth it never sees.
+//!
+//! ```text
+//! seed, shape ──► draws ──► records/ (what the program gets)          limits.json, classes.json: computed from the plant alone,
+//!                   │  └──► truth/   (what it never gets)             committed before any program is judged
+//!                   ▼                                                            │
+//!                 run: PROGRAM close … on copies in an empty folder ──► runs/ ───┴──► score: score.json and one page
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`draws`] | which effects, how strong, where, under which difficulties: a pure function of seed and shape |
+//! | [`folder`] | the files of a study's folder; each is whole or absent |
+//! | [`program`] | one start of the program under study: time limit, wall time, memory |
+//! | [`step`] | one draw: records, program, what it wrote |
+//! | [`answer`] | what a campaign is told of it |
+//! | [`report`] | `report.json`, read as strictly as it is promised |
+//! | [`judge`] | one case: what was hidden against what was named |
+//! | [`leave_out`] | one case whose effect is left out of the program's catalogue |
+//! | [`resolve`] | whether the experiment that a program proposes resolves what it could not tell apart |
+//! | [`interval`] | what so many of so many prove |
+//! | [`score`] | all cases: rates, confusion matrix, parameters, time |
+//! | [`page`] | the score as one page |
+//! | [`compare`] | several scores side by side |
+//! | [`curve`] | how rates fall with noise and amplitude |
+//! | [`trajectory`], [`signature`] | true states of a record; what an effect changes in windows that start from them |
+//! | [`limits`] | amplitude from which an ideal observer sees an effect |
+//! | [`classes`] | which effects leave the same signature in a record |
+//! | [`compute`] | both, for all places and draws |
+//! | [`document`] | both as tables of a page |
+//!
+//! The commands: `scripts/study --help`; what they found: `tests/docs/study.md`.
+
+pub mod answer;
+pub mod classes;
+pub mod compare;
+pub mod compute;
+pub mod curve;
+pub mod document;
+pub mod draws;
+pub mod folder;
+pub mod interval;
+pub mod judge;
+pub mod leave_out;
+pub mod limits;
+pub mod page;
+pub mod program;
+pub mod report;
+pub mod resolve;
+pub mod score;
+pub mod signature;
+pub mod step;
+pub mod trajectory;
+
+/// Version of every JSON file of the study.
+pub const SCHEMA_VERSION: u32 = 1;

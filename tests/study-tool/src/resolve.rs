@@ -1,0 +1,277 @@
+//! Whether the experiment that a program proposes tells apart what its first record could not.
+//!
+//! ```text
+//! runs/LABEL/0007/report.json ── ambiguous, the truth among the names ──► next.experiment ──► none: "no experiment can"
+//!                                                                                │
+//!    the same hidden draw under that experiment, with noise of its own ◄─────────┘
+//!       │
+//!       └─► PROGRAM close --train train.csv next.csv --test test.csv … in an empty folder ──► runs/LABEL-resolve/0007/
+//! ```
+//!
+//! The experiment is the file that the program wrote beside its report; where a run did not keep it, the program is run once more
+//! on the same records, which gives the same report. The new record is made by the record maker as the first was: same rig, same
+//! numbers that are off, same kind and level of noise.
+//!
+//! - *Resolved*: one name, the truth's, at its place, and no alternative but itself.
+//! - *Still ambiguous*: the truth is among the names and alternatives, but not alone.
+//! - *Wrong*: it is not.
+//! - *Error*: no good report, an experiment that cannot be run, or one that the program does not propose again.
+//!
+//! Draws of one effect alone are looked at: of several, an ambiguity between two is not one draw's own.
+//!
+//! Source: issue 6, Acceptance 5.
+
+pub mod tables;
+
+use crate::SCHEMA_VERSION;
+use crate::draws::{Draw, Kind};
+use crate::folder::{FolderError, make_whole, read};
+use crate::program::{Ended, Identity, Program, Start, Taken};
+use crate::report::{self, Named, Report, Verdict};
+use crate::step::{Step, StepEnd, StepError, check_blind, read_result};
+use plant::RigParameters;
+use record_maker::{self, Hidden, Recipe};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::fs;
+use std::path::Path;
+
+pub use tables::Table;
+
+/// What makes the noise of the new record another one; below 2^53, as seeds are.
+const OWN_NOISE: u64 = 0x4e_4558_5400;
+
+/// How a draw ended that was ambiguous.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// The right name alone.
+    Resolved,
+    /// The right name among others.
+    StillAmbiguous,
+    /// The right name is gone.
+    Wrong,
+    /// There is no good report.
+    Error,
+}
+
+/// What is left of a draw whose proposed experiment was run, as `resolution.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Resolution {
+    /// Of [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Number of the draw.
+    pub number: usize,
+    /// Which program.
+    pub program: Identity,
+    /// File of the experiment.
+    pub experiment: String,
+    /// Why the experiment was not run, or not given to the program.
+    pub problem: Option<String>,
+    /// How the program ended with both records; nothing when there was a problem.
+    pub taken: Option<Taken>,
+}
+
+/// Gives the label under which resolutions stand.
+#[must_use]
+pub fn label(label: &str) -> String {
+    format!("{label}-resolve")
+}
+
+/// The entry of a report that leaves the truth ambiguous: it or one of its alternatives is the truth.
+#[must_use]
+pub fn ambiguous<'a>(draw: &Draw, report: &'a Report) -> Option<&'a Named> {
+    let [hidden] = draw.recipe.hidden.as_slice() else { return None };
+    let open = report.named.iter().filter(|entry| !entry.alternatives.is_empty());
+    open.into_iter().find(|entry| names(entry).any(|name| is_truth(name, hidden)))
+}
+
+/// Whether a report leaves anything ambiguous.
+#[must_use]
+pub fn leaves_open(report: &Report) -> bool {
+    report.verdict == Verdict::Ambiguous || report.named.iter().any(|entry| !entry.alternatives.is_empty())
+}
+
+/// Judges what the program said with both records.
+#[must_use]
+pub fn judge(hidden: &Hidden, taken: &Taken, report: &Result<Report, String>) -> Outcome {
+    let report = match (taken.ended, report) {
+        (Ended::Exited(_), Ok(report)) if report.verdict != Verdict::BadData => report,
+        _ => return Outcome::Error,
+    };
+    let mut all = report.named.iter().flat_map(names).peekable();
+    let any = all.peek().is_some();
+    let right: Vec<bool> = all.map(|name| is_truth(name, hidden)).collect();
+    let alone = report.named.len() == 1 && report.verdict != Verdict::OutsideCatalogue;
+    if any && alone && right.iter().all(|right| *right) {
+        Outcome::Resolved
+    } else if right.contains(&true) {
+        Outcome::StillAmbiguous
+    } else {
+        Outcome::Wrong
+    }
+}
+
+/// An entry and what explains the records as well.
+fn names(entry: &Named) -> impl Iterator<Item = &Named> {
+    std::iter::once(entry).chain(&entry.alternatives)
+}
+
+fn is_truth(name: &Named, hidden: &Hidden) -> bool {
+    name.sheet.name == hidden.name && name.place == hidden.place
+}
+
+/// The recipe of a draw's new record: the same rig with noise of its own.
+#[must_use]
+pub fn recipe(draw: &Draw) -> Recipe {
+    Recipe { seed: draw.recipe.seed ^ OWN_NOISE, ..draw.recipe.clone() }
+}
+
+/// What there was to do for a draw.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Found {
+    /// Nothing: it has no result yet, is not of one effect, or leaves the truth not open.
+    NotOpen,
+    /// Nothing: the program says that no experiment can tell.
+    NothingProposed,
+    /// What was proposed was measured.
+    Measured(Resolution),
+}
+
+/// Measures what is proposed for a draw, unless it was, and runs the program on both records; `None` when it was told to stop.
+///
+/// # Errors
+/// [`StepError`] when a file of the study cannot be used, or the results are another program's.
+pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Found>, StepError> {
+    let folder = step.study.run(step.label, draw.number);
+    if draw.kind != Kind::Single || !folder.exists() {
+        return Ok(Some(Found::NotOpen));
+    }
+    let report = report::read(&folder.join("report.json")).ok();
+    let Some(report) = report.filter(|report| ambiguous(draw, report).is_some()) else {
+        return Ok(Some(Found::NotOpen));
+    };
+    let path = folder.join("result.json");
+    check_program(&path, &read_result(&path)?.program, program)?;
+    let done = step.study.run(&label(step.label), draw.number);
+    if done.exists() {
+        let path = done.join("resolution.json");
+        let resolution = read_resolution(&path)?;
+        check_program(&path, &resolution.program, program)?;
+        if !step.again {
+            return Ok(Some(Found::Measured(resolution)));
+        }
+    }
+    if report.proposed().is_none() {
+        return Ok(Some(Found::NothingProposed));
+    }
+    step.check_disk()?;
+    step.records(draw)?;
+    let ran = make_whole(&done, |folder| {
+        let resolution = resolve(step, program, draw, folder).map_err(StepEnd::Error)?;
+        resolution.ok_or(StepEnd::Interrupted)
+    });
+    match ran {
+        Ok(resolution) => Ok(Some(Found::Measured(resolution))),
+        Err(StepEnd::Interrupted) => Ok(None),
+        Err(StepEnd::Error(error)) => Err(error),
+    }
+}
+
+/// What is proposed is run by whoever proposed it.
+fn check_program(path: &Path, own: &Identity, program: &Program) -> Result<(), FolderError> {
+    if own == program.identity() {
+        return Ok(());
+    }
+    let what = format!(
+        "is of another program ({own:?}) than this one ({:?}): give the one that was run, with its arguments",
+        program.identity()
+    );
+    Err(FolderError::content(path, what))
+}
+
+/// Fills the folder of a draw; `None` when the study was told to stop.
+fn resolve(
+    step: &Step<'_>,
+    program: &Program,
+    draw: &Draw,
+    folder: &Path,
+) -> Result<Option<Resolution>, StepError> {
+    let number = draw.number;
+    let files = |error| StepError::Files { number, error };
+    let first = report::read(&step.study.run(step.label, number).join("report.json"));
+    let experiment = first.as_ref().ok().and_then(Report::proposed).unwrap_or_default().to_owned();
+    let empty = tempfile::tempdir().map_err(files)?;
+    step.lay_out(draw, empty.path())?;
+    let mut resolution = Resolution {
+        schema_version: SCHEMA_VERSION,
+        number,
+        program: program.identity().clone(),
+        experiment,
+        problem: None,
+        taken: None,
+    };
+    let Some(text) = proposal(step, program, draw, &resolution.experiment)? else { return Ok(None) };
+    match text.and_then(|text| measure(draw, &resolution.experiment, &text, empty.path(), folder)) {
+        Err(problem) => resolution.problem = Some(problem),
+        Ok(()) => {
+            check_blind(number, &empty.path().join("next.csv"))?;
+            let start = Start { folder: empty.path(), train: &["train.csv", "next.csv"], own: &[] };
+            let Some(taken) = step.start(number, program, &start, folder)? else { return Ok(None) };
+            resolution.taken = Some(taken);
+        }
+    }
+    fs::write(folder.join("resolution.json"), format!("{:#}\n", json!(resolution))).map_err(files)?;
+    Ok(Some(resolution))
+}
+
+/// Text of the proposed experiment, or why there is none; `None` when the study was told to stop.
+fn proposal(
+    step: &Step<'_>,
+    program: &Program,
+    draw: &Draw,
+    experiment: &str,
+) -> Result<Option<Result<String, String>>, StepError> {
+    let number = draw.number;
+    let files = |error| StepError::Files { number, error };
+    let kept = step.study.run(step.label, number).join(experiment);
+    if kept.is_file() {
+        return Ok(Some(Ok(read(&kept)?)));
+    }
+    // It was not kept: equal records give an equal report, and the file beside it.
+    let [empty, folder] = [tempfile::tempdir().map_err(files)?, tempfile::tempdir().map_err(files)?];
+    step.lay_out(draw, empty.path())?;
+    let start = Start { folder: empty.path(), train: &["train.csv"], own: &[] };
+    if step.start(number, program, &start, folder.path())?.is_none() {
+        return Ok(None);
+    }
+    let again = fs::read_to_string(folder.path().join(experiment));
+    Ok(Some(again.map_err(|_| format!("run again, the program did not write {experiment}"))))
+}
+
+/// Makes the record of a draw under an experiment as `next.csv`, and keeps the experiment.
+fn measure(draw: &Draw, name: &str, toml: &str, empty: &Path, folder: &Path) -> Result<(), String> {
+    fs::write(folder.join("next.toml"), toml).map_err(|error| error.to_string())?;
+    let record = record_maker::simulate_proposed(&recipe(draw), &RigParameters::baseline(), (name, toml));
+    record
+        .and_then(|record| record_maker::write_measurement(&record, empty, "next.csv"))
+        .map_err(|error| format!("the experiment cannot be run: {error}"))
+}
+
+/// A draw's resolution.
+///
+/// # Errors
+/// [`FolderError`] when it is none of this version.
+pub fn read_resolution(path: &Path) -> Result<Resolution, FolderError> {
+    serde_json::from_str::<Resolution>(&read(path)?)
+        .map_err(|error| error.to_string())
+        .and_then(|own| {
+            let good = own.schema_version == SCHEMA_VERSION;
+            if good { Ok(own) } else { Err(format!("schema version {}", own.schema_version)) }
+        })
+        .map_err(|what| FolderError::content(path, format!("is no resolution of this version: {what}")))
+}
+
+#[cfg(test)]
+mod tests;

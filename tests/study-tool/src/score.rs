@@ -1,0 +1,318 @@
+//! All cases of a study, from one folder or from several: rates with intervals, confusion matrix, parameters, time.
+
+use crate::classes::{DrawClasses, Member, read_draw};
+use crate::draws::{Draw, Kind, Shape};
+use crate::folder::{FolderError, Study, draw_as_json};
+use crate::judge::{Judgement, judge};
+use crate::leave_out::{self, Expectations, LeftOut};
+use crate::limits::Limits;
+use crate::program::Identity;
+use crate::report;
+use crate::step::{RunResult, read_result};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+pub mod tables;
+
+pub use tables::Tables;
+
+/// Multiple of its limit from which an effect must be named.
+pub const CLEAR: f64 = 3.0;
+
+/// A study that was scored.
+#[derive(Debug, Serialize)]
+pub struct Score {
+    /// Of [`crate::SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// What its results are called.
+    pub label: String,
+    /// Which program.
+    pub program: Identity,
+    /// Of all random numbers.
+    pub seed: u64,
+    /// How many draws of what.
+    pub shape: Shape,
+    /// Draws whose classes are not known: there an effect is alone in its class.
+    pub without_classes: usize,
+    /// What the cases say together; with effects left out, only what makes sense then.
+    pub tables: Tables,
+    /// What they say when the hidden effects were left out of the program's catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leave_out: Option<leave_out::Tables>,
+    /// The cases.
+    pub cases: Vec<Case>,
+}
+
+/// One draw and what became of it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Case {
+    /// Number of the draw.
+    pub number: usize,
+    /// What it is about.
+    pub kind: Kind,
+    /// Its recipe.
+    pub recipe: Value,
+    /// For each hidden effect its amplitude over the committed limit, or its strength in this record where it has no limit.
+    pub over_limit: Vec<Option<f64>>,
+    /// Whether two or more hidden effects are of different classes, and all three times above their limits.
+    pub separable: bool,
+    /// Whether its form is not the catalogue's.
+    pub foreign_form: bool,
+    /// Whether parameters are off besides.
+    pub wrong_parameters: bool,
+    /// Whether its noise is coloured and its sampling jitters.
+    pub coloured_noise: bool,
+    /// What it came to.
+    pub judgement: Judgement,
+    /// What it came to when the hidden effect was left out of the program's catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<LeftOut>,
+    /// Wall time of the program, s.
+    pub wall_s: f64,
+    /// Largest resident set of the program, KiB.
+    pub memory_kib: u64,
+    /// The command that repeats it, as far as the program goes.
+    pub repeat: String,
+}
+
+/// Why a study cannot be scored.
+#[derive(Debug, thiserror::Error)]
+pub enum ScoreError {
+    /// A file of a study.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// No folder was given.
+    #[error("no study to score: give its folder")]
+    Nothing,
+    /// The folders are of different studies.
+    #[error("{left} and {right} are of different studies: score those of one")]
+    Mixed {
+        /// One folder.
+        left: String,
+        /// Another one.
+        right: String,
+    },
+    /// A result is there twice.
+    #[error(
+        "draw {number} has a result in {left} and in {right}: give each folder once, or delete one of them"
+    )]
+    Doubled {
+        /// Number of the draw.
+        number: usize,
+        /// One folder.
+        left: String,
+        /// Another one.
+        right: String,
+    },
+    /// Draws have no result.
+    #[error(
+        "{folders}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
+    )]
+    MissingRuns {
+        /// Folders of the study.
+        folders: String,
+        /// Label of the results.
+        label: String,
+        /// How many.
+        count: usize,
+        /// The first of them.
+        first: usize,
+    },
+    /// Results are of different programs.
+    #[error("draw {number} was run with {other:?}, the others with {program:?}: score one program at a time")]
+    Programs {
+        /// Number of the draw.
+        number: usize,
+        /// Its program.
+        other: Box<Identity>,
+        /// That of the first draw.
+        program: Box<Identity>,
+    },
+    /// Effects were left out, and what must show then is not known.
+    #[error("effects were left out of the program's catalogue: tests/study/outside-expected.json is wanted")]
+    NoExpectations,
+}
+
+/// What a score is made with besides the results.
+#[derive(Debug, Clone, Copy)]
+pub struct Known<'a> {
+    /// The committed limits.
+    pub limits: Option<&'a Limits>,
+    /// Classes that are known beforehand, by the number of the draw.
+    pub classes: Option<&'a BTreeMap<usize, DrawClasses>>,
+    /// What must show of effects that are left out.
+    pub expectations: Option<&'a Expectations>,
+}
+
+/// Scores a study whose results are in one folder or in several, as machines without a common disk leave them.
+///
+/// # Errors
+/// [`ScoreError`] when anything is missing, doubled or mixed.
+pub fn score(folders: &[PathBuf], label: &str, known: Known<'_>) -> Result<Score, ScoreError> {
+    let studies = folders.iter().map(|folder| Study::open(folder)).collect::<Result<Vec<_>, _>>()?;
+    let first = studies.first().ok_or(ScoreError::Nothing)?;
+    check_mixed(first, &studies)?;
+    let leave_out = leaves_out(&studies, label)?;
+    let mut cases = Vec::new();
+    let mut program: Option<Identity> = None;
+    let mut without_classes = 0;
+    for (study, draw) in places(&studies, label, leave_out)? {
+        let result = read_result(&study.run(label, draw.number).join("result.json"))?;
+        let own = program.get_or_insert_with(|| result.program.clone());
+        if *own != result.program {
+            let (other, program) = (Box::new(result.program), Box::new(own.clone()));
+            return Err(ScoreError::Programs { number: draw.number, other, program });
+        }
+        let classes = classes_of(study, draw, known)?;
+        without_classes += usize::from(classes.is_none() && !draw.recipe.hidden.is_empty());
+        cases.push(case(study, draw, label, &result, classes.as_ref(), known)?);
+    }
+    let program = program.ok_or(ScoreError::Nothing)?;
+    let mut tables = Tables::of(&cases);
+    if leave_out {
+        // Nobody names what is not in the catalogue.
+        tables.headline = leave_out::tables::headline(&cases);
+        tables.splits.clear();
+        tables.effects.clear();
+        tables.nothing_hidden.clear();
+    }
+    Ok(Score {
+        schema_version: crate::SCHEMA_VERSION,
+        label: label.to_owned(),
+        program,
+        seed: first.plan.seed,
+        shape: first.plan.shape,
+        without_classes,
+        tables,
+        leave_out: leave_out.then(|| leave_out::Tables::of(&cases)),
+        cases,
+    })
+}
+
+/// One draw alone, as far as its classes are known.
+///
+/// # Errors
+/// [`ScoreError`] when a file of the study cannot be used.
+pub fn one(study: &Study, draw: &Draw, label: &str, known: Known<'_>) -> Result<Case, ScoreError> {
+    let result = read_result(&study.run(label, draw.number).join("result.json"))?;
+    let classes = classes_of(study, draw, known)?;
+    case(study, draw, label, &result, classes.as_ref(), known)
+}
+
+fn check_mixed(first: &Study, studies: &[Study]) -> Result<(), ScoreError> {
+    let name = |study: &Study| study.root.display().to_string();
+    match studies.iter().find(|study| study.plan != first.plan) {
+        Some(other) => Err(ScoreError::Mixed { left: name(first), right: name(other) }),
+        None => Ok(()),
+    }
+}
+
+/// Which study has the result of each draw.
+fn places<'a>(
+    studies: &'a [Study],
+    label: &str,
+    leave_out: bool,
+) -> Result<Vec<(&'a Study, &'a Draw)>, ScoreError> {
+    let name = |study: &Study| study.root.display().to_string();
+    let mut places = Vec::new();
+    let mut missing = Vec::new();
+    // With effects left out, draws of one effect alone are run.
+    let wanted = |draw: &&Draw| !leave_out || draw.kind == Kind::Single;
+    for draw in studies.iter().take(1).flat_map(|study| &study.draws).filter(wanted) {
+        let mut own = studies.iter().filter(|study| study.run(label, draw.number).exists());
+        match (own.next(), own.next()) {
+            (None, _) => missing.push(draw.number),
+            (Some(study), None) => places.push((study, draw)),
+            (Some(one), Some(other)) => {
+                let (left, right) = (name(one), name(other));
+                return Err(ScoreError::Doubled { number: draw.number, left, right });
+            }
+        }
+    }
+    let Some(first) = missing.first() else { return Ok(places) };
+    let folders = studies.iter().map(name).collect::<Vec<_>>().join(", ");
+    Err(ScoreError::MissingRuns { folders, label: label.to_owned(), count: missing.len(), first: *first })
+}
+
+/// Whether the hidden effects were left out: what the first result says, wherever it is.
+fn leaves_out(studies: &[Study], label: &str) -> Result<bool, FolderError> {
+    let paths = studies
+        .iter()
+        .flat_map(|study| study.draws.iter().map(|draw| study.run(label, draw.number).join("result.json")));
+    let first = paths.into_iter().find(|path| path.exists());
+    Ok(first.map(|path| read_result(&path)).transpose()?.is_some_and(|result| result.program.leave_out))
+}
+
+fn classes_of(study: &Study, draw: &Draw, known: Known<'_>) -> Result<Option<DrawClasses>, FolderError> {
+    if let Some(classes) = known.classes.and_then(|classes| classes.get(&draw.number)) {
+        return Ok(Some(classes.clone()));
+    }
+    let path = study.class(draw.number);
+    if path.exists() { read_draw(&path, draw.number).map(Some) } else { Ok(None) }
+}
+
+fn case(
+    study: &Study,
+    draw: &Draw,
+    label: &str,
+    result: &RunResult,
+    classes: Option<&DrawClasses>,
+    known: Known<'_>,
+) -> Result<Case, ScoreError> {
+    let recipe = &draw.recipe;
+    let report = report::read(&study.run(label, draw.number).join("report.json"));
+    let members: Vec<Vec<Member>> = classes.map_or_else(Vec::new, |classes| {
+        classes.hidden.iter().map(|hidden| hidden.members.clone()).collect()
+    });
+    let over_limit: Vec<_> =
+        (0..recipe.hidden.len()).map(|at| over_limit(draw, at, classes, known.limits)).collect();
+    let twins = recipe.hidden.iter().enumerate().any(|(at, _)| {
+        let others = recipe.hidden.iter().enumerate().filter(|(other, _)| *other != at);
+        let own = members.get(at);
+        others.into_iter().any(|(_, other)| {
+            own.is_some_and(|own| own.iter().any(|member| member.is_twin() && member.effect == other.name))
+        })
+    });
+    let clear = over_limit.iter().all(|ratio| ratio.is_some_and(|ratio| ratio >= CLEAR));
+    let judgement = judge(draw, &members, &result.taken, &report);
+    let left_out = if result.program.leave_out {
+        let expectations = known.expectations.ok_or(ScoreError::NoExpectations)?;
+        let good = report.as_ref().ok().filter(|_| judgement.error.is_none());
+        Some(leave_out::judge(draw, &result.without, expectations, good))
+    } else {
+        None
+    };
+    let step = if left_out.is_some() { "leave-out" } else { "run" };
+    let (root, number) = (study.root.display(), draw.number);
+    Ok(Case {
+        number,
+        kind: draw.kind,
+        recipe: draw_as_json(draw),
+        separable: recipe.hidden.len() > 1 && clear && !twins,
+        over_limit,
+        foreign_form: recipe.foreign_form,
+        wrong_parameters: !recipe.wrong_parameters.is_empty(),
+        coloured_noise: recipe.coloured_noise,
+        judgement,
+        left_out,
+        wall_s: result.taken.wall_s,
+        memory_kib: result.taken.memory_kib,
+        repeat: format!(
+            "scripts/study one {step} --out {root} --draw {number} --label again --program PROGRAM"
+        ),
+    })
+}
+
+/// How far a hidden effect lies above its limit.
+fn over_limit(draw: &Draw, at: usize, classes: Option<&DrawClasses>, limits: Option<&Limits>) -> Option<f64> {
+    let hidden = &draw.recipe.hidden[at];
+    let sheet = plant::effects::sheet(hidden.name)?;
+    // What is always seen has no limit: there its signature in this record counts.
+    let ratio = limits?.ratio(sheet, hidden.place, hidden.numbers[0]);
+    ratio.or_else(|| Some(classes?.hidden.get(at)?.strength))
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,351 @@
+//! What the cases say together.
+
+use super::{CLEAR, Case};
+use crate::draws::Kind;
+use crate::interval::Rate;
+use crate::judge::{HiddenJudged, NumberJudged};
+use plant::effects::SHEETS;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Columns of the confusion matrix beside the effects.
+pub const BESIDE: [&str; 5] = ["nothing", "parameter", "outside", "ambiguous", "error"];
+
+/// All tables.
+#[derive(Debug, Serialize)]
+pub struct Tables {
+    /// The lines that the targets are about.
+    pub headline: Vec<Line>,
+    /// Single effects, split by difficulty and by amplitude.
+    pub splits: Vec<Split>,
+    /// Single effects, one by one.
+    pub effects: Vec<Split>,
+    /// True effects against what they were called.
+    pub confusion: Vec<ConfusionRow>,
+    /// What was called in cases with nothing hidden, and in those of a wrong parameter.
+    pub nothing_hidden: Vec<ConfusionRow>,
+    /// Fitted numbers.
+    pub numbers: Numbers,
+    /// Wall time of the program, s.
+    pub wall_s: Spread,
+    /// Largest resident set, MiB.
+    pub memory_mib: Spread,
+    /// Share of the gap that the program claims to have closed on the held-out record, single effects that were named right.
+    pub claimed_closed_ratio: Spread,
+    /// The same of all signals together, each in units of its noise.
+    pub claimed_joint_ratio: Spread,
+    /// Why cases have no good report, and how many.
+    pub errors: BTreeMap<String, usize>,
+}
+
+/// A rate with its name and what is wanted.
+#[derive(Debug, Clone, Serialize)]
+pub struct Line {
+    /// What is counted.
+    pub name: String,
+    /// The rate.
+    pub rate: Rate,
+    /// What is wanted, in words.
+    pub wanted: &'static str,
+}
+
+impl Line {
+    /// Whether the rate should be low: then its upper bound is told.
+    #[must_use]
+    pub fn is_low(&self) -> bool {
+        self.wanted == "none" || self.wanted.starts_with("at most")
+    }
+}
+
+/// Rates of a part of the single effects.
+#[derive(Debug, Clone, Serialize)]
+pub struct Split {
+    /// Which part.
+    pub name: String,
+    /// A name of the class.
+    pub class_right: Rate,
+    /// The first name is the effect itself.
+    pub top: Rate,
+    /// The effect itself alone, of those that are alone in their class.
+    pub alone: Rate,
+    /// The place, of those whose class was named.
+    pub where_right: Rate,
+}
+
+/// A row of the confusion matrix.
+#[derive(Debug, Clone, Serialize)]
+pub struct ConfusionRow {
+    /// What was hidden.
+    pub truth: String,
+    /// Cases.
+    pub of: usize,
+    /// How often it was called so: all, of its class, at the right place.
+    pub called: BTreeMap<String, [usize; 3]>,
+}
+
+/// How good fitted numbers are.
+#[derive(Debug, Clone, Serialize)]
+pub struct Numbers {
+    /// |fitted - true| / |true| of amplitudes, in the catalogue's form.
+    pub off_ratio: Spread,
+    /// Standard error / |true| of amplitudes.
+    pub error_ratio: Spread,
+    /// Amplitudes that two standard errors cover.
+    pub covered: Rate,
+    /// All numbers that two standard errors cover.
+    pub all_covered: Rate,
+    /// The same of draws with a foreign form.
+    pub foreign_covered: Rate,
+    /// Right names without a number or without its error.
+    pub untold: usize,
+}
+
+/// Least, median, 90th percentile, largest.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Spread {
+    /// How many.
+    pub of: usize,
+    /// Least, median, 90th percentile, largest; `None` of nothing.
+    pub quantiles: Option<[f64; 4]>,
+}
+
+impl Spread {
+    /// The spread of values.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let mut values: Vec<f64> = values.into_iter().collect();
+        values.sort_by(f64::total_cmp);
+        let Some(last) = values.len().checked_sub(1) else { return Spread::default() };
+        let at = |share: f64| values[(share * last as f64).round() as usize];
+        Spread { of: values.len(), quantiles: Some([at(0.0), at(0.5), at(0.9), at(1.0)]) }
+    }
+}
+
+impl Tables {
+    /// The tables of these cases.
+    #[must_use]
+    pub fn of(cases: &[Case]) -> Self {
+        let singles: Vec<&Case> = of_kind(cases, Kind::Single).collect();
+        let mut errors = BTreeMap::new();
+        for error in cases.iter().filter_map(|case| case.judgement.error.clone()) {
+            *errors.entry(error).or_default() += 1;
+        }
+        let named_right = || singles.iter().filter(|case| right(case));
+        Tables {
+            headline: headline(cases, &singles),
+            splits: splits(&singles),
+            effects: SHEETS
+                .iter()
+                .map(|sheet| {
+                    split(
+                        sheet.name,
+                        singles.iter().copied().filter(|case| hidden(case).effect == sheet.name),
+                    )
+                })
+                .collect(),
+            confusion: SHEETS
+                .iter()
+                .map(|sheet| {
+                    row(sheet.name, singles.iter().copied().filter(|case| hidden(case).effect == sheet.name))
+                })
+                .collect(),
+            nothing_hidden: nothing_hidden(cases),
+            numbers: numbers(&singles),
+            wall_s: Spread::of(cases.iter().map(|case| case.wall_s)),
+            memory_mib: Spread::of(cases.iter().map(|case| case.memory_kib as f64 / 1024.0)),
+            claimed_closed_ratio: Spread::of(
+                named_right().filter_map(|case| case.judgement.claimed_closed_ratio),
+            ),
+            claimed_joint_ratio: Spread::of(
+                named_right().filter_map(|case| case.judgement.claimed_joint_ratio),
+            ),
+            errors,
+        }
+    }
+}
+
+fn of_kind(cases: &[Case], kind: Kind) -> impl Iterator<Item = &Case> {
+    cases.iter().filter(move |case| case.kind == kind)
+}
+
+/// The one hidden effect of a single case.
+pub(crate) fn hidden(case: &Case) -> &HiddenJudged {
+    &case.judgement.hidden[0]
+}
+
+fn right(case: &Case) -> bool {
+    hidden(case).right
+}
+
+/// The amplitude of a single case over its limit.
+pub(crate) fn over_limit(case: &Case) -> Option<f64> {
+    case.over_limit.first().copied().flatten()
+}
+
+fn is_clear(case: &Case) -> bool {
+    over_limit(case).is_some_and(|ratio| ratio >= CLEAR)
+}
+
+fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
+    let clear = || singles.iter().copied().filter(|case| is_clear(case));
+    let line = |name: &str, wanted, rate| Line { name: name.to_owned(), rate, wanted };
+    let nulls = || of_kind(cases, Kind::Null);
+    let parameters = || of_kind(cases, Kind::Parameter);
+    let pairs = || of_kind(cases, Kind::Pair).filter(|case| case.separable);
+    let triples = || of_kind(cases, Kind::Triple).filter(|case| case.separable);
+    let all_right = |case: &Case| case.judgement.hidden.iter().all(|hidden| hidden.right);
+    let alone_in_class = |case: &&Case| hidden(case).class_size == 1;
+    vec![
+        line(
+            "one effect, 3 x limit and more: its class among the names",
+            "at least 95 %",
+            Rate::of(clear(), right),
+        ),
+        line(
+            "the same, alone in its class: right alone",
+            "at least 85 %",
+            Rate::of(clear().filter(alone_in_class), |case| case.judgement.alone),
+        ),
+        line(
+            "the same, class named: where right",
+            "all",
+            Rate::of(clear().filter(|case| right(case)), |case| hidden(case).where_right),
+        ),
+        line(
+            "the same, the catalogue's form: held-out chi2 claimed to be that of nothing missing",
+            "at least 80 %",
+            Rate::of(
+                clear()
+                    .filter(|case| right(case) && !case.foreign_form)
+                    .filter_map(|case| case.judgement.claimed_white),
+                |white| white,
+            ),
+        ),
+        line(
+            "nothing hidden: called missing",
+            "at most 2 %",
+            Rate::of(nulls(), |case| case.judgement.false_alarm),
+        ),
+        line(
+            "a parameter off: reported, no effect named",
+            "all",
+            Rate::of(parameters(), |case| case.judgement.parameter_right),
+        ),
+        line(
+            "a parameter off: called missing",
+            "none",
+            Rate::of(parameters(), |case| case.judgement.false_alarm),
+        ),
+        line("two effects, separable: both classes named", "at least 80 %", Rate::of(pairs(), all_right)),
+        line(
+            "two effects, separable: no third",
+            "at least 90 %",
+            Rate::of(pairs(), |case| case.judgement.too_many == 0),
+        ),
+        line("three effects, separable: all classes named", "no target", Rate::of(triples(), all_right)),
+        line(
+            "no good report (crash, time limit, bad JSON, refused)",
+            "none",
+            Rate::of(cases, |case| case.judgement.error.is_some()),
+        ),
+    ]
+}
+
+/// Whether a case is of a part.
+pub(crate) type IsPart = Box<dyn Fn(&Case) -> bool>;
+
+/// Parts of single effects, by amplitude and by what was made hard.
+pub(crate) fn parts() -> Vec<(&'static str, IsPart)> {
+    fn part(is: impl Fn(&Case) -> bool + 'static) -> IsPart {
+        Box::new(is)
+    }
+    let between = |least: f64, most: f64| {
+        part(move |case| over_limit(case).is_some_and(|ratio| ratio >= least && ratio < most))
+    };
+    vec![
+        ("all", part(|_| true)),
+        ("below the limit", between(0.0, 1.0)),
+        ("1 to 3 x limit", between(1.0, CLEAR)),
+        ("3 x limit and more", between(CLEAR, f64::INFINITY)),
+        ("3 to 10 x limit", between(CLEAR, 10.0)),
+        ("10 x limit and more", between(10.0, f64::INFINITY)),
+        ("limit not known", part(|case| over_limit(case).is_none())),
+        ("3 x limit, the catalogue's form", part(|case| is_clear(case) && !case.foreign_form)),
+        ("3 x limit, another form", part(|case| is_clear(case) && case.foreign_form)),
+        ("3 x limit, parameters right", part(|case| is_clear(case) && !case.wrong_parameters)),
+        ("3 x limit, parameters off", part(|case| is_clear(case) && case.wrong_parameters)),
+        ("3 x limit, white noise", part(|case| is_clear(case) && !case.coloured_noise)),
+        ("3 x limit, coloured noise and jitter", part(|case| is_clear(case) && case.coloured_noise)),
+    ]
+}
+
+fn splits(singles: &[&Case]) -> Vec<Split> {
+    let of_part = |(name, is): &(&str, IsPart)| split(name, singles.iter().copied().filter(|case| is(case)));
+    parts().iter().map(of_part).collect()
+}
+
+fn split<'a>(name: &str, cases: impl Iterator<Item = &'a Case>) -> Split {
+    let cases: Vec<&Case> = cases.collect();
+    let all = || cases.iter().copied();
+    Split {
+        name: name.to_owned(),
+        class_right: Rate::of(all(), right),
+        top: Rate::of(all(), |case| case.judgement.top),
+        alone: Rate::of(all().filter(|case| hidden(case).class_size == 1), |case| case.judgement.alone),
+        where_right: Rate::of(all().filter(|case| right(case)), |case| hidden(case).where_right),
+    }
+}
+
+fn row<'a>(truth: &str, cases: impl Iterator<Item = &'a Case>) -> ConfusionRow {
+    let mut row = ConfusionRow { truth: truth.to_owned(), of: 0, called: BTreeMap::new() };
+    for case in cases {
+        row.of += 1;
+        let cell = row.called.entry(case.judgement.called.clone()).or_default();
+        let hidden = case.judgement.hidden.first();
+        cell[0] += 1;
+        cell[1] += usize::from(hidden.is_some_and(|hidden| hidden.right));
+        cell[2] += usize::from(hidden.is_some_and(|hidden| hidden.where_right));
+    }
+    row
+}
+
+fn nothing_hidden(cases: &[Case]) -> Vec<ConfusionRow> {
+    let nulls = |off| of_kind(cases, Kind::Null).filter(move |case| case.wrong_parameters == off);
+    let mut rows = vec![
+        row("nothing, parameters right", nulls(false)),
+        row("nothing, parameters off by 1 to 3 %", nulls(true)),
+    ];
+    let wrong = |case: &Case| {
+        let name = case.recipe["wrong_parameters"][0]["name"].as_str();
+        name.unwrap_or_default().to_owned()
+    };
+    rows.extend(
+        crate::draws::ALONE
+            .iter()
+            .map(|name| row(name, of_kind(cases, Kind::Parameter).filter(|case| wrong(case) == *name))),
+    );
+    rows
+}
+
+fn numbers(singles: &[&Case]) -> Numbers {
+    let told = |foreign| {
+        singles.iter().filter(move |case| case.foreign_form == foreign).flat_map(|case| &hidden(case).numbers)
+    };
+    let amplitudes = || told(false).filter(|number| number.amplitude);
+    let covered = |numbers: &mut dyn Iterator<Item = &NumberJudged>| {
+        Rate::of(numbers.filter_map(|number| number.covered), |covered| covered)
+    };
+    Numbers {
+        off_ratio: Spread::of(amplitudes().map(|number| number.off_ratio)),
+        error_ratio: Spread::of(amplitudes().filter_map(|number| number.error_ratio)),
+        covered: covered(&mut amplitudes()),
+        all_covered: covered(&mut told(false)),
+        foreign_covered: covered(&mut told(true)),
+        untold: singles
+            .iter()
+            .filter(|case| case.judgement.top && hidden(case).where_right)
+            .filter(|case| {
+                !hidden(case).numbers.iter().any(|number| number.amplitude && number.covered.is_some())
+            })
+            .count(),
+    }
+}

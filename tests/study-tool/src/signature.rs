@@ -1,0 +1,351 @@
+//! What an effect changes in a record, as an ideal observer sees it.
+//!
+//! ```text
+//! J = (readings of the plant with the effect - readings of the baseline) / noise of the sensors        in windows of 100 ms
+//! M = 1 - S S^+          S: what the readings change with x, v, p_a, p_b at the start of the window
+//! |M J|                  how many standard deviations the matched filter of the effect lies from nothing
+//! ```
+//!
+//! Every window starts at the true x, v, p_a, p_b of the record, and with the same inputs; what else moves (spool, lagged flow,
+//! the effects' memories) goes on from the window before, of each plant its own. The observer does not know the true initial
+//! state: what a change of it could explain is projected out, window by window.
+//!
+//! That holds for the sensors' effects too, without an exception. A constant offset of the position is a change of x at the
+//! start as far as the readings of x go; what is left of it is what only the true x would do to the rest: volumes and with them
+//! the rates of the pressures, cushions and stops, the gap of the linkage against the other axis. An offset of a pressure is
+//! left in the flow (which depends on the absolute pressure) and in the force balance; one of the force sensor is left whole,
+//! since no initial state shifts a force. At rest with shut valves an offset is truly invisible, and no sum over such windows
+//! brings it back. Windows know nothing of each other: the creep of a leak over seconds counts only for what it is within each
+//! 100 ms, and an observer of longer windows sees such effects below these limits.
+//!
+//! Noise: that of the sensor and of its rounding together, sqrt(sigma^2 + step^2/12). The readings are the plant's own, before
+//! noise and rounding. The first window is left out: memories fill in it [rig-model.md: a record is judged after 0.1 s].
+//!
+//! Where a piston stops, breaks away or turns, and where the linkage makes contact, the force jumps. Which side of a sample
+//! such an event falls on is decided by microseconds; a difference of hundreds of newtons in one sample is then no measure of
+//! anything. The readings of the force next to an event (of the baseline, of the plant with the effect, or of one with a nudged
+//! initial state) count for nothing [rig-model.md, Accuracy: single samples of the force at stick and contact events excepted].
+//! An event that moves by more than a sample is seen in those between.
+//!
+//! Sensitivities are differences over a change that is small against the noise. Through stick and slip they are what they are:
+//! one side of a kink. Source: discrepancy-notes.md, 1 and 6; Kay 1998, Fundamentals of Statistical Signal Processing II, 4.3.
+
+use crate::trajectory::{POINT_NUMBERS, Point, TrueTrajectory, WINDOW};
+use nalgebra::DMatrix;
+use plant::{Inputs, Plant, RigParameters, State, Truth};
+
+/// Readings of an axis: position, force, pressures a and b.
+const CHANNELS: usize = 4;
+/// Share of the largest singular value below which a direction of the initial state changes nothing.
+const RANK: f64 = 1e-6;
+
+/// Place of the force among the readings of an axis.
+const FORCE: usize = 1;
+/// Slower than this a piston is at rest, m/s: bristles creep.
+const REST_M_PER_S: f64 = 1e-5;
+
+/// The observer of one record.
+#[derive(Debug)]
+pub struct Observer {
+    trajectory: TrueTrajectory,
+    noise: [f64; CHANNELS],
+    baseline: Run,
+    /// What the initial state of each window explains.
+    windows: Vec<Window>,
+}
+
+/// The whitened readings of a plant, and which of them stand next to an event.
+#[derive(Debug, Default)]
+struct Run {
+    readings: Vec<f64>,
+    jumps: Vec<bool>,
+}
+
+/// What the initial state of a window explains.
+#[derive(Debug)]
+struct Window {
+    /// One column for each number of the state, all of one length.
+    sensitivities: Vec<f64>,
+    /// Readings next to an event of the baseline or of a nudged plant.
+    jumps: Vec<bool>,
+    /// Orthonormal, 0 where `jumps`.
+    basis: Vec<Vec<f64>>,
+}
+
+impl Observer {
+    /// The observer of a trajectory.
+    #[must_use]
+    pub fn new(trajectory: TrueTrajectory) -> Self {
+        let sensors = trajectory.rig.sensors();
+        let with_rounding = |noise: f64, step: f64| (noise * noise + step * step / 12.0).sqrt();
+        let pressure = with_rounding(sensors.pressure_noise_pa, sensors.pressure_step_pa());
+        let noise = [
+            with_rounding(sensors.position_noise_m, sensors.position_step_m()),
+            with_rounding(sensors.force_noise_n, sensors.force_step_n()),
+            pressure,
+            pressure,
+        ];
+        let mut observer = Observer { trajectory, noise, baseline: Run::default(), windows: Vec::new() };
+        let (baseline, starts) = observer.run(&observer.trajectory.rig);
+        observer.baseline = baseline;
+        observer.windows = (0..starts.len()).map(|window| observer.window(window, &starts[window])).collect();
+        observer
+    }
+
+    /// M J of a rig against the baseline.
+    #[must_use]
+    pub fn signature(&self, rig: &RigParameters) -> Vec<f64> {
+        let rows = self.rows();
+        let (Run { mut readings, jumps }, _) = self.run(rig);
+        readings.iter_mut().zip(&self.baseline.readings).for_each(|(own, baseline)| *own -= baseline);
+        readings[..rows].fill(0.0);
+        for ((difference, jumps), window) in
+            readings.chunks_exact_mut(rows).zip(jumps.chunks_exact(rows)).zip(&self.windows)
+        {
+            window.project(difference, jumps);
+        }
+        readings
+    }
+
+    /// The baseline that this observer has.
+    #[must_use]
+    pub fn rig(&self) -> &RigParameters {
+        &self.trajectory.rig
+    }
+
+    /// Whitened readings in a window.
+    fn rows(&self) -> usize {
+        WINDOW * CHANNELS * self.trajectory.measured.iter().filter(|measured| **measured).count()
+    }
+
+    /// The readings of a rig in all windows, and the state that each begins with.
+    fn run(&self, rig: &RigParameters) -> (Run, Vec<State>) {
+        let windows = self.trajectory.windows();
+        let mut run = Run::default();
+        let mut starts = Vec::with_capacity(windows);
+        let mut plant = self.plant(rig, &self.trajectory.start);
+        for window in 0..windows {
+            let start = seated(&plant, &self.trajectory.points[window * WINDOW]);
+            starts.push(start);
+            plant.go_on_in(&start).expect("the states of a record are some that the rig can be in");
+            self.read(&mut plant, window, &mut run);
+        }
+        (run, starts)
+    }
+
+    /// Steps through a window and appends its readings.
+    fn read(&self, plant: &mut Plant, window: usize, run: &mut Run) {
+        let from = run.readings.len();
+        let measured =
+            || self.trajectory.measured.iter().enumerate().filter(|(_, measured)| **measured).map(|(i, _)| i);
+        let mut phases = [Vec::with_capacity(WINDOW + 1), Vec::with_capacity(WINDOW + 1)];
+        for inputs in &self.trajectory.inputs[window * WINDOW..][..WINDOW] {
+            let truth = plant.truth(inputs);
+            let shown = plant.shown(&truth);
+            for i in measured() {
+                run.readings.extend(shown[i].iter().zip(self.noise).map(|(value, noise)| value / noise));
+                phases[i].push(phase(&truth, i));
+            }
+            plant.step(inputs);
+        }
+        let end = plant.truth(&Inputs::default());
+        run.jumps.resize(run.readings.len(), false);
+        let width = self.rows() / WINDOW;
+        for (lane, i) in measured().enumerate() {
+            phases[i].push(phase(&end, i));
+            for at in 0..WINDOW {
+                let own = phases[i][at];
+                let jumps = phases[i][at.saturating_sub(1)] != own || phases[i][at + 1] != own;
+                run.jumps[from + at * width + lane * CHANNELS + FORCE] = jumps;
+            }
+        }
+    }
+
+    /// What a change of the initial state can explain in a window.
+    fn window(&self, window: usize, start: &State) -> Window {
+        let rows = self.rows();
+        let baseline = &self.baseline.readings[window * rows..][..rows];
+        let mut jumps = self.baseline.jumps[window * rows..][..rows].to_vec();
+        let mut sensitivities = Vec::new();
+        for axis in (0..2).filter(|axis| self.trajectory.measured[*axis]) {
+            for number in 0..POINT_NUMBERS {
+                let mut points = self.trajectory.points[window * WINDOW];
+                points[axis] = points[axis].nudged(number);
+                let mut plant = self.plant(&self.trajectory.rig, start);
+                plant
+                    .go_on_in(&seated(&plant, &points))
+                    .expect("a nudge leaves the rig in a state of its own");
+                let mut nudged = Run::default();
+                self.read(&mut plant, window, &mut nudged);
+                sensitivities
+                    .extend(nudged.readings.iter().zip(baseline).map(|(own, baseline)| own - baseline));
+                jumps.iter_mut().zip(&nudged.jumps).for_each(|(all, own)| *all |= own);
+            }
+        }
+        let basis = basis(&sensitivities, &jumps);
+        Window { sensitivities, jumps, basis }
+    }
+
+    fn plant(&self, rig: &RigParameters, state: &State) -> Plant {
+        Plant::in_state(rig, state).expect("the states of a record are some that the rig can be in")
+    }
+}
+
+impl Window {
+    /// Projects what the initial state explains out of a difference of readings, of which those at `jumps` count for nothing.
+    fn project(&self, difference: &mut [f64], jumps: &[bool]) {
+        let all: Vec<bool> = self.jumps.iter().zip(jumps).map(|(left, right)| *left || *right).collect();
+        let zeroed = difference.iter_mut().zip(&all).filter(|(_, jumps)| **jumps);
+        zeroed.for_each(|(own, _)| *own = 0.0);
+        let more;
+        let basis = if all == self.jumps {
+            &self.basis
+        } else {
+            more = basis(&self.sensitivities, &all);
+            &more
+        };
+        for direction in basis {
+            let share = dot(difference, direction);
+            difference.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
+        }
+    }
+}
+
+/// An orthonormal basis of some columns without the rows that count for nothing.
+fn basis(columns: &[f64], without: &[bool]) -> Vec<Vec<f64>> {
+    let rows = without.len();
+    let mut kept = Vec::with_capacity(columns.len());
+    for column in columns.chunks_exact(rows) {
+        let column: Vec<f64> =
+            column.iter().zip(without).map(|(own, without)| if *without { 0.0 } else { *own }).collect();
+        // The scale of a column is no matter, but it would decide what the rank is.
+        let length = length(&column);
+        if length > 0.0 {
+            kept.extend(column.iter().map(|own| own / length));
+        }
+    }
+    if kept.is_empty() {
+        return Vec::new();
+    }
+    let parts = DMatrix::from_vec(rows, kept.len() / rows, kept).svd(true, false);
+    let u = parts.u.expect("it was asked for");
+    let least = RANK * parts.singular_values.max();
+    let kept = (0..u.ncols()).filter(|column| parts.singular_values[*column] > least);
+    kept.map(|column| u.column(column).iter().copied().collect()).collect()
+}
+
+/// Which way an axis goes, and whether the rods touch.
+fn phase(truth: &Truth, axis: usize) -> (i8, bool) {
+    let velocity = truth.axes[axis].rod_velocity_m_per_s;
+    let way = if velocity.abs() < REST_M_PER_S { 0 } else { velocity.signum() as i8 };
+    (way, truth.contact_force_n != 0.0)
+}
+
+/// A plant's state with the mechanical state and the pressures of a record; the rest stays its own.
+fn seated(plant: &Plant, points: &[Point; 2]) -> State {
+    let mut state = *plant.state();
+    let truth = plant.truth(&Inputs::default());
+    let cylinder = plant.rig().cylinder();
+    for ((own, point), axis) in state.axes.iter_mut().zip(points).zip(&truth.axes) {
+        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+        // The volumes are the plant's own: an effect may have changed them.
+        let volume_a = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
+        let volume_b = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
+        own.extension_m += way_m;
+        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
+        own.stored_air_a_j = point.pressures_pa[0] * volume_a;
+        own.stored_air_b_j = point.pressures_pa[1] * volume_b;
+    }
+    state
+}
+
+/// Length of a signature: standard deviations of the matched filter.
+#[must_use]
+pub fn length(signature: &[f64]) -> f64 {
+    dot(signature, signature).sqrt()
+}
+
+/// How alike two signatures are, 0 to 1, whatever their sign; 0 if one is nothing.
+#[must_use]
+pub fn alike(left: &[f64], right: &[f64]) -> f64 {
+    let lengths = length(left) * length(right);
+    if lengths > 0.0 { (dot(left, right) / lengths).abs().min(1.0) } else { 0.0 }
+}
+
+fn dot(left: &[f64], right: &[f64]) -> f64 {
+    left.iter().zip(right).map(|(left, right)| left * right).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::Setup;
+
+    /// Two seconds of strokes of the drive, without a controller.
+    pub(crate) fn trajectory() -> TrueTrajectory {
+        let rig = RigParameters::baseline();
+        let mut plant = Plant::new(&rig, &Setup { carriage_position_m: 0.2, ..Setup::default() }).unwrap();
+        let mut trajectory = TrueTrajectory {
+            rig,
+            measured: [true, false],
+            start: *plant.state(),
+            inputs: Vec::new(),
+            points: Vec::new(),
+        };
+        for cycle in 0..2000 {
+            let valve = 0.3 * (f64::from(cycle) * 0.012).sin() + if cycle % 500 < 100 { 0.3 } else { 0.0 };
+            let inputs = Inputs { valve: [plant::quantise_valve(valve), 0.0], ..Inputs::default() };
+            trajectory.inputs.push(inputs);
+            trajectory.points.push(Point::of(&plant.truth(&inputs), 0.5));
+            plant.step(&inputs);
+        }
+        trajectory
+    }
+
+    #[test]
+    fn the_baseline_against_itself_is_nothing() {
+        let observer = Observer::new(trajectory());
+        assert_eq!(length(&observer.signature(&RigParameters::baseline())), 0.0);
+    }
+
+    #[test]
+    fn a_signature_is_proportional_to_its_amplitude_where_it_is_small() {
+        let observer = Observer::new(trajectory());
+        let rig = |newton: f64| {
+            RigParameters::baseline().with("friction.sliding_force_n", &[26.0 + newton]).unwrap()
+        };
+        let [one, two] = [0.5, 1.0].map(|newton| observer.signature(&rig(newton)));
+        let ratio = length(&two) / length(&one);
+        // Stops shift with the friction: a tenth beside the straight line.
+        assert!((ratio - 2.0).abs() < 0.2, "{ratio}");
+        assert!(alike(&one, &two) > 0.95, "{}", alike(&one, &two));
+        assert!(length(&one) > 3.6, "{}", length(&one));
+    }
+
+    #[test]
+    fn different_laws_leave_different_signatures() {
+        let observer = Observer::new(trajectory());
+        let with =
+            |path: &str, value| observer.signature(&RigParameters::baseline().with(path, &[value]).unwrap());
+        let mass = with("mass.drive_kg", 5.2);
+        let lag = with("valve.flow_lag_time_constant_ms", 8.5);
+        assert!(alike(&mass, &lag) < 0.8, "{}", alike(&mass, &lag));
+    }
+
+    #[test]
+    fn what_the_initial_state_explains_is_projected_out() {
+        let observer = Observer::new(trajectory());
+        let rows = observer.rows();
+        for (window, basis) in observer.windows.iter().map(|window| &window.basis).enumerate() {
+            assert!(basis.len() <= POINT_NUMBERS, "window {window}");
+            for (at, one) in basis.iter().enumerate() {
+                assert_eq!(one.len(), rows);
+                // Orthonormal to rounding of a few hundred terms.
+                for (other_at, other) in basis.iter().enumerate() {
+                    let expected = f64::from(u8::from(at == other_at));
+                    assert!((dot(one, other) - expected).abs() < 1e-12);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! The force programs, linked, in the experiment of Fig. 9.
+
+use crate::{corners, mark};
+use std::error::Error;
+use tuning::cases::{Case, Made, figures};
+use tuning::rehearsed::{gain_margin, worst_gain_margin};
+use tuning::{Trial, TrialError, in_parallel};
+
+struct Ladder {
+    load: &'static str,
+    gain: &'static str,
+    unit: &'static str,
+    gains: &'static [f64],
+}
+
+const LADDERS: [Ladder; 2] = [
+    Ladder {
+        load: "force-p",
+        gain: "algorithm.gain_m_per_n_s",
+        unit: "m/(N s)",
+        gains: &[0.002, 0.003, 0.004, 0.005, 0.006, 0.008, 0.01, 0.012, 0.015],
+    },
+    Ladder {
+        load: "force-pid-map",
+        gain: "algorithm.gain_per_s",
+        unit: "1/s",
+        gains: &[50.0, 75.0, 100.0, 125.0, 150.0, 200.0, 250.0, 300.0],
+    },
+];
+const DRIVE: &str = "position-linked";
+/// The paper's structure alone, load and drive, as it keeps the bounds of Fig. 9.
+const PAPER: (&str, &str) = ("force-paper-linked", "position-paper-linked");
+/// Numbers of the paper's force program that are tried together.
+const GAINS: [f64; 5] = [0.008, 0.01, 0.012, 0.015, 0.02];
+const SHARES: [f64; 4] = [0.3, 0.5, 0.65, 0.8];
+/// Seeds of the sensors' noise that figures are taken over.
+const SEEDS: [u64; 3] = [1, 2, 3];
+
+/// Programs of the drive that are tried beside each other.
+const DRIVES: [&str; 5] = [DRIVE, "position-paper-linked", "position-p", "position-pid", "position-cascade"];
+
+/// Prints them all.
+pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
+    for ladder in &LADDERS {
+        println!("\n### {}, drive: {DRIVE}\n", ladder.load);
+        by_gain(ladder)?;
+        by_corner(&ladder.case(None)?)?;
+    }
+    println!("\n### force-p, gain and velocity feed-forward: settling / overshoot / worst margin\n");
+    by_feed_forward()?;
+    println!("\n### Drives of a linked rig\n");
+    by_drive()
+}
+
+impl Ladder {
+    fn case(&self, gain: Option<f64>) -> Result<Case, Box<dyn Error>> {
+        let set: Vec<_> = gain.map(|gain| format!("load.{}={gain}", self.gain)).into_iter().collect();
+        Case::new(&Made { experiment: "load-step", drive: Some(DRIVE), load: Some(self.load), set: &set })
+    }
+}
+
+/// Figures of a step and of rests; the worst of some runs.
+#[derive(Clone, Copy, Default)]
+struct Figures {
+    settling_s: f64,
+    overshoot: f64,
+    speed_ratio: f64,
+    peak_m: f64,
+    motion_n: f64,
+    rest_m: f64,
+    rest_n: f64,
+}
+
+impl Figures {
+    fn of(case: &Case, trial: &Trial) -> Result<Self, TrialError> {
+        let figure = figures(&case.run(trial)?);
+        // What is absent never came about.
+        let figure = |name: &str| figure(name).unwrap_or(f64::INFINITY);
+        Ok(Self {
+            settling_s: figure("force_settling_s"),
+            overshoot: figure("force_overshoot_ratio"),
+            speed_ratio: figure("drive_speed_ratio_least"),
+            peak_m: figure("position_error_peak_after_step_m"),
+            motion_n: figure("force_error_motion_rms_n"),
+            rest_m: figure("position_rest_peak_to_peak_smoothed_m"),
+            rest_n: figure("force_rest_peak_to_peak_n"),
+        })
+    }
+
+    fn worst(self, other: Self) -> Self {
+        Self {
+            settling_s: self.settling_s.max(other.settling_s),
+            overshoot: self.overshoot.max(other.overshoot),
+            speed_ratio: self.speed_ratio.max(other.speed_ratio),
+            peak_m: self.peak_m.max(other.peak_m),
+            motion_n: self.motion_n.max(other.motion_n),
+            rest_m: self.rest_m.max(other.rest_m),
+            rest_n: self.rest_n.max(other.rest_n),
+        }
+    }
+}
+
+const HEAD: &str = "settling 5 % 0 kg / worst corner, ms | overshoot 0 kg / worst corner, % | speed ratio | peak error, mm | in motion, N | rest p-p, mm / N | margin 0 kg | margin, worst corner |";
+
+/// What a case does: at 0 kg and 7 bar the worst of some kinds of noise, in the corners that of one.
+struct Told {
+    nominal: Figures,
+    corners: Figures,
+    margin: f64,
+    worst_margin: f64,
+}
+
+impl Told {
+    fn of(case: &Case) -> Result<Self, TrialError> {
+        let worst = |trials: &[Trial]| {
+            let runs = in_parallel(trials, |trial| Figures::of(case, trial)).into_iter();
+            Ok::<_, TrialError>(
+                runs.collect::<Result<Vec<_>, _>>()?.into_iter().reduce(Figures::worst).unwrap_or_default(),
+            )
+        };
+        Ok(Self {
+            nominal: worst(&SEEDS.map(|seed| Trial { seed, ..Trial::default() }))?,
+            corners: worst(&Trial::corners())?,
+            margin: gain_margin(&case.inputs, &case.scene, &Trial::default())?,
+            worst_margin: worst_gain_margin(&case.inputs, &case.scene)?,
+        })
+    }
+
+    /// The cells under [`HEAD`].
+    fn cells(&self) -> String {
+        let Self { nominal: figures, corners, margin, worst_margin } = self;
+        let overshoots = [figures, corners].map(|figures| number(figures.overshoot * 1e2, 1)).join(" / ");
+        let rest = [number(figures.rest_m * 1e3, 2), number(figures.rest_n, 1)].join(" / ");
+        [
+            [figures, corners].map(|figures| ms(figures.settling_s)).join(" / "),
+            overshoots,
+            number(figures.speed_ratio, 2),
+            number(figures.peak_m * 1e3, 1),
+            number(figures.motion_n, 1),
+            rest,
+            margin.to_string(),
+            worst_margin.to_string(),
+        ]
+        .join(" | ")
+            + " |"
+    }
+}
+
+/// Figures and margins over the gain.
+fn by_gain(ladder: &Ladder) -> Result<(), Box<dyn Error>> {
+    println!("| gain, {} | {HEAD}", ladder.unit);
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let own = shipped(&ladder.case(None)?, ladder.gain).ok_or("no gain")?;
+    for &gain in ladder.gains {
+        println!("| {} | {}", mark(gain, own == gain), Told::of(&ladder.case(Some(gain))?)?.cells());
+    }
+    Ok(())
+}
+
+/// The paper's force program over both its numbers.
+fn by_feed_forward() -> Result<(), Box<dyn Error>> {
+    println!("| gain, m/(N s) | {} |", SHARES.map(|share| format!("feed-forward {share}")).join(" | "));
+    println!("|---{}|", "|---".repeat(SHARES.len()));
+    for gain in GAINS {
+        let mut cells = Vec::new();
+        for share in SHARES {
+            let set = [
+                format!("load.algorithm.gain_m_per_n_s={gain}"),
+                format!("load.algorithm.velocity_feed_forward={share}"),
+            ];
+            let made = Made { experiment: "load-step", drive: Some(DRIVE), load: Some("force-p"), set: &set };
+            let case = Case::new(&made)?;
+            let figures = Figures::of(&case, &Trial::default())?;
+            let margin = worst_gain_margin(&case.inputs, &case.scene)?;
+            cells.push(format!(
+                "{} ms / {} % / {margin}",
+                ms(figures.settling_s),
+                number(figures.overshoot * 1e2, 1)
+            ));
+        }
+        println!("| {gain} | {} |", cells.join(" | "));
+    }
+    Ok(())
+}
+
+/// Programs of the drive under both force programs.
+fn by_drive() -> Result<(), Box<dyn Error>> {
+    println!("| load, drive | {HEAD}");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let loads = LADDERS.iter().map(|ladder| ladder.load);
+    let pairs = loads.flat_map(|load| DRIVES.map(|drive| (load, drive))).chain([PAPER]);
+    for (load, drive) in pairs {
+        let made = Made { experiment: "load-step", drive: Some(drive), load: Some(load), set: &[] };
+        println!("| {load}, {drive} | {}", Told::of(&Case::new(&made)?)?.cells());
+    }
+    Ok(())
+}
+
+/// Margin of the shipped gain in each corner, and the step's settling and overshoot there.
+fn by_corner(case: &Case) -> Result<(), TrialError> {
+    let cells = in_parallel(&Trial::corners(), |trial| {
+        let figures = Figures::of(case, trial)?;
+        let margin = gain_margin(&case.inputs, &case.scene, trial)?;
+        Ok(format!("{margin} / {} ms / {} %", ms(figures.settling_s), number(figures.overshoot * 1e2, 1)))
+    });
+    corners(&cells.into_iter().collect::<Result<Vec<_>, TrialError>>()?);
+    Ok(())
+}
+
+/// A time in ms; a dash for what never settled.
+fn ms(time_s: f64) -> String {
+    number(time_s * 1e3, 0)
+}
+
+/// A dash for what never came about.
+fn number(value: f64, decimals: usize) -> String {
+    // Without the sign of a zero.
+    let unit = 10_f64.powi(decimals as i32);
+    if value.is_finite() { format!("{:.decimals$}", (value * unit).round() / unit + 0.0) } else { "-".into() }
+}
+
+/// The number in the load's program.
+fn shipped(case: &Case, name: &str) -> Option<f64> {
+    let mode = controller::setup::Mode { partner_needed: true, real_time: false, forever: false };
+    let controller = case.inputs.controller(plant::Axis::Load, mode).ok()?;
+    let program = controller.program();
+    program.place(name).map(|place| program.values()[place])
+}

@@ -1,0 +1,90 @@
+//! The position programs, unlinked.
+
+use crate::{corners, mark, nominal};
+use controller::program::Program;
+use controller::program::file::{ProgramError, Source};
+use plant::{Axis, RigParameters};
+use std::error::Error;
+use std::path::Path;
+use tuning::position::{POINT_TO_POINT, STEP, attempt, delay_margin, gain_margin};
+use tuning::{Trial, TrialError, in_parallel};
+
+const GAIN: &str = "algorithm.gain_per_s";
+const PROGRAMS: [(&str, &[f64]); 3] = [
+    ("position-p", &[5.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0]),
+    ("position-pid", &[10.0, 15.0, 20.0, 25.0, 30.0, 40.0]),
+    ("position-cascade", &[5.0, 10.0, 15.0, 20.0, 25.0, 30.0]),
+];
+
+/// Prints them all.
+pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
+    for (name, gains) in PROGRAMS {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../controller/programs/{name}.toml"));
+        let shipped = Shipped { source: Source::read(&path)?, rig: RigParameters::baseline() };
+        println!("\n### {name}\n");
+        shipped.by_gain(gains)?;
+        shipped.by_corner()?;
+    }
+    Ok(())
+}
+
+struct Shipped {
+    source: Source,
+    rig: RigParameters,
+}
+
+impl Shipped {
+    fn program(&self, gain: Option<f64>) -> Result<Program, ProgramError> {
+        let mut program = self.source.program(Axis::Drive, &self.rig, false)?;
+        if let (Some(place), Some(gain)) = (program.place(GAIN), gain) {
+            program.set(place, gain).expect("the ladder is within the range");
+        }
+        Ok(program)
+    }
+
+    /// Figures and margins over the gain.
+    fn by_gain(&self, gains: &[f64]) -> Result<(), Box<dyn Error>> {
+        println!(
+            "| gain, 1/s | dynamic, mm | static, mm | rest p-p, mm | step overshoot 0 kg / worst corner, mm | margin 0 kg | margin, worst corner |"
+        );
+        println!("|---|---|---|---|---|---|---|");
+        let own = self.program(None)?;
+        let own = own.place(GAIN).map(|place| own.values()[place]);
+        for &gain in gains {
+            let make = || self.program(Some(gain)).expect("made before");
+            let moved = attempt(make(), POINT_TO_POINT, &Trial::default())?;
+            let tried = in_parallel(&Trial::corners(), |trial| {
+                Ok((gain_margin(make, trial)?, attempt(make(), STEP, trial)?.overshoot_m))
+            });
+            let tried = tried.into_iter().collect::<Result<Vec<_>, TrialError>>()?;
+            let (margin, overshoot_m) = tried[nominal()];
+            let worst = tried.iter().fold((f64::MAX, 0.0_f64), |(least, most), (margin, overshoot)| {
+                (least.min(*margin), most.max(*overshoot))
+            });
+            println!(
+                "| {} | {:.2} | {:.2} | {:.2} | {:.1} / {:.1} | {margin} | {} |",
+                mark(gain, own == Some(gain)),
+                moved.dynamic_m * 1e3,
+                moved.static_m * 1e3,
+                moved.rest_peak_to_peak_m * 1e3,
+                overshoot_m * 1e3,
+                worst.1 * 1e3,
+                worst.0
+            );
+        }
+        Ok(())
+    }
+
+    /// Margins of the shipped gain in each corner: factor / cycles of delay, and the dynamic error there.
+    fn by_corner(&self) -> Result<(), TrialError> {
+        let make = || self.program(None).expect("made before");
+        let cells = in_parallel(&Trial::corners(), |trial| {
+            let late = delay_margin(make, trial)?.map_or("-".to_owned(), |cycles| format!("{cycles} ms"));
+            let moved = attempt(make(), POINT_TO_POINT, trial)?;
+            Ok(format!("{} / {late} / {:.2} mm", gain_margin(make, trial)?, moved.dynamic_m * 1e3))
+        });
+        corners(&cells.into_iter().collect::<Result<Vec<_>, TrialError>>()?);
+        Ok(())
+    }
+}
