@@ -7,7 +7,7 @@ use crate::edits::{self, EditError};
 use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
 use crate::points::{Point, Points};
 use crate::shelf::{RigFile, Shelf, Text};
-use controller::program::file::Source;
+use axis_control::program::file::Source;
 use plant::effects::draw::{Among, Urn};
 use plant::effects::sheet;
 use plant::{Axis, RigParameters, Scene};

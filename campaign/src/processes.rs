@@ -9,8 +9,8 @@ use crate::factor::Value;
 use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
 use crate::shelf::Shelf;
+use axis_control::experiment::Experiment;
 use bench::{SummaryError, join};
-use controller::experiment::Experiment;
 use protocol::exit::Exit;
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
@@ -174,7 +174,7 @@ impl Files {
         let stroke_m = condition.nominal.nominal.cylinder().stroke_m;
         let read = Experiment::from_toml(&condition.experiment_toml, &experiment.path, stroke_m)
             .map_err(|error| refused(error.to_string()))?;
-        let program = |axis, section: Option<&controller::experiment::AxisExperiment>| {
+        let program = |axis, section: Option<&axis_control::experiment::AxisExperiment>| {
             let source = condition.program(shelf, axis, &section?.program.written)?;
             Some(fs::canonicalize(&source.path).unwrap_or(source.path))
         };

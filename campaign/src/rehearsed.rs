@@ -8,17 +8,17 @@ use crate::factor::Value;
 use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
 use crate::shelf::Shelf;
+use axis_control::axis::{AxisController, AxisRecord};
+use axis_control::setup::{Inputs, Mode};
 use bench::figures::{self, position};
 use bench::record::{MEASURED, Record, TRUE};
 use bench::series::Series;
 use bench::tables_read::{StateSpan, Table, enter};
 use bench::thresholds;
-use controller::axis::{AxisController, AxisRecord};
-use controller::rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
-use controller::setup::{Inputs, Mode};
 use plant::tables::{self, CycleRecord};
 use plant::{Axis, Truth};
 use protocol::frames::MainChainState;
+use rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
 use serde_json::{Map, json};
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ pub fn rehearse(
     let controllers = Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode));
     let controllers = controllers
         .collect::<Result<_, _>>()
-        .map_err(|error: controller::run::RunError| refused(error.to_string()))?;
+        .map_err(|error: axis_control::setup::InputError| refused(error.to_string()))?;
     let parts =
         RehearsalParts { rig: &condition.rig, scene: &condition.scene, seed: condition.seed, controllers };
     let mut rehearsal = Rehearsal::new(parts).map_err(|error| refused(error.to_string()))?;
@@ -58,7 +58,7 @@ pub fn rehearse(
 }
 
 fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Outcome, String> {
-    let controllers = || rehearsal.station().controllers();
+    let controllers = || rehearsal.node().controllers();
     let is_stopped = |controller: &&AxisController| {
         matches!(controller.state(), MainChainState::Aborted | MainChainState::Fault)
     };
@@ -69,7 +69,7 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
     let (ended, because) = match stopped {
         _ if broken.is_some() => (Ended::Failed, broken.unwrap_or_default()),
         Some(axis) => (Ended::Stopped, format!("{}: {}", axis.axis().name(), axis.cause())),
-        None if rehearsal.station().done() => (Ended::Done, String::new()),
+        None if rehearsal.node().done() => (Ended::Done, String::new()),
         None => (Ended::TimeOver, "the longest time was over before the experiment was done".to_owned()),
     };
     let drive =

@@ -1,11 +1,10 @@
 //! The controller's command line.
 
-use crate::chains::AfterStop;
+use axis_control::setup::FileArguments;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use plant::Axis;
 use protocol::bus::BusUrl;
 use protocol::exit::EXIT_CODE_HELP;
-use runlog::run_folder;
 use std::path::PathBuf;
 
 /// Controls the axes of the rig over a CAN bus.
@@ -64,7 +63,7 @@ pub struct Library {
     pub file: PathBuf,
 }
 
-/// How the controllers are paced.
+/// How the controllers are outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Pace {
     /// Answer the rig's frames as they arrive.
@@ -94,41 +93,6 @@ impl Axes {
             Self::Both => &Axis::ALL,
         }
     }
-}
-
-/// What is controlled, how, and where the files go.
-#[derive(Args, Clone, Debug)]
-pub struct FileArguments {
-    /// Rig file, of which nominal numbers are read: valve characteristic, areas, stroke.
-    #[arg(long)]
-    pub rig: PathBuf,
-    /// Experiment file: set-points, programs, settling, repetitions.
-    #[arg(long)]
-    pub experiment: PathBuf,
-    /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
-    #[arg(long, default_value_os_t = run_folder::new_folder())]
-    pub out: PathBuf,
-    /// Folder of the programs that the experiment names; by default "programs" beside the experiment's folder.
-    #[arg(long)]
-    pub programs: Option<PathBuf>,
-    /// Program file of the drive, in place of the experiment's.
-    #[arg(long)]
-    pub drive_program: Option<PathBuf>,
-    /// Program file of the load axis, in place of the experiment's.
-    #[arg(long)]
-    pub load_program: Option<PathBuf>,
-    /// Parameter set in place of the programs' numbers, as 'controller parameters' or XCP writes it; --set goes before it.
-    #[arg(long, value_name = "FILE")]
-    pub parameters: Option<PathBuf>,
-    /// A variable in place of the program's, such as drive.algorithm.gain_per_s=30; may be repeated.
-    #[arg(long, value_name = "AXIS.TASK.NAME=VALUE")]
-    pub set: Vec<String>,
-    /// Repeat the experiment until the rig ends, instead of saying Done.
-    #[arg(long)]
-    pub repeat: bool,
-    /// What follows an emergency stop that was released, in place of the experiment's.
-    #[arg(long, value_enum)]
-    pub after_emergency_stop: Option<AfterStop>,
 }
 
 /// How to run with a rig on a bus.

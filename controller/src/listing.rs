@@ -1,18 +1,18 @@
 //! The list of all algorithms and of all parameters, for people.
 
-use crate::algorithm::Quantity;
-use crate::algorithms::SHIPPED;
-use crate::axis::AxisController;
-use crate::chains::{force, matching, settled};
-use crate::cli::{A2lArguments, FileArguments, OneAxis};
-use crate::parameters::Parameter;
+use crate::cli::{A2lArguments, OneAxis};
 use crate::run::RunError;
-use crate::setup::{Inputs, Mode};
-use crate::xcp::a2l::{self, Described};
-use crate::{parameter_set, post_controller, pre_controller};
+use algorithms::SHIPPED;
+use algorithms::algorithm::Quantity;
+use algorithms::parameters::Parameter;
+use axis_control::axis::AxisController;
+use axis_control::chains::{force, matching, settled};
+use axis_control::setup::{FileArguments, Inputs, Mode};
+use axis_control::{parameter_set, post_controller, pre_controller};
 use plant::Axis;
 use protocol::exit::Exit;
 use std::io::{self, Write};
+use xcp::a2l::{self, Described};
 
 /// Prints the list.
 #[must_use]
@@ -58,7 +58,7 @@ pub fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
 }
 
 fn controller(inputs: &Inputs, axis: Axis) -> Result<AxisController, RunError> {
-    inputs.controller(axis, Mode { partner_needed: false, real_time: false, forever: false })
+    Ok(inputs.controller(axis, Mode { partner_needed: false, real_time: false, forever: false })?)
 }
 
 fn write(out: &mut impl Write) -> io::Result<()> {

@@ -2,8 +2,8 @@
 
 use clap::Parser;
 use controller::cli::{Cli, Command};
-use controller::plugin::command;
 use controller::run::RunError;
+use plugin::command;
 use std::process::ExitCode;
 
 #[cfg(feature = "count-allocations")]

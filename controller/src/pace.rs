@@ -3,9 +3,10 @@
 //! In real time the controllers have no clock of their own that could drift against the rig's: the sensors of a cycle wake
 //! them, and their wake-up latency is counted from the arrival of the frame at our queue (see [`crate::timing`]).
 
-use crate::rig_view::PerAxis;
-use crate::station::{News, Station};
+use crate::Node;
 use crate::timing::{Stopwatch, StopwatchAccount};
+use axis_control::node::{News, STOPPED_CYCLES};
+use axis_control::rig_view::PerAxis;
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{Bus, BusError, Received};
 use realtime::{Clock, Continued, Interrupt, VitalsReader};
@@ -18,8 +19,6 @@ const PATIENCE: Duration = Duration::from_millis(20);
 const SILENCE: Duration = Duration::from_millis(200);
 /// Silence after Done that counts as the rig's end.
 const DONE_SILENCE: Duration = Duration::from_secs(1);
-/// Cycles after an abort or a fault during which the valve is still told to stay shut and the record goes on.
-pub(crate) const STOPPED_CYCLES: u64 = 2000;
 /// Answers that the allocation count leaves out at the start.
 const WARM_UP: u64 = 1000;
 
@@ -38,10 +37,10 @@ pub enum End {
     LockstepTimeout,
 }
 
-/// Controllers on their bus, and what may end their run.
-pub struct Ride<'a> {
+/// The node of a run, its bus and what may end it.
+pub struct RunContext<'a> {
     /// The controllers.
-    pub station: &'a mut Station,
+    pub node: &'a mut Node,
     /// Their peer on the bus.
     pub bus: &'a mut dyn Bus,
     /// How long the rig may be silent.
@@ -50,8 +49,8 @@ pub struct Ride<'a> {
     pub interrupt: &'a Interrupt,
 }
 
-/// What a pace measured.
-pub struct Paced {
+/// How a run ended and what was measured meanwhile.
+pub struct RunOutcome {
     /// Why it ended.
     pub end: End,
     /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
@@ -61,10 +60,14 @@ pub struct Paced {
 }
 
 /// Answers frames as they arrive, under a stopwatch.
-pub fn run_real(ride: Ride<'_>, mut stopwatch: Stopwatch<impl Clock + Send>, continued: Continued) -> Paced {
-    let Ride { station, bus, grace, interrupt } = ride;
+pub fn run_real(
+    context: RunContext<'_>,
+    mut stopwatch: Stopwatch<impl Clock + Send>,
+    continued: Continued,
+) -> RunOutcome {
+    let RunContext { node, bus, grace, interrupt } = context;
     let mut vitals = VitalsReader::new(continued);
-    let mut rig = RigLife::new(station);
+    let mut rig = RigLife::new(node);
     // Not being connected yet is no loss; only what was up can be lost.
     let mut was_up = true;
     let mut ever_up = false;
@@ -73,21 +76,21 @@ pub fn run_real(ride: Ride<'_>, mut stopwatch: Stopwatch<impl Clock + Send>, con
     stopwatch.begin();
     let end = loop {
         bus.wait_readable(PATIENCE);
-        if watch.is_none() && station.answered() >= WARM_UP {
+        if watch.is_none() && node.answered() >= WARM_UP {
             watch = Some(realtime::allocations::watch());
         }
         stopwatch.woke();
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
-            let sensors = station.take(&frame);
+            let sensors = node.take(&frame);
             stopwatch.took(&frame, stamp_ns, sensors);
         }
         stopwatch.took_all();
-        let answered = station.answer(&mut stopwatch.bus(bus));
+        let answered = node.answer(&mut stopwatch.bus(bus));
         stopwatch.answered(answered, || counted(&mut vitals));
         if interrupt.came() {
             break End::Interrupted;
         }
-        if station.ending() {
+        if node.ending() {
             break End::RigEnded;
         }
         ever_up |= bus.is_up();
@@ -96,17 +99,17 @@ pub fn run_real(ride: Ride<'_>, mut stopwatch: Stopwatch<impl Clock + Send>, con
         let went = times_gone != std::mem::replace(&mut disconnects, times_gone);
         if went && ever_up && was_up {
             was_up = false;
-            station.tell(News::BusLost);
+            node.tell(News::BusLost);
         }
         if ever_up && bus.is_up() != was_up {
             was_up = bus.is_up();
-            station.tell(if was_up { News::BusBack } else { News::BusLost });
+            node.tell(if was_up { News::BusBack } else { News::BusLost });
         }
-        let quiet = rig.quiet(station);
-        if station.stopped_for() > STOPPED_CYCLES {
+        let quiet = rig.quiet(node);
+        if node.stopped_for() > STOPPED_CYCLES {
             break End::Stopped;
         }
-        if quiet > DONE_SILENCE && station.done() {
+        if quiet > DONE_SILENCE && node.done() {
             break End::RigEnded;
         }
         if quiet > grace {
@@ -117,7 +120,7 @@ pub fn run_real(ride: Ride<'_>, mut stopwatch: Stopwatch<impl Clock + Send>, con
         drop(watch);
         realtime::allocations::counted()
     });
-    Paced { end, allocations, stopwatch: stopwatch.finish() }
+    RunOutcome { end, allocations, stopwatch: stopwatch.finish() }
 }
 
 /// What the kernel counted since it was asked last, in the words of the timing table.
@@ -142,18 +145,18 @@ struct RigLife {
 }
 
 impl RigLife {
-    fn new(station: &Station) -> Self {
-        Self { heard: Self::heard(station), last: WallInstant::now(), silent: false }
+    fn new(node: &Node) -> Self {
+        Self { heard: Self::heard(node), last: WallInstant::now(), silent: false }
     }
 
     /// What others say is no life of the rig: it sends sensors and ticks.
-    fn heard(station: &Station) -> (PerAxis, Option<u64>) {
-        (station.view().received(), station.view().cycle())
+    fn heard(node: &Node) -> (PerAxis, Option<u64>) {
+        (node.view().received(), node.view().cycle())
     }
 
     /// For how long it has been silent; tells a person when that begins.
-    fn quiet(&mut self, station: &mut Station) -> Duration {
-        let before = std::mem::replace(&mut self.heard, Self::heard(station));
+    fn quiet(&mut self, node: &mut Node) -> Duration {
+        let before = std::mem::replace(&mut self.heard, Self::heard(node));
         if self.heard != before {
             self.last = WallInstant::now();
         }
@@ -161,7 +164,7 @@ impl RigLife {
         if (quiet > SILENCE) != self.silent {
             self.silent = !self.silent;
             if self.silent {
-                station.tell(News::SensorsSilent);
+                node.tell(News::SensorsSilent);
             }
         }
         quiet
@@ -172,14 +175,14 @@ impl RigLife {
 ///
 /// # Errors
 /// [`BusError::NoBarrier`] on a bus without one.
-pub fn run_lockstep(ride: Ride<'_>, name: &str) -> Result<Paced, BusError> {
-    let Ride { station, bus, grace, interrupt } = ride;
+pub fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOutcome, BusError> {
+    let RunContext { node, bus, grace, interrupt } = context;
     bus.join_lockstep(Role::Member, name)?;
     let mut waiting_since = None;
     let end = loop {
         match bus.receive() {
             Received::Frame(frame, _) => {
-                station.take(&frame);
+                node.take(&frame);
             }
             Received::Barrier(control) => match control.kind {
                 Kind::Go { .. } => {
@@ -188,12 +191,12 @@ pub fn run_lockstep(ride: Ride<'_>, name: &str) -> Result<Paced, BusError> {
                     if interrupt.came() {
                         break End::Interrupted;
                     }
-                    if station.ending() {
+                    if node.ending() {
                         break End::RigEnded;
                     }
-                    station.answer(bus);
+                    node.answer(bus);
                     bus.done(control.cycle);
-                    if station.stopped_for() > STOPPED_CYCLES {
+                    if node.stopped_for() > STOPPED_CYCLES {
                         break End::Stopped;
                     }
                 }
@@ -208,12 +211,12 @@ pub fn run_lockstep(ride: Ride<'_>, name: &str) -> Result<Paced, BusError> {
                 let since = *waiting_since.get_or_insert_with(WallInstant::now);
                 if bus.counters().disconnects > 0 || since.elapsed() > grace {
                     // The farewell itself may be lost on the wire; a rig that goes when all is done has ended.
-                    let ended = station.ending() || station.done();
+                    let ended = node.ending() || node.done();
                     break if ended { End::RigEnded } else { End::BusGone };
                 }
                 bus.wait_readable(Duration::from_millis(100));
             }
         }
     };
-    Ok(Paced { end, allocations: None, stopwatch: StopwatchAccount::default() })
+    Ok(RunOutcome { end, allocations: None, stopwatch: StopwatchAccount::default() })
 }

@@ -2,12 +2,11 @@
 //!
 //! A thread of its own polls the queues, so that the 1 ms path wakes nobody.
 
-use crate::axis::AxisRecord;
-use crate::guard::Stuck;
-use crate::station::News;
+use crate::reload::Reloader;
 use crate::timing::ledger::{Ledger, TimingFigures};
-use crate::watch::Watcher;
-use crate::xcp::clerk::Clerk;
+use algorithms::guard::Stuck;
+use axis_control::axis::AxisRecord;
+use axis_control::node::News;
 use crossbeam_channel::{Receiver, TryRecvError};
 use plant::Axis;
 use protocol::frames::MainChainState;
@@ -15,6 +14,7 @@ use runlog::run_folder::LineFile;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
+use xcp::clerk::Clerk;
 
 /// Pause between two looks at the queues.
 const POLL_PERIOD: Duration = Duration::from_millis(4);
@@ -99,7 +99,7 @@ pub struct Writer {
     /// What a person is told.
     pub news: Receiver<News>,
     /// Who looks at the program files, if anybody does.
-    pub watcher: Option<Watcher>,
+    pub reloader: Option<Reloader>,
     /// Who does what XCP asks for, if it may.
     pub clerk: Option<Clerk>,
     /// Who records what the stopwatch stamped, where time is real.
@@ -120,7 +120,7 @@ impl Writer {
     /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
     /// which does not return, when an algorithm never does, with everything written.
     pub fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
-        let Self { mut tables, records, news, mut watcher, mut clerk, mut ledger } = self;
+        let Self { mut tables, records, news, mut reloader, mut clerk, mut ledger } = self;
         let mut told = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
@@ -137,8 +137,8 @@ impl Writer {
                     Err(gone) => finished = gone == TryRecvError::Disconnected,
                 }
             }
-            if let Some(watcher) = &mut watcher {
-                watcher.look();
+            if let Some(reloader) = &mut reloader {
+                reloader.look();
             }
             if let Some(clerk) = &mut clerk {
                 clerk.look();

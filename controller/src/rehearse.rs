@@ -3,21 +3,20 @@
 //! It leaves what a run on a bus leaves, save for what only a bus has: no `bus.log`, no latencies.
 
 use crate::cli::RehearseArguments;
-use crate::guard::{STUCK, Stuck};
 use crate::recording::{Tables, sentence};
-use crate::rehearsal::{Rehearsal, RehearsalParts};
 use crate::report::{self, AxisReport, Report};
 use crate::run::RunError;
-use crate::setup::{Inputs, Mode};
-use crate::station::News;
 use crate::timing::ledger::TimingFigures;
-use plant::scene::Outcome;
-use plant::{Axis, Scene, tables};
+use algorithms::guard::{STUCK, Stuck};
+use axis_control::node::News;
+use axis_control::setup::Inputs;
+use plant::Axis;
 use protocol::bus::BusCounters;
 use protocol::exit::Exit;
 use realtime::{Interrupt, Percentiles, Recorder};
+use rehearsal::{PlantTables, Rehearsal};
 use runlog::flight_dump;
-use runlog::run_folder::{LineFile, SCHEMA_VERSION, clear, clear_results, controller_results, write_json};
+use runlog::run_folder::{SCHEMA_VERSION, clear, clear_results, controller_results, write_json};
 use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -29,14 +28,9 @@ use std::time::{Duration, Instant};
 pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(&arguments.files)?;
     let file = arguments.files.experiment.display().to_string();
-    let scene = Scene::from_toml(&inputs.experiment_toml, &file, &inputs.rig).map_err(RunError::input)?;
-    if scene.sealed.is_some() {
-        return Err(RunError::Input(format!(
-            "{file}: rig.sealed: a rehearsal runs the plant inside the controller, which must not read a sealed file; use \
-             'emulator run' and 'controller run', or scripts/run without --rehearse"
-        )));
-    }
-    let mut rehearsal = rehearsal(&inputs, &scene, arguments.seed, arguments.files.repeat)?;
+    let scene = rehearsal::scene(&inputs, &file).map_err(RunError::input)?;
+    let mut rehearsal = rehearsal::of_inputs(&inputs, &scene, arguments.seed, arguments.files.repeat)
+        .map_err(RunError::input)?;
     let interrupt =
         Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
     let out = &arguments.files.out;
@@ -46,20 +40,24 @@ pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     end_when_stuck();
     let started = Instant::now();
-    let mut files = Files::create(out, &scene, &rehearsal.plant().term_names()).map_err(RunError::output)?;
+    let mut files = PlantTables::create(out, &scene, &rehearsal).map_err(RunError::output)?;
+    let mut axes = Tables::create(out, &Axis::ALL).map_err(RunError::output)?;
     let cycles = (arguments.seconds * 1000.0).round() as u64;
     let (mut told, mut news) = (Vec::new(), Vec::new());
     let mut interrupted = false;
     while rehearsal.cycles() < cycles && !rehearsal.ended() && !interrupted {
         let rehearsed = rehearsal.step(|cycle, outcome| told.push(event(cycle, outcome)));
-        files.write(&rehearsed).map_err(RunError::output)?;
+        files
+            .write(&rehearsed.cycle)
+            .and_then(|()| rehearsed.axes.iter().flatten().try_for_each(|record| axes.write(record)))
+            .map_err(RunError::output)?;
         for item in rehearsal.take_news() {
             eprintln!("controller: {}", sentence(item));
             news.push(item);
         }
         interrupted = interrupt.came();
     }
-    files.write_out().map_err(RunError::output)?;
+    files.write_out().and_then(|()| axes.write_out()).map_err(RunError::output)?;
     if let Some(error) = rehearsal.off_the_wire() {
         let cycle = rehearsal.cycles();
         return Err(RunError::Input(format!(
@@ -93,49 +91,6 @@ fn end_when_stuck() {
     });
 }
 
-/// A rehearsal of what was read.
-///
-/// # Errors
-/// [`RunError::Input`] when rig and scene, or experiment and programs, do not go together.
-pub fn rehearsal(inputs: &Inputs, scene: &Scene, seed: u64, forever: bool) -> Result<Rehearsal, RunError> {
-    let mode = Mode { partner_needed: true, real_time: false, forever };
-    let controllers =
-        Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?;
-    let parts = RehearsalParts { rig: &inputs.rig, scene, seed, controllers };
-    Rehearsal::new(parts).map_err(RunError::input)
-}
-
-/// The tables of a rehearsal.
-struct Files {
-    measurement: LineFile,
-    truth: LineFile,
-    axes: Tables,
-}
-
-impl Files {
-    fn create(folder: &Path, scene: &Scene, terms: &[String]) -> std::io::Result<Self> {
-        let mut measurement = LineFile::create(&folder.join("measurement.csv"))?;
-        let mut truth = LineFile::create(&folder.join("truth.csv"))?;
-        tables::write_measurement_head(measurement.lines(), scene.linked, scene.added_mass_kg)?;
-        tables::write_truth_head(truth.lines(), terms)?;
-        Ok(Self { measurement, truth, axes: Tables::create(folder, &Axis::ALL)? })
-    }
-
-    fn write(&mut self, rehearsed: &crate::rehearsal::Rehearsed) -> std::io::Result<()> {
-        tables::write_measurement(self.measurement.lines(), &rehearsed.cycle)?;
-        tables::write_truth(self.truth.lines(), &rehearsed.cycle)?;
-        rehearsed.axes.iter().flatten().try_for_each(|record| self.axes.write(record))?;
-        self.measurement.write_when_full()?;
-        self.truth.write_when_full()
-    }
-
-    fn write_out(&mut self) -> std::io::Result<()> {
-        self.measurement.write_out()?;
-        self.truth.write_out()?;
-        self.axes.write_out()
-    }
-}
-
 struct Ended {
     rehearsal: Rehearsal,
     interrupted: bool,
@@ -144,18 +99,18 @@ struct Ended {
     took_s: f64,
 }
 
-fn event(cycle: u64, outcome: Outcome) -> serde_json::Value {
+fn event(cycle: u64, outcome: impl std::fmt::Debug) -> serde_json::Value {
     json!({ "cycle": cycle, "what": format!("{outcome:?}") })
 }
 
 fn save(
     arguments: &RehearseArguments,
     inputs: &Inputs,
-    scene: &Scene,
+    scene: &impl serde::Serialize,
     ended: &Ended,
 ) -> Result<Exit, RunError> {
-    let station = ended.rehearsal.station();
-    let axes = AxisReport::of_station(station, inputs);
+    let node = ended.rehearsal.node();
+    let axes = AxisReport::of_node(node, inputs);
     let stopped = report::stopped(&axes);
     let (exit, ended_because) = match stopped {
         _ if ended.interrupted => {
@@ -184,15 +139,15 @@ fn save(
         started_unix_s: None,
         ended_well: exit == Exit::Good,
         ended_because: ended_because.clone(),
-        cycles_answered: station.answered(),
+        cycles_answered: node.answered(),
         rig_cycles_skipped: 0,
-        frames_ignored: station.ignored(),
+        frames_ignored: node.ignored(),
         bus: BusCounters::default(),
         frames_late: 0,
         frames_duplicate: 0,
         timing: TimingFigures::none(),
         allocations_in_cycle: None,
-        records_dropped: station.records_dropped(),
+        records_dropped: node.records_dropped(),
         sensors_before_start: 0,
         timing_dropped: 0,
         realtime_granted: Vec::new(),

@@ -1,16 +1,16 @@
 //! `controller.json`, or `controller-drive.json` and `controller-load.json`: what a process's controllers were run with and what
 //! they counted.
 
-use crate::axis::AxisController;
-use crate::setup::Inputs;
-use crate::station::{IgnoredFrames, News, Station};
 use crate::timing::ledger::TimingFigures;
-use crate::xcp::port::PortCounters;
+use axis_control::axis::AxisController;
+use axis_control::node::{CalibrationPort, ControllerNode, IgnoredFrames, News};
+use axis_control::setup::Inputs;
 use plant::Axis;
 use protocol::bus::BusCounters;
 use protocol::frames::MainChainState;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use xcp::port::PortCounters;
 
 /// The report of a process.
 #[derive(Debug, Serialize)]
@@ -106,8 +106,12 @@ pub struct AxisReport {
 }
 
 impl AxisReport {
-    fn new(controller: &AxisController, station: &Station, inputs: &Inputs) -> Self {
-        let view = station.view();
+    fn new<P: CalibrationPort>(
+        controller: &AxisController,
+        node: &ControllerNode<P>,
+        inputs: &Inputs,
+    ) -> Self {
+        let view = node.view();
         let program = controller.program();
         let source = inputs.programs[controller.axis().index()].as_ref();
         let values = program.values().iter();
@@ -119,7 +123,7 @@ impl AxisReport {
             algorithm_fault: controller.algorithm_fault().map(|fault| fault.to_string()),
             position_error_dynamic_m: controller.figures().dynamic_m(),
             position_error_static_m: controller.figures().static_m(),
-            cycles_answered: station.answered_by(controller.axis()),
+            cycles_answered: node.answered_by(controller.axis()),
             sensors_received: view.received().get(controller.axis()),
             sensors_lost: view.lost().get(controller.axis()),
             sensors_late: view.late().get(controller.axis()),
@@ -134,16 +138,19 @@ impl AxisReport {
                 .map(|variable| variable.name.clone())
                 .zip(values.copied())
                 .collect(),
-            xcp: station.xcp(controller.axis()),
+            xcp: None,
         }
     }
 
-    /// Of every controller of a station.
+    /// Of every controller of a node, without what XCP did.
     #[must_use]
-    pub fn of_station(station: &Station, inputs: &Inputs) -> BTreeMap<&'static str, Self> {
+    pub fn of_node<P: CalibrationPort>(
+        node: &ControllerNode<P>,
+        inputs: &Inputs,
+    ) -> BTreeMap<&'static str, Self> {
         let of =
-            |controller: &AxisController| (controller.axis().name(), Self::new(controller, station, inputs));
-        station.controllers().map(of).collect()
+            |controller: &AxisController| (controller.axis().name(), Self::new(controller, node, inputs));
+        node.controllers().map(of).collect()
     }
 
     /// Whether the axis ended what it was asked for.

@@ -1,25 +1,22 @@
 //! One run of the controllers: files read, bus opened, threads started, everything saved however it ends.
 
-use crate::axis::AxisController;
+use crate::Node;
 use crate::cli::{Axes, Pace, RunArguments};
 use crate::farewell;
-use crate::guard::STUCK;
-use crate::pace::{self, End, Paced, Ride};
-use crate::plugin::PluginError;
+use crate::pace::{self, End, RunContext, RunOutcome};
 use crate::recording::{Tables, Writer, Written};
+use crate::reload::Reloader;
 use crate::report::{self, AxisReport, Report};
-use crate::setup::{Inputs, Mode};
-use crate::station::{Change, IgnoredFrames, Outlets, Station};
 use crate::timing::Stopwatch;
 use crate::timing::ledger::TimingFigures;
 use crate::timing::setup::{self, RunStart};
-use crate::watch;
-use crate::xcp::a2l::{self, Described};
-use crate::xcp::clerk::{Book, Clerk};
-use crate::xcp::config::XcpConfig;
-use crate::xcp::port::{Port, Queues};
+use algorithms::guard::STUCK;
+use axis_control::axis::AxisController;
+use axis_control::node::{Change, ControllerNode, IgnoredFrames, Outlets};
+use axis_control::setup::{InputError, Inputs, Mode};
 use crossbeam_channel::{Sender, bounded};
 use plant::Axis;
+use plugin::PluginError;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
 use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, Request};
@@ -29,6 +26,10 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
 use std::time::Duration;
+use xcp::a2l::{self, Described};
+use xcp::clerk::{Book, Clerk};
+use xcp::config::XcpConfig;
+use xcp::port::{Port, Queues};
 
 /// Rows that fit the queue: 16 s of both axes.
 const ROW_QUEUE: usize = 32 * 1024;
@@ -44,6 +45,9 @@ pub enum RunError {
     /// A file cannot be read, or says something that is not allowed.
     #[error("{0}")]
     Input(String),
+    /// Experiment and programs.
+    #[error(transparent)]
+    Files(#[from] InputError),
     /// A library that is no algorithm.
     #[error(transparent)]
     Plugin(#[from] PluginError),
@@ -109,12 +113,13 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (news_sender, news) = bounded(NEWS_QUEUE);
     let (change_sender, changes) = bounded(CHANGE_QUEUE);
     let outlets = Outlets { records: record_sender, news: news_sender, changes, waits: !real_time };
-    let (ports, clerk) = match &xcp {
+    let (mut ports, clerk) = match &xcp {
         Some(config) => open_xcp(arguments, &inputs, config, &controllers, &change_sender)?,
         None => (Vec::new(), None),
     };
-    let station = Station::new(controllers, outlets).with_xcp(ports);
-    let watcher = arguments.watch.then(|| watch::Watcher::new(&inputs, axes, change_sender));
+    let port_of = |axis| Some(ports.swap_remove(ports.iter().position(|port: &Port| port.axis() == axis)?));
+    let node = ControllerNode::with_ports(controllers, outlets, port_of);
+    let reloader = arguments.watch.then(|| Reloader::new(&inputs, axes, change_sender));
     let started = RunStart::now();
     let timing = real_time.then(|| setup::begin(arguments, &started, signals.freeze)).transpose()?;
     let (stopwatch, ledger) = timing.unzip();
@@ -122,12 +127,12 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let asking = &signals.interrupt;
         let writer = scope.spawn(move || {
-            let writer = Writer { tables, records, news, watcher, clerk, ledger };
+            let writer = Writer { tables, records, news, reloader, clerk, ledger };
             writer.run(|| asking.ask(), || end_stuck(out, axes))
         });
         let bus = bus.as_mut();
         let (interrupt, continued) = (&signals.interrupt, signals.continued);
-        let parts = Work { arguments, inputs: &inputs, station, stopwatch, bus, interrupt, continued };
+        let parts = Work { arguments, inputs: &inputs, node, stopwatch, bus, interrupt, continued };
         let work = scope.spawn(|| parts.run());
         let finished = join(work);
         let written = join(writer);
@@ -203,7 +208,7 @@ fn end_stuck(out: &Path, axes: &[Axis]) {
 }
 
 struct Finished {
-    paced: Paced,
+    outcome: RunOutcome,
     grants: Grants,
     bus: BusCounters,
     axes: BTreeMap<&'static str, AxisReport>,
@@ -223,7 +228,7 @@ struct Ended {
 struct Work<'a> {
     arguments: &'a RunArguments,
     inputs: &'a Inputs,
-    station: Station,
+    node: Node,
     /// In real time.
     stopwatch: Option<Stopwatch<MonotonicClock>>,
     bus: &'a mut dyn Bus,
@@ -232,28 +237,34 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// The station goes at the end, and with it the sending ends of the recorder's queues.
+    /// The node goes at the end, and with it the sending ends of the recorder's queues.
     fn run(self) -> Result<Finished, RunError> {
-        let Self { arguments, inputs, mut station, stopwatch, bus, interrupt, continued } = self;
+        let Self { arguments, inputs, mut node, stopwatch, bus, interrupt, continued } = self;
         let grants = acquire_realtime(arguments);
         let grace = Duration::from_secs_f64(arguments.bus_grace);
-        let ride = Ride { station: &mut station, bus: &mut *bus, grace, interrupt };
-        let paced = match stopwatch {
-            Some(stopwatch) => pace::run_real(ride, stopwatch, continued),
-            None => pace::run_lockstep(ride, member_name(arguments.axis))?,
+        let context = RunContext { node: &mut node, bus: &mut *bus, grace, interrupt };
+        let outcome = match stopwatch {
+            Some(stopwatch) => pace::run_real(context, stopwatch, continued),
+            None => pace::run_lockstep(context, member_name(arguments.axis))?,
         };
         if arguments.pace == Pace::Real {
-            farewell::hear_out(bus, paced.end == End::RigEnded);
+            farewell::hear_out(bus, outcome.end == End::RigEnded);
+        }
+        let mut axes = AxisReport::of_node(&node, inputs);
+        for axis in Axis::ALL {
+            if let (Some(report), Some(port)) = (axes.get_mut(axis.name()), node.port(axis)) {
+                report.xcp = Some(port.counters());
+            }
         }
         Ok(Finished {
-            paced,
+            outcome,
             grants,
             bus: *bus.counters(),
-            axes: AxisReport::of_station(&station, inputs),
-            answered: station.answered(),
-            skipped: station.view().skipped(),
-            ignored: station.ignored(),
-            records_dropped: station.records_dropped(),
+            axes,
+            answered: node.answered(),
+            skipped: node.view().skipped(),
+            ignored: node.ignored(),
+            records_dropped: node.records_dropped(),
         })
     }
 }
@@ -277,14 +288,14 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
 }
 
 fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
-    let Finished { paced, axes, .. } = &ended.finished;
+    let Finished { outcome, axes, .. } = &ended.finished;
     let done = arguments.files.repeat || axes.values().all(AxisReport::is_done);
     let stopped = report::stopped(axes);
     let aborted = || {
         let why = stopped.map_or_else(String::new, |(name, axis)| format!(": {name}: {}", axis.chain_cause));
         (Exit::BoundBroken, format!("stopped before the end{why}"))
     };
-    match paced.end {
+    match outcome.end {
         _ if ended.written.failure.is_some() => (Exit::BadInput, "the output could not be written".into()),
         End::Stopped => aborted(),
         End::RigEnded if stopped.is_some() => aborted(),
@@ -304,7 +315,7 @@ fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
 fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit, RunError> {
     let (exit, ended_because) = verdict(arguments, &ended);
     let Ended { started, finished, written } = ended;
-    let Finished { paced, grants, bus, axes, .. } = finished;
+    let Finished { outcome, grants, bus, axes, .. } = finished;
     let sum = |of: fn(&AxisReport) -> u64| axes.values().map(of).sum::<u64>();
     eprintln!(
         "controller: {ended_because}; {} cycles answered, {} sensor frames lost",
@@ -327,10 +338,10 @@ fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit,
         frames_late: sum(|axis| axis.sensors_late),
         frames_duplicate: sum(|axis| axis.sensors_duplicate),
         timing: written.timing.unwrap_or_else(TimingFigures::none),
-        allocations_in_cycle: paced.allocations.filter(|_| cfg!(feature = "count-allocations")),
+        allocations_in_cycle: outcome.allocations.filter(|_| cfg!(feature = "count-allocations")),
         records_dropped: finished.records_dropped,
-        sensors_before_start: paced.stopwatch.before_start,
-        timing_dropped: paced.stopwatch.dropped,
+        sensors_before_start: outcome.stopwatch.before_start,
+        timing_dropped: outcome.stopwatch.dropped,
         realtime_granted: grants.granted().to_vec(),
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
         axes,

@@ -3,10 +3,10 @@
 //!
 //! Whatever comes, the opening is a number within the valve, and the valve is shut in every state that has no control.
 
+use axis_control::axis::{Answer, AxisController};
+use axis_control::setup::{Inputs, Mode};
 use clap::Parser;
-use controller::axis::{Answer, AxisController};
 use controller::cli::{Cli, Command};
-use controller::setup::{Inputs, Mode};
 use plant::Axis;
 use proptest::prelude::*;
 use protocol::frames::{

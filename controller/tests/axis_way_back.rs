@@ -1,12 +1,12 @@
 //! What an axis controller keeps and what it forgets: after a fault of its own, with a rig that began anew, with a rig that fell
 //! silent about itself, with rods that are not linked. On the virtual clock, under a partner that goes along.
 
+use axis_control::axis::{Answer, AxisController};
+use axis_control::chains::Fault;
+use axis_control::chains::main::MainCause;
+use axis_control::setup::{Inputs, Mode};
 use clap::Parser;
-use controller::axis::{Answer, AxisController};
-use controller::chains::Fault;
-use controller::chains::main::MainCause;
 use controller::cli::{Cli, Command};
-use controller::setup::{Inputs, Mode};
 use plant::Axis;
 use protocol::frames::{
     ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, EmergencyStopReason, Frame,

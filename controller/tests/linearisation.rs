@@ -1,7 +1,7 @@
 //! The pressure-compensated linearisation against the plant.
 
-use controller::algorithm::Ready;
-use controller::linearisation::{Air, Law, Linearisation};
+use algorithms::algorithm::Ready;
+use algorithms::linearisation::{Air, Law, Linearisation};
 use plant::{Inputs, Plant, RigParameters, Setup};
 
 #[test]

@@ -1,9 +1,9 @@
 //! A rig that skips cycles, or a process that misses some: nothing that was due is dropped, and nobody is blamed for silence.
 
+use axis_control::axis::{Answer, AxisController};
+use axis_control::setup::{Inputs, Mode};
 use clap::Parser;
-use controller::axis::{Answer, AxisController};
 use controller::cli::{Cli, Command};
-use controller::setup::{Inputs, Mode};
 use plant::Axis;
 use protocol::frames::{ChainStatus, Frame, MainChainState, RigStatus, Sensors};
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Experiment files, as the rig (`[rig]`) and as the controllers read them.
 #![no_main]
 
-use controller::experiment::Experiment;
+use axis_control::experiment::Experiment;
 use libfuzzer_sys::fuzz_target;
 use plant::{RigParameters, Scene};
 use std::path::Path;

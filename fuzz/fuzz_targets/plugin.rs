@@ -4,7 +4,7 @@
 //! fuzzer's bytes. In this process, as the trial's child does it.
 #![no_main]
 
-use controller::plugin;
+use plugin;
 use libfuzzer_sys::fuzz_target;
 use libloading::Library;
 use std::path::Path;

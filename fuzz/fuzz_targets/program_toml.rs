@@ -1,9 +1,9 @@
 //! Program files: any text is refused, or makes a program of either axis that controls without a panic.
 #![no_main]
 
-use controller::program::file::Source;
-use controller::program::{Demand, Hand};
-use controller::set_point::{ForceSetPoint, SetPoint};
+use axis_control::program::file::Source;
+use axis_control::program::{Demand, Hand};
+use axis_control::set_point::{ForceSetPoint, SetPoint};
 use libfuzzer_sys::fuzz_target;
 use plant::{Axis, RigParameters};
 use protocol::frames::Sensors;

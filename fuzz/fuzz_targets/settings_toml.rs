@@ -1,9 +1,9 @@
 //! Parameter sets and the configuration of XCP: any text is refused with a message, or holds nothing that is out of its range.
 #![no_main]
 
-use controller::parameter_set;
-use controller::program::file::Source;
-use controller::xcp::config::XcpConfig;
+use axis_control::parameter_set;
+use axis_control::program::file::Source;
+use xcp::config::XcpConfig;
 use libfuzzer_sys::fuzz_target;
 use plant::{Axis, RigParameters};
 use std::sync::OnceLock;

@@ -4,11 +4,11 @@
 //! as others do, with a DISCONNECT or with a CONNECT.
 #![no_main]
 
-use controller::xcp::alone::slave;
-use controller::xcp::image::Desk;
-use controller::xcp::lock;
-use controller::xcp::signals::COUNT;
-use controller::xcp::slave::Slave;
+use xcp::alone::slave;
+use xcp::image::Desk;
+use xcp::lock;
+use xcp::signals::COUNT;
+use xcp::slave::Slave;
 use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 

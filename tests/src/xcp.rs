@@ -5,11 +5,11 @@ use crate::peer::{Packet, Peer};
 use crate::process::{Ended, PATIENCE, Running};
 use crate::records::json;
 use crate::scene::Scene;
-use controller::xcp::lock;
 use protocol::can::CanFrame;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use xcp::lock;
 
 /// Secret of the write protection, as it stands in [`config`]'s file and in the Python client.
 pub const SECRET: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];

@@ -1,9 +1,9 @@
 //! People at the rig: scripted hands and buttons, the rig's own emergency stop on the bus, and its console.
 
-use controller::rehearsal::{Rehearsal, RehearsalParts};
 use plant::RigParameters;
 use protocol::can::CanFrame;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame};
+use rehearsal::{Rehearsal, RehearsalParts};
 use std::path::Path;
 use system_tests::binaries::Build;
 use system_tests::events::{Event, all, times};

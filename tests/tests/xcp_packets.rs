@@ -50,7 +50,7 @@ fn unlock(answers: &[[u8; 8]]) -> Vec<Vec<u8>> {
     let mut said = vec![vec![0xFF, 0], vec![0xF8, 0, 1], vec![0xF8, 1, 0]];
     if let [_, first, second, ..] = answers {
         let seed = [&first[2..8], &second[2..4]].concat().try_into().expect("8 bytes");
-        let key = controller::xcp::lock::key(&SECRET, seed);
+        let key = xcp::lock::key(&SECRET, seed);
         said.push([&[0xF7, 8], &key[..6]].concat());
         said.push([&[0xF7, 2], &key[6..]].concat());
     }

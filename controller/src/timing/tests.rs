@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::cli::{Cli, Command};
-use crate::setup::{Inputs, Mode};
-use crate::station::{self, Station};
+use axis_control::node::{self, ControllerNode};
+use axis_control::setup::{Inputs, Mode};
 use clap::Parser;
 use crossbeam_channel::{Receiver, bounded};
 use protocol::bus::control::Role;
@@ -341,7 +341,7 @@ fn what_finds_no_room_is_counted() {
 }
 
 /// The controllers of both axes on a bus.
-fn both_axes() -> Station {
+fn both_axes() -> ControllerNode {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = |name: &str| root.join(name).display().to_string();
     let [rig, experiment] = [path("../plant/rig.toml"), path("experiments/load-step.toml")];
@@ -355,16 +355,16 @@ fn both_axes() -> Station {
     let (records, _) = bounded(64);
     let (news, _) = bounded(64);
     let (_, changes) = bounded(1);
-    Station::new(controllers.into(), station::Outlets { records, news, changes, waits: false })
+    ControllerNode::new(controllers.into(), node::Outlets { records, news, changes, waits: false })
 }
 
 #[test]
 fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
     use Axis::{Drive, Load};
     let mut bench = Bench::new(&Axis::ALL);
-    let mut station = both_axes();
+    let mut node = both_axes();
     let tick = Frame::Tick(Tick { cycle: 0, ..Tick::default() }).encode().unwrap();
-    assert_eq!(station.take(&tick), None);
+    assert_eq!(node.take(&tick), None);
     let wake_ups: [&[(Axis, u8)]; 7] = [
         &[(Drive, 0), (Load, 0)],
         &[(Drive, 1)],
@@ -381,12 +381,12 @@ fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
             let frame =
                 if *axis == Drive { Frame::DriveSensors(sensors) } else { Frame::LoadSensors(sensors) };
             let frame = frame.encode().unwrap();
-            let whose = station.take(&frame);
+            let whose = node.take(&frame);
             bench.stopwatch.took(&frame, bench.now(), whose);
             bench.clock.pass(1);
         }
         bench.stopwatch.took_all();
-        let cycles = station.answer(&mut bench.stopwatch.bus(&mut bench.wire));
+        let cycles = node.answer(&mut bench.stopwatch.bus(&mut bench.wire));
         bench.stopwatch.answered(cycles, Vitals::default);
     }
     let rows = bench.rows();
@@ -402,6 +402,6 @@ fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
         [both(0), (1, true, false), both(2), both(3), (4, false, true), both(5), both(6)],
         "cycles with the axes that answered them"
     );
-    assert_eq!(Axis::ALL.map(|axis| station.answered_by(axis)), [6, 6]);
-    assert_eq!(station.answered(), rows.len() as u64);
+    assert_eq!(Axis::ALL.map(|axis| node.answered_by(axis)), [6, 6]);
+    assert_eq!(node.answered(), rows.len() as u64);
 }

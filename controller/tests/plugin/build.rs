@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use controller::plugin::{TRIAL_LIMIT, Trier};
+use plugin::{TRIAL_LIMIT, Trier};
 
 /// A folder with libraries.
 pub(crate) struct Libraries(tempfile::TempDir);

@@ -2,11 +2,11 @@
 
 use crate::build::{Libraries, trier};
 use crate::position_pi::KIND;
-use controller::algorithm::{Algorithm, Quantity, Ready};
-use controller::guard::Guarded;
-use controller::linearisation::{Law, Linearisation};
-use controller::plugin::{Plugin, load_tried_by};
+use algorithms::algorithm::{Algorithm, Quantity, Ready};
+use algorithms::guard::Guarded;
+use algorithms::linearisation::{Law, Linearisation};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
+use plugin::{Plugin, load_tried_by};
 use realtime::{MonotonicClock, allocations};
 
 fn example() -> Plugin {

@@ -1,10 +1,10 @@
 //! Libraries that pass their trial and fail later: the watch latches and nothing of theirs leaves any more.
 
 use crate::build::{Libraries, trier};
-use controller::algorithm::Ready;
-use controller::guard::{AlgorithmFault, Guarded, LONGEST_ONCE};
-use controller::plugin::load_tried_by;
+use algorithms::algorithm::Ready;
+use algorithms::guard::{AlgorithmFault, Guarded, LONGEST_ONCE};
 use plant::RigParameters;
+use plugin::load_tried_by;
 use realtime::MonotonicClock;
 
 /// The library of `options` under watch, after 999 good steps.

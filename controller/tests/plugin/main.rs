@@ -9,7 +9,7 @@ mod position_pi;
 mod refused;
 
 /// So that `position_pi.rs` compiles as it would beside the shipped algorithms.
-use controller::{algorithm, parameters};
+use algorithms::{algorithm, parameters};
 
 /// Counts what the watched part of a test allocates.
 #[global_allocator]

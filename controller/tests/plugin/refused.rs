@@ -1,8 +1,8 @@
 //! Libraries that are refused when they are loaded, each with its words.
 
 use crate::build::{Libraries, trier, trier_with};
-use controller::plugin::{describe, load_tried_by, probe};
 use plant::RigParameters;
+use plugin::{describe, load_tried_by, probe};
 use std::process::Command;
 use std::time::Duration;
 
@@ -104,7 +104,7 @@ fn what_is_no_library_and_what_is_not_there_is_told_so() {
 fn a_trier_that_knows_nothing_of_libraries_refuses_all() {
     let libraries = Libraries::new();
     let library = libraries.hostile(&[]);
-    let other = controller::plugin::Trier { program: "/bin/true".into(), ..trier() };
+    let other = plugin::Trier { program: "/bin/true".into(), ..trier() };
     let told = load_tried_by(&other, &library, &RigParameters::baseline()).err().unwrap().to_string();
     assert!(told.contains("'/bin/true' cannot try libraries"), "{told}");
 }

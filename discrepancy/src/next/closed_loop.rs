@@ -9,12 +9,12 @@
 
 use super::menu::{Entry, program};
 use crate::gridded_record::Point;
-use controller::axis::AxisRecord;
-use controller::rehearsal::{Rehearsal, RehearsalParts};
-use controller::run::RunError;
-use controller::setup::{Inputs as Files, Mode};
+use axis_control::axis::AxisRecord;
+use axis_control::setup::InputError;
+use axis_control::setup::{Inputs as Files, Mode};
 use plant::{Axis, Inputs, RigParameters, Scene, SceneError, SetupError, State, Truth};
 use protocol::frames::MainChainState;
+use rehearsal::{Rehearsal, RehearsalParts};
 
 /// Longest run, periods: what is behind it is not looked at.
 const LONGEST: usize = 30_000;
@@ -39,7 +39,7 @@ const UNSETTLED: [&str; 6] = [
 pub enum ClosedLoopError {
     /// The experiment or a program is none.
     #[error(transparent)]
-    Files(#[from] RunError),
+    Files(#[from] InputError),
     /// `[rig]` of the experiment is none.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -110,7 +110,7 @@ pub fn drive(
         inputs.push(Inputs { valve: cycle.valve, ..Inputs::default() });
         points.push(points_of(&cycle.truth, stroke_m));
     }
-    let done = rehearsal.station().done();
+    let done = rehearsal.node().done();
     Ok(ClosedLoopRun { linked: scene.linked, start, inputs, points, began, done })
 }
 

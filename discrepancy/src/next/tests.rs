@@ -1,7 +1,7 @@
 //! The menu is safe and can be run; what is proposed separates what it says.
 
 use super::*;
-use controller::setup::Inputs as Files;
+use axis_control::setup::Inputs as Files;
 use std::collections::BTreeSet;
 
 /// A pair that differs by so much against noise alone.

@@ -6,12 +6,12 @@ use super::numbers::Numbers;
 use super::rig::{Evaluated, Rig, STEPS_PER_MS, State, drift};
 use super::sensing::Sensing;
 use super::{Experiment, MakeError, ROWS, Recipe, Record, Row, TrueAxis, hidden};
-use controller::axis::AxisController;
-use controller::cli::FileArguments;
-use controller::rehearsal::{Rehearsal, SimulatedRig, Standing};
-use controller::setup::{Inputs, Mode};
+use axis_control::axis::AxisController;
+use axis_control::setup::FileArguments;
+use axis_control::setup::{Inputs, Mode};
 use plant::scene::{Holder, Outcome, RigCall};
 use plant::{Axis, AxisReadings, RigParameters, Scene};
+use rehearsal::{Rehearsal, SimulatedRig, Standing};
 use std::path::{Path, PathBuf};
 
 /// Rms and largest error of a sampling instant, s.
@@ -81,7 +81,7 @@ pub fn simulate_proposed(
     while !rehearsal.ended() && record.rows.len() < MOST_ROWS {
         record.rows.push(next_row(&mut rehearsal)?);
     }
-    if rehearsal.station().done() {
+    if rehearsal.node().done() {
         Ok(record)
     } else {
         Err(MakeError::Unfinished { file: file.to_owned(), length_s: record.rows.len() as f64 / 1000.0 })

@@ -44,7 +44,7 @@ pub use closed_loop::{replay, simulate, simulate_proposed};
 pub use files::{make, write, write_measurement};
 pub use numbers::PARAMETERS;
 
-use controller::run::RunError;
+use axis_control::setup::InputError;
 use plant::effects::sheet::Place;
 use plant::{Axis, AxisReadings, SceneError};
 
@@ -220,7 +220,7 @@ pub enum MakeError {
     },
     /// Experiment and programs do not go together.
     #[error(transparent)]
-    Run(#[from] RunError),
+    Run(#[from] InputError),
     /// The setup is none of the rig's.
     #[error(transparent)]
     Scene(#[from] SceneError),

@@ -24,12 +24,17 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 10] = [
+const ROOMS: [&str; 15] = [
     "protocol",
     "realtime",
     "runlog",
     "plant",
     "emulator",
+    "algorithms",
+    "plugin",
+    "axis-control",
+    "xcp",
+    "rehearsal",
     "controller",
     "bench",
     "discrepancy",
@@ -44,9 +49,27 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("plant", &[]),
     ("fmu", &["plant"]),
     ("emulator", &["protocol", "realtime", "runlog", "plant"]),
-    ("controller", &["protocol", "realtime", "runlog", "plant"]),
-    ("discrepancy", &["protocol", "realtime", "runlog", "plant", "controller", "bench"]),
-    ("campaign", &["protocol", "realtime", "runlog", "plant", "controller", "bench"]),
+    ("algorithms", &["realtime", "plant"]),
+    ("plugin", &["protocol", "plant", "algorithms"]),
+    ("axis", &["protocol", "realtime", "runlog", "plant", "algorithms", "plugin"]),
+    ("xcp", &["protocol", "runlog", "plant", "algorithms", "axis-control"]),
+    ("rehearsal", &["protocol", "runlog", "plant", "axis-control"]),
+    (
+        "controller",
+        &[
+            "protocol",
+            "realtime",
+            "runlog",
+            "plant",
+            "algorithms",
+            "plugin",
+            "axis-control",
+            "xcp",
+            "rehearsal",
+        ],
+    ),
+    ("discrepancy", &["protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "bench"]),
+    ("campaign", &["protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "bench"]),
 ];
 
 /// House-style: who knows whom.
@@ -102,13 +125,18 @@ fn edge(room: &str, other: &str) -> String {
 /// What the controller may take from `plant`: the nominal numbers, and which axis is which.
 const NOMINAL: &[&str] = &["RigParameters", "Axis", "parameters"];
 
-/// Where the controller looks into the plant: its rehearsal, as the paper has it.
-const REHEARSAL: &[&str] = &["controller/src/rehearsal.rs", "controller/src/rehearse.rs"];
+/// Crates of the axis controllers; their rehearsal, which looks into the plant, is a crate of its own.
+const NOMINAL_CRATES: &[&str] = &["algorithms/", "plugin/", "axis/", "xcp/", "controller/"];
 
-/// The controller reads the rig's nominal numbers and nothing else of the plant.
+/// An axis controller reads the rig's nominal numbers and nothing else of the plant.
 pub(super) const NOMINAL_NUMBERS_ONLY: Rule = Rule {
     name: "nominal-numbers-only",
-    applies: |path| path.starts_with("controller/src/") && is_rust(path) && !REHEARSAL.contains(&path),
+    applies: |path| {
+        is_rust(path)
+            && NOMINAL_CRATES
+                .iter()
+                .any(|room| path.strip_prefix(room).is_some_and(|path| path.starts_with("src/")))
+    },
     check: |file| {
         // Over lines, because a list in braces may be broken.
         let mut problems = Vec::new();
@@ -136,7 +164,7 @@ pub(super) const NOMINAL_NUMBERS_ONLY: Rule = Rule {
         problems
     },
     bad: &[
-        ("controller/src/a.rs", "//! A.\nuse plant::Plant;\n", 2),
+        ("axis/src/a.rs", "//! A.\nuse plant::Plant;\n", 2),
         ("controller/src/a.rs", "use plant::{\n    Axis,\n    Truth,\n};\n", 1),
         ("controller/src/a.rs", "use plant::*;\n", 1),
         ("controller/src/a.rs", "fn f() {\n    let p = plant::Plant::new();\n}\n", 2),
@@ -151,7 +179,7 @@ pub(super) const NOMINAL_NUMBERS_ONLY: Rule = Rule {
             "const N: usize = plant::parameters::VALVE_POINTS;\nuse power_plant::Boiler;\n",
         ),
         ("emulator/src/a.rs", "use plant::Plant;\n"),
-        ("controller/src/rehearsal.rs", "use plant::Plant;\n"),
+        ("rehearsal/src/lib.rs", "use plant::Plant;\n"),
     ],
 };
 

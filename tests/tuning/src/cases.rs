@@ -6,11 +6,8 @@ use bench::figures::{self, Figures, position};
 use bench::record::Record;
 use bench::series::{Series, Span};
 use bench::tables_read::{StateSpan, Table};
-use controller::axis::AxisRecord;
-use controller::cli::FileArguments;
-use controller::rehearsal::Rehearsed;
-use controller::setup::Inputs;
 use plant::{Axis, Scene};
+use rehearsal::Rehearsed;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 

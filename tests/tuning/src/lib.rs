@@ -14,8 +14,8 @@ pub mod cases;
 pub mod position;
 pub mod rehearsed;
 
-use controller::guard::AlgorithmFault;
-use controller::run::RunError;
+use algorithms::guard::AlgorithmFault;
+use axis_control::setup::InputError;
 use plant::{ParameterError, RigParameters};
 use std::sync::Mutex;
 
@@ -82,7 +82,7 @@ pub enum TrialError {
     Algorithm(#[from] AlgorithmFault),
     /// Experiment and programs do not go together.
     #[error(transparent)]
-    Run(#[from] RunError),
+    Run(#[from] InputError),
 }
 
 /// Largest of [`FACTORS`] up to which `is_still`; 0 if it is not even as it is.

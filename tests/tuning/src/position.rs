@@ -14,9 +14,9 @@
 //! is judged apart.
 
 use crate::{Trial, TrialError, largest_factor, means, peak_to_peak};
-use controller::guard::AlgorithmFault;
-use controller::program::{Demand, Hand, Program};
-use controller::set_point::{ForceSetPoint, SetPoint, SmoothWay};
+use algorithms::guard::AlgorithmFault;
+use axis_control::program::{Demand, Hand, Program};
+use axis_control::set_point::{ForceSetPoint, SetPoint, SmoothWay};
 use plant::{Inputs, Plant, RigParameters, Setup, quantise_valve};
 use protocol::frames::Sensors;
 use std::collections::VecDeque;
@@ -217,7 +217,7 @@ impl Figures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use controller::program::file::Source;
+    use axis_control::program::file::Source;
     use plant::Axis;
     use std::path::Path;
 

@@ -13,10 +13,10 @@
 //! time.
 
 use super::{Trial, TrialError, in_parallel, means, peak_to_peak};
-use controller::rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
-use controller::setup::{Inputs, Mode};
+use axis_control::setup::{Inputs, Mode};
 use plant::{Axis, Scene};
 use protocol::frames::MainChainState;
+use rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
 
 /// Largest movement at rest that is no oscillation, m.
 pub const STILL_M: f64 = 2e-4;
@@ -79,7 +79,7 @@ pub fn rehearse(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<Run, Tr
     while rehearsal.cycles() < LONGEST && !rehearsal.ended() {
         rows.push(rehearsal.step(|_, _| {}));
     }
-    let done = rehearsal.station().done();
+    let done = rehearsal.node().done();
     Ok(Run { rows, done })
 }
 

@@ -2,7 +2,7 @@
 //!
 //! The tables behind it: `controller/docs/gains.md`, `controller/docs/better-than-the-paper.md`.
 
-use controller::program::file::Source;
+use axis_control::program::file::Source;
 use plant::{Axis, RigParameters};
 use std::path::Path;
 use tuning::Trial;

@@ -1,9 +1,9 @@
 //! The load axis moved by hand: valve shut, P, P with feed-forward, and the manual mode with its distinction of cases.
 
 use crate::sheet::{SEEDS, Spread};
-use controller::rehearsal::Rehearsed;
 use plant::Axis;
 use plant::scene::{Arm, Hand, Part};
+use rehearsal::Rehearsed;
 use std::error::Error;
 use tuning::cases::{Case, Made, figures};
 use tuning::rehearsed::{self, Run};

@@ -221,7 +221,7 @@ fn number(value: f64, decimals: usize) -> String {
 
 /// The number in the load's program.
 fn shipped(case: &Case, name: &str) -> Option<f64> {
-    let mode = controller::setup::Mode { partner_needed: true, real_time: false, forever: false };
+    let mode = axis_control::setup::Mode { partner_needed: true, real_time: false, forever: false };
     let controller = case.inputs.controller(plant::Axis::Load, mode).ok()?;
     let program = controller.program();
     program.place(name).map(|place| program.values()[place])

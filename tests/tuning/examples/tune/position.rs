@@ -1,8 +1,8 @@
 //! The position programs, unlinked.
 
 use crate::{corners, mark, nominal};
-use controller::program::Program;
-use controller::program::file::{ProgramError, Source};
+use axis_control::program::Program;
+use axis_control::program::file::{ProgramError, Source};
 use plant::{Axis, RigParameters};
 use std::error::Error;
 use std::path::Path;

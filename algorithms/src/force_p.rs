@@ -1,0 +1,69 @@
+//! Force control as in the paper: proportional, with the own rod's velocity as a disturbance fed forward.
+//!
+//! ```text
+//!   w ──► v = k_p (w - F) + k_f x'
+//! ```
+//!
+//! w: set-point of the force, N; F: own force sensor, N, compression positive; x': rate of the own extension, m/s; k_p: gain,
+//! m/(N s); k_f: share of the rate. No state. At a blocked rod the air integrates v to force, so P alone leaves no lasting
+//! error; the motion that the other axis forces on the rod would, and x' moves the air along with the rod.
+//!
+//! Source: [Neugebauer 2011, section 4].
+
+use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
+use crate::parameters::Parameter;
+
+/// In the list of algorithms.
+pub const KIND: Kind = Kind {
+    name: "force-p",
+    about: "force: proportional with the rod's velocity fed forward, the paper's",
+    controls: Quantity::Force,
+    parameters: &PARAMETERS,
+    make: |_| Box::new(ForceP),
+};
+
+const GAIN: usize = 0;
+const FEED_FORWARD: usize = 1;
+static PARAMETERS: [Parameter; 2] = [
+    Parameter::new(("gain_m_per_n_s", "m/(N s)"), [0.0, 0.05], 0.012, "velocity for each error"),
+    Parameter::new(
+        ("velocity_feed_forward", ""),
+        [0.0, 2.0],
+        0.8,
+        "share of the own rod's velocity that is fed forward",
+    ),
+];
+
+/// The algorithm.
+#[derive(Debug)]
+pub struct ForceP;
+
+impl Algorithm for ForceP {
+    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {}
+
+    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
+        let velocity = parameters[GAIN] * (ready.set_force_n - ready.force_n)
+            + parameters[FEED_FORWARD] * ready.velocity_m_per_s;
+        velocity.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S)
+    }
+}
+
+/// Largest result, m/s: several times what any valve of this rig gives.
+const LARGEST_M_PER_S: f64 = 5.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws;
+
+    #[test]
+    fn the_error_and_the_velocity_add_up() {
+        let ready = Ready { set_force_n: 300.0, force_n: 280.0, velocity_m_per_s: -0.2, ..Ready::default() };
+        assert_eq!(ForceP.step(&ready, &[0.01, 0.5]), 0.01 * 20.0 - 0.1);
+    }
+
+    #[test]
+    fn what_every_algorithm_must_keep() {
+        laws::check(&KIND);
+    }
+}

@@ -1,0 +1,330 @@
+//! Force control by a PID whose output, a rate of force, goes through a map of the air's stiffness.
+//!
+//! ```text
+//!   w_r' = sat(w' + (w - w_r) / T_r)              reference: what the axis can follow of a step      |w_r'| <= v_r c
+//!   w_e' = (w_r - w_e) / T_v                      expected: the reference later by the valve
+//!   e    = dz(w_e - F)                            dz(e) = e - sat(e, (1 - s) d)
+//!   I'   = s e / T_i  -  (1 - s) I / T_f
+//!   f    = k_r w_r' + k_p (e + I + T_d (w_e' - F')) + s k_b b x''
+//!   v    = f / c(x, p_a, p_b) + s k_f x'          c = p_a A_a^2 / V_a + p_b A_b^2 / V_b
+//! ```
+//!
+//! w, w': set-point and its rate, N and N/s; F, F': own force sensor and its filtered rate; x', x'': filtered rates of the own
+//! extension, m/s and m/s^2; c: stiffness of the air, N/m, from nominal geometry and measured position and pressures: the
+//! characteristic map, which has its counterpart for the valve in the pressure-compensated linearisation
+//! ([`crate::linearisation`]); b: nominal viscous friction, N s/m; k_p: gain, 1/s; T_i, T_d: integral and derivative time,
+//! s; T_r, T_v: time constants, s; v_r: m/s; k_r, k_f, k_b: shares fed forward; s: how much the rod moves, 0 to 1; d: dead
+//! zone, N; T_f: 50 ms.
+//!
+//! Why: a step is more than the valve can do, so the error is taken against what can be expected by now, and the gain need
+//! not be low for the step's sake. The sensor sees what is left of the air's force behind the rod's friction: when the
+//! other axis slows down under the step, b x'' of it comes or goes, and is fed forward. At rest friction freezes the force:
+//! the integral fades and small errors are let be, lest they pump the rod loose.
+//!
+//! The integral part stops at its limit, and while the valve cannot follow unless the error takes it back.
+//!
+//! Source: PID in the ideal form and integrator clamping [Åström, Hägglund 1995]; the map is the outlook of
+//! [Neugebauer 2011, section 5]; c from its eqs. 1 to 4.
+
+use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
+use crate::linearisation::Air;
+use crate::parameters::Parameter;
+use plant::RigParameters;
+use std::f64::consts::TAU;
+
+/// In the list of algorithms.
+pub const KIND: Kind = Kind {
+    name: "force-pid-map",
+    about: "force: PID through a map of the air's stiffness, with friction and velocity fed forward",
+    controls: Quantity::Force,
+    parameters: &PARAMETERS,
+    make: |rig| Box::new(ForcePidMap::new(rig)),
+};
+
+const GAIN: usize = 0;
+const INTEGRAL_TIME: usize = 1;
+const INTEGRAL_LIMIT: usize = 2;
+const DERIVATIVE_TIME: usize = 3;
+const DERIVATIVE_HZ: usize = 4;
+const REFERENCE_TIME: usize = 5;
+const REFERENCE_SPEED: usize = 6;
+const VALVE_TIME: usize = 7;
+const RATE_SHARE: usize = 8;
+const VELOCITY_SHARE: usize = 9;
+const FRICTION_SHARE: usize = 10;
+const DEAD_ZONE: usize = 11;
+const STANDSTILL: usize = 12;
+static PARAMETERS: [Parameter; 13] = [
+    Parameter::new(("gain_per_s", "1/s"), [0.0, 400.0], 150.0, "rate of force for each error"),
+    Parameter::new(
+        ("integral_time_s", "s"),
+        [0.0, 100.0],
+        0.2,
+        "time in which the integral part doubles a standing error; 0 for none",
+    ),
+    Parameter::new(
+        ("integral_limit_n", "N"),
+        [0.0, 500.0],
+        100.0,
+        "largest integral part, as the error that it stands for",
+    ),
+    Parameter::new(
+        ("derivative_time_s", "s"),
+        [0.0, 0.05],
+        0.0,
+        "time over which the error is extrapolated by its rate",
+    ),
+    Parameter::new(
+        ("derivative_filter_hz", "Hz"),
+        [1.0, 400.0],
+        100.0,
+        "cut-off of the measured force's rate",
+    ),
+    Parameter::new(
+        ("reference_time_s", "s"),
+        [0.001, 1.0],
+        0.032,
+        "time constant with which a step is followed",
+    ),
+    Parameter::new(
+        ("reference_speed_m_per_s", "m/s"),
+        [0.01, 10.0],
+        2.0,
+        "fastest rate of the reference, as the velocity that it stands for",
+    ),
+    Parameter::new(("valve_time_s", "s"), [0.0, 0.1], 0.012, "how much later the force comes than asked for"),
+    Parameter::new(
+        ("rate_feed_forward", ""),
+        [0.0, 2.0],
+        1.0,
+        "share of the reference's rate that is fed forward",
+    ),
+    Parameter::new(
+        ("velocity_feed_forward", ""),
+        [0.0, 2.0],
+        1.0,
+        "share of the own rod's velocity that is fed forward while it moves",
+    ),
+    Parameter::new(
+        ("friction_feed_forward", ""),
+        [0.0, 1.0],
+        0.8,
+        "share of the nominal viscous friction's rate that is fed forward while it moves",
+    ),
+    Parameter::new(("dead_zone_n", "N"), [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
+    Parameter::new(
+        ("standstill_m_per_s", "m/s"),
+        [0.001, 0.2],
+        0.04,
+        "velocity from which on the rod moves; up to half of it, it stands",
+    ),
+];
+/// Time in which the integral part fades while the rod stands, s.
+const FADING_S: f64 = 0.05;
+
+/// The algorithm.
+#[derive(Debug)]
+pub struct ForcePidMap {
+    air: Air,
+    viscous_n_s_per_m: f64,
+    memory: Memory,
+}
+
+/// What is remembered from step to step.
+#[derive(Debug, Default)]
+struct Memory {
+    reference_n: f64,
+    expected_n: f64,
+    integral_n: f64,
+    force_n: f64,
+    force_rate_n_per_s: f64,
+    result_m_per_s: f64,
+}
+
+impl ForcePidMap {
+    /// For a rig of these nominal numbers.
+    #[must_use]
+    pub fn new(rig: &RigParameters) -> Self {
+        Self {
+            air: Air::new(rig),
+            viscous_n_s_per_m: rig.friction().viscous_n_s_per_m,
+            memory: Memory::default(),
+        }
+    }
+}
+
+impl Algorithm for ForcePidMap {
+    fn reset(&mut self, ready: &Ready, _parameters: &[f64]) {
+        let force_n = ready.force_n;
+        self.memory = Memory { reference_n: force_n, expected_n: force_n, force_n, ..Memory::default() };
+    }
+
+    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
+        let p = |place: usize| parameters[place];
+        let memory = &mut self.memory;
+        let period_s = ready.period_s;
+        let stiffness_n_per_m = self.air.at(ready).stiffness_n_per_m();
+        let moves = (2.0 * ready.velocity_m_per_s.abs() / p(STANDSTILL) - 1.0).clamp(0.0, 1.0);
+
+        let fastest = p(REFERENCE_SPEED) * stiffness_n_per_m;
+        let catching_up = (ready.set_force_n - memory.reference_n) / p(REFERENCE_TIME).max(period_s);
+        let reference_rate = (ready.set_force_rate_n_per_s + catching_up).clamp(-fastest, fastest);
+        memory.reference_n += period_s * reference_rate;
+        let behind_n = memory.reference_n - memory.expected_n;
+        let expected_rate = behind_n / p(VALVE_TIME).max(period_s);
+        memory.expected_n += period_s * expected_rate;
+
+        let slope = (ready.force_n - memory.force_n) / period_s;
+        memory.force_n = ready.force_n;
+        memory.force_rate_n_per_s +=
+            (1.0 - libm::exp(-TAU * p(DERIVATIVE_HZ) * period_s)) * (slope - memory.force_rate_n_per_s);
+
+        let error_n = memory.expected_n - ready.force_n;
+        let dead_n = (1.0 - moves) * p(DEAD_ZONE);
+        let error_n = error_n - error_n.clamp(-dead_n, dead_n);
+        let held_back = memory.result_m_per_s - ready.applied_velocity_m_per_s;
+        if p(INTEGRAL_TIME) == 0.0 {
+            memory.integral_n = 0.0;
+        } else if held_back * error_n <= 1e-9 {
+            memory.integral_n += moves * error_n * period_s / p(INTEGRAL_TIME);
+        }
+        memory.integral_n *= 1.0 - (1.0 - moves) * (period_s / FADING_S).min(1.0);
+        memory.integral_n = memory.integral_n.clamp(-p(INTEGRAL_LIMIT), p(INTEGRAL_LIMIT));
+
+        let lead_n = p(DERIVATIVE_TIME) * (expected_rate - memory.force_rate_n_per_s);
+        let friction_rate = moves * self.viscous_n_s_per_m * ready.acceleration_m_per_s2;
+        let force_rate = p(RATE_SHARE) * reference_rate
+            + p(GAIN) * (error_n + memory.integral_n + lead_n)
+            + p(FRICTION_SHARE) * friction_rate;
+        let result = force_rate / stiffness_n_per_m + p(VELOCITY_SHARE) * moves * ready.velocity_m_per_s;
+        memory.result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
+        memory.result_m_per_s
+    }
+}
+
+/// Largest result, m/s: several times what any valve of this rig gives.
+const LARGEST_M_PER_S: f64 = 5.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::{self, Stuck};
+
+    const CYCLE_S: f64 = 1e-3;
+
+    fn defaults() -> Vec<f64> {
+        PARAMETERS.iter().map(|parameter| parameter.default).collect()
+    }
+
+    fn moving_at(velocity_m_per_s: f64) -> Ready {
+        Ready {
+            period_s: CYCLE_S,
+            position_m: 0.25,
+            velocity_m_per_s,
+            pressure_a_pa: 4e5,
+            pressure_b_pa: 4e5,
+            supply_pressure_pa: 7e5,
+            ..Ready::default()
+        }
+    }
+
+    /// A step of 200 N on a rod that moves along while the air, c v, is an integrator behind a lag of the valve's time.
+    fn step_response(change: impl Fn(&mut [f64])) -> Vec<f64> {
+        let mut parameters = defaults();
+        change(&mut parameters);
+        let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
+        let mut ready = moving_at(-0.1);
+        let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
+        algorithm.reset(&ready, &parameters);
+        let mut rate = 0.0;
+        ready.set_force_n = 200.0;
+        (0..1000)
+            .map(|_| {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = result.clamp(-0.6, 0.6);
+                let wanted = stiffness * (ready.applied_velocity_m_per_s - ready.velocity_m_per_s);
+                rate += (wanted - rate) * CYCLE_S / parameters[VALVE_TIME];
+                ready.force_n += CYCLE_S * rate;
+                ready.force_n
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_step_of_the_force_is_followed_aperiodically_within_three_time_constants() {
+        let force_n = step_response(|_| ());
+        let largest = force_n.iter().copied().fold(0.0, f64::max);
+        assert!(largest < 1.02 * 200.0, "{largest}");
+        // Three time constants leave 5 % of a step; the valve's time, and what its saturation takes, come on top.
+        let settled = force_n.iter().rposition(|force| (force - 200.0).abs() > 0.05 * 200.0).unwrap();
+        assert!((60..150).contains(&settled), "{settled} ms");
+    }
+
+    #[test]
+    fn a_motion_that_is_fed_forward_too_little_leaves_no_lasting_error() {
+        let end = *step_response(|parameters| parameters[VELOCITY_SHARE] = 0.8).last().unwrap();
+        assert!((end - 200.0).abs() < 0.1, "{end}");
+        let without = *step_response(|parameters| {
+            parameters[VELOCITY_SHARE] = 0.8;
+            parameters[INTEGRAL_TIME] = 0.0;
+        })
+        .last()
+        .unwrap();
+        // P alone: k_p e = 0.2 c 0.1 m/s.
+        assert!((without - 200.0).abs() > 0.3, "{without}");
+    }
+
+    #[test]
+    fn a_valve_that_cannot_follow_does_not_wind_it_up() {
+        // 1500 N over 100 s: 150 N in 10 s, of a limit of 500 N.
+        let changed = &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 500.0)];
+        let held = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
+        let back = Ready { set_force_n: -15.0, ..moving_at(0.1) };
+        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
+    }
+
+    #[test]
+    fn after_a_step_that_the_valve_cannot_follow_it_turns_in_time() {
+        let parameters = defaults();
+        for shut in [false, true] {
+            let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
+            let mut ready = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
+            algorithm.reset(&ready, &parameters);
+            for _ in 0..10_000 {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
+            }
+            // The set-point comes back below the force: the reference needs 1500 N / (v_r c), some 150 ms, and turns the result.
+            ready.set_force_n = -1500.0;
+            let turned = (0..1000).position(|_| {
+                let result = algorithm.step(&ready, &parameters);
+                ready.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
+                result < 0.0
+            });
+            assert!(turned.is_some_and(|cycles| cycles < 300), "{turned:?}");
+        }
+    }
+
+    #[test]
+    fn a_standing_rod_lets_small_errors_be_and_the_integral_fades() {
+        let parameters = defaults();
+        let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
+        let mut ready = Ready { force_n: 100.0, set_force_n: 104.0, ..moving_at(0.1) };
+        algorithm.reset(&ready, &parameters);
+        for _ in 0..100 {
+            ready.applied_velocity_m_per_s = algorithm.step(&ready, &parameters);
+        }
+        assert!(algorithm.memory.integral_n > 1.0);
+        ready.velocity_m_per_s = 0.0;
+        for _ in 0..1000 {
+            ready.applied_velocity_m_per_s = algorithm.step(&ready, &parameters);
+        }
+        // 1 s is twenty times the fading time, and thirty reference times.
+        assert!(ready.applied_velocity_m_per_s.abs() < 1e-6, "{}", ready.applied_velocity_m_per_s);
+    }
+
+    #[test]
+    fn what_every_algorithm_must_keep() {
+        laws::check(&KIND);
+    }
+}

@@ -1,0 +1,260 @@
+//! Cascaded position control: position, velocity and pneumatic force, each loop inside the last, with integral part.
+//!
+//! ```text
+//!   w, w', w'' ──► position ──v_c──► velocity ──F_c──► force ──► v
+//!                      ▲                 ▲               ▲
+//!                      x                 x'         p_a, p_b, x
+//!
+//!   e   = w - x
+//!   v_c = k_x e + k_f w'
+//!   F_c = k_f m w'' + b v_c + k_v (v_c - x') + k_r F_sli sat(v_c / v_r) + k_l F_s + I        I' = k_i e
+//!   v   = v_c + (k_F (F_c - F) + k_a b w'') / c
+//!   F   = p_a A_a - p_b A_b - p_atm (A_a - A_b)            c = p_a A_a^2 / V_a + p_b A_b^2 / V_b
+//! ```
+//!
+//! w, x, e: set-point, extension, error, m; k_x: position gain, 1/s; v_c: wanted speed, m/s; k_f, k_a: shares of the
+//! set-point's rates that are fed forward; F_c, F: wanted and measured pneumatic force, N; F_s: force sensor, N; m: moved
+//! mass, kg; b: viscous friction, N s/m; F_sli: sliding friction, N, compensated in full from the speed v_r on; k_v:
+//! velocity gain, N s/m; k_r, k_l: shares; I: integral part, N; k_i: N/(m s); k_F: force gain, 1/s; A, V, p: areas, volumes
+//! and pressures of the chambers; c: stiffness of the air, N/m.
+//!
+//! The force's rate is F' = c (v - x'), v being what the valve does (see [`crate::linearisation`], whose
+//! pressure-compensated law it wants): v is therefore the wanted speed and, over c, the wanted rate of the force. The force
+//! sensor tells the load; it also reads the mass behind it, which its low-pass (force_filter_hz of the pre-controller, 5
+//! Hz) keeps out of the loop.
+//!
+//! The integral part stands still at its limit, while the error is larger than its zone, and while the valve cannot follow,
+//! unless the error takes it back. At rest, within the rest zone, 0 comes out: see [`crate::rest_zone`].
+//!
+//! Source: [Neugebauer 2011, section 5] supposes that such a cascade does better than P; air and friction from
+//! rig-model.md.
+
+use super::position_p::{VELOCITY_FEED_FORWARD, gain};
+use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
+use crate::linearisation::Air;
+use crate::parameters::Parameter;
+use crate::rest_zone::{self, RestZone};
+use plant::RigParameters;
+
+/// In the list of algorithms.
+pub const KIND: Kind = Kind {
+    name: "position-cascade",
+    about: "position: cascaded loops for position, velocity and pneumatic force, with integral part",
+    controls: Quantity::Position,
+    parameters: &PARAMETERS,
+    make: |rig| Box::new(PositionCascade::new(rig)),
+};
+
+const GAIN: usize = 0;
+const FEED_FORWARD: usize = 1;
+const VELOCITY_GAIN: usize = 2;
+const INTEGRAL_GAIN: usize = 3;
+const INTEGRAL_LIMIT: usize = 4;
+const INTEGRAL_ZONE: usize = 5;
+const FORCE_GAIN: usize = 6;
+const ACCELERATION_FEED_FORWARD: usize = 7;
+const MASS: usize = 8;
+const FRICTION: usize = 9;
+const FRICTION_SPEED: usize = 10;
+const LOAD: usize = 11;
+const REST_ZONE: usize = 12;
+static PARAMETERS: [Parameter; 13] = [
+    gain(15.0),
+    VELOCITY_FEED_FORWARD,
+    Parameter::new(
+        ("velocity_gain_n_s_per_m", "N/(m/s)"),
+        [0.0, 20_000.0],
+        700.0,
+        "force for each error of the velocity",
+    ),
+    Parameter::new(
+        ("integral_gain_n_per_m_s", "N/(m s)"),
+        [0.0, 1e6],
+        100_000.0,
+        "rate of the force for each error of the position",
+    ),
+    Parameter::new(("integral_limit_n", "N"), [0.0, 1000.0], 60.0, "largest force of the integral part"),
+    Parameter::new(
+        ("integral_zone_m", "m"),
+        [0.0, 0.5],
+        0.005,
+        "larger errors leave the integral part as it is",
+    ),
+    Parameter::new(("force_gain_per_s", "1/s"), [0.0, 200.0], 25.0, "force rate for each error of the force"),
+    Parameter::new(
+        ("acceleration_feed_forward", ""),
+        [0.0, 2.0],
+        1.0,
+        "share of the set-point's acceleration that is fed forward as a force rate",
+    ),
+    Parameter::new(
+        ("moved_mass_kg", "kg"),
+        [0.0, 100.0],
+        5.0,
+        "mass that the set-point's acceleration is told of",
+    ),
+    Parameter::new(
+        ("friction_compensation", ""),
+        [0.0, 1.0],
+        1.0,
+        "share of the nominal sliding friction that is compensated",
+    ),
+    Parameter::new(
+        ("friction_speed_m_per_s", "m/s"),
+        [1e-4, 1.0],
+        0.004,
+        "wanted speed from which on it is compensated in full",
+    ),
+    Parameter::new(
+        ("load_compensation", ""),
+        [0.0, 1.0],
+        1.0,
+        "share of the measured force between rod and carriage that is compensated",
+    ),
+    rest_zone::parameter(2e-4),
+];
+
+/// Largest result, m/s: several times what any valve of this rig gives.
+const LARGEST_M_PER_S: f64 = 5.0;
+
+/// The algorithm.
+#[derive(Debug)]
+pub struct PositionCascade {
+    air: Air,
+    viscous_n_s_per_m: f64,
+    sliding_force_n: f64,
+    integral_n: f64,
+    last_result_m_per_s: f64,
+    rest: RestZone,
+}
+
+impl PositionCascade {
+    /// For a rig of these nominal numbers.
+    #[must_use]
+    pub fn new(rig: &RigParameters) -> Self {
+        Self {
+            air: Air::new(rig),
+            viscous_n_s_per_m: rig.friction().viscous_n_s_per_m,
+            sliding_force_n: rig.friction().sliding_force_n,
+            integral_n: 0.0,
+            last_result_m_per_s: 0.0,
+            rest: RestZone::default(),
+        }
+    }
+}
+
+impl Algorithm for PositionCascade {
+    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {
+        self.integral_n = 0.0;
+        self.last_result_m_per_s = 0.0;
+        self.rest = RestZone::default();
+    }
+
+    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
+        let p = |place: usize| parameters[place];
+        let error_m = ready.set_position_m - ready.position_m;
+        if self.rest.rests(ready, p(REST_ZONE)) {
+            self.last_result_m_per_s = 0.0;
+            return 0.0;
+        }
+        let set_acceleration = ready.set_acceleration_m_per_s2;
+        let velocity = p(GAIN) * error_m + p(FEED_FORWARD) * ready.set_velocity_m_per_s;
+
+        // The valve gives less than was asked for: only an error that takes the integral back counts.
+        let held_back = self.last_result_m_per_s - ready.applied_velocity_m_per_s;
+        if error_m.abs() <= p(INTEGRAL_ZONE) && held_back * error_m <= 0.0 {
+            self.integral_n += p(INTEGRAL_GAIN) * error_m * ready.period_s;
+        }
+        self.integral_n = self.integral_n.clamp(-p(INTEGRAL_LIMIT), p(INTEGRAL_LIMIT));
+
+        let sliding_n = (velocity / p(FRICTION_SPEED)).clamp(-1.0, 1.0) * self.sliding_force_n;
+        let force_n = p(FEED_FORWARD) * p(MASS) * set_acceleration
+            + self.viscous_n_s_per_m * velocity
+            + p(VELOCITY_GAIN) * (velocity - ready.velocity_m_per_s)
+            + p(FRICTION) * sliding_n
+            + p(LOAD) * ready.force_n
+            + self.integral_n;
+        let air = self.air.at(ready);
+        let rate_n_per_s = p(FORCE_GAIN) * (force_n - air.force_n())
+            + p(ACCELERATION_FEED_FORWARD) * self.viscous_n_s_per_m * set_acceleration;
+        self.last_result_m_per_s =
+            (velocity + rate_n_per_s / air.stiffness_n_per_m()).clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
+        self.last_result_m_per_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::{self, Stuck};
+
+    fn cascade() -> PositionCascade {
+        PositionCascade::new(&RigParameters::baseline())
+    }
+
+    fn defaults() -> Vec<f64> {
+        PARAMETERS.iter().map(|parameter| parameter.default).collect()
+    }
+
+    /// Air in balance at rest, as the rig starts.
+    fn balanced() -> Ready {
+        let air = RigParameters::baseline();
+        let (cylinder, atmosphere) = (air.cylinder(), air.supply().atmospheric_pressure_pa);
+        let [a, b] = [cylinder.piston_area_m2, cylinder.annulus_area_m2];
+        Ready {
+            period_s: 1e-3,
+            position_m: 0.2,
+            set_position_m: 0.2,
+            pressure_a_pa: (3.5e5 * b + atmosphere * (a - b)) / a,
+            pressure_b_pa: 3.5e5,
+            supply_pressure_pa: 7e5,
+            ..Ready::default()
+        }
+    }
+
+    #[test]
+    fn each_loop_adds_its_part() {
+        let mut parameters = defaults();
+        for place in [INTEGRAL_GAIN, FRICTION, LOAD] {
+            parameters[place] = 0.0;
+        }
+        let ready = Ready { set_position_m: 0.21, set_velocity_m_per_s: 0.1, ..balanced() };
+        let velocity = 15.0 * 0.01 + 0.1;
+        let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
+        let force = (1100.0 + 700.0) * velocity;
+        let expected = velocity + 25.0 * force / stiffness;
+        let result = cascade().step(&ready, &parameters);
+        // The balance above is computed, not measured: rounding of newtons out of some hundred.
+        assert!((result - expected).abs() < 1e-9, "{result}, not {expected}");
+    }
+
+    #[test]
+    fn the_measured_load_is_compensated() {
+        let ready = Ready { set_velocity_m_per_s: 0.1, ..balanced() };
+        let loaded = Ready { force_n: 100.0, ..ready };
+        let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
+        let more = cascade().step(&loaded, &defaults()) - cascade().step(&ready, &defaults());
+        assert!((more - 25.0 * 100.0 / stiffness).abs() < 1e-9, "{more}");
+    }
+
+    #[test]
+    fn what_every_algorithm_must_keep() {
+        laws::check(&KIND);
+    }
+
+    #[test]
+    fn it_does_not_wind_up() {
+        // 0.2 m at 300 N/(m s): 600 N in 10 s, of a limit of 1000 N.
+        let changed =
+            &[(INTEGRAL_GAIN, 300.0), (INTEGRAL_LIMIT, 1000.0), (INTEGRAL_ZONE, 0.5), (REST_ZONE, 0.0)];
+        let held = Ready { set_position_m: 0.4, ..balanced() };
+        let back = Ready { set_position_m: 0.19, ..balanced() };
+        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
+    }
+
+    #[test]
+    fn its_integral_keeps_its_limit() {
+        // The integral's limit is 60 N; 4 mm take it back at 100 kN/(m s) within 2 * 60 / (4e-3 * 1e5) = 0.3 s.
+        laws::keeps_its_limit(&KIND, &balanced(), 0.3);
+    }
+}

@@ -1,0 +1,158 @@
+//! Position control by a PID with velocity feed-forward.
+//!
+//! ```text
+//!   e = w - x         e' = w' - x'
+//!   v = k_p (e + e' T_d + I) + k_f w'
+//!   I' = e / T_i
+//! ```
+//!
+//! w, w': set-point and its rate, m and m/s; x, x': extension and its filtered rate; k_p: gain, 1/s; T_d, T_i: derivative
+//! and integral time, s (T_i = 0: no integral part); k_f: share of the set-point's rate; I: integral part, m.
+//!
+//! The integral part stands still at its limit, while the error is larger than its zone, and while the valve cannot follow,
+//! unless the error takes it back. The derivative makes up for the lag of the air, 0.2 s in the middle of the stroke. At
+//! rest, within the rest zone, 0 comes out: see [`crate::rest_zone`].
+//!
+//! Source: [Åström, Hägglund 1995], PID in the ideal form; the derivative filter is the pre-controller's.
+
+use super::position_p::{VELOCITY_FEED_FORWARD, gain};
+use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
+use crate::parameters::Parameter;
+use crate::rest_zone::{self, RestZone};
+
+/// In the list of algorithms.
+pub const KIND: Kind = Kind {
+    name: "position-pid",
+    about: "position: PID with velocity feed-forward",
+    controls: Quantity::Position,
+    parameters: &PARAMETERS,
+    make: |_| Box::new(PositionPid::default()),
+};
+
+const GAIN: usize = 0;
+const FEED_FORWARD: usize = 1;
+const INTEGRAL_TIME: usize = 2;
+const INTEGRAL_LIMIT: usize = 3;
+const INTEGRAL_ZONE: usize = 4;
+const DERIVATIVE_TIME: usize = 5;
+const REST_ZONE: usize = 6;
+static PARAMETERS: [Parameter; 7] = [
+    gain(30.0),
+    VELOCITY_FEED_FORWARD,
+    Parameter::new(
+        ("integral_time_s", "s"),
+        [0.0, 100.0],
+        1.0,
+        "time in which the integral part doubles a standing error; 0 for none",
+    ),
+    Parameter::new(
+        ("integral_limit_m", "m"),
+        [0.0, 0.1],
+        0.003,
+        "largest integral part, as the error that it stands for",
+    ),
+    Parameter::new(
+        ("integral_zone_m", "m"),
+        [0.0, 0.5],
+        0.003,
+        "larger errors leave the integral part as it is",
+    ),
+    Parameter::new(
+        ("derivative_time_s", "s"),
+        [0.0, 1.0],
+        0.12,
+        "time over which the error is extrapolated by its rate",
+    ),
+    rest_zone::parameter(3e-4),
+];
+
+/// Largest result, m/s: several times what any valve of this rig gives.
+const LARGEST_M_PER_S: f64 = 5.0;
+
+/// The algorithm.
+#[derive(Debug, Default)]
+pub struct PositionPid {
+    integral_m: f64,
+    last_result_m_per_s: f64,
+    rest: RestZone,
+}
+
+impl Algorithm for PositionPid {
+    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {
+        *self = Self::default();
+    }
+
+    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
+        let p = |place: usize| parameters[place];
+        let error_m = ready.set_position_m - ready.position_m;
+        if self.rest.rests(ready, p(REST_ZONE)) {
+            self.last_result_m_per_s = 0.0;
+            return 0.0;
+        }
+        let held_back = self.last_result_m_per_s - ready.applied_velocity_m_per_s;
+        if p(INTEGRAL_TIME) == 0.0 {
+            self.integral_m = 0.0;
+        } else if error_m.abs() <= p(INTEGRAL_ZONE) && held_back * error_m <= 0.0 {
+            self.integral_m += error_m * ready.period_s / p(INTEGRAL_TIME);
+        }
+        self.integral_m = self.integral_m.clamp(-p(INTEGRAL_LIMIT), p(INTEGRAL_LIMIT));
+        let rate_m_per_s = ready.set_velocity_m_per_s - ready.velocity_m_per_s;
+        let result = p(GAIN) * (error_m + p(DERIVATIVE_TIME) * rate_m_per_s + self.integral_m)
+            + p(FEED_FORWARD) * ready.set_velocity_m_per_s;
+        self.last_result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
+        self.last_result_m_per_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::{self, Stuck};
+
+    const AT_REST: Ready = Ready {
+        period_s: 1e-3,
+        position_m: 0.2,
+        velocity_m_per_s: 0.0,
+        acceleration_m_per_s2: 0.0,
+        force_n: 0.0,
+        pressure_a_pa: 3.1e5,
+        pressure_b_pa: 3.5e5,
+        supply_pressure_pa: 7e5,
+        set_position_m: 0.2,
+        set_velocity_m_per_s: 0.0,
+        set_acceleration_m_per_s2: 0.0,
+        set_force_n: 0.0,
+        set_force_rate_n_per_s: 0.0,
+        applied_velocity_m_per_s: 0.0,
+    };
+
+    #[test]
+    fn its_parts_add_up() {
+        let ready = Ready { position_m: 0.199, velocity_m_per_s: 0.04, set_velocity_m_per_s: 0.1, ..AT_REST };
+        let result = PositionPid::default().step(&ready, &[20.0, 1.0, 0.5, 0.003, 0.003, 0.12, 0.0]);
+        let expected = 20.0 * (0.001 + 0.12 * 0.06 + 0.001 * 1e-3 / 0.5) + 0.1;
+        assert!((result - expected).abs() < 1e-12, "{result}, not {expected}");
+    }
+
+    #[test]
+    fn what_every_algorithm_must_keep() {
+        laws::check(&KIND);
+    }
+
+    #[test]
+    fn it_does_not_wind_up() {
+        // 0.3 m over 100 s: 30 mm in 10 s, of a limit of 100 mm.
+        let changed =
+            &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 0.1), (INTEGRAL_ZONE, 0.5), (REST_ZONE, 0.0)];
+        let held = Ready { set_position_m: 0.5, ..AT_REST };
+        let back = Ready { set_position_m: 0.19, ..AT_REST };
+        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
+    }
+
+    #[test]
+    fn its_integral_keeps_its_limit() {
+        // The integral's limit is 3 mm; 2.9 mm take it back in 2 * 3 / 2.9 s of an integral time of 1 s at most, but the
+        // error itself turns the sign as soon as the integral is below it.
+        laws::keeps_its_limit(&KIND, &AT_REST, 2.1);
+    }
+}

@@ -1,0 +1,315 @@
+//! One axis controller: what came over the bus in, a valve command and a word for the partner out, once a cycle.
+//!
+//! ```text
+//!   hear(frame)*      partner's status and values, emergency stops, the console
+//!   answer(sensors) ─► emergency stop chain ─► main chain ─► work: what is asked ─► program: opening ─► Answer
+//! ```
+//!
+//! Drive and load are the same code; what differs is their work (a position, a force, or nothing) and their program. They
+//! know each other through what was heard alone. Nothing here allocates, locks, prints or blocks.
+
+mod average;
+mod by_hand;
+mod changes;
+mod heard;
+mod range;
+mod record;
+mod slow;
+mod work;
+
+pub use changes::PlannedChange;
+pub use record::{Answer, AxisRecord};
+pub use work::{ForcePlan, Plan, PositionPlan, PrepareStep};
+
+use crate::chains::leading::{Leading, LeadingInputs};
+use crate::chains::main::{MainCause, MainConfig, MainOutput, OwnAxis};
+use crate::chains::settled::ControlError;
+use crate::chains::{AfterStop, Fault};
+use crate::figures::PositionFigures;
+use crate::node::News;
+use crate::program::{Hand, Program};
+use algorithms::guard::AlgorithmFault;
+use average::Average;
+use changes::Changes;
+use heard::Heard;
+use plant::Axis;
+use protocol::frames::{
+    ALIVE_RANGE, ECHO_RANGE, EmergencyStop, EmergencyStopChainState, Frame, MainChainState, RigStatus,
+    Sensors, ValveCommand,
+};
+use range::Range;
+use slow::Slow;
+use work::{Asked, Seen, Work};
+
+/// What an axis controller is made of.
+pub struct AxisParts {
+    /// Which axis.
+    pub axis: Axis,
+    /// Its program.
+    pub program: Program,
+    /// What it does in the experiment.
+    pub plan: Plan,
+    /// Its main chain.
+    pub main: MainConfig,
+    /// Nominal supply pressure, absolute, Pa.
+    pub supply_pressure_pa: f64,
+    /// Parameters that change, by time.
+    pub changes: Vec<PlannedChange>,
+    /// A row of the record every so many cycles.
+    pub record_every: u64,
+}
+
+/// The controller of one axis.
+pub struct AxisController {
+    axis: Axis,
+    program: Program,
+    work: Work,
+    leading: Leading,
+    main_config: MainConfig,
+    heard: Heard,
+    changes: Changes,
+    supply_pressure_pa: f64,
+    record_every: u64,
+    figures: PositionFigures,
+    average: Average,
+    range: Range,
+    /// What the rig said of itself last, however long ago.
+    rig: Option<RigStatus>,
+    fault: Option<Fault>,
+    algorithm_fault: Option<AlgorithmFault>,
+    asked: Option<Asked>,
+    slow: Slow,
+    alive: u8,
+}
+
+impl AxisController {
+    /// A controller that waits for its rig.
+    #[must_use]
+    pub fn new(parts: AxisParts) -> Self {
+        let AxisParts { axis, program, plan, main, supply_pressure_pa, changes, record_every } = parts;
+        Self {
+            axis,
+            work: Work::new(plan, &main),
+            changes: Changes::new(changes, &program),
+            program,
+            leading: Leading::new(main.clone(), supply_pressure_pa),
+            heard: Heard::new(axis, main.experiment),
+            main_config: main,
+            supply_pressure_pa,
+            record_every,
+            figures: PositionFigures::default(),
+            average: Average::default(),
+            range: Range::default(),
+            rig: None,
+            fault: None,
+            algorithm_fault: None,
+            asked: None,
+            slow: Slow::new(axis),
+            alive: 0,
+        }
+    }
+
+    /// Takes a frame that is none of the own sensors and nothing of the rig's.
+    pub fn hear(&mut self, frame: &Frame) {
+        self.heard.take(frame);
+    }
+
+    /// The answer to the sensors of `cycle`; `rig` is the rig's status if it is fresh.
+    ///
+    /// A status that is no longer fresh shuts nothing: rods do not part and supplies do not change because frames are lost, and
+    /// an emergency stop comes as a frame of its own. What was said last holds; the way back from an emergency stop
+    /// waits for a fresh one.
+    pub fn answer(&mut self, cycle: u64, sensors: &Sensors, rig: Option<&RigStatus>) -> Answer {
+        self.rig = rig.copied().or(self.rig);
+        // Until the rig has told its supply pressure, the nominal one is the best guess.
+        let supply_pa = self.rig.map_or(self.supply_pressure_pa, |rig| rig.supply_pressure_pa);
+        self.program.observe(cycle, sensors, supply_pa);
+        self.average.take(sensors.position_m);
+        self.heard.listen(cycle);
+        let output = self.advance(cycle, rig, self.rig.map(|_| self.own_axis(sensors)));
+        let partner = &self.heard.partner;
+        let hand = self.heard.hand.take();
+        let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.still(), hand };
+        self.asked = self.work.ask(&output, &seen, &mut self.program);
+        let beyond = self.range.take(self.axis, rig, output.phase);
+        self.fault = self.work.fault().or(beyond);
+        if self.fault.is_some() {
+            self.asked = None;
+        }
+        self.changes.follow(output.phase, &mut self.program);
+        let command = self.command(cycle);
+        if let Some(fault) = self.fault {
+            self.leading.trip(fault, cycle);
+        }
+        self.take_figures(&output, sensors);
+        let record = cycle.is_multiple_of(self.record_every).then(|| self.record(cycle, sensors, &command));
+        self.answer_with(cycle, command, record)
+    }
+
+    /// What is to be said in `cycle` though no own sensors came, which is a fault once it lasted.
+    pub fn without_sensors(&mut self, cycle: u64) -> Option<EmergencyStop> {
+        self.fault = Some(Fault::SensorLoss);
+        self.advance(cycle, None, None);
+        self.program.shut();
+        self.leading.frame_due(cycle)
+    }
+
+    /// Both chains that lead, moved on.
+    fn advance(&mut self, cycle: u64, rig: Option<&RigStatus>, own: Option<OwnAxis>) -> MainOutput {
+        let before = self.leading.output().map(|output| output.state);
+        let output = self.leading.advance(&LeadingInputs {
+            cycle,
+            rig: rig.copied(),
+            own,
+            prepared: self.work.prepared(),
+            partner: self.heard.partner,
+            frame: self.heard.stop.take(),
+            console: std::mem::take(&mut self.heard.console),
+            fault: self.fault.take(),
+        });
+        if output.state == MainChainState::InitialPositioning && before != Some(output.state) {
+            self.algorithm_fault = None;
+            self.program.restart_algorithms();
+        }
+        output
+    }
+
+    fn own_axis(&self, sensors: &Sensors) -> OwnAxis {
+        let error = match &self.asked {
+            Some(Asked { demand, hand: Hand::User }) => self.work.error(demand, self.program.ready()),
+            _ => ControlError::None,
+        };
+        OwnAxis { position_m: sensors.position_m - self.program.geometry().offset_m, error }
+    }
+
+    fn command(&mut self, cycle: u64) -> ValveCommand {
+        self.alive = ((u64::from(self.alive) + 1) % ALIVE_RANGE) as u8;
+        let shut = ValveCommand {
+            opening: 0.0,
+            alive: self.alive,
+            echo: (cycle % ECHO_RANGE) as u16,
+            enable: false,
+        };
+        let Some(Asked { demand, hand }) = &self.asked else {
+            self.program.shut();
+            return shut;
+        };
+        match self.program.control(cycle, demand, *hand) {
+            Ok(output) => ValveCommand { opening: output.opening, enable: true, ..shut },
+            Err(fault) => {
+                self.algorithm_fault = Some(fault);
+                self.fault = Some(Fault::ControllerFault);
+                self.program.shut();
+                shut
+            }
+        }
+    }
+
+    fn take_figures(&mut self, output: &MainOutput, sensors: &Sensors) {
+        match (&self.asked, output.state) {
+            (Some(Asked { demand, hand: Hand::User }), MainChainState::Experiment)
+                if self.work.is_position() =>
+            {
+                self.figures.take(&demand.position, sensors.position_m);
+            }
+            // What an emergency stop cut off is no positioning.
+            (_, MainChainState::Aborted | MainChainState::Fault) => self.figures.drop_repetition(),
+            _ => self.figures.end_repetition(),
+        }
+    }
+
+    fn answer_with(&mut self, cycle: u64, command: ValveCommand, record: Option<AxisRecord>) -> Answer {
+        let status = self.status();
+        let due = self.slow.due(cycle, &status);
+        let news = due.other_state.then(|| News::State {
+            axis: self.axis,
+            state: status.main_chain,
+            cycle,
+            cause: self.cause(),
+        });
+        Answer {
+            command,
+            emergency_stop: self.leading.frame_due(cycle),
+            status: due.status.then_some(status),
+            values: due.values.then(|| self.values()),
+            news,
+            record,
+        }
+    }
+
+    /// The rig's time began again, or it is another rig: nothing of the old one is kept. What a person has changed of the
+    /// program stays.
+    pub fn restart(&mut self) {
+        self.leading.restart(0);
+        self.work.restart();
+        self.changes.take_back(&mut self.program);
+        self.program.restart();
+        self.heard = Heard::new(self.axis, self.main_config.experiment);
+        self.figures = PositionFigures::default();
+        self.average = Average::default();
+        self.range = Range::default();
+        self.slow = Slow::new(self.axis);
+        (self.rig, self.fault, self.algorithm_fault, self.asked, self.alive) = (None, None, None, None, 0);
+    }
+
+    /// Which axis.
+    #[must_use]
+    pub fn axis(&self) -> Axis {
+        self.axis
+    }
+
+    /// State of the main chain.
+    #[must_use]
+    pub fn state(&self) -> MainChainState {
+        self.status().main_chain
+    }
+
+    /// Why the main chain came to its state.
+    #[must_use]
+    pub fn cause(&self) -> MainCause {
+        self.leading.entered().cause
+    }
+
+    /// Whether a stopped axis may begin anew.
+    #[must_use]
+    pub fn may_restart(&self) -> bool {
+        self.main_config.after_emergency_stop != AfterStop::End
+    }
+
+    /// State of the emergency stop chain.
+    #[must_use]
+    pub fn emergency_stop(&self) -> EmergencyStopChainState {
+        self.leading.emergency_stop()
+    }
+
+    /// Its program, whose variables may be changed between two cycles.
+    pub fn program_mut(&mut self) -> &mut Program {
+        &mut self.program
+    }
+
+    /// Its program.
+    #[must_use]
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// Figures of the position control so far.
+    #[must_use]
+    pub fn figures(&self) -> &PositionFigures {
+        &self.figures
+    }
+
+    /// Why the algorithm is no longer asked.
+    #[must_use]
+    pub fn algorithm_fault(&self) -> Option<AlgorithmFault> {
+        self.algorithm_fault
+    }
+
+    /// How often the experiment has been driven through.
+    #[must_use]
+    pub fn repetitions_done(&self) -> u32 {
+        self.leading
+            .output()
+            .map_or(0, |output| output.repetition + u32::from(output.state == MainChainState::Done))
+    }
+}

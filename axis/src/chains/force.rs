@@ -1,0 +1,417 @@
+//! Force chain of the load axis: relieving stress and manual mode under force control with set-point zero, and what the load is
+//! doing otherwise.
+//!
+//! ```text
+//!             asked                    |force| low for 50 ms              |v| high for 20 ms
+//!   Idle ─────────────────► Limited ──────────────────────► Standstill ────────────────────► Moving
+//!    ▲  relieve or manual      │                             │      ▲    |v| low for 100 ms    │
+//!    │                         │ too long (relieve)          │      └──────────────────────────┤ too long (relieve)
+//!    │ idle asked              ▼                             │ relieved                        │
+//!    └──────────────────── Fault ◄── too long (relieve) ─────┤                                 │
+//!                              ▲                             ▼                                 │
+//!                              │                            Done                               │
+//!                              └───────────────────────────────────────────────────────────────┘
+//!   any but fault ── asked: idle, initial ramp, load profile, done ──► Idle, InitialRamp, LoadProfile, Done
+//!   any but fault ── asked anew: relieve, manual ────────────────────► Limited
+//! ```
+//!
+//! | state | velocity limited | feed-forward | dead zone |
+//! |---|---|---|---|
+//! | limited | yes | no | no |
+//! | standstill, relieved | no | no | yes |
+//! | moving | no | yes | no |
+//!
+//! At first the velocity is limited, since a high force between linked axes would throw the rod. The case distinction on
+//! significant movement is the paper's: at standstill the noise of the velocity must not be fed forward, and a control error
+//! within the friction must not be worked on; when moving, both would be felt in the hand. Movement begins with the velocity and
+//! ends with its mean: a rod that bounces within the gap of the linkage is fast at times and goes nowhere.
+
+use super::{CYCLE_S, Entered, Fault, cycles, elapsed_s};
+use algorithms::parameters::Parameter;
+use protocol::frames::ForceChainState;
+
+/// Name of the table of [`PARAMETERS`].
+pub const TABLE: &str = "force-chain";
+
+/// Parameters, in the order of the slices.
+pub const PARAMETERS: &[Parameter] = &[
+    Parameter::new(("high_force_n", "N"), [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),
+    Parameter::new(("limited_m_per_s", "m/s"), [1e-3, 1.0], 0.02, "largest rod velocity while it is limited"),
+    Parameter::new(("low_force_for_s", "s"), [0.0, 10.0], 0.05, "how long the force must be low to end that"),
+    Parameter::new(("moving_m_per_s", "m/s"), [1e-4, 1.0], 0.01, "significant movement; half of it ends it"),
+    Parameter::new(("moving_for_s", "s"), [0.0, 1.0], 0.02, "how long the axis must move significantly"),
+    Parameter::new(("still_for_s", "s"), [0.0, 1.0], 0.1, "how long it must not, to be at standstill again"),
+    Parameter::new(("relieved_n", "N"), [0.1, 2000.0], 20.0, "mean force of a relieved system"),
+    Parameter::new(("relieved_for_s", "s"), [0.0, 60.0], 0.3, "how long it must be lower, at standstill"),
+    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 15.0, "how long relieving may take")
+        .at_start_only(),
+];
+
+/// Time constant of the mean force, s.
+const MEAN_S: f64 = 0.05;
+/// Time constant of the mean velocity, s: long beside a rod that bounces within the gap of the linkage, which goes nowhere.
+const MEAN_VELOCITY_S: f64 = 0.15;
+/// Share of the significant velocity below which, in the mean, movement ends.
+const STILL_SHARE: f64 = 0.5;
+
+/// [`PARAMETERS`] by name.
+#[derive(Clone, Copy, Debug)]
+struct Numbers {
+    high_force_n: f64,
+    limited_m_per_s: f64,
+    low_force_for_s: f64,
+    moving_m_per_s: f64,
+    moving_for_s: f64,
+    still_for_s: f64,
+    relieved_n: f64,
+    relieved_for_s: f64,
+    relieve_timeout_s: f64,
+}
+
+impl Numbers {
+    fn of(values: &[f64]) -> Self {
+        let &[
+            high_force_n,
+            limited_m_per_s,
+            low_force_for_s,
+            moving_m_per_s,
+            moving_for_s,
+            still_for_s,
+            relieved_n,
+            relieved_for_s,
+            relieve_timeout_s,
+        ] = values
+        else {
+            panic!("{} values for the {} parameters of {TABLE}", values.len(), PARAMETERS.len())
+        };
+        Self {
+            high_force_n,
+            limited_m_per_s,
+            low_force_for_s,
+            moving_m_per_s,
+            moving_for_s,
+            still_for_s,
+            relieved_n,
+            relieved_for_s,
+            relieve_timeout_s,
+        }
+    }
+}
+
+/// What the load axis is asked to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ForceAsked {
+    /// Nothing: valve shut, or held still.
+    #[default]
+    Idle,
+    /// To relieve the linked system of stress.
+    Relieve,
+    /// To give way to a hand.
+    Manual,
+    /// The ramp to the initial force.
+    InitialRamp,
+    /// The experiment's force.
+    LoadProfile,
+    /// To hold the last force.
+    Done,
+}
+
+/// What the chain is told each cycle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ForceInputs {
+    /// The rig's cycle.
+    pub cycle: u64,
+    /// What is asked.
+    pub asked: ForceAsked,
+    /// Own force sensor, N.
+    pub force_n: f64,
+    /// Own velocity, filtered, m/s.
+    pub velocity_m_per_s: f64,
+}
+
+/// What the force control must do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceOutput {
+    /// The state.
+    pub state: ForceChainState,
+    /// Limit of the rod's velocity, m/s.
+    pub limit_m_per_s: Option<f64>,
+    /// Velocity feed-forward acts.
+    pub feed_forward: bool,
+    /// The control error has its dead zone.
+    pub dead_zone: bool,
+    /// Set-point, N; `None` where it is the axis's own.
+    pub set_force_n: Option<f64>,
+    /// The system is relieved of stress.
+    pub relieved: bool,
+    /// The fault, while in fault.
+    pub fault: Option<Fault>,
+}
+
+/// Why a state was entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForceCause {
+    /// The controller or the rig began.
+    Began,
+    /// The axis is asked so.
+    Asked(ForceAsked),
+    /// The force is low.
+    LowForce,
+    /// The axis moves.
+    Moves,
+    /// It does not.
+    Still,
+    /// The mean force is low.
+    Relieved,
+    /// It took too long.
+    TooLong,
+}
+
+/// Means of what the axis shows, up to a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Mean {
+    cycle: u64,
+    force_n: f64,
+    velocity_m_per_s: f64,
+}
+
+impl Mean {
+    fn to(self, now: &Self) -> Self {
+        let passed_s = now.cycle.saturating_sub(self.cycle) as f64 * CYCLE_S;
+        let towards =
+            |mean: f64, value: f64, constant_s: f64| mean + (passed_s / constant_s).min(1.0) * (value - mean);
+        Self {
+            cycle: now.cycle,
+            force_n: towards(self.force_n, now.force_n, MEAN_S),
+            velocity_m_per_s: towards(self.velocity_m_per_s, now.velocity_m_per_s, MEAN_VELOCITY_S),
+        }
+    }
+}
+
+/// State of the chain; each holds what it needs and nothing else. `began` is when the relief or the manual mode began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Idle,
+    Limited { began: u64, low_since: Option<u64> },
+    Standstill { began: u64, moves_since: Option<u64>, low_since: Option<u64> },
+    Moving { began: u64, still_since: Option<u64> },
+    InitialRamp,
+    LoadProfile,
+    Done,
+    Fault,
+}
+
+/// An edge: where to, and why.
+type Edge = (ForceChainState, ForceCause);
+
+/// The chain.
+#[derive(Clone, Debug)]
+pub struct ForceChain {
+    state: State,
+    asked: ForceAsked,
+    /// Mean of the force, with the cycle of its last sample.
+    mean: Option<Mean>,
+    entered: Entered<ForceChainState, ForceCause>,
+}
+
+impl Default for ForceChain {
+    fn default() -> Self {
+        let entered = Entered { cycle: 0, state: ForceChainState::Idle, cause: ForceCause::Began };
+        Self { state: State::Idle, asked: ForceAsked::Idle, mean: None, entered }
+    }
+}
+
+impl ForceChain {
+    /// Moves on by one edge at most, with `values` in the order of [`PARAMETERS`].
+    ///
+    /// # Panics
+    /// When `values` is not as long as the table.
+    pub fn advance(&mut self, inputs: &ForceInputs, values: &[f64]) -> ForceOutput {
+        let numbers = Numbers::of(values);
+        self.note(inputs, &numbers);
+        if let Some((state, cause)) = self.decide(inputs, &numbers) {
+            self.enter(state, cause, inputs.cycle);
+        }
+        self.asked = inputs.asked;
+        self.output(&numbers)
+    }
+
+    /// The rig's time begins anew at `cycle`: so does the chain.
+    pub fn restart(&mut self, cycle: u64) {
+        *self = Self::default();
+        self.enter_idle(ForceCause::Began, cycle);
+    }
+
+    /// The state entered last, when and why.
+    #[must_use]
+    pub fn entered(&self) -> Entered<ForceChainState, ForceCause> {
+        self.entered
+    }
+
+    /// Keeps what the inputs tell, without a change of state.
+    fn note(&mut self, inputs: &ForceInputs, numbers: &Numbers) {
+        let ForceInputs { cycle, force_n, velocity_m_per_s, .. } = *inputs;
+        let now = Mean { cycle, force_n, velocity_m_per_s };
+        let mut mean = self.mean.map_or(now, |last| last.to(&now));
+        if !matches!(self.state, State::Moving { .. }) {
+            // The mean is of one movement: what was before it does not count.
+            mean.velocity_m_per_s = velocity_m_per_s;
+        }
+        // What is no number must not stay.
+        self.mean = (mean.force_n.is_finite() && mean.velocity_m_per_s.is_finite()).then_some(mean);
+        let mean_n = mean.force_n;
+        let lasting = |since: &mut Option<u64>, holds: bool| {
+            *since = if holds { since.or(Some(cycle)) } else { None };
+        };
+        match &mut self.state {
+            State::Limited { low_since, .. } => lasting(low_since, force_n.abs() < numbers.high_force_n),
+            State::Standstill { moves_since, low_since, .. } => {
+                lasting(moves_since, velocity_m_per_s.abs() > numbers.moving_m_per_s);
+                lasting(low_since, mean_n.abs() < numbers.relieved_n);
+            }
+            State::Moving { still_since, .. } => {
+                let speed_m_per_s = mean.velocity_m_per_s.abs();
+                lasting(still_since, speed_m_per_s < STILL_SHARE * numbers.moving_m_per_s);
+            }
+            _ => {}
+        }
+    }
+
+    /// The edge to go, if any.
+    fn decide(&self, inputs: &ForceInputs, numbers: &Numbers) -> Option<Edge> {
+        use ForceChainState as S;
+        let asked = inputs.asked;
+        if self.state == State::Fault {
+            return (asked == ForceAsked::Idle).then_some((S::Idle, ForceCause::Asked(asked)));
+        }
+        if asked != self.asked {
+            let state = match asked {
+                ForceAsked::Idle => S::Idle,
+                ForceAsked::Relieve | ForceAsked::Manual => S::Limited,
+                ForceAsked::InitialRamp => S::InitialRamp,
+                ForceAsked::LoadProfile => S::LoadProfile,
+                ForceAsked::Done => S::Done,
+            };
+            return Some((state, ForceCause::Asked(asked)));
+        }
+        let lasted = |since: Option<u64>, least_s: f64| {
+            since.is_some_and(|since| inputs.cycle.saturating_sub(since) >= cycles(least_s))
+        };
+        let relieving = asked == ForceAsked::Relieve;
+        let too_long = |began: u64| {
+            let late = relieving && elapsed_s(began, inputs.cycle) > numbers.relieve_timeout_s;
+            late.then_some((S::Fault, ForceCause::TooLong))
+        };
+        match self.state {
+            State::Limited { began, low_since } => lasted(low_since, numbers.low_force_for_s)
+                .then_some((S::Standstill, ForceCause::LowForce))
+                .or_else(|| too_long(began)),
+            State::Standstill { moves_since, .. } if lasted(moves_since, numbers.moving_for_s) => {
+                Some((S::Moving, ForceCause::Moves))
+            }
+            State::Standstill { began, low_since, .. } => (relieving
+                && lasted(low_since, numbers.relieved_for_s))
+            .then_some((S::Done, ForceCause::Relieved))
+            .or_else(|| too_long(began)),
+            State::Moving { began, still_since } => lasted(still_since, numbers.still_for_s)
+                .then_some((S::Standstill, ForceCause::Still))
+                .or_else(|| too_long(began)),
+            State::Idle | State::InitialRamp | State::LoadProfile | State::Done | State::Fault => None,
+        }
+    }
+
+    fn output(&self, numbers: &Numbers) -> ForceOutput {
+        let relieved = self.state == State::Done && self.asked == ForceAsked::Relieve;
+        let yields = relieved
+            || matches!(self.asked, ForceAsked::Relieve | ForceAsked::Manual) && self.state != State::Fault;
+        let limited = matches!(self.state, State::Limited { .. });
+        let still = matches!(self.state, State::Standstill { .. }) || relieved;
+        ForceOutput {
+            state: self.name(),
+            limit_m_per_s: limited.then_some(numbers.limited_m_per_s),
+            feed_forward: !(limited || still),
+            dead_zone: still,
+            set_force_n: yields.then_some(0.0),
+            relieved,
+            fault: (self.state == State::Fault).then_some(Fault::RelieveTimeout),
+        }
+    }
+
+    /// When the relief or the manual mode began; `now` outside of both.
+    fn began(&self, now: u64) -> u64 {
+        match self.state {
+            State::Limited { began, .. } | State::Standstill { began, .. } | State::Moving { began, .. } => {
+                began
+            }
+            _ => now,
+        }
+    }
+
+    fn enter(&mut self, state: ForceChainState, cause: ForceCause, now: u64) {
+        match state {
+            ForceChainState::Idle => self.enter_idle(cause, now),
+            ForceChainState::Limited => self.enter_limited(cause, now),
+            ForceChainState::Standstill => self.enter_standstill(cause, now),
+            ForceChainState::Moving => self.enter_moving(cause, now),
+            ForceChainState::InitialRamp => self.enter_initial_ramp(cause, now),
+            ForceChainState::LoadProfile => self.enter_load_profile(cause, now),
+            ForceChainState::Done => self.enter_done(cause, now),
+            ForceChainState::Fault => self.enter_fault(cause, now),
+        }
+    }
+
+    fn enter_idle(&mut self, cause: ForceCause, now: u64) {
+        self.set(State::Idle, cause, now);
+    }
+
+    fn enter_limited(&mut self, cause: ForceCause, now: u64) {
+        self.set(State::Limited { began: now, low_since: None }, cause, now);
+    }
+
+    fn enter_standstill(&mut self, cause: ForceCause, now: u64) {
+        let state = State::Standstill { began: self.began(now), moves_since: None, low_since: None };
+        self.set(state, cause, now);
+    }
+
+    fn enter_moving(&mut self, cause: ForceCause, now: u64) {
+        self.set(State::Moving { began: self.began(now), still_since: None }, cause, now);
+    }
+
+    fn enter_initial_ramp(&mut self, cause: ForceCause, now: u64) {
+        self.set(State::InitialRamp, cause, now);
+    }
+
+    fn enter_load_profile(&mut self, cause: ForceCause, now: u64) {
+        self.set(State::LoadProfile, cause, now);
+    }
+
+    fn enter_done(&mut self, cause: ForceCause, now: u64) {
+        self.set(State::Done, cause, now);
+    }
+
+    fn enter_fault(&mut self, cause: ForceCause, now: u64) {
+        self.set(State::Fault, cause, now);
+    }
+
+    fn set(&mut self, state: State, cause: ForceCause, now: u64) {
+        self.state = state;
+        self.entered = Entered { cycle: now, state: self.name(), cause };
+    }
+
+    /// The state as the bus names it.
+    fn name(&self) -> ForceChainState {
+        match self.state {
+            State::Idle => ForceChainState::Idle,
+            State::Limited { .. } => ForceChainState::Limited,
+            State::Standstill { .. } => ForceChainState::Standstill,
+            State::Moving { .. } => ForceChainState::Moving,
+            State::InitialRamp => ForceChainState::InitialRamp,
+            State::LoadProfile => ForceChainState::LoadProfile,
+            State::Done => ForceChainState::Done,
+            State::Fault => ForceChainState::Fault,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

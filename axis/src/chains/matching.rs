@@ -1,0 +1,360 @@
+//! Matching chain of the load axis: with linked axes, average both measured positions and take the difference as the offset of
+//! the load's sensor.
+//!
+//! ```text
+//!          asked                     linked, both at rest                time over
+//!   Idle ────────► WaitingForRest ───────────────────────► Averaging ─────────────────► Matched
+//!    ▲                  ▲   │ ▲                             │     │                        │
+//!    │                  │   │ └─ not linked, partner ───────┘     │ offset implausible,    │ asked anew
+//!    │                  │   │    silent, somebody moved           ▼ too long               │
+//!    │                  │   └───── too long ──────────────────► Fault                      │
+//!    │                  └──────────────────────────────────────────────────────────────────┘
+//!    └── any: the rig restarted; waiting, averaging, fault: no longer asked
+//! ```
+//!
+//! offset = mean of the load's position sensor - mean of the drive's `averaged_position`, in rig coordinates; the load's
+//! position is its sensor less the offset. The load eye may lie anywhere in the gap of the linkage, so ±0.1 mm
+//! ([`UNCERTAINTY_M`]) remain, besides the drive sensor's own error: the offset makes both axes agree, not either of them true.
+//! A matched offset holds until the next one, or until the rig restarts.
+
+use super::{Entered, Fault, Partner, cycles};
+use algorithms::parameters::Parameter;
+use protocol::frames::MatchingChainState;
+
+/// Name of the table of [`PARAMETERS`].
+pub const TABLE: &str = "matching-chain";
+
+/// Parameters, in the order of the slices.
+pub const PARAMETERS: &[Parameter] = &[
+    Parameter::new(("average_s", "s"), [0.01, 60.0], 0.5, "time over which both positions are averaged"),
+    Parameter::new(("rest_s", "s"), [0.0, 60.0], 0.2, "how long the partner must have been at rest before"),
+    Parameter::new(("moved_m", "m"), [1e-5, 0.1], 0.3e-3, "range of a position that counts as movement"),
+    Parameter::new(("offset_most_m", "m"), [1e-4, 0.5], 5e-3, "largest plausible offset"),
+    Parameter::new(("match_timeout_s", "s"), [0.1, 600.0], 10.0, "how long matching may take")
+        .at_start_only(),
+];
+
+/// What the linkage's gap leaves open in a matched offset, to each side, m.
+pub const UNCERTAINTY_M: f64 = 0.1e-3;
+
+/// The partner's averaged position is taken each so many cycles, its period.
+const SAMPLE_CYCLES: u64 = 10;
+
+/// [`PARAMETERS`] by name.
+#[derive(Clone, Copy, Debug)]
+struct Numbers {
+    average_s: f64,
+    rest_s: f64,
+    moved_m: f64,
+    offset_most_m: f64,
+    match_timeout_s: f64,
+}
+
+impl Numbers {
+    fn of(values: &[f64]) -> Self {
+        let &[average_s, rest_s, moved_m, offset_most_m, match_timeout_s] = values else {
+            panic!("{} values for the {} parameters of {TABLE}", values.len(), PARAMETERS.len())
+        };
+        Self { average_s, rest_s, moved_m, offset_most_m, match_timeout_s }
+    }
+}
+
+/// What the chain is told each cycle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MatchingInputs {
+    /// The rig's cycle.
+    pub cycle: u64,
+    /// Matching is wanted.
+    pub asked: bool,
+    /// The rig says that the axes are linked.
+    pub linked: bool,
+    /// The own axis keeps still.
+    pub still: bool,
+    /// Own position sensor, without any offset, m.
+    pub position_m: f64,
+    /// The partner.
+    pub partner: Partner,
+}
+
+/// What the chain says each cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MatchingOutput {
+    /// The state.
+    pub state: MatchingChainState,
+    /// The last matched offset, to be taken from the own sensor, m; 0 before.
+    pub offset_m: f64,
+    /// Matching is done.
+    pub matched: bool,
+    /// The fault, while in fault.
+    pub fault: Option<Fault>,
+}
+
+/// Why a state was entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MatchingCause {
+    /// The controller or the rig began.
+    Began,
+    /// Matching is asked for.
+    Asked,
+    /// It no longer is.
+    NotAsked,
+    /// Linked, and both at rest.
+    AtRest,
+    /// Not linked.
+    NotLinked,
+    /// The partner is silent.
+    Silent,
+    /// An axis moved.
+    Moved,
+    /// Averaged.
+    Averaged,
+    /// The fault.
+    Fault(Fault),
+}
+
+/// Positions of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Positions {
+    sum_m: f64,
+    count: f64,
+    low_m: f64,
+    high_m: f64,
+}
+
+impl Positions {
+    const NONE: Self = Self { sum_m: 0.0, count: 0.0, low_m: f64::INFINITY, high_m: f64::NEG_INFINITY };
+
+    fn take(&mut self, position_m: f64) {
+        self.sum_m += position_m;
+        self.count += 1.0;
+        self.low_m = self.low_m.min(position_m);
+        self.high_m = self.high_m.max(position_m);
+    }
+
+    /// Before the first position there is no movement; what is no number is one.
+    fn moved(&self, most_m: f64) -> bool {
+        let still = self.high_m - self.low_m <= most_m && self.sum_m.is_finite();
+        self.count > 0.0 && !still
+    }
+
+    fn mean_m(&self) -> f64 {
+        self.sum_m / self.count
+    }
+}
+
+/// State of the chain; each holds what it needs and nothing else. `began` is when matching was asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Idle,
+    /// `partner` has not moved since `rest_since`.
+    WaitingForRest {
+        began: u64,
+        partner: Positions,
+        rest_since: u64,
+    },
+    /// `sampled`: when the partner's position was taken last.
+    Averaging {
+        began: u64,
+        since: u64,
+        own: Positions,
+        partner: Positions,
+        sampled: Option<u64>,
+    },
+    Matched,
+    Fault {
+        fault: Fault,
+    },
+}
+
+/// An edge: where to, and why.
+type Edge = (MatchingChainState, MatchingCause);
+
+/// The chain.
+#[derive(Clone, Debug)]
+pub struct MatchingChain {
+    state: State,
+    asked: bool,
+    offset_m: f64,
+    entered: Entered<MatchingChainState, MatchingCause>,
+}
+
+impl Default for MatchingChain {
+    fn default() -> Self {
+        let entered = Entered { cycle: 0, state: MatchingChainState::Idle, cause: MatchingCause::Began };
+        Self { state: State::Idle, asked: false, offset_m: 0.0, entered }
+    }
+}
+
+impl MatchingChain {
+    /// Moves on by one edge at most, with `values` in the order of [`PARAMETERS`].
+    ///
+    /// # Panics
+    /// When `values` is not as long as the table.
+    pub fn advance(&mut self, inputs: &MatchingInputs, values: &[f64]) -> MatchingOutput {
+        let numbers = Numbers::of(values);
+        self.note(inputs, &numbers);
+        if let Some((state, cause)) = self.decide(inputs, &numbers) {
+            self.enter(state, cause, inputs.cycle);
+        }
+        self.asked = inputs.asked;
+        self.output()
+    }
+
+    /// The rig's time begins anew at `cycle`: so does the chain, without an offset.
+    pub fn restart(&mut self, cycle: u64) {
+        *self = Self::default();
+        self.enter_idle(MatchingCause::Began, cycle);
+    }
+
+    /// The state entered last, when and why.
+    #[must_use]
+    pub fn entered(&self) -> Entered<MatchingChainState, MatchingCause> {
+        self.entered
+    }
+
+    /// Keeps what the inputs tell, without a change of state.
+    fn note(&mut self, inputs: &MatchingInputs, numbers: &Numbers) {
+        let cycle = inputs.cycle;
+        let partner_m = partner_position_m(inputs);
+        match &mut self.state {
+            State::WaitingForRest { partner, rest_since, .. } => {
+                if let Some(position_m) = partner_m {
+                    partner.take(position_m);
+                }
+                if partner_m.is_none() || partner.moved(numbers.moved_m) {
+                    (*partner, *rest_since) = (Positions::NONE, cycle);
+                }
+            }
+            State::Averaging { own, partner, sampled, .. } => {
+                own.take(inputs.position_m);
+                let due = sampled.is_none_or(|last| cycle.saturating_sub(last) >= SAMPLE_CYCLES);
+                if let Some(position_m) = partner_m.filter(|_| due) {
+                    partner.take(position_m);
+                    *sampled = Some(cycle);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The edge to go, if any.
+    fn decide(&self, inputs: &MatchingInputs, numbers: &Numbers) -> Option<Edge> {
+        use MatchingChainState as S;
+        let passed = |since: u64| inputs.cycle.saturating_sub(since);
+        let too_long = |began: u64| {
+            let late = passed(began) > cycles(numbers.match_timeout_s);
+            late.then_some((S::Fault, MatchingCause::Fault(Fault::MatchingTimeout)))
+        };
+        match &self.state {
+            State::Matched if !inputs.asked => None,
+            State::Idle if !inputs.asked => None,
+            _ if !inputs.asked => Some((S::Idle, MatchingCause::NotAsked)),
+            State::Idle => Some((S::WaitingForRest, MatchingCause::Asked)),
+            State::Matched => (!self.asked).then_some((S::WaitingForRest, MatchingCause::Asked)),
+            State::Fault { .. } => None,
+            State::WaitingForRest { began, rest_since, .. } => {
+                let at_rest = inputs.still && passed(*rest_since) >= cycles(numbers.rest_s);
+                let go = at_rest && inputs.linked && partner_position_m(inputs).is_some();
+                go.then_some((S::Averaging, MatchingCause::AtRest)).or_else(|| too_long(*began))
+            }
+            State::Averaging { began, since, own, partner, .. } => {
+                let moved = own.moved(numbers.moved_m) || partner.moved(numbers.moved_m);
+                let back = |cause| Some((S::WaitingForRest, cause));
+                let over = passed(*since) >= cycles(numbers.average_s);
+                match partner_position_m(inputs) {
+                    _ if !inputs.linked => back(MatchingCause::NotLinked),
+                    None => back(MatchingCause::Silent),
+                    _ if moved => back(MatchingCause::Moved),
+                    _ if over => Some(Self::judge(own.mean_m() - partner.mean_m(), numbers)),
+                    _ => too_long(*began),
+                }
+            }
+        }
+    }
+
+    fn judge(offset_m: f64, numbers: &Numbers) -> Edge {
+        if offset_m.abs() <= numbers.offset_most_m {
+            return (MatchingChainState::Matched, MatchingCause::Averaged);
+        }
+        (MatchingChainState::Fault, MatchingCause::Fault(Fault::OffsetImplausible))
+    }
+
+    fn output(&self) -> MatchingOutput {
+        let fault = match self.state {
+            State::Fault { fault } => Some(fault),
+            _ => None,
+        };
+        let matched = self.state == State::Matched;
+        MatchingOutput { state: self.name(), offset_m: self.offset_m, matched, fault }
+    }
+
+    fn enter(&mut self, state: MatchingChainState, cause: MatchingCause, now: u64) {
+        match state {
+            MatchingChainState::Idle => self.enter_idle(cause, now),
+            MatchingChainState::WaitingForRest => self.enter_waiting_for_rest(cause, now),
+            MatchingChainState::Averaging => self.enter_averaging(cause, now),
+            MatchingChainState::Matched => self.enter_matched(cause, now),
+            MatchingChainState::Fault => self.enter_fault(cause, now),
+        }
+    }
+
+    fn enter_idle(&mut self, cause: MatchingCause, now: u64) {
+        self.set(State::Idle, cause, now);
+    }
+
+    fn enter_waiting_for_rest(&mut self, cause: MatchingCause, now: u64) {
+        let began = self.began(now);
+        self.set(State::WaitingForRest { began, partner: Positions::NONE, rest_since: now }, cause, now);
+    }
+
+    fn enter_averaging(&mut self, cause: MatchingCause, now: u64) {
+        let [own, partner] = [Positions::NONE; 2];
+        let state = State::Averaging { began: self.began(now), since: now, own, partner, sampled: None };
+        self.set(state, cause, now);
+    }
+
+    fn enter_matched(&mut self, cause: MatchingCause, now: u64) {
+        if let State::Averaging { own, partner, .. } = &self.state {
+            self.offset_m = own.mean_m() - partner.mean_m();
+        }
+        self.set(State::Matched, cause, now);
+    }
+
+    fn enter_fault(&mut self, cause: MatchingCause, now: u64) {
+        let MatchingCause::Fault(fault) = cause else { unreachable!("only a fault leads to fault") };
+        self.set(State::Fault { fault }, cause, now);
+    }
+
+    fn set(&mut self, state: State, cause: MatchingCause, now: u64) {
+        self.state = state;
+        self.entered = Entered { cycle: now, state: self.name(), cause };
+    }
+
+    /// When matching was asked for; `now` when it was not.
+    fn began(&self, now: u64) -> u64 {
+        match self.state {
+            State::WaitingForRest { began, .. } | State::Averaging { began, .. } => began,
+            State::Idle | State::Matched | State::Fault { .. } => now,
+        }
+    }
+
+    /// The state as the bus names it.
+    fn name(&self) -> MatchingChainState {
+        match self.state {
+            State::Idle => MatchingChainState::Idle,
+            State::WaitingForRest { .. } => MatchingChainState::WaitingForRest,
+            State::Averaging { .. } => MatchingChainState::Averaging,
+            State::Matched => MatchingChainState::Matched,
+            State::Fault { .. } => MatchingChainState::Fault,
+        }
+    }
+}
+
+/// Where a partner that speaks says it is.
+fn partner_position_m(inputs: &MatchingInputs) -> Option<f64> {
+    inputs.partner.fresh(inputs.cycle)?;
+    inputs.partner.values.map(|values| values.averaged_position_m)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,192 @@
+//! An experiment file: what both axes shall do, in which order, with which programs, and what is recorded.
+//!
+//! ```toml
+//! title = "load-step"
+//! about = "Positioning under a load step: Fig. 9 of the paper"
+//! number = 9                       # 1 to 255: its name on the bus
+//!
+//! [run]                            # both axes; the values here are the defaults
+//! repetitions = 1
+//! settling_s = 0.5
+//! settling_timeout_s = 10.0
+//! start = "by-itself"              # or "on-start"
+//! after_emergency_stop = "end"     # or "restart", "on-start"
+//!
+//! [drive]                          # see the module axis, and for the laws the module set_point::law
+//! program = "position-p"
+//! start_m = 0.1
+//! [[drive.set-point]]
+//! law = "bestehorn"
+//! to_m = 0.4
+//! duration_s = 3.0
+//!
+//! [load]                           # absent: its valve is held shut
+//! program = "force-p"
+//! initial_force_n = 100.0
+//! [[load.set-point]]
+//! law = "step"
+//! to_n = 300.0
+//! duration_s = 3.0
+//!
+//! [recording]
+//! every_cycles = 1
+//! ```
+//!
+//! `[rig]` is the emulator's and `[passed]` the report's; they may hold what they like.
+
+pub mod axis;
+pub mod section;
+
+pub use axis::{AxisExperiment, ByHandLimits, Change, During, Prepare, ProgramReference, SetPoints};
+pub use section::ExperimentError;
+
+use crate::chains::AfterStop;
+use crate::chains::main::Start;
+use algorithms::parameters::Parameter;
+use section::{Section, Source};
+use std::path::Path;
+
+/// An experiment, checked.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    /// What it is called.
+    pub title: String,
+    /// A sentence about it; may be empty.
+    pub about: String,
+    /// Its name on the bus, 1 to 255.
+    pub number: u8,
+    /// What both axes keep to.
+    pub run: RunSection,
+    /// What the drive does; `None`: its valve is held shut.
+    pub drive: Option<AxisExperiment>,
+    /// What the load axis does; `None`: its valve is held shut.
+    pub load: Option<AxisExperiment>,
+    /// What is recorded.
+    pub recording: Recording,
+    /// `[rig]`, unread.
+    pub rig: toml::Table,
+    /// `[passed]`, unread.
+    pub passed: toml::Table,
+}
+
+/// `[run]`: what both axes keep to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunSection {
+    /// How often it is driven through, each from initial positioning on.
+    pub repetitions: u32,
+    /// How long an axis must stand still before and after, s.
+    pub settling_s: f64,
+    /// How long a waiting state of the chains may take before it is given up, s.
+    pub settling_timeout_s: f64,
+    /// What starts the experiment once both axes have settled.
+    pub start: Start,
+    /// What follows an emergency stop.
+    pub after_emergency_stop: AfterStop,
+}
+
+/// `[recording]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Recording {
+    /// Cycles between two rows of an axis's file.
+    pub every_cycles: u32,
+}
+
+static NUMBER: Parameter = Parameter::new(("number", ""), [1.0, 255.0], 1.0, "name on the bus");
+static REPETITIONS: Parameter =
+    Parameter::new(("repetitions", "times"), [1.0, 1e6], 1.0, "how often it is driven through");
+static SETTLING: Parameter =
+    Parameter::new(("settling_s", "s"), [0.0, 60.0], 0.5, "how long it stands still before and after");
+static SETTLING_TIMEOUT: Parameter = Parameter::new(
+    ("settling_timeout_s", "s"),
+    [0.1, 3600.0],
+    10.0,
+    "how long a waiting state may take before it is given up",
+);
+static EVERY: Parameter =
+    Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "cycles between two rows");
+
+impl Experiment {
+    /// The experiment in `text`, for a stroke of `stroke_m`. `file` is for messages, and tables are read beside it.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] for TOML that does not parse, unknown or missing keys, values out of range, and bad tables.
+    pub fn from_toml(text: &str, file: &Path, stroke_m: f64) -> Result<Self, ExperimentError> {
+        let source = Source::parse(text, file)?;
+        let mut root = source.root();
+        let title = root.needed_text("title", "what the experiment is called")?.text;
+        let about = root.text("about")?.map_or_else(String::new, |about| about.text);
+        // Within 1 to 255 by its range.
+        let number = root.whole_or_default(&NUMBER)? as u8;
+        let run = RunSection::read(root.section("run")?)?;
+        let mut axis = |key, usual| {
+            let section = root.section(key)?;
+            section.map(|section| AxisExperiment::read(section, usual, stroke_m)).transpose()
+        };
+        let drive = axis("drive", algorithms::algorithm::Quantity::Position)?;
+        let load = axis("load", algorithms::algorithm::Quantity::Force)?;
+        let recording = Recording::read(root.section("recording")?)?;
+        let [rig, passed] = [root.opaque("rig")?, root.opaque("passed")?];
+        root.finish()?;
+        if drive.is_none() && load.is_none() {
+            return Err(root.wrong("[drive] or [load] is needed: nothing moves without"));
+        }
+        Ok(Self { title, about, number, run, drive, load, recording, rig, passed })
+    }
+
+    /// How long one repetition takes, s: the longer of both axes.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        let axes = [&self.drive, &self.load].into_iter().flatten();
+        axes.map(|axis| axis.set_points.duration_s()).fold(0.0, f64::max)
+    }
+}
+
+impl RunSection {
+    fn read(section: Option<Section<'_>>) -> Result<Self, ExperimentError> {
+        let Some(mut section) = section else { return Ok(Self::default()) };
+        let run = Self {
+            repetitions: section.whole_or_default(&REPETITIONS)?,
+            settling_s: section.number_or_default(&SETTLING)?,
+            settling_timeout_s: section.number_or_default(&SETTLING_TIMEOUT)?,
+            start: section
+                .choice("start", &[("by-itself", Start::ByItself), ("on-start", Start::OnStart)])?,
+            after_emergency_stop: section.choice(
+                "after_emergency_stop",
+                &[("end", AfterStop::End), ("restart", AfterStop::Restart), ("on-start", AfterStop::OnStart)],
+            )?,
+        };
+        if run.settling_timeout_s <= run.settling_s {
+            let Self { settling_s, settling_timeout_s, .. } = run;
+            let said = format!(
+                "settling_timeout_s = {settling_timeout_s} s; allowed is above settling_s, which is {settling_s} s"
+            );
+            return Err(section.wrong_at("settling_timeout_s", &said));
+        }
+        section.finish()?;
+        Ok(run)
+    }
+}
+
+impl Default for RunSection {
+    fn default() -> Self {
+        Self {
+            repetitions: 1,
+            settling_s: SETTLING.default,
+            settling_timeout_s: SETTLING_TIMEOUT.default,
+            start: Start::ByItself,
+            after_emergency_stop: AfterStop::End,
+        }
+    }
+}
+
+impl Recording {
+    fn read(section: Option<Section<'_>>) -> Result<Self, ExperimentError> {
+        let Some(mut section) = section else { return Ok(Self { every_cycles: 1 }) };
+        let every_cycles = section.whole_or_default(&EVERY)?;
+        section.finish()?;
+        Ok(Self { every_cycles })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,256 @@
+//! `[drive]` and `[load]` of an experiment file: what one axis does.
+//!
+//! ```toml
+//! program = "position-p"        # programs/NAME.toml beside the experiments' folder, or a path ending in .toml
+//! start_m = 0.1                 # where initial positioning goes; a row of forces may leave it out
+//! prepare = ["relieve", "match"]
+//! during = "set-point"          # or "manual"
+//! force_limit_n = 1000.0        # the four of a row of forces
+//! initial_force_n = 100.0
+//! initial_ramp_s = 1.0
+//! by_hand_speed_m_per_s = 0.2   # of a row of forces by_hand_rate_n_per_s: set-points given by hand are followed, see below
+//! [[drive.set-point]]           # a row of positions or of forces
+//! [[drive.change]]
+//! at_s = 3.0
+//! parameter = "algorithm.gain_per_s"
+//! value = 30.0
+//! ```
+//!
+//! Whether the row is of positions or of forces follows from its laws and their keys (`to_m`, `to_n`); a row that says neither is
+//! of positions for the drive and of forces for the load axis.
+//!
+//! With a largest speed (or rate) by hand, the first frame `HandSetPoint` that finds the row at rest takes over: from then on the
+//! axis follows these frames while the experiment lasts, and the row no more.
+
+use super::section::{ExperimentError, Section};
+use crate::set_point::{ForceProfile, Motion, reading};
+use algorithms::algorithm::Quantity;
+use algorithms::parameters::Parameter;
+use std::path::{Path, PathBuf};
+
+/// What one axis does.
+#[derive(Clone, Debug)]
+pub struct AxisExperiment {
+    /// Its program.
+    pub program: ProgramReference,
+    /// Where initial positioning goes, m; `None`: it stays where it is.
+    pub start_m: Option<f64>,
+    /// What is done after initial positioning, in this order.
+    pub prepare: Vec<Prepare>,
+    /// How long the initial force is ramped to, s.
+    pub initial_ramp_s: f64,
+    /// Who leads the axis during the experiment.
+    pub during: During,
+    /// Its set-points.
+    pub set_points: SetPoints,
+    /// What set-points given by hand keep to; `None`: none are followed.
+    pub by_hand: Option<ByHandLimits>,
+    /// Parameters changed while running, in the order of their times.
+    pub changes: Vec<Change>,
+}
+
+/// A program as the experiment names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProgramReference {
+    /// Name or path as written.
+    pub written: String,
+    /// Line in the experiment file, from 1.
+    pub line: usize,
+}
+
+impl ProgramReference {
+    /// The program's file: `../programs/NAME.toml` from the experiment's folder, or the path from there that ends in .toml.
+    #[must_use]
+    pub fn path(&self, experiment_file: &Path) -> PathBuf {
+        let folder = experiment_file.parent().unwrap_or(Path::new(""));
+        if self.written.ends_with(".toml") {
+            return folder.join(&self.written);
+        }
+        folder.join("..").join("programs").join(format!("{}.toml", self.written))
+    }
+}
+
+/// A step of the preparation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Prepare {
+    /// Relieve the linked system of stress.
+    Relieve,
+    /// Match the position of both axes.
+    Match,
+}
+
+/// Who leads the axis during the experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum During {
+    /// Its set-points.
+    SetPoint,
+    /// A hand, under force control with set-point zero.
+    Manual,
+}
+
+/// What set-points given by hand keep to, in m or N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByHandLimits {
+    /// Largest rate on the way to one, per s.
+    pub rate_per_s: f64,
+    /// Least and largest one; others are taken to these.
+    pub range: [f64; 2],
+}
+
+/// Set-points of an axis.
+#[derive(Clone, Debug)]
+pub enum SetPoints {
+    /// Position over time.
+    Positions(Motion),
+    /// Force over time and over what the axis does.
+    Forces(ForceProfile),
+}
+
+impl SetPoints {
+    /// What they are of.
+    #[must_use]
+    pub fn quantity(&self) -> Quantity {
+        match self {
+            Self::Positions(_) => Quantity::Position,
+            Self::Forces(_) => Quantity::Force,
+        }
+    }
+
+    /// How long they take, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        match self {
+            Self::Positions(motion) => motion.duration_s(),
+            Self::Forces(profile) => profile.duration_s(),
+        }
+    }
+}
+
+/// A parameter of the axis's program that changes while running.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// When, s after the experiment began.
+    pub at_s: f64,
+    /// Which one, such as `algorithm.gain_per_s`.
+    pub parameter: String,
+    /// Its new value, in the parameter's unit.
+    pub value: f64,
+    /// Line in the experiment file, from 1.
+    pub line: usize,
+}
+
+static RAMP: Parameter =
+    Parameter::new(("initial_ramp_s", "s"), [0.01, 60.0], 1.0, "how long the initial force is ramped to");
+static FORCE_LIMIT: Parameter =
+    Parameter::new(("force_limit_n", "N"), [1.0, 2000.0], 1000.0, "largest force that is asked for");
+static BY_HAND_SPEED: Parameter = Parameter::new(
+    ("by_hand_speed_m_per_s", "m/s"),
+    [0.001, 1.0],
+    0.2,
+    "largest speed to a position given by hand",
+);
+static BY_HAND_RATE: Parameter = Parameter::new(
+    ("by_hand_rate_n_per_s", "N/s"),
+    [1.0, 10_000.0],
+    200.0,
+    "largest rate to a force given by hand",
+);
+static AT: Parameter =
+    Parameter::new(("at_s", "s"), [0.0, 86_400.0], 0.0, "when, after the experiment began");
+// What the program's own table allows is checked there.
+static VALUE: Parameter = Parameter::new(("value", ""), [-1e15, 1e15], 0.0, "the parameter's new value");
+
+const PREPARE: [(&str, Prepare); 2] = [("relieve", Prepare::Relieve), ("match", Prepare::Match)];
+const DURING: [(&str, During); 2] = [("set-point", During::SetPoint), ("manual", During::Manual)];
+
+impl AxisExperiment {
+    /// Reads it; `usual` is what a row is of that does not say.
+    pub(super) fn read(
+        mut section: Section<'_>,
+        usual: Quantity,
+        stroke_m: f64,
+    ) -> Result<Self, ExperimentError> {
+        let program = program(&mut section)?;
+        let start = Parameter::new(("start_m", "m"), [0.0, stroke_m], 0.0, "where initial positioning goes");
+        let start_m = section.number(&start)?;
+        let prepare = section.choices("prepare", &PREPARE)?;
+        let during = section.choice("during", &DURING)?;
+        let segments = section.sections("set-point")?;
+        let quantity = reading::quantity(&segments)?.unwrap_or(usual);
+        let mut initial_ramp_s = RAMP.default;
+        let by_hand;
+        let set_points = match quantity {
+            Quantity::Position => {
+                if let Some(key) = FORCE_KEYS.iter().find(|key| section.has(key)) {
+                    let said = format!("{key} is for set-points of force; these are of position");
+                    return Err(section.wrong_at(key, &said));
+                }
+                let start_m = section.needed_number(&start)?;
+                let speed = section.number(&BY_HAND_SPEED)?;
+                by_hand = speed.map(|rate_per_s| ByHandLimits { rate_per_s, range: [0.0, stroke_m] });
+                SetPoints::Positions(reading::motion(start_m, segments, stroke_m)?)
+            }
+            Quantity::Force => {
+                let limit_n = section.number_or_default(&FORCE_LIMIT)?;
+                let initial = Parameter::new(
+                    ("initial_force_n", "N"),
+                    [0.0, limit_n],
+                    0.0,
+                    "force that it begins with",
+                );
+                let initial_n = section.number_or_default(&initial)?;
+                initial_ramp_s = section.number_or_default(&RAMP)?;
+                let rate = section.number(&BY_HAND_RATE)?;
+                by_hand = rate.map(|rate_per_s| ByHandLimits { rate_per_s, range: [0.0, limit_n] });
+                SetPoints::Forces(reading::forces([initial_n, limit_n], segments, stroke_m)?)
+            }
+        };
+        if by_hand.is_some() && during == During::Manual {
+            let said = "during = \"manual\" leaves no set-points to be given by hand: leave one of both out";
+            return Err(section.wrong_at("during", said));
+        }
+        let changes = section.sections("change")?.into_iter().map(change).collect::<Result<Vec<_>, _>>();
+        let mut changes = changes?;
+        changes.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
+        section.finish()?;
+        Ok(Self { program, start_m, prepare, initial_ramp_s, during, set_points, by_hand, changes })
+    }
+
+    /// The force that the axis begins with, N; 0 when it is position controlled.
+    #[must_use]
+    pub fn initial_force_n(&self) -> f64 {
+        match &self.set_points {
+            SetPoints::Positions(_) => 0.0,
+            SetPoints::Forces(profile) => profile.initial_force_n(),
+        }
+    }
+
+    /// The program's file.
+    #[must_use]
+    pub fn program_path(&self, experiment_file: &Path) -> PathBuf {
+        self.program.path(experiment_file)
+    }
+}
+
+const FORCE_KEYS: [&str; 4] = ["force_limit_n", "initial_force_n", "initial_ramp_s", "by_hand_rate_n_per_s"];
+
+fn program(section: &mut Section<'_>) -> Result<ProgramReference, ExperimentError> {
+    let program = section.needed_text("program", "a name in programs, or a path ending in .toml")?;
+    let is_name = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    if program.text.ends_with(".toml") || (!program.text.is_empty() && program.text.chars().all(is_name)) {
+        return Ok(ProgramReference { written: program.text, line: program.line });
+    }
+    let said = format!(
+        "program = \"{}\"; allowed is a name of letters, digits, - and _, or a path ending in .toml",
+        program.text
+    );
+    Err(section.wrong_at("program", &said))
+}
+
+fn change(mut section: Section<'_>) -> Result<Change, ExperimentError> {
+    let at_s = section.needed_number(&AT)?;
+    let parameter = section.needed_text("parameter", "which one, such as algorithm.gain_per_s")?;
+    let value = section.needed_number(&VALUE)?;
+    section.finish()?;
+    Ok(Change { at_s, parameter: parameter.text, value, line: parameter.line })
+}

@@ -1,0 +1,308 @@
+//! A table of a TOML file, read key by key: what is wrong is told with file, line, key, value and what is allowed.
+//!
+//! Every number is checked against a [`Parameter`]. A key that nobody asked for is refused by [`Section::finish`], which names
+//! those that were asked for.
+
+use algorithms::parameters::Parameter;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A file that cannot be used: file, line, key, value and what is allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct ExperimentError(String);
+
+/// A TOML file that is being read.
+pub struct Source<'a> {
+    text: &'a str,
+    file: &'a Path,
+    root: Spanned<DeTable<'a>>,
+}
+
+impl<'a> Source<'a> {
+    /// Parses `text`; `file` is for messages, and paths in it are relative to its folder.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] for what is no TOML.
+    pub fn parse(text: &'a str, file: &'a Path) -> Result<Self, ExperimentError> {
+        let root =
+            DeTable::parse(text).map_err(|error| ExperimentError(format!("{}: {error}", file.display())))?;
+        Ok(Self { text, file, root })
+    }
+
+    /// The whole file.
+    #[must_use]
+    pub fn root(&self) -> Section<'_> {
+        Section { source: self, path: String::new(), table: self.root.get_ref(), at: 0, asked: Vec::new() }
+    }
+
+    fn line(&self, at: usize) -> usize {
+        1 + self.text.as_bytes()[..at.min(self.text.len())].iter().filter(|byte| **byte == b'\n').count()
+    }
+
+    /// The value as it is written, on one line.
+    fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
+        let text = self.text.get(value.span()).unwrap_or_default();
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        if words.chars().count() > 60 { words.chars().take(57).chain("...".chars()).collect() } else { words }
+    }
+}
+
+/// A text with the line that it stands in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Text {
+    /// What is written.
+    pub text: String,
+    /// Line in the file, from 1.
+    pub line: usize,
+}
+
+/// One table of a [`Source`].
+pub struct Section<'a> {
+    source: &'a Source<'a>,
+    path: String,
+    table: &'a DeTable<'a>,
+    at: usize,
+    asked: Vec<String>,
+}
+
+impl<'a> Section<'a> {
+    /// Whether the key is there. To ask is not to allow it.
+    #[must_use]
+    pub fn has(&self, key: &str) -> bool {
+        self.table.keys().any(|name| name.get_ref() == key)
+    }
+
+    /// The text under `key`, if it is there and one. To look is not to allow it.
+    #[must_use]
+    pub fn peek(&self, key: &str) -> Option<&str> {
+        self.table
+            .iter()
+            .find(|(name, _)| name.get_ref() == key)
+            .and_then(|(_, value)| value.get_ref().as_str())
+    }
+
+    /// Line in which the table begins, from 1.
+    #[must_use]
+    pub fn line(&self) -> usize {
+        self.source.line(self.at)
+    }
+
+    /// The number of this parameter, in its range; `None` when the key is absent.
+    ///
+    /// # Errors
+    /// No number, or out of range.
+    pub fn number(&mut self, parameter: &Parameter) -> Result<Option<f64>, ExperimentError> {
+        let Some(value) = self.value(&parameter.name) else { return Ok(None) };
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse().ok(),
+            DeValue::Integer(integer) => {
+                i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|whole| whole as f64)
+            }
+            _ => None,
+        };
+        match number {
+            Some(number) => {
+                parameter.check(number).map(Some).map_err(|error| self.told(value, &error.to_string()))
+            }
+            None => {
+                let Parameter { name, unit, least, most, .. } = parameter;
+                let written = self.source.written(value);
+                let allowed = format!("allowed is a number, {least} to {most} {unit}");
+                Err(self.told(value, &format!("{name} = {written}; {}", allowed.trim_end())))
+            }
+        }
+    }
+
+    /// The number of this parameter, or its default.
+    ///
+    /// # Errors
+    /// No number, or out of range.
+    pub fn number_or_default(&mut self, parameter: &Parameter) -> Result<f64, ExperimentError> {
+        Ok(self.number(parameter)?.unwrap_or(parameter.default))
+    }
+
+    /// The number of this parameter, which must be there.
+    ///
+    /// # Errors
+    /// Missing, no number, or out of range.
+    pub fn needed_number(&mut self, parameter: &Parameter) -> Result<f64, ExperimentError> {
+        let Parameter { name, unit, least, most, meaning, .. } = parameter;
+        let missing = format!("{name} is missing: {meaning}, {least} to {most} {unit}");
+        self.number(parameter)?.ok_or_else(|| self.lacks(missing.trim_end()))
+    }
+
+    /// The whole number of this parameter, or its default.
+    ///
+    /// # Errors
+    /// No whole number, or out of range.
+    pub fn whole_or_default(&mut self, parameter: &Parameter) -> Result<u32, ExperimentError> {
+        let number = self.number_or_default(parameter)?;
+        if number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number) {
+            return Ok(number as u32);
+        }
+        let said = format!("{} = {number}; allowed is a whole number", parameter.name);
+        Err(self.wrong_at(&parameter.name, &said))
+    }
+
+    /// The text under `key`; `None` when it is absent.
+    ///
+    /// # Errors
+    /// No text.
+    pub fn text(&mut self, key: &str) -> Result<Option<Text>, ExperimentError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        match value.get_ref().as_str() {
+            Some(text) => Ok(Some(Text { text: text.into(), line: self.source.line(value.span().start) })),
+            None => {
+                let written = self.source.written(value);
+                Err(self.told(value, &format!("{key} = {written}; allowed is a text in quotes")))
+            }
+        }
+    }
+
+    /// The text under `key`, which must be there; `meaning` is for the message when it is not.
+    ///
+    /// # Errors
+    /// Missing, or no text.
+    pub fn needed_text(&mut self, key: &str, meaning: &str) -> Result<Text, ExperimentError> {
+        self.text(key)?.ok_or_else(|| self.lacks(&format!("{key} is missing: {meaning}")))
+    }
+
+    /// Which of the named choices `key` makes; the first when it is absent.
+    ///
+    /// # Errors
+    /// None of them.
+    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T, ExperimentError> {
+        let Some(written) = self.text(key)? else { return Ok(choices[0].1) };
+        self.chosen(key, &written.text, choices)
+    }
+
+    /// The named choices listed under `key`; none when it is absent.
+    ///
+    /// # Errors
+    /// No list, or one that holds something else.
+    pub fn choices<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<Vec<T>, ExperimentError> {
+        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
+        let list = value.get_ref().as_array();
+        let texts = list.and_then(|list| list.iter().map(|item| item.get_ref().as_str()).collect());
+        let Some(texts): Option<Vec<&str>> = texts else {
+            let written = self.source.written(value);
+            return Err(self.told(value, &format!("{key} = {written}; allowed is a list of texts")));
+        };
+        texts.into_iter().map(|text| self.chosen(key, text, choices)).collect()
+    }
+
+    fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T, ExperimentError> {
+        choices.iter().find(|(name, _)| *name == text).map(|(_, choice)| *choice).ok_or_else(|| {
+            let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
+            self.wrong_at(key, &format!("{key} = \"{text}\"; allowed is {}", names.join(", ")))
+        })
+    }
+
+    /// The table under `key`; `None` when it is absent.
+    ///
+    /// # Errors
+    /// No table.
+    pub fn section(&mut self, key: &str) -> Result<Option<Self>, ExperimentError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        self.inner(self.path_of(key), value).map(Some)
+    }
+
+    /// The tables of the list under `key`, each called by its place from 1 on; none when it is absent.
+    ///
+    /// # Errors
+    /// No list of tables.
+    pub fn sections(&mut self, key: &str) -> Result<Vec<Self>, ExperimentError> {
+        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
+        let Some(list) = value.get_ref().as_array() else {
+            return Err(
+                self.told(value, &format!("{key} must be a list of tables: [[{}]]", self.path_of(key)))
+            );
+        };
+        let path = |place: usize| format!("{}[{place}]", self.path_of(key));
+        list.iter().enumerate().map(|(index, item)| self.inner(path(index + 1), item)).collect()
+    }
+
+    /// The table under `key` as it stands, unread; empty when it is absent.
+    ///
+    /// # Errors
+    /// No table.
+    pub fn opaque(&mut self, key: &str) -> Result<toml::Table, ExperimentError> {
+        let Some(section) = self.section(key)? else { return Ok(toml::Table::new()) };
+        // The text parsed before, so its parts do.
+        let whole: toml::Table = toml::from_str(self.source.text)
+            .map_err(|error| ExperimentError(format!("{}: {error}", self.source.file.display())))?;
+        let keys = section.path.split('.');
+        let found = keys.into_iter().try_fold(whole, |table, key| table.get(key)?.as_table().cloned());
+        Ok(found.unwrap_or_default())
+    }
+
+    /// A file that the text names, relative to the folder of the file that is read.
+    #[must_use]
+    pub fn beside(&self, name: &str) -> PathBuf {
+        self.source.file.parent().unwrap_or(Path::new("")).join(name)
+    }
+
+    /// Refuses keys that nobody asked for.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn finish(&self) -> Result<(), ExperimentError> {
+        let unknown = |name: &&Spanned<_>| !self.asked.iter().any(|asked| name.get_ref() == asked);
+        let Some(name) = self.table.keys().find(unknown) else { return Ok(()) };
+        let line = self.source.line(name.span().start);
+        let path = self.path_of(name.get_ref());
+        let said = format!("{line}: unknown key {path}; allowed is {}", self.asked.join(", "));
+        Err(ExperimentError(format!("{}:{said}", self.source.file.display())))
+    }
+
+    /// An error of the whole table.
+    #[must_use]
+    pub fn wrong(&self, said: &str) -> ExperimentError {
+        let dot = if self.path.is_empty() { "" } else { "." };
+        ExperimentError(format!("{}:{}: {}{dot}{said}", self.source.file.display(), self.line(), self.path))
+    }
+
+    /// An error of the value under `key`, which begins with that key.
+    #[must_use]
+    pub fn wrong_at(&self, key: &str, said: &str) -> ExperimentError {
+        match self.table.iter().find(|(name, _)| name.get_ref() == key) {
+            Some((_, value)) => self.told(value, said),
+            None => self.wrong(said),
+        }
+    }
+
+    /// A missing key, with those that are there: it may be one of them, misspelt.
+    fn lacks(&self, said: &str) -> ExperimentError {
+        let keys: Vec<&str> = self.table.keys().map(|name| name.get_ref().as_ref()).collect();
+        self.wrong(&format!("{said}; the keys here are {}", keys.join(", ")))
+    }
+
+    fn told(&self, value: &Spanned<DeValue<'_>>, said: &str) -> ExperimentError {
+        let line = self.source.line(value.span().start);
+        ExperimentError(format!("{}:{line}: {}", self.source.file.display(), self.path_of(said)))
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
+    }
+
+    fn value(&mut self, key: &str) -> Option<&'a Spanned<DeValue<'a>>> {
+        if !self.asked.iter().any(|asked| asked == key) {
+            self.asked.push(key.into());
+        }
+        self.table.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+    }
+
+    fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>) -> Result<Self, ExperimentError> {
+        let Some(table) = value.get_ref().as_table() else {
+            let line = self.source.line(value.span().start);
+            return Err(ExperimentError(format!(
+                "{}:{line}: {path} must be a table",
+                self.source.file.display()
+            )));
+        };
+        Ok(Self { source: self.source, path, table, at: value.span().start, asked: Vec::new() })
+    }
+}

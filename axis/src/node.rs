@@ -1,0 +1,512 @@
+//! The controllers of a process on the bus: frames in, commands out, whatever paces them.
+//!
+//! ```text
+//!   take(frame)* ──► answer: for each axis with fresh sensors, one command that echoes their cycle;
+//!                            every ten cycles, and on change, status and values of its chains; its emergency stop
+//! ```
+//!
+//! Only the newest sensors of an axis are answered: after a stall, the backlog is read and not replayed. An axis hears its
+//! partner as it would over the bus, a cycle after the partner spoke, also when both live in this process: one
+//! process or two give the same log. Nothing here allocates, locks, prints or blocks.
+
+use crate::axis::{Answer, AxisController, AxisRecord};
+use crate::chains::main::MainCause;
+use crate::program::Program;
+use crate::rig_view::{RigView, TickNews};
+use crossbeam_channel::{Receiver, Sender};
+use plant::Axis;
+use protocol::bus::Bus;
+use protocol::can::CanFrame;
+use protocol::frames::{
+    ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand,
+};
+use std::collections::VecDeque;
+
+/// Ticks of the rig, one every ten cycles, without sensors of an axis in between, after which they count as lost: 50 ms. Sooner
+/// than its partner gives it up for its silence, so that the cause is named.
+const SILENT_TICKS: u64 = 5;
+/// Cycles from tick to tick.
+const TICK_PERIOD: u64 = protocol::periods::TICK_CYCLES;
+/// Cycles after an abort or a fault during which the valve is still commanded shut and the record goes on.
+pub const STOPPED_CYCLES: u64 = 2000;
+/// Frames of a partner that wait for their cycle; a cycle has three at most.
+const MAIL_ROOM: usize = 16;
+
+/// What a node reports to a person.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum News {
+    /// The main chain of an axis went to this state in this cycle, because of this.
+    State {
+        /// The axis.
+        axis: Axis,
+        /// Its state.
+        #[serde(serialize_with = "state_name")]
+        state: MainChainState,
+        /// The rig's cycle.
+        cycle: u64,
+        /// Why.
+        #[serde(serialize_with = "in_words")]
+        cause: MainCause,
+    },
+    /// The rig's time began again.
+    RigRestarted,
+    /// The bus went away.
+    BusLost,
+    /// It is back.
+    BusBack,
+    /// No sensors for a while.
+    SensorsSilent,
+}
+
+fn state_name<S: serde::Serializer>(state: &MainChainState, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(state.name())
+}
+
+fn in_words<S: serde::Serializer>(cause: &MainCause, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(cause)
+}
+
+/// Frames that were counted and ignored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct IgnoredFrames {
+    /// Not as `rig.dbc` says.
+    pub malformed: u64,
+    /// Identifiers that `rig.dbc` does not know, extended and remote frames.
+    pub unknown: u64,
+}
+
+/// A parameter that shall change, already checked against its table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change {
+    /// Of which axis.
+    pub axis: Axis,
+    /// Place in the list of variables.
+    pub place: usize,
+    /// Its value.
+    pub value: f64,
+}
+
+/// The queues between a node and the threads that may wait.
+pub struct Outlets {
+    /// A row of an axis each recorded cycle.
+    pub records: Sender<AxisRecord>,
+    /// What a person is told.
+    pub news: Sender<News>,
+    /// Parameters changed while running.
+    pub changes: Receiver<Change>,
+    /// Lockstep waits for the recorder rather than lose a row.
+    pub waits: bool,
+}
+
+/// Frames between two axes of one process, each heard in the cycle after the one in which it was sent, as over the bus.
+#[derive(Default)]
+struct Mail(VecDeque<(u64, Frame)>);
+
+impl Mail {
+    fn new() -> Self {
+        Self(VecDeque::with_capacity(MAIL_ROOM))
+    }
+
+    fn post(&mut self, cycle: u64, frame: Frame) {
+        if self.0.len() == MAIL_ROOM {
+            self.0.pop_front();
+        }
+        self.0.push_back((cycle, frame));
+    }
+
+    fn heard_in(&mut self, cycle: u64) -> Option<Frame> {
+        let due = self.0.front().is_some_and(|(sent, _)| *sent < cycle);
+        if due { self.0.pop_front().map(|(_, frame)| frame) } else { None }
+    }
+}
+
+/// An axis of this process.
+struct Member<P> {
+    controller: AxisController,
+    /// From the partner in this process.
+    mail: Mail,
+    answered: u64,
+    stopped_for: u64,
+    /// Ticks since the last own sensors.
+    silent_ticks: u64,
+    /// Measurement and calibration, if that was asked for.
+    port: Option<P>,
+}
+
+/// Access to a controller from outside its program: signals are measured, parameters are changed between two cycles.
+pub trait CalibrationPort {
+    /// Processes a frame that is a command to the port; returns whether it was one.
+    fn take(&mut self, frame: &CanFrame) -> bool;
+
+    /// The rig's time began again.
+    fn restart(&mut self);
+
+    /// Samples the signals of `controller` after it has answered the sensors of a cycle.
+    fn observe(&mut self, controller: &AxisController, cycle: u64, sensors: &Sensors, command: &ValveCommand);
+
+    /// Answers waiting commands and sends what is due, once all valves have their commands.
+    fn serve(&mut self, program: &mut Program, bus: &mut dyn Bus);
+}
+
+/// The port of a controller without measurement and calibration; it has no value.
+#[derive(Clone, Copy, Debug)]
+pub enum NoPort {}
+
+impl CalibrationPort for NoPort {
+    fn take(&mut self, _: &CanFrame) -> bool {
+        match *self {}
+    }
+
+    fn restart(&mut self) {
+        match *self {}
+    }
+
+    fn observe(&mut self, _: &AxisController, _: u64, _: &Sensors, _: &ValveCommand) {
+        match *self {}
+    }
+
+    fn serve(&mut self, _: &mut Program, _: &mut dyn Bus) {
+        match *self {}
+    }
+}
+
+/// The controllers of a process on the bus.
+pub struct ControllerNode<P = NoPort> {
+    view: RigView,
+    members: Vec<Member<P>>,
+    outlets: Outlets,
+    ignored: IgnoredFrames,
+    records_dropped: u64,
+    ending: bool,
+    /// Cycles that an axis answered, each once.
+    answered: u64,
+    newest_answered: Option<u64>,
+}
+
+impl ControllerNode {
+    /// Puts the controllers, one or two, on the bus.
+    #[must_use]
+    pub fn new(controllers: Vec<AxisController>, outlets: Outlets) -> Self {
+        Self::with_ports(controllers, outlets, |_| None)
+    }
+}
+
+impl<P: CalibrationPort> ControllerNode<P> {
+    /// Puts the controllers, one or two, on the bus, each with the port that `port_of` gives for its axis.
+    #[must_use]
+    pub fn with_ports(
+        controllers: Vec<AxisController>,
+        outlets: Outlets,
+        mut port_of: impl FnMut(Axis) -> Option<P>,
+    ) -> Self {
+        let member = |controller: AxisController| Member {
+            port: port_of(controller.axis()),
+            controller,
+            mail: Mail::new(),
+            answered: 0,
+            stopped_for: 0,
+            silent_ticks: 0,
+        };
+        Self {
+            view: RigView::default(),
+            members: controllers.into_iter().map(member).collect(),
+            outlets,
+            ignored: IgnoredFrames::default(),
+            records_dropped: 0,
+            ending: false,
+            answered: 0,
+            newest_answered: None,
+        }
+    }
+
+    /// Processes a frame; returns the axis whose sensors it carried.
+    pub fn take(&mut self, frame: &CanFrame) -> Option<Axis> {
+        if self.members.iter_mut().filter_map(|member| member.port.as_mut()).any(|port| port.take(frame)) {
+            return None;
+        }
+        match Frame::decode(frame) {
+            Ok(Frame::DriveSensors(sensors)) => return Some(self.take_sensors(Axis::Drive, sensors)),
+            Ok(Frame::LoadSensors(sensors)) => return Some(self.take_sensors(Axis::Load, sensors)),
+            Ok(Frame::RigStatus(status)) => self.view.take_status(status),
+            Ok(Frame::Tick(tick)) => match self.view.take_tick(&tick) {
+                TickNews::Usual => self.members.iter_mut().for_each(|member| member.silent_ticks += 1),
+                TickNews::Ending => self.ending = true,
+                TickNews::Restarted => {
+                    self.ending = false;
+                    self.newest_answered = None;
+                    self.members.iter_mut().for_each(|member| {
+                        member.controller.restart();
+                        member.mail.0.clear();
+                        member.silent_ticks = 0;
+                        member.port.iter_mut().for_each(CalibrationPort::restart);
+                    });
+                    self.tell(News::RigRestarted);
+                }
+            },
+            Ok(frame) => self.members.iter_mut().for_each(|member| member.controller.hear(&frame)),
+            Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
+                self.ignored.unknown += 1;
+            }
+            Err(_) => self.ignored.malformed += 1,
+        }
+        None
+    }
+
+    fn take_sensors(&mut self, axis: Axis, sensors: Sensors) -> Axis {
+        self.view.take_sensors(axis, sensors);
+        axis
+    }
+
+    /// Answers fresh sensors; returns for each axis the cycle that was answered.
+    pub fn answer(&mut self, bus: &mut dyn Bus) -> [Option<u64>; 2] {
+        if self.ending {
+            return [None; 2];
+        }
+        let mut answered: [Option<(u64, Sensors, ValveCommand)>; 2] = [None; 2];
+        self.take_changes();
+        for place in 0..self.members.len() {
+            let axis = self.members[place].controller.axis();
+            if let Some((cycle, sensors)) = self.view.fresh_sensors(axis) {
+                let status = self.view.status().copied();
+                let member = &mut self.members[place];
+                while let Some(frame) = member.mail.heard_in(cycle) {
+                    member.controller.hear(&frame);
+                }
+                let answer = member.controller.answer(cycle, &sensors, status.as_ref());
+                member.answered += 1;
+                member.silent_ticks = 0;
+                let stopped =
+                    matches!(member.controller.state(), MainChainState::Aborted | MainChainState::Fault)
+                        && !member.controller.may_restart();
+                member.stopped_for = if stopped { member.stopped_for + 1 } else { 0 };
+                self.send(place, cycle, &answer, bus);
+                answered[axis.index()] = Some((cycle, sensors, answer.command));
+            } else if self.members[place].silent_ticks >= SILENT_TICKS {
+                self.speak_without_sensors(place, bus);
+            }
+        }
+        // When all valves have their commands.
+        for Member { controller, port, .. } in &mut self.members {
+            if let Some(port) = port {
+                if let Some((cycle, sensors, command)) = &answered[controller.axis().index()] {
+                    port.observe(controller, *cycle, sensors, command);
+                }
+                port.serve(controller.program_mut(), bus);
+            }
+        }
+        let cycles = answered.map(|answer| answer.map(|(cycle, ..)| cycle));
+        self.count(cycles);
+        cycles
+    }
+
+    /// One axis may answer a cycle whose sensors of the other were overtaken: it counts, and once if both answer it.
+    fn count(&mut self, mut cycles: [Option<u64>; 2]) {
+        cycles.sort_unstable();
+        for cycle in cycles.into_iter().flatten() {
+            if self.newest_answered.is_none_or(|newest| cycle > newest) {
+                self.newest_answered = Some(cycle);
+                self.answered += 1;
+            }
+        }
+    }
+
+    /// The rig goes on, and own sensors do not come: after each tick the axis says what a fault has to say.
+    fn speak_without_sensors(&mut self, place: usize, bus: &mut dyn Bus) {
+        let Some(cycle) = self.view.cycle() else { return };
+        let member = &mut self.members[place];
+        if member.answered == 0 {
+            // It never had any: it waits for its rig.
+            return;
+        }
+        let axis = member.controller.axis();
+        let stop = member.controller.without_sensors(cycle);
+        member.stopped_for += if member.controller.may_restart() { 0 } else { TICK_PERIOD };
+        member.silent_ticks = SILENT_TICKS - 1;
+        if let Some(stop) = stop {
+            self.send_to_all(place, cycle, &emergency_stop_frame(axis, stop), bus);
+        }
+    }
+
+    /// Onto the bus, and to the partner if it lives in this process.
+    fn send_to_all(&mut self, place: usize, cycle: u64, frame: &Frame, bus: &mut dyn Bus) {
+        send(bus, frame);
+        self.members.iter_mut().enumerate().filter(|(other, _)| *other != place).for_each(|(_, member)| {
+            member.mail.post(cycle, as_received(frame));
+        });
+    }
+
+    fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn Bus) {
+        let axis = self.members[place].controller.axis();
+        send(bus, &command_frame(axis, answer.command));
+        let frames = [
+            answer.emergency_stop.map(|stop| emergency_stop_frame(axis, stop)),
+            answer.status.map(|status| status_frame(axis, status)),
+            answer.values.map(|values| values_frame(axis, values)),
+        ];
+        for frame in frames.into_iter().flatten() {
+            self.send_to_all(place, cycle, &frame, bus);
+        }
+        if let Some(news) = answer.news {
+            self.tell(news);
+        }
+        if let Some(record) = answer.record {
+            let sent = if self.outlets.waits {
+                self.outlets.records.send(record).is_ok()
+            } else {
+                self.outlets.records.try_send(record).is_ok()
+            };
+            self.records_dropped += u64::from(!sent);
+        }
+    }
+
+    fn take_changes(&mut self) {
+        while let Ok(change) = self.outlets.changes.try_recv() {
+            let of_axis = |member: &&mut Member<P>| member.controller.axis() == change.axis;
+            let Some(member) = self.members.iter_mut().find(of_axis) else { continue };
+            // Checked by whoever sent it.
+            let _ = member.controller.program_mut().set(change.place, change.value);
+        }
+    }
+
+    /// Tells a person something; a full queue loses it, which a person survives.
+    pub fn tell(&mut self, news: News) {
+        let _ = self.outlets.news.try_send(news);
+    }
+
+    /// Whether the rig said that no more sensors come.
+    #[must_use]
+    pub fn ending(&self) -> bool {
+        self.ending
+    }
+
+    /// The controllers of this process.
+    pub fn controllers(&self) -> impl Iterator<Item = &AxisController> {
+        self.members.iter().map(|member| &member.controller)
+    }
+
+    /// The port of `axis`, if it has one.
+    #[must_use]
+    pub fn port(&self, axis: Axis) -> Option<&P> {
+        self.member(axis)?.port.as_ref()
+    }
+
+    fn member(&self, axis: Axis) -> Option<&Member<P>> {
+        self.members.iter().find(|member| member.controller.axis() == axis)
+    }
+
+    /// Whether `axis` is one of ours.
+    #[must_use]
+    pub fn has(&self, axis: Axis) -> bool {
+        self.controllers().any(|controller| controller.axis() == axis)
+    }
+
+    /// Whether all of them are done.
+    #[must_use]
+    pub fn done(&self) -> bool {
+        self.controllers().all(|controller| controller.state() == MainChainState::Done)
+    }
+
+    /// The rig as seen from here.
+    #[must_use]
+    pub fn view(&self) -> &RigView {
+        &self.view
+    }
+
+    /// Frames counted and ignored.
+    #[must_use]
+    pub fn ignored(&self) -> IgnoredFrames {
+        self.ignored
+    }
+
+    /// Cycles that an axis answered, each once.
+    #[must_use]
+    pub fn answered(&self) -> u64 {
+        self.answered
+    }
+
+    /// Cycles answered by `axis`; 0 where it is none of ours.
+    #[must_use]
+    pub fn answered_by(&self, axis: Axis) -> u64 {
+        self.member(axis).map_or(0, |member| member.answered)
+    }
+
+    /// Cycles answered since an axis was stopped for good, by an abort or a fault; 0 while none is.
+    #[must_use]
+    pub fn stopped_for(&self) -> u64 {
+        self.members.iter().map(|member| member.stopped_for).max().unwrap_or(0)
+    }
+
+    /// Rows lost to a full queue.
+    #[must_use]
+    pub fn records_dropped(&self) -> u64 {
+        self.records_dropped
+    }
+}
+
+fn command_frame(axis: Axis, command: ValveCommand) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveValveCommand(command),
+        Axis::Load => Frame::LoadValveCommand(command),
+    }
+}
+
+fn emergency_stop_frame(axis: Axis, stop: EmergencyStop) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveEmergencyStop(stop),
+        Axis::Load => Frame::LoadEmergencyStop(stop),
+    }
+}
+
+fn status_frame(axis: Axis, status: ChainStatus) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveChainStatus(status),
+        Axis::Load => Frame::LoadChainStatus(status),
+    }
+}
+
+fn values_frame(axis: Axis, values: ChainValues) -> Frame {
+    match axis {
+        Axis::Drive => Frame::DriveChainValues(values),
+        Axis::Load => Frame::LoadChainValues(values),
+    }
+}
+
+fn encode(frame: &Frame) -> CanFrame {
+    frame
+        .encode()
+        .unwrap_or_else(|error| panic!("a controller made a frame that rig.dbc does not allow: {error}"))
+}
+
+/// The frame as it arrives elsewhere: values rounded to what the wire carries.
+pub(crate) fn as_received(frame: &Frame) -> Frame {
+    Frame::decode(&encode(frame)).unwrap_or_else(|error| panic!("an encoded frame does not decode: {error}"))
+}
+
+/// Sends a frame that a controller made itself; what the bus does not take is counted there.
+fn send(bus: &mut dyn Bus, frame: &Frame) {
+    let _ = bus.send(&encode(frame));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mail_is_heard_in_the_cycle_after_it_was_sent() {
+        let mut mail = Mail::new();
+        let frame = Frame::DriveChainStatus(ChainStatus::default());
+        mail.post(7, frame);
+        assert!(mail.heard_in(7).is_none());
+        mail.post(8, frame);
+        assert!(mail.heard_in(8).is_some() && mail.heard_in(8).is_none());
+        assert!(mail.heard_in(9).is_some());
+    }
+
+    #[test]
+    fn a_partner_that_is_not_heard_for_long_leaves_the_newest() {
+        let mut mail = Mail::new();
+        (0..100).for_each(|cycle| mail.post(cycle, Frame::DriveChainStatus(ChainStatus::default())));
+        assert_eq!((0..200).filter(|_| mail.heard_in(1000).is_some()).count(), MAIL_ROOM);
+    }
+}

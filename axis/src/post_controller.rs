@@ -1,0 +1,130 @@
+//! Post-controller: from the wanted rod velocity to a valve opening, with everything that limits it.
+//!
+//! ```text
+//!   wanted velocity ──► dead zone ──► linearisation ──► limit ──► opening        manual mode overrides all of it
+//! ```
+//!
+//! The dead zone shuts the valve for wanted velocities below it and opens it again from one and a half times of it on, so
+//! that noise at its edge does not let the valve chatter.
+
+use algorithms::algorithm::Ready;
+use algorithms::linearisation::Linearisation;
+use algorithms::parameters::Parameter;
+
+const OPENING_LIMIT: usize = 1;
+const DEAD_ZONE: usize = 2;
+const MANUAL: usize = 3;
+const MANUAL_OPENING: usize = 4;
+/// Parameters of the post-controller; the first is the multiple of its task.
+pub static PARAMETERS: [Parameter; 5] = [
+    crate::program::EVERY_CYCLES,
+    Parameter::new(("opening_limit", ""), [0.0, 1.0], 1.0, "largest opening in either direction"),
+    Parameter::new(
+        ("dead_zone_m_per_s", "m/s"),
+        [0.0, 0.1],
+        0.0,
+        "wanted velocities below it shut the valve",
+    ),
+    Parameter::new(
+        ("manual", ""),
+        [0.0, 1.0],
+        0.0,
+        "from 0.5 on, manual mode: manual_opening instead of the algorithm",
+    ),
+    Parameter::new(("manual_opening", ""), [-1.0, 1.0], 0.0, "opening in manual mode"),
+];
+/// Share of the dead zone by which the wanted velocity must exceed it to open the valve again.
+const HYSTERESIS: f64 = 0.5;
+
+/// What goes to the valve.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Output {
+    /// Opening, -1 to 1.
+    pub opening: f64,
+    /// The rod velocity that it stands for, m/s.
+    pub applied_velocity_m_per_s: f64,
+}
+
+/// The post-controller of one axis.
+#[derive(Clone, Debug)]
+pub struct PostController {
+    linearisation: Linearisation,
+    shut: bool,
+}
+
+impl PostController {
+    /// A post-controller with this linearisation.
+    #[must_use]
+    pub fn new(linearisation: Linearisation) -> Self {
+        Self { linearisation, shut: true }
+    }
+
+    /// Forgets what it did, as after [`PostController::new`].
+    pub fn restart(&mut self) {
+        self.shut = true;
+    }
+
+    /// Turns a finite wanted velocity into an opening.
+    pub fn step(&mut self, wanted_m_per_s: f64, ready: &Ready, parameters: &[f64]) -> Output {
+        if parameters[MANUAL] >= 0.5 {
+            return self.output(parameters[MANUAL_OPENING], ready);
+        }
+        let dead_zone = parameters[DEAD_ZONE] * if self.shut { 1.0 + HYSTERESIS } else { 1.0 };
+        self.shut = wanted_m_per_s.abs() < dead_zone;
+        if self.shut {
+            return Output::default();
+        }
+        let limit = parameters[OPENING_LIMIT];
+        let opening = self.linearisation.opening(wanted_m_per_s, ready);
+        if opening.abs() <= limit {
+            let most = self.linearisation.velocity(opening, ready).abs();
+            return Output { opening, applied_velocity_m_per_s: wanted_m_per_s.clamp(-most, most) };
+        }
+        self.output(opening.clamp(-limit, limit), ready)
+    }
+
+    fn output(&self, opening: f64, ready: &Ready) -> Output {
+        Output { opening, applied_velocity_m_per_s: self.linearisation.velocity(opening, ready) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use algorithms::linearisation::Law;
+    use plant::RigParameters;
+    use proptest::prelude::*;
+
+    fn post() -> PostController {
+        PostController::new(Linearisation::new(&RigParameters::baseline(), Law::ChokedExhaust))
+    }
+
+    #[test]
+    fn the_dead_zone_shuts_and_opens_with_hysteresis() {
+        let mut post = post();
+        let parameters = [1.0, 1.0, 0.01, 0.0, 0.0];
+        for (wanted, open) in
+            [(0.009, false), (0.014, false), (0.016, true), (0.011, true), (0.009, false), (0.011, false)]
+        {
+            assert_eq!(post.step(wanted, &Ready::default(), &parameters).opening != 0.0, open, "{wanted}");
+        }
+    }
+
+    #[test]
+    fn manual_mode_overrides() {
+        let output = post().step(-3.0, &Ready::default(), &[1.0, 1.0, 0.0, 1.0, 0.25]);
+        assert!(output.opening == 0.25 && output.applied_velocity_m_per_s > 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn the_opening_keeps_its_limit_and_what_is_applied_never_exceeds_what_was_wanted(
+            wanted in -20.0..20.0_f64, limit in 0.0..1.0_f64, dead_zone in 0.0..0.1_f64,
+        ) {
+            let output = post().step(wanted, &Ready::default(), &[1.0, limit, dead_zone, 0.0, 0.0]);
+            prop_assert!(output.opening.abs() <= limit);
+            prop_assert!(output.applied_velocity_m_per_s.abs() <= wanted.abs() + 1e-12);
+            prop_assert!(output.opening * wanted >= 0.0);
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! Forces over time and over what the axis does.
+//!
+//! ```text
+//!   ForceProfile (constant)              ForceSource (moving state: a copy of a few numbers)
+//!     laws of time ─────────┐
+//!     step at a position ───┼──► limit 0 ... force_limit_n ──► ForceSetPoint
+//!     loads F(x, v, a) ─────┘
+//! ```
+//!
+//! Signs: compression is positive. The load axis presses against the drive's extension, to -x, so that a force above 0 acts on
+//! the carriage in -x. A load that opposes a motion in +x is therefore above its base force, one in -x below it; and since an
+//! axis can only press, the sum is limited to 0 and the limit. With a base force of half the span a load acts to both sides.
+//!
+//! A new load is a file in the folder beside this one and a line in [`KINDS`].
+
+pub mod at_position;
+pub mod damper;
+pub mod dry_friction;
+pub mod mass;
+pub mod spring;
+
+use super::law::{Given, Law, Moment};
+use super::row::{Lasting, Place, Row};
+use super::{Actual, ForceSetPoint};
+use crate::experiment::section::ExperimentError;
+use algorithms::parameters::Parameter;
+use at_position::AtPosition;
+use std::fmt;
+use std::sync::Arc;
+
+/// Loads that depend on what the axis does.
+pub const KINDS: &[Kind] = &[spring::KIND, damper::KIND, mass::KIND, dry_friction::KIND];
+
+/// A kind of load.
+pub struct Kind {
+    /// Its name in files.
+    pub name: &'static str,
+    /// What it does, in a few words.
+    pub about: &'static str,
+    /// Reads one from its table.
+    pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Load>, ExperimentError>,
+}
+
+/// A force that depends on what the axis does.
+pub trait Load: fmt::Debug + Send + Sync {
+    /// What it adds to its base force, N, and the rate of that, N/s.
+    fn at(&self, actual: &Actual) -> [f64; 2];
+}
+
+/// One segment of a profile.
+#[derive(Clone, Debug)]
+pub(super) enum Segment {
+    Timed(Arc<dyn Law>),
+    AtPosition(AtPosition),
+    Load { load: Arc<dyn Load>, base_n: f64, duration_s: f64 },
+}
+
+impl Lasting for Segment {
+    fn duration_s(&self) -> f64 {
+        match self {
+            Self::Timed(law) => law.duration_s(),
+            Self::AtPosition(step) => step.duration_s,
+            Self::Load { duration_s, .. } => *duration_s,
+        }
+    }
+
+    fn end(&self) -> f64 {
+        match self {
+            Self::Timed(law) => law.end(),
+            Self::AtPosition(step) => step.to_n,
+            Self::Load { base_n, .. } => *base_n,
+        }
+    }
+}
+
+impl Segment {
+    /// Reads the load of a segment's table.
+    pub(super) fn read_load(kind: &Kind, given: &mut Given<'_, '_>) -> Result<Self, ExperimentError> {
+        let load = (kind.read)(given)?;
+        let base = Parameter::new(
+            ("base_force_n", "N"),
+            [0.0, given.scale.force_limit_n],
+            given.from,
+            "force without the load; by default where the row stands",
+        );
+        let base_n = given.section.number_or_default(&base)?;
+        Ok(Self::Load { load, base_n, duration_s: given.duration_s(0.001)? })
+    }
+}
+
+/// Force over time: a start and a row of segments. It does not change while it runs; see [`ForceSource`].
+#[derive(Clone, Debug)]
+pub struct ForceProfile {
+    row: Row<Segment>,
+    limit_n: f64,
+}
+
+impl ForceProfile {
+    pub(super) fn new(initial_force_n: f64, limit_n: f64, segments: Vec<Segment>) -> Self {
+        Self { row: Row::new(initial_force_n, segments), limit_n }
+    }
+
+    /// A force that stays, and lasts no time.
+    #[must_use]
+    pub fn at_rest(force_n: f64) -> Self {
+        Self::new(force_n, force_n, Vec::new())
+    }
+
+    /// How long it takes, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.row.duration_s()
+    }
+
+    /// The force that it begins with, N.
+    #[must_use]
+    pub fn initial_force_n(&self) -> f64 {
+        self.row.start()
+    }
+
+    /// Largest force that it asks for, N; the least is 0.
+    #[must_use]
+    pub fn limit_n(&self) -> f64 {
+        self.limit_n
+    }
+
+    /// The force at the end, N: of a load that depends on the axis its base force.
+    #[must_use]
+    pub fn end_n(&self) -> f64 {
+        self.row.end()
+    }
+
+    fn limited(&self, moment: Moment) -> ForceSetPoint {
+        let mut point = ForceSetPoint::from(moment);
+        if !point.rate_n_per_s.is_finite() {
+            point.rate_n_per_s = 0.0;
+        }
+        if (0.0..=self.limit_n).contains(&point.force_n) {
+            return point;
+        }
+        // Not clamp, which hands a NaN on.
+        let force_n = point.force_n.max(0.0).min(self.limit_n);
+        ForceSetPoint { force_n, rate_n_per_s: 0.0, ..point }
+    }
+}
+
+/// What a profile remembers from cycle to cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Memory {
+    /// Segment that is being driven, and what has happened in it.
+    segment: Option<usize>,
+    crossing: at_position::Crossing,
+    /// The force of the last cycle, N.
+    last_n: Option<f64>,
+}
+
+/// A profile being driven; asked once a cycle, with time that does not go back.
+#[derive(Clone, Debug)]
+pub struct ForceSource {
+    profile: Arc<ForceProfile>,
+    memory: Memory,
+}
+
+impl ForceSource {
+    /// At its beginning.
+    #[must_use]
+    pub fn new(profile: ForceProfile) -> Self {
+        Self { profile: Arc::new(profile), memory: Memory::default() }
+    }
+
+    /// Begins anew.
+    pub fn reset(&mut self) {
+        self.memory = Memory::default();
+    }
+
+    /// What is being driven.
+    #[must_use]
+    pub fn profile(&self) -> &ForceProfile {
+        &self.profile
+    }
+
+    /// How long it takes, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.profile.duration_s()
+    }
+
+    /// The set-point `time_s` after the start: the initial force before it, [`Self::end`] from the end on.
+    pub fn at(&mut self, time_s: f64, actual: &Actual) -> ForceSetPoint {
+        let moment = match self.profile.row.place(time_s) {
+            Place::Before => Moment::at_rest(self.profile.initial_force_n()),
+            Place::Behind => return self.end(),
+            Place::In { index, segment, since_s } => {
+                if self.memory.segment != Some(index) {
+                    self.memory.segment = Some(index);
+                    self.memory.crossing = at_position::Crossing::default();
+                }
+                match segment {
+                    Segment::Timed(law) => law.at(since_s),
+                    Segment::AtPosition(step) => step.at(since_s, &mut self.memory.crossing, actual),
+                    Segment::Load { load, base_n, .. } => {
+                        let [force, rate] = load.at(actual);
+                        Moment { value: base_n + force, rate, acceleration: 0.0, moving: true }
+                    }
+                }
+            }
+        };
+        let point = self.profile.limited(moment);
+        let after_a_load = matches!(self.memory.segment, Some(index) if self.profile.row.is_load(index));
+        self.memory.last_n = after_a_load.then_some(point.force_n);
+        point
+    }
+
+    /// The set-point that is held from the end on. After a load that depends on the axis it is the force that it had last, so
+    /// that nothing jumps.
+    #[must_use]
+    pub fn end(&self) -> ForceSetPoint {
+        ForceSetPoint::at_rest(self.memory.last_n.unwrap_or(self.profile.end_n()))
+    }
+}
+
+impl Row<Segment> {
+    fn is_load(&self, index: usize) -> bool {
+        matches!(self.segment(index), Some(Segment::Load { .. }))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+//! What sine and chirp share: a deviation to either side whose frequency is constant or sweeps, faded in and out if asked.
+//!
+//! ```text
+//!   x  = x_0 + A w sin(phi)                          phi = 2 pi (f_0 t + (f_1 - f_0) t^2 / (2 T))
+//!   x' = A (w' sin(phi) + w phi' cos(phi))
+//!   x" = A (w" sin(phi) + (2 w' phi' + w phi") cos(phi) - w phi'^2 sin(phi))
+//! ```
+//!
+//! w: fade, 1 except along a Bestehorn sinoid at either end for fade_s. Without a fade the rate jumps at either end, and the
+//! phase must end at a multiple of pi, so that the row goes on where it stood; with one it begins and ends at rest.
+
+use super::bestehorn;
+use super::law::{Given, Law, Moment};
+use crate::experiment::section::ExperimentError;
+use algorithms::parameters::Parameter;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+static FADE: Parameter = Parameter::new(("fade_s", "s"), [0.0, 3600.0], 0.0, "how long it fades in, and out");
+/// How far the last phase may be off a multiple of pi, as share of pi.
+const PHASE_TOLERANCE: f64 = 1e-6;
+
+#[derive(Debug)]
+pub(super) struct Oscillation {
+    from: f64,
+    amplitude: f64,
+    from_hz: f64,
+    to_hz: f64,
+    duration_s: f64,
+    fade_s: f64,
+}
+
+impl Oscillation {
+    /// Reads all but the frequencies.
+    pub(super) fn read(
+        given: &mut Given<'_, '_>,
+        [from_hz, to_hz]: [f64; 2],
+    ) -> Result<Arc<dyn Law>, ExperimentError> {
+        let amplitude = given.amplitude()?;
+        let duration_s = given.duration_s(0.01)?;
+        let fade_s = given.section.number_or_default(&FADE)?;
+        if 2.0 * fade_s > duration_s {
+            let most_s = 0.5 * duration_s;
+            let said = format!("fade_s = {fade_s} s; allowed is 0 to {most_s} s, half of duration_s");
+            return Err(given.section.wrong_at("fade_s", &said));
+        }
+        let halves = (from_hz + to_hz) * duration_s;
+        if fade_s == 0.0 && (halves - halves.round()).abs() > PHASE_TOLERANCE {
+            let mean_hz = 0.5 * (from_hz + to_hz);
+            let [shorter_s, longer_s] = [halves.floor(), halves.ceil()].map(|whole| whole / (2.0 * mean_hz));
+            let said = format!(
+                "duration_s = {duration_s} s ends off the middle; allowed is a multiple of half a period, such as {shorter_s} \
+                 or {longer_s} s, or a fade_s above 0"
+            );
+            return Err(given.section.wrong_at("duration_s", &said));
+        }
+        Ok(Arc::new(Self { from: given.from, amplitude, from_hz, to_hz, duration_s, fade_s }))
+    }
+
+    /// Fade with its two derivatives.
+    fn fade(&self, time_s: f64) -> [f64; 3] {
+        let fade_s = self.fade_s;
+        let left_s = self.duration_s - time_s;
+        if fade_s == 0.0 || (time_s >= fade_s && left_s >= fade_s) {
+            return [1.0, 0.0, 0.0];
+        }
+        let (nearer_s, sign) = if time_s < left_s { (time_s, 1.0) } else { (left_s, -1.0) };
+        let [w, rate, acceleration] = bestehorn::at((nearer_s / fade_s).clamp(0.0, 1.0));
+        [w, sign * rate / fade_s, acceleration / (fade_s * fade_s)]
+    }
+}
+
+impl Law for Oscillation {
+    fn at(&self, time_s: f64) -> Moment {
+        let sweep_hz_per_s = (self.to_hz - self.from_hz) / self.duration_s;
+        let turns = (self.from_hz + 0.5 * sweep_hz_per_s * time_s) * time_s;
+        let phase_rate = TAU * (self.from_hz + sweep_hz_per_s * time_s);
+        // Whole turns taken off first: the sine of a large angle loses digits.
+        let phase = TAU * (turns - turns.floor());
+        let (sine, cosine) = (libm::sin(phase), libm::cos(phase));
+        let [w, w1, w2] = self.fade(time_s);
+        let along = w2 - w * phase_rate * phase_rate;
+        let across = 2.0 * w1 * phase_rate + w * TAU * sweep_hz_per_s;
+        Moment {
+            value: self.from + self.amplitude * w * sine,
+            rate: self.amplitude * (w1 * sine + w * phase_rate * cosine),
+            acceleration: self.amplitude * (along * sine + across * cosine),
+            moving: self.amplitude != 0.0,
+        }
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn end(&self) -> f64 {
+        self.from
+    }
+
+    /// Both sides, also when it is over before it has been to both.
+    fn reach(&self) -> [f64; 2] {
+        [self.from - self.amplitude, self.from + self.amplitude]
+    }
+}
+
+// The tolerance of the phase is of no account beside a sensor's step: 1e-6 pi of half a metre is 0.8 um.
+const _: () = assert!(PHASE_TOLERANCE * PI * 0.25 < 1e-6);

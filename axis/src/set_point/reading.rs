@@ -1,0 +1,121 @@
+//! Rows of set-points from the tables of an experiment file.
+
+use super::force::{self, ForceProfile, Segment, at_position::AtPosition};
+use super::law::{self, Given, Law, Scale};
+use super::row::Lasting;
+use super::{Motion, table};
+use crate::experiment::section::{ExperimentError, Section};
+use algorithms::algorithm::Quantity;
+use std::sync::Arc;
+
+/// Keys that say what a law is of, where the law alone does not.
+const TELLING: [(&str, Quantity); 4] = [
+    ("to_m", Quantity::Position),
+    ("amplitude_m", Quantity::Position),
+    ("to_n", Quantity::Force),
+    ("amplitude_n", Quantity::Force),
+];
+
+/// What the row is of; `None` when none of its segments says.
+pub(crate) fn quantity(segments: &[Section<'_>]) -> Result<Option<Quantity>, ExperimentError> {
+    let mut first = None;
+    for segment in segments {
+        let Some(own) = own_quantity(segment) else { continue };
+        let (quantity, line) = *first.get_or_insert((own, segment.line()));
+        if own != quantity {
+            let words = |quantity| if quantity == Quantity::Force { "forces" } else { "positions" };
+            let (own, other) = (words(own), words(quantity));
+            let said =
+                format!("law is of {own}, line {line} of {other}: a row mixes no positions and forces");
+            return Err(segment.wrong_at("law", &said));
+        }
+    }
+    Ok(first.map(|(quantity, _)| quantity))
+}
+
+fn own_quantity(segment: &Section<'_>) -> Option<Quantity> {
+    let name = segment.peek("law")?;
+    if force::KINDS.iter().any(|kind| kind.name == name) {
+        return Some(Quantity::Force);
+    }
+    let kind = law::KINDS.iter().find(|kind| kind.name == name)?;
+    if let [only] = kind.serves {
+        return Some(*only);
+    }
+    if name == table::KIND.name {
+        return table::quantity_of(&segment.beside(segment.peek("file")?));
+    }
+    TELLING.iter().find(|(key, _)| segment.has(key)).map(|(_, quantity)| *quantity)
+}
+
+/// A row of positions within the stroke.
+pub(crate) fn motion(
+    start_m: f64,
+    segments: Vec<Section<'_>>,
+    stroke_m: f64,
+) -> Result<Motion, ExperimentError> {
+    let scale = Scale { quantity: Quantity::Position, stroke_m, force_limit_n: 0.0 };
+    let mut from = start_m;
+    let mut laws = Vec::new();
+    for mut section in segments {
+        let name = section.needed_text("law", &names(scale.quantity))?.text;
+        let mut given = Given { section: &mut section, from, scale };
+        let law = timed(&name, &mut given)?;
+        section.finish()?;
+        from = law.end();
+        laws.push(law);
+    }
+    Ok(Motion::new(start_m, laws))
+}
+
+/// A row of forces up to a limit: from an initial force and the limit, both in N.
+pub(crate) fn forces(
+    [initial_n, limit_n]: [f64; 2],
+    sections: Vec<Section<'_>>,
+    stroke_m: f64,
+) -> Result<ForceProfile, ExperimentError> {
+    let scale = Scale { quantity: Quantity::Force, stroke_m, force_limit_n: limit_n };
+    let mut from = initial_n;
+    let mut segments = Vec::new();
+    for mut section in sections {
+        let name = section.needed_text("law", &names(scale.quantity))?.text;
+        let at_position = name == super::step::KIND.name && section.has(force::at_position::KEY);
+        let mut given = Given { section: &mut section, from, scale };
+        let load = force::KINDS.iter().find(|kind| kind.name == name);
+        let segment = match load {
+            Some(kind) => Segment::read_load(kind, &mut given)?,
+            None if at_position => Segment::AtPosition(AtPosition::read(&mut given)?),
+            None => Segment::Timed(timed(&name, &mut given)?),
+        };
+        section.finish()?;
+        from = segment.end();
+        segments.push(segment);
+    }
+    Ok(ForceProfile::new(initial_n, limit_n, segments))
+}
+
+/// The law called `name`, within the limits of its row.
+fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, ExperimentError> {
+    let quantity = given.scale.quantity;
+    let kind = law::KINDS.iter().find(|kind| kind.name == name && kind.serves.contains(&quantity));
+    let Some(kind) = kind else {
+        let said = format!("law = \"{name}\"; allowed is {}", names(quantity));
+        return Err(given.section.wrong_at("law", &said));
+    };
+    let law = (kind.read)(given)?;
+    let ([least, most], unit) = (law.reach(), given.scale.unit());
+    if least >= 0.0 && most <= given.scale.most() {
+        return Ok(law);
+    }
+    let allowed = given.scale.most();
+    let said =
+        format!("law = \"{name}\" goes from {least} to {most} {unit}; allowed is 0 to {allowed} {unit}");
+    Err(given.section.wrong_at("law", &said))
+}
+
+/// The laws of a row of this quantity, for messages.
+fn names(quantity: Quantity) -> String {
+    let timed = law::KINDS.iter().filter(|kind| kind.serves.contains(&quantity)).map(|kind| kind.name);
+    let loads = force::KINDS.iter().filter(|_| quantity == Quantity::Force).map(|kind| kind.name);
+    timed.chain(loads).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,413 @@
+//! What a run reads before it starts: rig, experiment and programs, checked; and the controllers made of them.
+
+use crate::axis::{AxisController, AxisParts, ForcePlan, Plan, PlannedChange, PositionPlan, PrepareStep};
+use crate::chains::main::{Lengths, MainConfig, approach_s};
+use crate::chains::matching;
+use crate::chains::settled::Bounds;
+use crate::chains::{AfterStop, force, main};
+use crate::experiment::{AxisExperiment, During, Experiment, Prepare, SetPoints};
+use crate::parameter_set::{self, Setting};
+use crate::program::file::Source;
+use crate::program::{Program, Task};
+use crate::set_point::ForceSource;
+use algorithms::algorithm::Quantity;
+use clap::Args;
+use plant::{Axis, RigParameters};
+use protocol::frames::DRIVE_CHAIN_VALUES;
+use runlog::run_folder;
+use std::path::{Path, PathBuf};
+
+/// A file that cannot be used, or files that do not go together: file, line, key, value and what is allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct InputError(String);
+
+impl InputError {
+    fn of(error: impl ToString) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// What is controlled, how, and where the files go.
+#[derive(Args, Clone, Debug)]
+pub struct FileArguments {
+    /// Rig file, of which nominal numbers are read: valve characteristic, areas, stroke.
+    #[arg(long)]
+    pub rig: PathBuf,
+    /// Experiment file: set-points, programs, settling, repetitions.
+    #[arg(long)]
+    pub experiment: PathBuf,
+    /// Folder for the run's files, made if missing; give both programs the same. Default: a new one named by the time.
+    #[arg(long, default_value_os_t = run_folder::new_folder())]
+    pub out: PathBuf,
+    /// Folder of the programs that the experiment names; by default "programs" beside the experiment's folder.
+    #[arg(long)]
+    pub programs: Option<PathBuf>,
+    /// Program file of the drive, in place of the experiment's.
+    #[arg(long)]
+    pub drive_program: Option<PathBuf>,
+    /// Program file of the load axis, in place of the experiment's.
+    #[arg(long)]
+    pub load_program: Option<PathBuf>,
+    /// Parameter set in place of the programs' numbers, as 'controller parameters' or XCP writes it; --set goes before it.
+    #[arg(long, value_name = "FILE")]
+    pub parameters: Option<PathBuf>,
+    /// A variable in place of the program's, such as drive.algorithm.gain_per_s=30; may be repeated.
+    #[arg(long, value_name = "AXIS.TASK.NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Repeat the experiment until the rig ends, instead of saying Done.
+    #[arg(long)]
+    pub repeat: bool,
+    /// What follows an emergency stop that was released, in place of the experiment's.
+    #[arg(long, value_enum)]
+    pub after_emergency_stop: Option<AfterStop>,
+}
+
+/// Everything that was read.
+pub struct Inputs {
+    /// Nominal numbers of the rig.
+    pub rig: RigParameters,
+    /// The rig file as it stands.
+    pub rig_toml: String,
+    /// The experiment.
+    pub experiment: Experiment,
+    /// Its file as it stands.
+    pub experiment_toml: String,
+    /// Programs of drive and load, as they stand; `None` for an axis that the experiment leaves out.
+    pub programs: [Option<Source>; 2],
+    /// Variables set by a parameter set or on the command line, in this order.
+    overrides: Vec<Setting>,
+    experiment_file: PathBuf,
+}
+
+/// How the controllers of a process are run.
+#[derive(Clone, Copy, Debug)]
+pub struct Mode {
+    /// The other axis's controller is waited for.
+    pub partner_needed: bool,
+    /// Time is real: it is watched.
+    pub real_time: bool,
+    /// Until the rig ends.
+    pub forever: bool,
+}
+
+impl Inputs {
+    /// Reads and checks the files.
+    ///
+    /// # Errors
+    /// [`InputError`] with file, line, key, value and allowed range.
+    pub fn read(files: &FileArguments) -> Result<Self, InputError> {
+        let rig_toml = read(&files.rig)?;
+        let rig =
+            RigParameters::from_toml(&rig_toml, &files.rig.display().to_string()).map_err(InputError::of)?;
+        let (stroke_m, most_m) = (rig.cylinder().stroke_m, DRIVE_CHAIN_VALUES.signals[0].max);
+        if stroke_m > most_m {
+            let file = files.rig.display();
+            return Err(InputError(format!(
+                "{file}: cylinder.stroke_mm: {stroke_m} m; rig.dbc carries positions of at most {most_m} m"
+            )));
+        }
+        let experiment_toml = read(&files.experiment)?;
+        let mut experiment =
+            Experiment::from_toml(&experiment_toml, &files.experiment, stroke_m).map_err(InputError::of)?;
+        let run = &mut experiment.run;
+        run.after_emergency_stop = files.after_emergency_stop.unwrap_or(run.after_emergency_stop);
+        let given = [&files.drive_program, &files.load_program];
+        let mut programs = [None, None];
+        for (axis, section) in sections(&experiment) {
+            let path = match (given[axis.index()], &files.programs) {
+                (Some(path), _) => path.clone(),
+                (None, Some(folder)) if !section.program.written.ends_with(".toml") => {
+                    folder.join(format!("{}.toml", section.program.written))
+                }
+                (None, _) => section.program_path(&files.experiment),
+            };
+            programs[axis.index()] = Some(Source::read(&path).map_err(|error| {
+                let place = format!("{}:{}", files.experiment.display(), section.program.line);
+                InputError(format!("{place}: program of the {} axis: {error}", axis.name()))
+            })?);
+        }
+        let mut overrides = match &files.parameters {
+            Some(path) => parameter_set::read(path).map_err(InputError::of)?,
+            None => Vec::new(),
+        };
+        for text in &files.set {
+            overrides.push(parse_override(text)?);
+        }
+        if let Some(Setting { axis, name, place, .. }) =
+            overrides.iter().find(|setting| programs[setting.axis.index()].is_none())
+        {
+            let axis = axis.name();
+            return Err(InputError(format!(
+                "{place}{axis}.{name}: {} has no [{axis}], so that axis has no variables",
+                files.experiment.display()
+            )));
+        }
+        let experiment_file = files.experiment.clone();
+        Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
+    }
+
+    /// The same for texts that no file holds: an experiment under a name for messages, and the text of a program by its name.
+    ///
+    /// # Errors
+    /// [`InputError`] as for files, and for a program that `text_of` does not know.
+    pub fn of_texts(
+        rig: &RigParameters,
+        (name, experiment_toml): (&str, &str),
+        text_of: impl Fn(&str) -> Option<String>,
+        set: &[&str],
+    ) -> Result<Self, InputError> {
+        let source_of = |_, written: &str| {
+            text_of(written).map(|text| Source { path: written.into(), title: written.to_owned(), text })
+        };
+        Self::of_sources(rig, (Path::new(name), experiment_toml), source_of, set)
+    }
+
+    /// The same for an experiment whose text is not that of its file, which tables are read beside, and for programs by axis and
+    /// by what the experiment names.
+    ///
+    /// # Errors
+    /// [`InputError`] as for files, and for a program that `source_of` does not know.
+    pub fn of_sources(
+        rig: &RigParameters,
+        (file, experiment_toml): (&Path, &str),
+        source_of: impl Fn(Axis, &str) -> Option<Source>,
+        set: &[impl AsRef<str>],
+    ) -> Result<Self, InputError> {
+        let experiment =
+            Experiment::from_toml(experiment_toml, file, rig.cylinder().stroke_m).map_err(InputError::of)?;
+        let mut programs = [None, None];
+        for (axis, section) in sections(&experiment) {
+            let written = &section.program.written;
+            let source = source_of(axis, written).ok_or_else(|| {
+                InputError(format!("{}: no program {written} is known here", file.display()))
+            })?;
+            programs[axis.index()] = Some(source);
+        }
+        let overrides =
+            set.iter().map(|text| parse_override(text.as_ref())).collect::<Result<Vec<_>, _>>()?;
+        let (rig, experiment_toml) = (rig.clone(), experiment_toml.to_owned());
+        let rig_toml = String::new();
+        let experiment_file = file.to_owned();
+        Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
+    }
+
+    /// The controller of `axis`.
+    ///
+    /// # Errors
+    /// [`InputError`] when program and experiment do not go together.
+    pub fn controller(&self, axis: Axis, mode: Mode) -> Result<AxisController, InputError> {
+        let section =
+            sections(&self.experiment).find(|(other, _)| *other == axis).map(|(_, section)| section);
+        let mut program = self.program(axis, mode.real_time)?;
+        self.check_kind(axis, section, &program)?;
+        for Setting { name, value, place: at, .. } in self.overrides.iter().filter(|one| one.axis == axis) {
+            let told = |error: String| InputError(format!("{at}{error}"));
+            let place = place(&program, axis, name).map_err(|error| told(error.to_string()))?;
+            program.set(place, *value).map_err(|error| told(format!("{}.{error}", axis.name())))?;
+        }
+        let changes = section.map_or(Ok(Vec::new()), |section| self.changes(axis, section, &program))?;
+        let main = self.main_config(section, &program, mode);
+        Ok(AxisController::new(AxisParts {
+            axis,
+            program,
+            plan: section.map_or(Plan::Shut, plan),
+            main,
+            supply_pressure_pa: self.rig.supply().pressure_pa,
+            changes,
+            record_every: u64::from(self.experiment.recording.every_cycles),
+        }))
+    }
+
+    /// The program of an axis; one that nothing is asked of for an axis that the experiment leaves out.
+    fn program(&self, axis: Axis, real_time: bool) -> Result<Program, InputError> {
+        let shut = Source::shut();
+        let source = self.programs[axis.index()].as_ref().unwrap_or(&shut);
+        source.program(axis, &self.rig, real_time).map_err(InputError::of)
+    }
+
+    /// Title of the program of an axis.
+    #[must_use]
+    pub fn program_title(&self, axis: Axis) -> String {
+        self.programs[axis.index()]
+            .as_ref()
+            .map_or_else(|| Source::shut().title, |source| source.title.clone())
+    }
+
+    fn check_kind(
+        &self,
+        axis: Axis,
+        section: Option<&AxisExperiment>,
+        program: &Program,
+    ) -> Result<(), InputError> {
+        let Some(section) = section else { return Ok(()) };
+        let (asked, able) = (section.set_points.quantity(), program.controls());
+        if asked == able {
+            return self.check_gives_way(axis, section, program);
+        }
+        let name = |quantity| match quantity {
+            Quantity::Position => "positions",
+            Quantity::Force => "forces",
+        };
+        Err(InputError(format!(
+            "{}:{}: the {} axis has set-points of {}, and its program controls {}; choose another program",
+            self.experiment_file.display(),
+            section.program.line,
+            axis.name(),
+            name(asked),
+            name(able)
+        )))
+    }
+
+    /// An axis that presses gives way too: on linked rods while the drive is positioned, to relieve stress, to a hand.
+    fn check_gives_way(
+        &self,
+        axis: Axis,
+        section: &AxisExperiment,
+        program: &Program,
+    ) -> Result<(), InputError> {
+        if section.set_points.quantity() == Quantity::Position || program.gives_way() {
+            return Ok(());
+        }
+        let source = self.programs[axis.index()].as_ref();
+        Err(InputError(format!(
+            "{}: no [giving-way]: the {} axis has set-points of forces ({}:{}), and its force chain needs an algorithm to \
+             relieve stress and to give way; add\n[giving-way]\nname = \"force-manual\"",
+            source.map_or(Path::new("(none)"), |source| source.path.as_path()).display(),
+            axis.name(),
+            self.experiment_file.display(),
+            section.program.line,
+        )))
+    }
+
+    fn changes(
+        &self,
+        axis: Axis,
+        section: &AxisExperiment,
+        program: &Program,
+    ) -> Result<Vec<PlannedChange>, InputError> {
+        let planned = section.changes.iter().map(|change| {
+            let at = format!("{}:{}", self.experiment_file.display(), change.line);
+            let place = place(program, axis, &change.parameter)
+                .map_err(|error| InputError(format!("{at}: {error}")))?;
+            let value = program.variables()[place]
+                .parameter
+                .check_change(change.value)
+                .map_err(|error| InputError(format!("{at}: {error}")))?;
+            Ok(PlannedChange { at_s: change.at_s, place, value })
+        });
+        planned.collect()
+    }
+
+    fn main_config(&self, section: Option<&AxisExperiment>, program: &Program, mode: Mode) -> MainConfig {
+        let run = &self.experiment.run;
+        let all: Vec<_> = sections(&self.experiment).map(|(_, section)| lengths(section, program)).collect();
+        let most = |of: fn(&Lengths) -> f64| all.iter().map(of).fold(0.0, f64::max);
+        MainConfig {
+            experiment: self.experiment.number,
+            partner_needed: mode.partner_needed,
+            start_m: section.and_then(|section| match &section.set_points {
+                SetPoints::Positions(motion) => Some(motion.start_m()),
+                SetPoints::Forces(_) => None,
+            }),
+            prepares: section.is_some_and(|section| !section.prepare.is_empty()),
+            own: Lengths {
+                // Both axes end together, whichever has the longer row.
+                experiment_s: self.experiment.duration_s(),
+                ..section.map_or(Lengths::default(), |section| lengths(section, program))
+            },
+            either: Lengths {
+                prepare_s: most(|lengths| lengths.prepare_s),
+                initial_force_s: most(|lengths| lengths.initial_force_s),
+                experiment_s: self.experiment.duration_s(),
+            },
+            approach_longest_s: approach_s(0.0, self.rig.cylinder().stroke_m),
+            repetitions: (!mode.forever).then_some(run.repetitions),
+            settling_s: run.settling_s,
+            settling_timeout_s: run.settling_timeout_s,
+            partner_timeout_s: main::PARTNER_TIMEOUT_S,
+            start: run.start,
+            after_emergency_stop: run.after_emergency_stop,
+            settled: Bounds::of(program.task(Task::Settled)),
+        }
+    }
+}
+
+/// Axes that the experiment speaks of.
+fn sections(experiment: &Experiment) -> impl Iterator<Item = (Axis, &AxisExperiment)> {
+    let sections = [(Axis::Drive, &experiment.drive), (Axis::Load, &experiment.load)];
+    sections.into_iter().filter_map(|(axis, section)| Some((axis, section.as_ref()?)))
+}
+
+/// How long the states before the experiment may take.
+fn lengths(section: &AxisExperiment, program: &Program) -> Lengths {
+    let step_s = |step: &Prepare| match step {
+        Prepare::Relieve => timeout_s(force::PARAMETERS, program.task(Task::ForceChain), "relieve_timeout_s"),
+        Prepare::Match => {
+            timeout_s(matching::PARAMETERS, program.task(Task::MatchingChain), "match_timeout_s")
+        }
+    };
+    let ramps = section.initial_force_n() > 0.0;
+    Lengths {
+        prepare_s: section.prepare.iter().map(step_s).sum(),
+        initial_force_s: if ramps { section.initial_ramp_s } else { 0.0 },
+        experiment_s: section.set_points.duration_s(),
+    }
+}
+
+fn timeout_s(table: &[algorithms::parameters::Parameter], values: &[f64], name: &str) -> f64 {
+    table.iter().position(|parameter| parameter.name == name).map_or(0.0, |place| values[place])
+}
+
+fn plan(section: &AxisExperiment) -> Plan {
+    match &section.set_points {
+        SetPoints::Positions(motion) => {
+            Plan::Position(PositionPlan { motion: motion.clone(), by_hand: section.by_hand })
+        }
+        SetPoints::Forces(profile) => Plan::Force(ForcePlan {
+            source: ForceSource::new(profile.clone()),
+            initial_ramp_s: section.initial_ramp_s,
+            prepare: section
+                .prepare
+                .iter()
+                .map(|step| match step {
+                    Prepare::Relieve => PrepareStep::Relieve,
+                    Prepare::Match => PrepareStep::Match,
+                })
+                .collect(),
+            manual: section.during == During::Manual,
+            by_hand: section.by_hand,
+        }),
+    }
+}
+
+fn place(program: &Program, axis: Axis, name: &str) -> Result<usize, InputError> {
+    program.place(name).ok_or_else(|| {
+        let known: Vec<_> = program.variables().iter().map(|variable| variable.name.as_str()).collect();
+        InputError(format!("{}.{name}: no such variable; there are {}", axis.name(), known.join(", ")))
+    })
+}
+
+/// `drive.algorithm.gain_per_s=30`.
+fn parse_override(text: &str) -> Result<Setting, InputError> {
+    let parse = || {
+        let (name, value) = text.split_once('=')?;
+        let (axis, name) = name.split_once('.')?;
+        let axis = Axis::ALL.into_iter().find(|known| known.name() == axis)?;
+        let (name, value) = (name.trim().to_owned(), value.trim().parse().ok()?);
+        Some(Setting { axis, name, value, place: "--set ".into() })
+    };
+    parse().ok_or_else(|| {
+        InputError(format!(
+            "--set {text}: expected AXIS.TASK.NAME=NUMBER, such as drive.algorithm.gain_per_s=30"
+        ))
+    })
+}
+
+fn read(path: &Path) -> Result<String, InputError> {
+    std::fs::read_to_string(path)
+        .map_err(|error| InputError(format!("cannot read {}: {error}", path.display())))
+}
+
+#[cfg(test)]
+mod tests;

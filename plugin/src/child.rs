@@ -1,0 +1,206 @@
+//! A child process that tries a library before it is let into this one.
+//!
+//! ```text
+//!   load ──► controller probe-library FILE          writes, each on a line of its own, after [`MARK`]:
+//!              loading, entry, create, reset, steps    at STAGE          before each, so that a crash has a place
+//!              destroy                                 good | refused WHY    at the end
+//!   verdict ◄── exit status and the last lines; after [`TRIAL_LIMIT`] the child is killed
+//! ```
+//!
+//! The child has no real-time priority as long as libraries are loaded before the thread asks for one.
+
+use crate::wrong::Wrong;
+use crate::{PluginError, probe_telling};
+use protocol::exit::Exit;
+use std::env;
+use std::io::{self, PipeReader, Read, Write};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{self, Receiver};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How long a trial may take.
+pub const TRIAL_LIMIT: Duration = Duration::from_secs(5);
+
+/// The name of the hidden command.
+const COMMAND: &str = "probe-library";
+/// Begins each line of the child that is not the library's.
+const MARK: &str = "airbench-trial: ";
+/// How often the parent looks whether the child has ended.
+const LOOK_EVERY: Duration = Duration::from_millis(2);
+/// How much of what a library prints is kept, bytes.
+const MOST_TEXT: usize = 1 << 16;
+
+/// Who tries libraries.
+#[derive(Clone, Debug)]
+pub struct Trier {
+    /// A controller program.
+    pub program: PathBuf,
+    /// How long it may take.
+    pub limit: Duration,
+}
+
+impl Trier {
+    /// This program if it is the controller, else the one in its folder or in the folder around that (as for test programs).
+    ///
+    /// # Errors
+    /// [`Wrong::NoTrier`] with the places that were looked at.
+    pub fn find() -> Result<Self, Wrong> {
+        const NAME: &str = "controller";
+        let own = env::current_exe().map_err(Wrong::NoChild)?;
+        let around = own.ancestors().skip(1).take(2).map(|folder| folder.join(NAME));
+        let places: Vec<_> =
+            if own.file_name().is_some_and(|name| name == NAME) { vec![own] } else { around.collect() };
+        let found = places.iter().find(|place| place.is_file()).cloned();
+        let program = found.ok_or_else(|| {
+            Wrong::NoTrier(
+                places.iter().map(|place| place.display().to_string()).collect::<Vec<_>>().join(", "),
+            )
+        })?;
+        Ok(Self { program, limit: TRIAL_LIMIT })
+    }
+
+    /// Has a child open, ask and run the library.
+    pub(super) fn try_out(&self, library: &Path) -> Result<(), Wrong> {
+        let (reader, writer) = io::pipe().map_err(Wrong::NoChild)?;
+        let mut command = Command::new(&self.program);
+        command.args([COMMAND, "--"]).arg(library).stdin(Stdio::null());
+        command.stdout(writer.try_clone().map_err(Wrong::NoChild)?).stderr(writer);
+        let started = command.spawn();
+        // The command holds the pipe's other end; its text ends only when nobody does.
+        drop(command);
+        let mut child = started.map_err(Wrong::NoChild)?;
+        let said = read_aside(reader);
+        let status = wait(&mut child, self.limit).map_err(Wrong::NoChild)?;
+        judge(self, status, &collect(&said))
+    }
+}
+
+/// The child's side: tries the library and writes the verdict to standard output.
+pub(super) fn run(library: &Path) -> Exit {
+    // A line feed first: the library may have printed half a line.
+    let say = |text: &str| {
+        let mut out = io::stdout().lock();
+        // Nobody reads: then nobody wants to know.
+        let _ = writeln!(out, "\n{MARK}{text}").and_then(|()| out.flush());
+    };
+    match probe_telling(library, &mut |stage| say(&format!("at {stage}"))) {
+        Ok(_) => {
+            say("good");
+            Exit::Good
+        }
+        Err(PluginError { wrong, .. }) => {
+            say(&format!("refused {}", wrong.to_string().replace('\n', " ")));
+            Exit::BadInput
+        }
+    }
+}
+
+/// What a child has printed.
+struct Said {
+    /// The end of it.
+    tail: Arc<Mutex<Vec<u8>>>,
+    /// Told when the pipe has ended.
+    ended: Receiver<()>,
+}
+
+/// Reads in a thread of its own, so that a library that prints much does not block on a full pipe.
+fn read_aside(mut reader: PipeReader) -> Said {
+    let (sender, ended) = mpsc::channel();
+    let tail = Arc::new(Mutex::new(Vec::new()));
+    let kept = Arc::clone(&tail);
+    thread::spawn(move || {
+        let mut piece = [0; 4096];
+        while let Ok(length @ 1..) = reader.read(&mut piece) {
+            let mut kept = kept.lock().expect("the other side does not panic with it");
+            kept.extend_from_slice(&piece[..length]);
+            if kept.len() > 2 * MOST_TEXT {
+                let too_much = kept.len() - MOST_TEXT;
+                kept.drain(..too_much);
+            }
+        }
+        // Nobody waits any more: then nobody wants to know.
+        let _ = sender.send(());
+    });
+    Said { tail, ended }
+}
+
+/// What was read until the pipe's end; a grandchild that holds it open is not waited for.
+fn collect(said: &Said) -> String {
+    let _ = said.ended.recv_timeout(Duration::from_secs(1));
+    String::from_utf8_lossy(&said.tail.lock().expect("the reader does not panic with it")).into_owned()
+}
+
+/// The exit status, or None when the child had to be killed.
+fn wait(child: &mut Child, limit: Duration) -> io::Result<Option<ExitStatus>> {
+    let until = Instant::now() + limit;
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if Instant::now() >= until {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        thread::sleep(LOOK_EVERY);
+    }
+}
+
+/// What the status (None: killed) and the text of a child mean.
+fn judge(trier: &Trier, status: Option<ExitStatus>, text: &str) -> Result<(), Wrong> {
+    let (mut stage, mut verdict, mut last) = (None, None, "");
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        match line.strip_prefix(MARK).map(|told| told.split_once(' ').unwrap_or((told, ""))) {
+            Some(("at", place)) => stage = Some(place.to_owned()),
+            Some(told) => verdict = Some(told),
+            None => last = line,
+        }
+    }
+    let said = if last.is_empty() { String::new() } else { format!(" (it said: {last})") };
+    let place = || stage.clone().unwrap_or_else(|| "an unknown step".to_owned());
+    match (status, verdict) {
+        (None, _) => Err(Wrong::Hung { limit: trier.limit, stage: place(), said }),
+        (Some(status), _) if status.signal().is_some() => {
+            Err(Wrong::Crashed { status, stage: place(), said })
+        }
+        // It told no stage: another program, or an older one.
+        _ if stage.is_none() => Err(Wrong::ForeignTrier(trier.program.clone())),
+        (Some(status), Some(("good", _))) if status.success() => Ok(()),
+        (Some(_), Some(("refused", why))) => Err(Wrong::Told(why.to_owned())),
+        (Some(status), _) => Err(Wrong::Ended { status, stage: place(), said }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(status: Option<i32>, text: &str) -> String {
+        let trier = Trier { program: "controller".into(), limit: TRIAL_LIMIT };
+        let verdict = judge(&trier, status.map(ExitStatus::from_raw), text);
+        verdict.map_or_else(|wrong| wrong.to_string(), |()| "good".to_owned())
+    }
+
+    #[test]
+    fn a_verdict_needs_the_word_and_the_status() {
+        let text = "\nairbench-trial: at loading it\nhello\n\nairbench-trial: good\n";
+        assert_eq!(judged(Some(0), text), "good");
+        // Its clean-up crashed, or ended the process otherwise, after the verdict.
+        assert!(judged(Some(11), text).contains("SIGSEGV"));
+        assert!(judged(Some(3 << 8), text).contains("exit status: 3"));
+        // exit(0) from inside the library.
+        let ended = judged(Some(0), "airbench-trial: at create\nno licence\n");
+        assert!(ended.contains("during: create (it said: no licence)"), "{ended}");
+    }
+
+    #[test]
+    fn a_refusal_comes_in_the_childs_words_and_a_silent_child_is_no_trier() {
+        assert_eq!(judged(Some(2 << 8), "airbench-trial: at x\nairbench-trial: refused because"), "because");
+        assert!(judged(Some(0), "running 0 tests").contains("cannot try libraries"));
+        assert!(judged(None, "airbench-trial: at step 7").contains("during: step 7"));
+    }
+}

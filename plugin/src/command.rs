@@ -1,0 +1,61 @@
+//! The commands `check-library` and `probe-library`.
+
+use crate::child::{self, Trier};
+use crate::{Description, PluginError, describe};
+use algorithms::algorithm::Quantity;
+use algorithms::parameters::Parameter;
+use protocol::exit::Exit;
+use std::fmt;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Prints what the library offers.
+///
+/// # Errors
+/// [`PluginError`]: why it is refused.
+pub fn check_library(library: &Path) -> Result<Exit, PluginError> {
+    let description = Trier::find()
+        .map_err(|wrong| PluginError { library: library.to_owned(), wrong })
+        .and_then(|trier| describe(&trier, library))?;
+    // A closed pipe is the reader's wish.
+    let _ = write!(io::stdout(), "{description}");
+    Ok(Exit::Good)
+}
+
+/// Tries the library in this process, which may not survive it; tells the process that asked.
+#[must_use]
+pub fn probe_library(library: &Path) -> Exit {
+    child::run(library)
+}
+
+impl fmt::Display for Description {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let controls = match self.controls {
+            Quantity::Position => "position",
+            Quantity::Force => "force",
+        };
+        writeln!(f, "name      {}\nabout     {}\ncontrols  {controls}\n", self.name, self.about)?;
+        let row = |p: &Parameter| {
+            let number = |value: f64| format!("{value}");
+            [
+                p.name.to_string(),
+                p.unit.to_string(),
+                number(p.least),
+                number(p.most),
+                number(p.default),
+                p.meaning.to_string(),
+            ]
+        };
+        let head = ["parameter", "unit", "least", "most", "default", "meaning"].map(str::to_owned);
+        let rows: Vec<_> = [head].into_iter().chain(self.parameters.iter().map(row)).collect();
+        let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let widths: [usize; 5] = std::array::from_fn(width);
+        for row in &rows {
+            for (cell, width) in row.iter().zip(widths) {
+                write!(f, "{cell:width$}  ")?;
+            }
+            writeln!(f, "{}", row[5])?;
+        }
+        Ok(())
+    }
+}

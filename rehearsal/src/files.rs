@@ -1,0 +1,95 @@
+//! A rehearsal made of files, and the tables of the rig that it leaves.
+
+use crate::{Rehearsal, RehearsalParts};
+use axis_control::setup::{InputError, Inputs, Mode};
+use plant::tables::{self, CycleRecord};
+use plant::{Axis, Scene, SetupError};
+use runlog::run_folder::LineFile;
+use std::io;
+use std::path::Path;
+
+/// Files of which no rehearsal can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RehearsalError {
+    /// The scene of the experiment cannot be used: file, line, key, value and what is allowed.
+    #[error("{0}")]
+    Scene(String),
+    /// Experiment and programs do not go together.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// Rig and scene do not go together.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+}
+
+/// The scene of the experiment that was read; `file` is for messages.
+///
+/// # Errors
+/// [`RehearsalError::Scene`], for a sealed rig too.
+pub fn scene(inputs: &Inputs, file: &str) -> Result<Scene, RehearsalError> {
+    let scene = Scene::from_toml(&inputs.experiment_toml, file, &inputs.rig)
+        .map_err(|error| RehearsalError::Scene(error.to_string()))?;
+    if scene.sealed.is_some() {
+        return Err(RehearsalError::Scene(format!(
+            "{file}: rig.sealed: a rehearsal runs the plant inside the controller, which must not read a sealed file; use \
+             'emulator run' and 'controller run', or scripts/run without --rehearse"
+        )));
+    }
+    Ok(scene)
+}
+
+/// A rehearsal of what was read.
+///
+/// # Errors
+/// [`RehearsalError`] when rig and scene, or experiment and programs, do not go together.
+pub fn of_inputs(
+    inputs: &Inputs,
+    scene: &Scene,
+    seed: u64,
+    forever: bool,
+) -> Result<Rehearsal, RehearsalError> {
+    let mode = Mode { partner_needed: true, real_time: false, forever };
+    let controllers =
+        Axis::ALL.into_iter().map(|axis| inputs.controller(axis, mode)).collect::<Result<_, _>>()?;
+    Ok(Rehearsal::new(RehearsalParts { rig: &inputs.rig, scene, seed, controllers })?)
+}
+
+/// `measurement.csv` and `truth.csv` of a rehearsal.
+pub struct PlantTables {
+    measurement: LineFile,
+    truth: LineFile,
+}
+
+impl PlantTables {
+    /// Makes the tables in `folder`.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn create(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<Self> {
+        let mut measurement = LineFile::create(&folder.join("measurement.csv"))?;
+        let mut truth = LineFile::create(&folder.join("truth.csv"))?;
+        tables::write_measurement_head(measurement.lines(), scene.linked, scene.added_mass_kg)?;
+        tables::write_truth_head(truth.lines(), &rehearsal.plant().term_names())?;
+        Ok(Self { measurement, truth })
+    }
+
+    /// Appends the rows of a cycle.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn write(&mut self, cycle: &CycleRecord) -> io::Result<()> {
+        tables::write_measurement(self.measurement.lines(), cycle)?;
+        tables::write_truth(self.truth.lines(), cycle)?;
+        self.measurement.write_when_full()?;
+        self.truth.write_when_full()
+    }
+
+    /// Writes what is still in memory.
+    ///
+    /// # Errors
+    /// What the system says, with the file's name.
+    pub fn write_out(&mut self) -> io::Result<()> {
+        self.measurement.write_out()?;
+        self.truth.write_out()
+    }
+}

@@ -1,0 +1,378 @@
+//! The A2L file of an axis, made of the tables that define its parameters, controls and signals: nothing is written in it twice.
+//!
+//! What is the same for every program stands in `frame.a2l`: the protocol's numbers and their A2ML. Names are those of files
+//! with the axis in front, `drive.algorithm.gain_per_s`; what A2L allows in no name becomes `_`.
+//!
+//! Source: ASAM MCD-2 MC 1.7.1.
+
+use crate::daq::{LISTS, LONGEST_ENTRY};
+use crate::image::{
+    CHANNEL_STEP, CONTROL, DESCRIPTION, NARROW, PARAMETERS, SIGNAL, TRACE_CHANNELS, TRACE_CYCLES, TRACE_TOLD,
+    WIDE,
+};
+use crate::signals::{Format, SIGNALS};
+use crate::slave::{BLOCK_PACKETS, Texts};
+use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, TOLD};
+use crate::{EVENT_NAME, identifiers};
+use a2lfile::{
+    A2lFile, A2lObjectName, AddrType, Characteristic, CharacteristicType, CompuMethod, CompuTabRef,
+    CompuVtab, ConversionType, DataType, EcuAddress, FncValues, Group, IndexMode, MatrixDim, Measurement,
+    Module, ReadOnly, RecordLayout, RefCharacteristic, RefMeasurement, Root, ValuePairsStruct,
+};
+use algorithms::parameters::Parameter;
+use axis_control::program::Variable;
+use crc::{CRC_32_ISO_HDLC, Crc};
+use plant::Axis;
+use protocol::frames::BIT_RATE_PER_S;
+
+/// What the file describes.
+pub struct Described<'a> {
+    /// The axis.
+    pub axis: Axis,
+    /// Title of its program.
+    pub title: &'a str,
+    /// Variables of the program, in their order.
+    pub variables: &'a [Variable],
+}
+
+/// The texts that a slave hands out.
+pub struct Description {
+    /// All of them.
+    pub bytes: Vec<u8>,
+    /// Where each lies.
+    pub texts: Texts,
+}
+
+/// A file that our own tables do not make: a bug, told with what the library said.
+#[derive(Debug, thiserror::Error)]
+#[error("the A2L file of the {axis} axis cannot be made: {reason}")]
+pub struct A2lError {
+    axis: &'static str,
+    reason: String,
+}
+
+/// Which controller, program and tables this is: an A2L file with another one does not fit.
+#[must_use]
+pub fn epk(described: &Described<'_>) -> String {
+    let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+    let mut digest = crc.digest();
+    let mut note = |name: &str, parameter: &Parameter| {
+        let Parameter { unit, least, most, at_start_only, whole, .. } = parameter;
+        digest.update(format!("{name} {unit} {least} {most} {at_start_only} {whole}\n").as_bytes());
+    };
+    described.variables.iter().for_each(|variable| note(&variable.name, &variable.parameter));
+    CONTROLS.iter().for_each(|control| note(&control.name, control));
+    SIGNALS.iter().for_each(|signal| note(&signal.about.name, &signal.about));
+    let sum = digest.finalize();
+    format!("airbench {} {} {sum:08X}", env!("CARGO_PKG_VERSION"), described.axis.name())
+}
+
+/// Name of the file.
+#[must_use]
+pub fn file_name(axis: Axis) -> String {
+    format!("controller-{}.a2l", axis.name())
+}
+
+/// The texts that a slave hands out, the A2L file among them.
+///
+/// # Errors
+/// [`A2lError`].
+pub fn description(described: &Described<'_>) -> Result<Description, A2lError> {
+    let mut bytes = Vec::new();
+    let mut place = |text: &str| {
+        let at = bytes.len() as u32;
+        bytes.extend_from_slice(text.as_bytes());
+        (at, text.len() as u32)
+    };
+    let texts = Texts {
+        epk: place(&epk(described)),
+        event: place(EVENT_NAME),
+        file: place(&file_name(described.axis)),
+        a2l: place(&text(described)?),
+    };
+    Ok(Description { bytes, texts })
+}
+
+/// The A2L file.
+///
+/// # Errors
+/// [`A2lError`].
+pub fn text(described: &Described<'_>) -> Result<String, A2lError> {
+    let error = |reason: String| A2lError { axis: described.axis.name(), reason };
+    let (mut file, warnings) =
+        a2lfile::load_from_string(&frame(described), None, true).map_err(|what| error(what.to_string()))?;
+    let module = &mut file.project.module[0];
+    let mut maker = Maker { module, axis: described.axis.name(), parts: Vec::new() };
+    maker.record_layouts();
+    maker.parameters(described.variables);
+    maker.controls();
+    maker.signals();
+    maker.trace();
+    maker.groups();
+    checked(&file, warnings).map_err(error)?;
+    Ok(file.write_to_string())
+}
+
+fn checked(file: &A2lFile, mut problems: Vec<a2lfile::A2lError>) -> Result<(), String> {
+    problems.extend(file.check());
+    problems.first().map_or(Ok(()), |problem| Err(problem.to_string()))
+}
+
+fn frame(described: &Described<'_>) -> String {
+    let (master, slave) = identifiers(described.axis);
+    let hex = |number: u32| format!("{number:#X}").replacen("0X", "0x", 1);
+    // A text in quotes may hold anything but a quote and the end of its line.
+    let title: String =
+        described.title.chars().map(|c| if c == '"' || c.is_control() { '\'' } else { c }).collect();
+    [
+        ("@AXIS@", described.axis.name().to_owned()),
+        ("@TITLE@", title),
+        ("@EPK_ADDRESS@", hex(DESCRIPTION)),
+        ("@EPK@", epk(described)),
+        ("@BLOCK_PACKETS@", BLOCK_PACKETS.to_string()),
+        ("@LISTS@", LISTS.to_string()),
+        ("@LONGEST_ENTRY@", LONGEST_ENTRY.to_string()),
+        ("@EVENT@", EVENT_NAME.to_owned()),
+        ("@MASTER@", hex(u32::from(master))),
+        ("@SLAVE@", hex(u32::from(slave))),
+        ("@BAUDRATE@", BIT_RATE_PER_S.to_string()),
+    ]
+    .into_iter()
+    .fold(include_str!("frame.a2l").to_owned(), |text, (from, to)| text.replace(from, &to))
+}
+
+fn data_type(format: Format) -> DataType {
+    match format {
+        Format::Byte => DataType::Ubyte,
+        Format::Long => DataType::Ulong,
+        Format::Float => DataType::Float32Ieee,
+        Format::Double => DataType::Float64Ieee,
+    }
+}
+
+fn layout(format: Format) -> &'static str {
+    if format == Format::Long { "count" } else { "number" }
+}
+
+/// Fills a module.
+struct Maker<'a> {
+    module: &'a mut Module,
+    axis: &'static str,
+    /// Names of objects by group: what can be written or only read, and what is measured.
+    parts: Vec<(String, Vec<String>, Vec<String>)>,
+}
+
+impl Maker<'_> {
+    fn record_layouts(&mut self) {
+        for format in [Format::Long, Format::Double] {
+            let mut record = RecordLayout::new(layout(format).into());
+            record.fnc_values =
+                Some(FncValues::new(1, data_type(format), IndexMode::RowDir, AddrType::Direct));
+            self.module.record_layout.push(record);
+        }
+    }
+
+    /// `algorithm.gain_per_s` with the axis in front, in the letters that A2L allows.
+    fn name(&self, name: &str) -> String {
+        let allowed = |c: char| if c.is_ascii_alphanumeric() || c == '.' || c == '_' { c } else { '_' };
+        // A part of a name begins with no digit.
+        let part = |part: &str| {
+            let part: String = part.chars().map(allowed).collect();
+            if part.starts_with(|c: char| c.is_ascii_digit()) { format!("_{part}") } else { part }
+        };
+        let parts: Vec<String> = name.split('.').map(part).collect();
+        format!("{}.{}", self.axis, parts.join("."))
+    }
+
+    /// The conversion of numbers in `unit`: none but the unit itself.
+    fn unit(&mut self, unit: &str) -> String {
+        if unit.is_empty() {
+            return "NO_COMPU_METHOD".into();
+        }
+        let name =
+            format!("in_{}", unit.replace('/', "_per_").replace(|c: char| !c.is_ascii_alphanumeric(), "_"));
+        if !self.module.compu_method.iter().any(|method| method.get_name() == name) {
+            let meaning = format!("in {unit}");
+            self.module.compu_method.push(CompuMethod::new(
+                name.clone(),
+                meaning,
+                ConversionType::Identical,
+                "%.6".into(),
+                unit.into(),
+            ));
+        }
+        name
+    }
+
+    /// The conversion of counts to names.
+    fn names(&mut self, name: &str, values: &[&str]) -> String {
+        let method = format!("names.{name}");
+        let table = format!("{method}.table");
+        if !self.module.compu_method.iter().any(|known| known.get_name() == method) {
+            let mut made = CompuMethod::new(
+                method.clone(),
+                String::new(),
+                ConversionType::TabVerb,
+                "%.0".into(),
+                String::new(),
+            );
+            made.compu_tab_ref = Some(CompuTabRef::new(table.clone()));
+            self.module.compu_method.push(made);
+            let mut made = CompuVtab::new(
+                table,
+                String::new(),
+                ConversionType::TabVerb,
+                values.len().try_into().unwrap_or(u16::MAX),
+            );
+            made.value_pairs = values
+                .iter()
+                .zip(0_u32..)
+                .map(|(value, at)| ValuePairsStruct::new(f64::from(at), (*value).into()))
+                .collect();
+            self.module.compu_vtab.push(made);
+        }
+        method
+    }
+
+    fn parameters(&mut self, variables: &[Variable]) {
+        let mut names = Vec::new();
+        for (variable, at) in variables.iter().zip(0_u32..) {
+            let conversion = self.unit(&variable.parameter.unit);
+            let place = Place { address: PARAMETERS + at * WIDE, format: Format::Double, conversion };
+            names.push(self.characteristic(
+                &variable.name,
+                &variable.parameter,
+                place,
+                variable.parameter.at_start_only,
+            ));
+        }
+        self.parts.push(("parameters".into(), names, Vec::new()));
+    }
+
+    fn controls(&mut self) {
+        let signals: Vec<_> = SIGNALS.iter().map(|signal| signal.about.name.as_ref()).collect();
+        let mut names = Vec::new();
+        for (place, control) in CONTROLS.iter().enumerate() {
+            let conversion = match place {
+                trace::SOURCE => self.names("signal", &signals),
+                trace::SLOPE => self.names("slope", &["rising", "falling", "either", "at-once"]),
+                _ if (trace::CHANNEL..trace::ARM).contains(&place) => self.names("signal", &signals),
+                _ => self.unit(&control.unit),
+            };
+            let address = CONTROL + place as u32 * WIDE;
+            let place = Place { address, format: trace::control_format(place), conversion };
+            names.push(self.characteristic(&control.name, control, place, false));
+        }
+        self.parts.push(("controls".into(), names, Vec::new()));
+    }
+
+    fn characteristic(&mut self, name: &str, about: &Parameter, place: Place, read_only: bool) -> String {
+        let name = self.name(name);
+        let mut made = Characteristic::new(
+            name.clone(),
+            about.meaning.to_string(),
+            CharacteristicType::Value,
+            place.address,
+            layout(place.format).into(),
+            0.0,
+            place.conversion,
+            about.least,
+            about.most,
+        );
+        made.read_only = read_only.then(ReadOnly::new);
+        self.module.characteristic.push(made);
+        name
+    }
+
+    fn signals(&mut self) {
+        let mut names = Vec::new();
+        for (signal, at) in SIGNALS.iter().zip(0_u32..) {
+            let about = &signal.about;
+            let conversion = if signal.values.is_empty() {
+                self.unit(&about.unit)
+            } else {
+                self.names(&about.name, signal.values)
+            };
+            let place = Place { address: SIGNAL + at * NARROW, format: signal.format, conversion };
+            names.push(self.measurement(&about.name, &about.meaning, [about.least, about.most], place));
+        }
+        self.parts.push(("signals".into(), Vec::new(), names));
+    }
+
+    fn measurement(&mut self, name: &str, meaning: &str, range: [f64; 2], place: Place) -> String {
+        let name = self.name(name);
+        let [least, most] = range;
+        let data = data_type(place.format);
+        let mut made =
+            Measurement::new(name.clone(), meaning.into(), data, place.conversion, 0, 0.0, least, most);
+        made.ecu_address = Some(EcuAddress::new(place.address));
+        self.module.measurement.push(made);
+        name
+    }
+
+    fn trace(&mut self) {
+        let mut told = Vec::new();
+        for ((name, meaning), at) in TOLD.iter().zip(0_u32..) {
+            let conversion = if at == 0 { self.names("trace", trace::STATES) } else { self.unit("") };
+            let place = Place { address: TRACE_TOLD + at * NARROW, format: Format::Long, conversion };
+            told.push(self.measurement(name, meaning, [0.0, f64::from(u32::MAX)], place));
+        }
+        let cycles = Parameter::new(
+            ("trace.cycles", "cycles"),
+            [0.0, u32::MAX as f64],
+            0.0,
+            "trigger buffer: the rig's cycle of each sample, the oldest first",
+        );
+        let mut blocks = vec![self.block(&cycles, TRACE_CYCLES, Format::Long)];
+        for (number, at) in (1..=CHANNELS).zip(0_u32..) {
+            let about = Parameter {
+                name: format!("trace.samples_{number}").into(),
+                meaning: format!("trigger buffer: samples of channel {number}, the oldest first").into(),
+                ..Parameter::new(("", ""), [-1e12, 1e12], 0.0, "")
+            };
+            blocks.push(self.block(&about, TRACE_CHANNELS + at * CHANNEL_STEP, Format::Double));
+        }
+        self.parts.push(("trace".into(), blocks, told));
+    }
+
+    /// Samples as a block of memory, which is only read.
+    fn block(&mut self, about: &Parameter, address: u32, format: Format) -> String {
+        let conversion = self.unit(&about.unit);
+        let name = self.characteristic(&about.name, about, Place { address, format, conversion }, true);
+        if let Some(made) = self.module.characteristic.iter_mut().find(|made| made.get_name() == name) {
+            made.characteristic_type = CharacteristicType::ValBlk;
+            let mut length = MatrixDim::new();
+            length.dim_list = vec![CAPACITY as u16];
+            made.matrix_dim = Some(length);
+        }
+        name
+    }
+
+    fn groups(&mut self) {
+        for (name, characteristics, measurements) in std::mem::take(&mut self.parts) {
+            let mut group = Group::new(format!("{}_{name}", self.axis), String::new());
+            group.root = Some(Root::new());
+            if !characteristics.is_empty() {
+                let mut list = RefCharacteristic::new();
+                list.identifier_list = characteristics;
+                group.ref_characteristic = Some(list);
+            }
+            if !measurements.is_empty() {
+                let mut list = RefMeasurement::new();
+                list.identifier_list = measurements;
+                group.ref_measurement = Some(list);
+            }
+            self.module.group.push(group);
+        }
+    }
+}
+
+/// Where a value lies and how.
+struct Place {
+    address: u32,
+    format: Format,
+    conversion: String,
+}
+
+#[cfg(test)]
+mod tests;

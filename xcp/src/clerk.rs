@@ -1,0 +1,175 @@
+//! What a slave cannot do in the 1 ms path: files of parameter sets, and words for a person. It runs in the recorder's thread.
+//!
+//! A set is stored to `controller-drive-parameters.toml` or `controller-load-parameters.toml` of the run's folder, and loaded
+//! from there; no other file is read or written on a client's behalf.
+
+use axis_control::node::Change;
+use axis_control::parameter_set;
+use axis_control::program::Variable;
+use crossbeam_channel::{Receiver, Sender};
+use plant::Axis;
+use std::path::{Path, PathBuf};
+
+/// What a port tells.
+#[derive(Debug)]
+pub enum Note {
+    /// A parameter has another value.
+    Changed {
+        /// Of this axis.
+        axis: Axis,
+        /// The rig's cycle that was answered last.
+        cycle: u64,
+        /// Place in the list of variables.
+        place: usize,
+        /// The value.
+        value: f64,
+    },
+    /// Somebody had the right key.
+    Unlocked {
+        /// Of this axis.
+        axis: Axis,
+        /// The rig's cycle that was answered last.
+        cycle: u64,
+    },
+    /// Somebody had a wrong key.
+    WrongKey {
+        /// Of this axis.
+        axis: Axis,
+        /// The rig's cycle that was answered last.
+        cycle: u64,
+    },
+    /// These values are to be stored.
+    Store {
+        /// Of this axis.
+        axis: Axis,
+        /// In the order of its variables.
+        values: Vec<f64>,
+    },
+    /// The stored values are to be loaded.
+    Load {
+        /// Of this axis.
+        axis: Axis,
+    },
+}
+
+/// A copy of the parameters that comes back.
+#[derive(Debug)]
+pub struct Returned {
+    /// The copy, whose room serves again.
+    pub values: Vec<f64>,
+    /// Whether it is in the file.
+    pub stored: bool,
+}
+
+/// An axis of the clerk.
+pub struct Book {
+    /// The axis.
+    pub axis: Axis,
+    /// Its variables.
+    pub variables: Vec<Variable>,
+    /// Their values at the start.
+    pub values: Vec<f64>,
+    /// Back to its port.
+    pub returned: Sender<Returned>,
+}
+
+/// Does what ports ask for.
+pub struct Clerk {
+    notes: Receiver<Note>,
+    books: Vec<Book>,
+    changes: Sender<Change>,
+    folder: PathBuf,
+}
+
+/// Name of the file that a set is stored in.
+#[must_use]
+pub fn file_name(axis: Axis) -> String {
+    format!("controller-{}-parameters.toml", axis.name())
+}
+
+impl Clerk {
+    /// A clerk for these axes, with the run's folder.
+    #[must_use]
+    pub fn new(notes: Receiver<Note>, books: Vec<Book>, changes: Sender<Change>, folder: &Path) -> Self {
+        Self { notes, books, changes, folder: folder.into() }
+    }
+
+    /// Does what is asked for.
+    pub fn look(&mut self) {
+        let notes = self.notes.clone();
+        for note in notes.try_iter() {
+            match note {
+                Note::Changed { axis, cycle, place, value } => {
+                    let name =
+                        self.book(axis).and_then(|book| book.variables.get(place)).map(|found| &found.name);
+                    let name = name.map_or("?", String::as_str);
+                    eprintln!("controller: cycle {cycle}: {}.{name} is {value} now, by XCP", axis.name());
+                }
+                Note::Unlocked { axis, cycle } => {
+                    eprintln!("controller: cycle {cycle}: XCP of the {} axis is unlocked", axis.name());
+                }
+                Note::WrongKey { axis, cycle } => {
+                    eprintln!("controller: cycle {cycle}: a wrong key to XCP of the {} axis", axis.name());
+                }
+                Note::Store { axis, values } => self.store(axis, values),
+                Note::Load { axis } => match self.load(axis) {
+                    Ok(count) => {
+                        eprintln!("controller: {count} parameters of the {} axis loaded, by XCP", axis.name())
+                    }
+                    Err(problem) => eprintln!("controller: {problem}; the numbers in use stay"),
+                },
+            }
+        }
+    }
+
+    fn book(&self, axis: Axis) -> Option<&Book> {
+        self.books.iter().find(|book| book.axis == axis)
+    }
+
+    fn path(&self, axis: Axis) -> PathBuf {
+        self.folder.join(file_name(axis))
+    }
+
+    fn store(&self, axis: Axis, values: Vec<f64>) {
+        let Some(book) = self.book(axis) else { return };
+        let path = self.path(axis);
+        let text = parameter_set::text(axis, &book.variables, &values);
+        // Written beside it and moved over it: nobody reads half a set.
+        let part = path.with_extension("toml.part");
+        let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path));
+        match &written {
+            Ok(()) => {
+                eprintln!("controller: parameters of the {} axis stored in {}", axis.name(), path.display())
+            }
+            Err(error) => eprintln!("controller: cannot write {}: {error}", path.display()),
+        }
+        // A port that has gone needs nothing back.
+        let _ = book.returned.send(Returned { values, stored: written.is_ok() });
+    }
+
+    /// Hands all values of the set on, or none and why not.
+    fn load(&self, axis: Axis) -> Result<usize, String> {
+        let Some(book) = self.book(axis) else { return Ok(0) };
+        let settings = parameter_set::read(&self.path(axis)).map_err(|error| error.to_string())?;
+        let mut changes = Vec::new();
+        for setting in settings {
+            let told = |problem: String| format!("{}{}.{problem}", setting.place, axis.name());
+            let place = book
+                .variables
+                .iter()
+                .position(|variable| setting.axis == axis && variable.name == setting.name)
+                .ok_or_else(|| told(format!("{}: no such variable here", setting.name)))?;
+            let parameter = &book.variables[place].parameter;
+            if parameter.at_start_only && setting.value == book.values[place] {
+                continue;
+            }
+            let value = parameter.check_change(setting.value).map_err(|error| told(error.to_string()))?;
+            changes.push(Change { axis, place, value });
+        }
+        let count = changes.len();
+        for change in changes {
+            self.changes.try_send(change).map_err(|_| "too many changes at a time".to_owned())?;
+        }
+        Ok(count)
+    }
+}

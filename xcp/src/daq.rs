@@ -1,0 +1,468 @@
+//! Lists of measurements that the slave sends by itself, each cycle or each so many.
+//!
+//! ```text
+//!   FREE_DAQ ─► ALLOC_DAQ ─► ALLOC_ODT ─► ALLOC_ODT_ENTRY ─► SET_DAQ_PTR, WRITE_DAQ ─► mode, start ─► packets
+//!
+//!   packet = number of the ODT | time stamp, 2 bytes, in the first ODT of a list if asked for | up to 7 bytes of entries
+//! ```
+//!
+//! All entries of a list are taken in the same cycle, after the answer to the sensors. Their packets leave at once, as far as
+//! so many may leave in a cycle; the others follow in the next ones. So the reserve of the bus is kept: lists that would need
+//! more than that in the long run are refused at their start ([`Refusal::DaqConfig`]). The time stamp is the rig's cycle, low
+//! 16 bits.
+//!
+//! Everything has its place from the start: nothing here allocates.
+
+use crate::image::Image;
+use crate::packet::{BYTES, LAST_PID, Packet, Refusal};
+
+/// Most lists.
+pub const LISTS: usize = 8;
+/// Most ODTs of all lists together; each has one packet.
+pub const ODTS: usize = 32;
+/// Most entries of an ODT.
+pub const ENTRIES: usize = 7;
+/// Longest entry, bytes.
+pub const LONGEST_ENTRY: u8 = 7;
+/// Bytes of a time stamp.
+pub const STAMP_BYTES: usize = 2;
+/// Packets that may wait to leave.
+const ROOM: usize = 2 * ODTS;
+
+/// Bit of a list's mode: with time stamps. The only one that can be asked for.
+const MODE_STAMP: u8 = 0x10;
+/// Bits of a list's mode as it is told: selected, running.
+const SELECTED: u8 = 0x01;
+const RUNNING: u8 = 0x40;
+
+const _: () = assert!(ODTS <= LAST_PID as usize, "an ODT's number is its packet's first byte");
+
+/// A piece of memory.
+#[derive(Clone, Copy, Default)]
+pub struct Entry {
+    /// Its first address.
+    pub address: u32,
+    /// Bytes; 0 for an entry that was not written.
+    pub size: u8,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Odt {
+    entries: [Entry; ENTRIES],
+    count: usize,
+}
+
+#[derive(Clone, Copy, Default)]
+struct List {
+    first: usize,
+    odts: usize,
+    mode: u8,
+    prescaler: u8,
+    priority: u8,
+    selected: bool,
+    running: bool,
+    /// Cycles until it is due.
+    wait: u8,
+}
+
+/// How far the lists are made, since they are made in this order.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+enum Made {
+    Nothing,
+    Freed,
+    Lists,
+    Odts,
+    Entries,
+}
+
+/// All lists, and the packets that wait to leave.
+#[derive(Clone)]
+pub struct Daq {
+    /// Packets that may leave in a cycle.
+    per_cycle: u32,
+    made: Made,
+    lists: [List; LISTS],
+    count: usize,
+    odts: [Odt; ODTS],
+    used: usize,
+    pointer: Option<(usize, usize)>,
+    waiting: [Packet; ROOM],
+    head: usize,
+    queued: usize,
+    /// Packets for which there was no room; the admission at the start keeps it 0.
+    dropped: u64,
+}
+
+/// How a list is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ListMode {
+    /// Bits as they are told.
+    pub mode: u8,
+    /// A packet each so many cycles.
+    pub prescaler: u8,
+    /// As it was set; all lists are served alike.
+    pub priority: u8,
+}
+
+impl Daq {
+    /// No lists; so many packets may leave in a cycle.
+    #[must_use]
+    pub fn new(per_cycle: u32) -> Self {
+        Self {
+            per_cycle,
+            made: Made::Nothing,
+            lists: [List::default(); LISTS],
+            count: 0,
+            odts: [Odt::default(); ODTS],
+            used: 0,
+            pointer: None,
+            waiting: [[0; BYTES]; ROOM],
+            head: 0,
+            queued: 0,
+            dropped: 0,
+        }
+    }
+
+    /// Whether a list runs.
+    #[must_use]
+    pub fn runs(&self) -> bool {
+        self.lists[..self.count].iter().any(|list| list.running)
+    }
+
+    /// Packets for which there was no room.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    fn idle(&self) -> Result<(), Refusal> {
+        if self.runs() { Err(Refusal::DaqActive) } else { Ok(()) }
+    }
+
+    /// Gives all lists back; those that run stop.
+    pub fn free(&mut self) {
+        *self = Self { made: Made::Freed, dropped: self.dropped, ..Self::new(self.per_cycle) };
+    }
+
+    /// Makes so many lists.
+    ///
+    /// # Errors
+    /// [`Refusal::Sequence`] out of order, [`Refusal::MemoryOverflow`] beyond [`LISTS`].
+    pub fn alloc_lists(&mut self, count: u16) -> Result<(), Refusal> {
+        self.in_order(Made::Freed, Made::Freed, Made::Lists)?;
+        if usize::from(count) > LISTS {
+            return Err(Refusal::MemoryOverflow);
+        }
+        self.count = usize::from(count);
+        self.lists = [List { prescaler: 1, ..List::default() }; LISTS];
+        Ok(())
+    }
+
+    /// Makes so many ODTs of a list.
+    ///
+    /// # Errors
+    /// [`Refusal::Sequence`] out of order or again, [`Refusal::OutOfRange`] for no such list, [`Refusal::MemoryOverflow`] beyond
+    /// [`ODTS`].
+    pub fn alloc_odts(&mut self, list: u16, count: u8) -> Result<(), Refusal> {
+        let place = self.list(list)?;
+        if self.lists[place].odts > 0 {
+            return Err(Refusal::Sequence);
+        }
+        self.in_order(Made::Lists, Made::Odts, Made::Odts)?;
+        let count = usize::from(count);
+        if self.used + count > ODTS {
+            return Err(Refusal::MemoryOverflow);
+        }
+        (self.lists[place].first, self.lists[place].odts) = (self.used, count);
+        self.used += count;
+        Ok(())
+    }
+
+    /// Makes so many entries of an ODT.
+    ///
+    /// # Errors
+    /// As [`Daq::alloc_odts`]; [`Refusal::DaqActive`] while a list runs.
+    pub fn alloc_entries(&mut self, list: u16, odt: u8, count: u8) -> Result<(), Refusal> {
+        self.idle()?;
+        let odt = self.odt(list, odt)?;
+        self.in_order(Made::Odts, Made::Entries, Made::Entries)?;
+        if usize::from(count) > ENTRIES {
+            return Err(Refusal::MemoryOverflow);
+        }
+        self.odts[odt] = Odt { count: usize::from(count), ..Odt::default() };
+        Ok(())
+    }
+
+    fn in_order(&mut self, least: Made, most: Made, then: Made) -> Result<(), Refusal> {
+        if !(least..=most).contains(&self.made) {
+            return Err(Refusal::Sequence);
+        }
+        self.made = then;
+        Ok(())
+    }
+
+    fn list(&self, list: u16) -> Result<usize, Refusal> {
+        let list = usize::from(list);
+        if list < self.count { Ok(list) } else { Err(Refusal::OutOfRange) }
+    }
+
+    fn odt(&self, list: u16, odt: u8) -> Result<usize, Refusal> {
+        let List { first, odts, .. } = self.lists[self.list(list)?];
+        if usize::from(odt) < odts { Ok(first + usize::from(odt)) } else { Err(Refusal::OutOfRange) }
+    }
+
+    /// Empties the entries of a list; it stops.
+    ///
+    /// # Errors
+    /// [`Refusal::OutOfRange`] for no such list.
+    pub fn clear(&mut self, list: u16) -> Result<(), Refusal> {
+        let place = self.list(list)?;
+        let List { first, odts, .. } = self.lists[place];
+        (self.lists[place].running, self.lists[place].selected) = (false, false);
+        self.odts[first..first + odts].iter_mut().for_each(|odt| odt.entries = [Entry::default(); ENTRIES]);
+        Ok(())
+    }
+
+    /// Says which entry is written or read next.
+    ///
+    /// # Errors
+    /// [`Refusal::OutOfRange`] for no such entry, [`Refusal::DaqActive`] while a list runs.
+    pub fn point(&mut self, list: u16, odt: u8, entry: u8) -> Result<(), Refusal> {
+        self.idle()?;
+        self.pointer = None;
+        let odt = self.odt(list, odt)?;
+        if usize::from(entry) >= self.odts[odt].count {
+            return Err(Refusal::OutOfRange);
+        }
+        self.pointer = Some((odt, usize::from(entry)));
+        Ok(())
+    }
+
+    /// Writes the next entry.
+    ///
+    /// # Errors
+    /// [`Refusal::Sequence`] with none pointed at; [`Refusal::OutOfRange`] for a size that no packet holds, alone or with the
+    /// others of its ODT; [`Refusal::AccessDenied`] for memory that is not there; [`Refusal::DaqActive`] while a list runs.
+    pub fn write(&mut self, image: &Image, entry: Entry) -> Result<(), Refusal> {
+        self.idle()?;
+        let (odt, place) = self.pointer.ok_or(Refusal::Sequence)?;
+        if entry.size == 0 || entry.size > LONGEST_ENTRY {
+            return Err(Refusal::OutOfRange);
+        }
+        image.check_readable(entry.address, u32::from(entry.size))?;
+        let odt_entries = &mut self.odts[odt];
+        let before = std::mem::replace(&mut odt_entries.entries[place], entry);
+        if odt_entries.bytes() >= BYTES {
+            odt_entries.entries[place] = before;
+            return Err(Refusal::OutOfRange);
+        }
+        self.go_on(odt, place);
+        Ok(())
+    }
+
+    /// Reads the next entry.
+    ///
+    /// # Errors
+    /// [`Refusal::Sequence`] with none pointed at.
+    pub fn read(&mut self) -> Result<Entry, Refusal> {
+        let (odt, place) = self.pointer.ok_or(Refusal::Sequence)?;
+        self.go_on(odt, place);
+        Ok(self.odts[odt].entries[place])
+    }
+
+    fn go_on(&mut self, odt: usize, place: usize) {
+        self.pointer = (place + 1 < self.odts[odt].count).then_some((odt, place + 1));
+    }
+
+    /// Sets how a list is run: its mode (time stamps or none), the event, of which there is one, its prescaler and priority.
+    ///
+    /// # Errors
+    /// [`Refusal::OutOfRange`] for anything that is not offered, [`Refusal::DaqActive`] while the list runs.
+    pub fn set_mode(&mut self, list: u16, event: u16, asked: ListMode) -> Result<(), Refusal> {
+        let place = self.list(list)?;
+        if self.lists[place].running {
+            return Err(Refusal::DaqActive);
+        }
+        let ListMode { mode, prescaler, priority } = asked;
+        if event != 0 || mode & !MODE_STAMP != 0 || prescaler == 0 {
+            return Err(Refusal::OutOfRange);
+        }
+        self.lists[place] = List { mode, prescaler, priority, ..self.lists[place] };
+        Ok(())
+    }
+
+    /// How a list is run.
+    ///
+    /// # Errors
+    /// [`Refusal::OutOfRange`] for no such list.
+    pub fn mode(&self, list: u16) -> Result<ListMode, Refusal> {
+        let List { mode, prescaler, priority, selected, running, .. } = self.lists[self.list(list)?];
+        let bit = |is: bool, bit: u8| if is { bit } else { 0 };
+        let mode = mode | bit(selected, SELECTED) | bit(running, RUNNING);
+        Ok(ListMode { mode, prescaler, priority })
+    }
+
+    /// Stops (0), starts (1) or selects (2) a list; tells the number of its first packet.
+    ///
+    /// # Errors
+    /// [`Refusal::DaqConfig`] for a list that has nothing to send, whose packets do not hold it, or with which more packets would
+    /// come than may leave.
+    pub fn start_stop(&mut self, mode: u8, list: u16) -> Result<u8, Refusal> {
+        let place = self.list(list)?;
+        match mode {
+            0 => self.lists[place].running = false,
+            1 => {
+                self.check(place)?;
+                self.admit(|other, list| other == place || list.running)?;
+                self.start(place);
+            }
+            2 => {
+                self.check(place)?;
+                self.lists[place].selected = true;
+            }
+            _ => return Err(Refusal::OutOfRange),
+        }
+        Ok(self.lists[place].first as u8)
+    }
+
+    /// Stops all (0), starts (1) or stops (2) the selected lists.
+    ///
+    /// # Errors
+    /// As [`Daq::start_stop`]; none is started then.
+    pub fn start_stop_selected(&mut self, mode: u8) -> Result<(), Refusal> {
+        match mode {
+            0 => self.stop(),
+            1 => {
+                // Again: mode and entries may have changed since they were selected.
+                for place in (0..self.count).filter(|place| self.lists[*place].selected) {
+                    self.check(place)?;
+                }
+                self.admit(|_, list| list.selected || list.running)?;
+                for place in 0..self.count {
+                    if std::mem::take(&mut self.lists[place].selected) {
+                        self.start(place);
+                    }
+                }
+            }
+            2 => {
+                for list in &mut self.lists[..self.count] {
+                    if std::mem::take(&mut list.selected) {
+                        list.running = false;
+                    }
+                }
+            }
+            _ => return Err(Refusal::OutOfRange),
+        }
+        Ok(())
+    }
+
+    /// Stops all lists.
+    pub fn stop(&mut self) {
+        self.lists.iter_mut().for_each(|list| (list.running, list.selected) = (false, false));
+    }
+
+    fn start(&mut self, place: usize) {
+        (self.lists[place].running, self.lists[place].wait) = (true, 0);
+    }
+
+    /// Whether a list's packets hold what it asks for.
+    fn check(&self, place: usize) -> Result<(), Refusal> {
+        let List { first, odts, mode, .. } = self.lists[place];
+        let mut head = 1 + if mode & MODE_STAMP != 0 { STAMP_BYTES } else { 0 };
+        for odt in &self.odts[first..first + odts] {
+            if head + odt.bytes() > BYTES {
+                return Err(Refusal::DaqConfig);
+            }
+            head = 1;
+        }
+        if odts == 0 { Err(Refusal::DaqConfig) } else { Ok(()) }
+    }
+
+    /// Whether all packets of these lists may leave: packets per cycle, times all prescalers' common multiple, in whole numbers.
+    fn admit(&self, of: impl Fn(usize, &List) -> bool) -> Result<(), Refusal> {
+        let lists = self.lists[..self.count].iter().enumerate().filter(|(place, list)| of(*place, list));
+        // A sum of fractions with denominators of up to 255, in parts of a million, rounded up: never more than there is.
+        let parts: u64 = lists
+            .map(|(_, list)| (list.odts as u64 * 1_000_000).div_ceil(u64::from(list.prescaler.max(1))))
+            .sum();
+        // What rounding adds: less than one part for each list.
+        if parts <= u64::from(self.per_cycle) * 1_000_000 + LISTS as u64 {
+            Ok(())
+        } else {
+            Err(Refusal::DaqConfig)
+        }
+    }
+
+    /// Takes what is due in a cycle.
+    pub fn cycle(&mut self, cycle: u64, image: &Image) {
+        for place in 0..self.count {
+            let list = &mut self.lists[place];
+            if !list.running {
+                continue;
+            }
+            if list.wait > 0 {
+                list.wait -= 1;
+                continue;
+            }
+            list.wait = list.prescaler - 1;
+            let List { first, odts, mode, .. } = *list;
+            for number in first..first + odts {
+                let stamped = number == first && mode & MODE_STAMP != 0;
+                self.queue(self.packet(number, stamped.then_some(cycle), image));
+            }
+        }
+    }
+
+    fn packet(&self, number: usize, stamp: Option<u64>, image: &Image) -> Packet {
+        let mut packet = [0; BYTES];
+        packet[0] = number as u8;
+        let mut at = 1;
+        if let Some(cycle) = stamp {
+            packet[1..3].copy_from_slice(&(cycle as u16).to_le_bytes());
+            at += STAMP_BYTES;
+        }
+        let Odt { entries, count } = &self.odts[number];
+        for entry in &entries[..*count] {
+            let size = usize::from(entry.size);
+            // Checked when the entry was written; what regions there are does not change.
+            let _ = image.read(entry.address, &mut packet[at..at + size]);
+            at += size;
+        }
+        packet
+    }
+
+    fn queue(&mut self, packet: Packet) {
+        if self.queued == ROOM {
+            self.dropped += 1;
+            return;
+        }
+        self.waiting[(self.head + self.queued) % ROOM] = packet;
+        self.queued += 1;
+    }
+
+    /// The next packet to leave.
+    pub fn next_packet(&mut self) -> Option<Packet> {
+        if self.queued == 0 {
+            return None;
+        }
+        let packet = self.waiting[self.head];
+        self.head = (self.head + 1) % ROOM;
+        self.queued -= 1;
+        Some(packet)
+    }
+
+    /// Packets that may leave in a cycle.
+    #[must_use]
+    pub fn per_cycle(&self) -> u32 {
+        self.per_cycle
+    }
+}
+
+impl Odt {
+    fn bytes(&self) -> usize {
+        self.entries[..self.count].iter().map(|entry| usize::from(entry.size)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,489 @@
+//! The memory that an XCP client sees: nothing of the process, but values under addresses of our own, in regions.
+//!
+//! ```text
+//!   0x0001_0000  description: the A2L file, then the identification     bytes          read
+//!   0x1000_0000  parameters of the axis's program                       double each    read, write
+//!   0x2000_0000  controls: trigger buffer, parameter set                8 bytes each   read, write
+//!   0x3000_0000  signals of the newest cycle                            4 bytes each   read, DAQ
+//!   0x4000_0000  what the trigger buffer tells of itself                4 bytes each   read, DAQ
+//!   0x5000_0000  trigger buffer: cycles of the samples                  4 bytes each   read
+//!   0x51…, 52…, 53…, 54…_0000  its channels                             double each    read
+//! ```
+//!
+//! A transfer stays within a region. A value is written whole or not at all: what comes of it in a packet that ends within it
+//! waits for the packet that goes on there, and any other write forgets it. All values of a block are checked before the first
+//! is taken. A change acts from the next cycle on. Reading and writing allocate nothing.
+
+use crate::packet::Refusal;
+use crate::signals::{COUNT, Format, SIGNALS};
+use crate::trace::{self, ARM, CAPACITY, CHANNELS, CONTROLS, LOAD_SET, TOLD, Trace};
+use axis_control::program::Variable;
+
+/// First address of the description.
+pub const DESCRIPTION: u32 = 0x0001_0000;
+/// First address of the parameters.
+pub const PARAMETERS: u32 = 0x1000_0000;
+/// First address of the controls.
+pub const CONTROL: u32 = 0x2000_0000;
+/// First address of the signals.
+pub const SIGNAL: u32 = 0x3000_0000;
+/// First address of what the trigger buffer tells.
+pub const TRACE_TOLD: u32 = 0x4000_0000;
+/// First address of the samples' cycles.
+pub const TRACE_CYCLES: u32 = 0x5000_0000;
+/// First address of the first channel; from channel to channel it is [`CHANNEL_STEP`].
+pub const TRACE_CHANNELS: u32 = 0x5100_0000;
+/// From channel to channel.
+pub const CHANNEL_STEP: u32 = 0x0100_0000;
+
+/// Bytes from parameter to parameter, and from control to control.
+pub const WIDE: u32 = 8;
+/// Bytes from signal to signal.
+pub const NARROW: u32 = 4;
+
+/// What acts on what was written.
+pub trait Desk {
+    /// A parameter has another value, in its range.
+    fn set(&mut self, place: usize, value: f64);
+
+    /// The parameter set is to be stored; false when that is not possible now.
+    fn store(&mut self, values: &[f64]) -> bool;
+
+    /// The stored parameter set is to be loaded; false when that is not possible now.
+    fn load(&mut self) -> bool;
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Region {
+    Description,
+    Parameters,
+    Controls,
+    Signals,
+    TraceTold,
+    TraceCycles,
+    TraceChannel(usize),
+}
+
+/// The beginning of a value, of which the rest is still to come.
+#[derive(Clone, Copy)]
+struct Begun {
+    /// Address of the next byte.
+    next: u32,
+    bytes: [u8; 8],
+    count: usize,
+}
+
+/// The memory.
+#[derive(Clone)]
+pub struct Image {
+    description: Vec<u8>,
+    variables: Vec<Variable>,
+    parameters: Vec<f64>,
+    controls: [f64; CONTROLS.len()],
+    signals: [f64; COUNT],
+    trace: Trace,
+    begun: Option<Begun>,
+}
+
+impl Image {
+    /// A memory for a program with these variables and values, before its first cycle.
+    #[must_use]
+    pub fn new(description: Vec<u8>, variables: Vec<Variable>, values: &[f64]) -> Self {
+        Self {
+            description,
+            variables,
+            parameters: values.to_vec(),
+            controls: std::array::from_fn(|place| CONTROLS[place].default),
+            signals: [0.0; COUNT],
+            trace: Trace::default(),
+            begun: None,
+        }
+    }
+
+    /// Takes what a cycle left: signals, and parameters that others may have changed.
+    pub fn refresh(&mut self, cycle: u64, signals: &[f64; COUNT], parameters: &[f64]) {
+        self.signals = *signals;
+        self.parameters.copy_from_slice(parameters);
+        self.trace.take(cycle, signals);
+    }
+
+    /// The rig's time began again.
+    pub fn restart(&mut self) {
+        self.trace.restart();
+    }
+
+    /// Values of the parameters.
+    #[must_use]
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
+    }
+
+    /// Bytes of the description.
+    #[must_use]
+    pub fn description(&self) -> &[u8] {
+        &self.description
+    }
+
+    /// Forgets the beginning of a value.
+    pub fn forget(&mut self) {
+        self.begun = None;
+    }
+
+    /// Reads the bytes from `address` on.
+    ///
+    /// # Errors
+    /// [`Refusal::AccessDenied`] where nothing is, or beyond the end of a region.
+    pub fn read(&self, address: u32, into: &mut [u8]) -> Result<(), Refusal> {
+        let (region, mut offset) = self.reach(address, into.len() as u32)?;
+        if region == Region::Description {
+            let from = offset as usize;
+            into.copy_from_slice(&self.description[from..from + into.len()]);
+            return Ok(());
+        }
+        let width = width(region);
+        let mut rest = into;
+        while !rest.is_empty() {
+            let bytes = self.value(region, (offset / width) as usize);
+            let from = (offset % width) as usize;
+            let count = rest.len().min(width as usize - from);
+            let (now, later) = rest.split_at_mut(count);
+            now.copy_from_slice(&bytes[from..from + count]);
+            (rest, offset) = (later, offset + count as u32);
+        }
+        Ok(())
+    }
+
+    /// Whether so many bytes can be read from `address` on.
+    ///
+    /// # Errors
+    /// As [`Image::read`].
+    pub fn check_readable(&self, address: u32, count: u32) -> Result<(), Refusal> {
+        self.reach(address, count).map(|_| ())
+    }
+
+    fn reach(&self, address: u32, count: u32) -> Result<(Region, u32), Refusal> {
+        let (region, first) = region(address).ok_or(Refusal::AccessDenied)?;
+        let offset = address - first;
+        let end = offset.checked_add(count).ok_or(Refusal::AccessDenied)?;
+        if end <= self.size(region) { Ok((region, offset)) } else { Err(Refusal::AccessDenied) }
+    }
+
+    /// Bytes of a region.
+    fn size(&self, region: Region) -> u32 {
+        match region {
+            Region::Description => self.description.len() as u32,
+            Region::Parameters => self.parameters.len() as u32 * WIDE,
+            Region::Controls => CONTROLS.len() as u32 * WIDE,
+            Region::Signals => COUNT as u32 * NARROW,
+            Region::TraceTold => TOLD.len() as u32 * NARROW,
+            Region::TraceCycles => CAPACITY as u32 * NARROW,
+            Region::TraceChannel(_) => CAPACITY as u32 * WIDE,
+        }
+    }
+
+    /// A value of a region as it lies in memory.
+    fn value(&self, region: Region, place: usize) -> [u8; 8] {
+        let long = |count: u32| Format::Long.encode(f64::from(count));
+        match region {
+            Region::Description => [0; 8],
+            Region::Parameters => Format::Double.encode(self.parameters[place]),
+            Region::Controls if place == ARM => long(u32::from(self.trace.runs())),
+            Region::Controls => trace::control_format(place).encode(self.controls[place]),
+            Region::Signals => SIGNALS[place].format.encode(self.signals[place]),
+            Region::TraceTold => long(self.trace.told()[place]),
+            Region::TraceCycles => long(self.trace.cycle(place)),
+            Region::TraceChannel(channel) => Format::Double.encode(self.trace.value(channel, place)),
+        }
+    }
+
+    /// Writes the bytes from `address` on; `desk` is told of every value that became another's.
+    ///
+    /// # Errors
+    /// [`Refusal::AccessDenied`] where nothing is; [`Refusal::WriteProtected`] for what is only read, or read at the start only;
+    /// [`Refusal::OutOfRange`] for a value that its parameter does not allow; [`Refusal::Sequence`] for the rest of a value that
+    /// nobody began, and for arming with a pre-trigger as long as the buffer. Nothing of the block is taken then.
+    pub fn write(&mut self, address: u32, bytes: &[u8], desk: &mut dyn Desk) -> Result<(), Refusal> {
+        let begun = self.begun.take().filter(|begun| begun.next == address);
+        let (region, offset) = self.reach(address, bytes.len() as u32)?;
+        if !matches!(region, Region::Parameters | Region::Controls) {
+            return Err(Refusal::WriteProtected);
+        }
+        if !offset.is_multiple_of(WIDE) && begun.is_none() {
+            return Err(Refusal::Sequence);
+        }
+        let mut controls = self.controls;
+        // First all are looked at, then all are taken.
+        let mut rest = None;
+        for take in [false, true] {
+            let mut value = begun.unwrap_or(Begun { next: address, bytes: [0; 8], count: 0 });
+            for (byte, at) in bytes.iter().zip(offset..) {
+                value.bytes[value.count] = *byte;
+                value.count += 1;
+                value.next += 1;
+                let place = (at / WIDE) as usize;
+                // A count has four bytes of its own; the other four of its place are nobody's.
+                if value.count == self.own_bytes(region, place) {
+                    if take {
+                        self.take(region, place, value.bytes, desk)?;
+                    } else {
+                        self.check(region, place, value.bytes, &mut controls)?;
+                    }
+                }
+                if value.count == WIDE as usize {
+                    value = Begun { bytes: [0; 8], count: 0, ..value };
+                }
+            }
+            rest = Some(value).filter(|value| value.count > 0);
+        }
+        self.begun = rest;
+        Ok(())
+    }
+
+    /// Bytes of a place that mean something.
+    fn own_bytes(&self, region: Region, place: usize) -> usize {
+        match region {
+            Region::Controls => trace::control_format(place).bytes(),
+            _ => WIDE as usize,
+        }
+    }
+
+    fn check(
+        &self,
+        region: Region,
+        place: usize,
+        bytes: [u8; 8],
+        controls: &mut [f64; CONTROLS.len()],
+    ) -> Result<(), Refusal> {
+        let (parameter, format) = match region {
+            Region::Parameters => (&self.variables[place].parameter, Format::Double),
+            _ => (&CONTROLS[place], trace::control_format(place)),
+        };
+        let value = format.decode(bytes);
+        if parameter.at_start_only && region == Region::Parameters && value != self.parameters[place] {
+            return Err(Refusal::WriteProtected);
+        }
+        if !parameter.allows(value) {
+            return Err(Refusal::OutOfRange);
+        }
+        if region == Region::Controls {
+            controls[place] = value;
+            if place == ARM && value != 0.0 && !Trace::can_arm(controls) {
+                return Err(Refusal::Sequence);
+            }
+        }
+        Ok(())
+    }
+
+    fn take(
+        &mut self,
+        region: Region,
+        place: usize,
+        bytes: [u8; 8],
+        desk: &mut dyn Desk,
+    ) -> Result<(), Refusal> {
+        if region == Region::Parameters {
+            let value = Format::Double.decode(bytes);
+            // What is the same already is no change, and nobody is told of it.
+            if value.to_bits() != self.parameters[place].to_bits() {
+                self.parameters[place] = value;
+                desk.set(place, value);
+            }
+            return Ok(());
+        }
+        let value = trace::control_format(place).decode(bytes);
+        match place {
+            ARM if value == 0.0 => self.trace.disarm(),
+            ARM => self.trace.arm(&self.controls),
+            LOAD_SET if value == 0.0 => {}
+            LOAD_SET => return if desk.load() { Ok(()) } else { Err(Refusal::Busy) },
+            _ => self.controls[place] = value,
+        }
+        Ok(())
+    }
+}
+
+/// The region that an address lies in, and where it begins.
+fn region(address: u32) -> Option<(Region, u32)> {
+    let channel = |channel: usize| TRACE_CHANNELS + CHANNEL_STEP * channel as u32;
+    match address >> 24 {
+        0x00 if address >= DESCRIPTION => Some((Region::Description, DESCRIPTION)),
+        0x10 => Some((Region::Parameters, PARAMETERS)),
+        0x20 => Some((Region::Controls, CONTROL)),
+        0x30 => Some((Region::Signals, SIGNAL)),
+        0x40 => Some((Region::TraceTold, TRACE_TOLD)),
+        0x50 => Some((Region::TraceCycles, TRACE_CYCLES)),
+        high => {
+            let number = (high as usize).checked_sub(0x51).filter(|number| *number < CHANNELS)?;
+            Some((Region::TraceChannel(number), channel(number)))
+        }
+    }
+}
+
+/// Bytes from value to value in a region.
+fn width(region: Region) -> u32 {
+    match region {
+        Region::Parameters | Region::Controls | Region::TraceChannel(_) => WIDE,
+        _ => NARROW,
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use algorithms::parameters::Parameter;
+
+    /// Whoever is told, and remembers.
+    #[derive(Default)]
+    pub(crate) struct Notes {
+        pub(crate) set: Vec<(usize, f64)>,
+        pub(crate) stored: Vec<Vec<f64>>,
+        pub(crate) loads: usize,
+    }
+
+    impl Desk for Notes {
+        fn set(&mut self, place: usize, value: f64) {
+            self.set.push((place, value));
+        }
+
+        fn store(&mut self, values: &[f64]) -> bool {
+            self.stored.push(values.to_vec());
+            self.stored.len() == 1
+        }
+
+        fn load(&mut self) -> bool {
+            self.loads += 1;
+            true
+        }
+    }
+
+    pub(crate) fn image() -> Image {
+        let variable = |name: &'static str, parameter: Parameter| Variable { name: name.into(), parameter };
+        let gain = Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 25.0, "gain");
+        let every = Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "multiple").whole();
+        let timeout = Parameter::new(("timeout_s", "s"), [0.1, 60.0], 15.0, "how long").at_start_only();
+        let variables = vec![
+            variable("a.gain_per_s", gain),
+            variable("a.every_cycles", every),
+            variable("b.timeout_s", timeout),
+        ];
+        Image::new(b"description".to_vec(), variables, &[25.0, 1.0, 15.0])
+    }
+
+    fn read<const N: usize>(image: &Image, address: u32) -> [u8; N] {
+        let mut bytes = [0; N];
+        image.read(address, &mut bytes).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn a_value_is_read_as_it_is_in_pieces_of_any_size() {
+        let image = image();
+        let whole: [u8; 24] = read(&image, PARAMETERS);
+        assert_eq!(whole[..8], 25.0_f64.to_le_bytes());
+        for from in 0..24 {
+            for to in from..24 {
+                let mut piece = vec![0; to - from];
+                image.read(PARAMETERS + from as u32, &mut piece).unwrap();
+                assert_eq!(piece, whole[from..to], "{from} to {to}");
+            }
+        }
+        assert_eq!(read::<4>(&image, DESCRIPTION + 2), *b"scri");
+    }
+
+    #[test]
+    fn nothing_is_read_beyond_a_region_nor_where_none_is() {
+        let image = image();
+        for (address, count) in [
+            (0, 1),
+            (DESCRIPTION - 1, 1),
+            (DESCRIPTION + 8, 4),
+            (PARAMETERS + 20, 5),
+            (CONTROL + CONTROLS.len() as u32 * 8, 1),
+            (SIGNAL + COUNT as u32 * 4 - 1, 2),
+            (TRACE_CYCLES + CAPACITY as u32 * 4, 1),
+            (TRACE_CHANNELS + 4 * CHANNEL_STEP, 1),
+            (u32::MAX, 1),
+            (PARAMETERS - 1, 2),
+        ] {
+            let mut bytes = vec![0; count];
+            assert_eq!(image.read(address, &mut bytes), Err(Refusal::AccessDenied), "{address:#x} + {count}");
+        }
+    }
+
+    #[test]
+    fn a_value_is_taken_when_its_last_byte_is_there() {
+        let value = 30.5_f64.to_le_bytes();
+        for cut in 1..=8 {
+            let (mut image, mut notes) = (image(), Notes::default());
+            image.write(PARAMETERS, &value[..cut], &mut notes).unwrap();
+            if cut < 8 {
+                assert!(notes.set.is_empty(), "{cut} bytes are no value");
+                assert_eq!(read::<8>(&image, PARAMETERS), 25.0_f64.to_le_bytes());
+                image.write(PARAMETERS + cut as u32, &value[cut..], &mut notes).unwrap();
+            }
+            assert_eq!(notes.set, [(0, 30.5)], "cut at {cut}");
+            assert_eq!(read::<8>(&image, PARAMETERS), value);
+        }
+    }
+
+    #[test]
+    fn the_rest_of_a_value_that_nobody_began_is_refused() {
+        let (mut image, mut notes) = (image(), Notes::default());
+        assert_eq!(image.write(PARAMETERS + 4, &[0; 4], &mut notes), Err(Refusal::Sequence));
+        image.write(PARAMETERS, &[0; 6], &mut notes).unwrap();
+        image.write(PARAMETERS + 8, &[0; 4], &mut notes).unwrap();
+        assert_eq!(image.write(PARAMETERS + 6, &[0; 2], &mut notes), Err(Refusal::Sequence));
+        assert!(notes.set.is_empty());
+    }
+
+    #[test]
+    fn every_value_of_a_block_is_checked_before_the_first_is_taken() {
+        let bytes = |values: [f64; 3]| values.map(f64::to_le_bytes).concat();
+        for (values, refusal) in [
+            ([200.1, 2.0, 15.0], Refusal::OutOfRange),
+            ([30.0, 2.5, 15.0], Refusal::OutOfRange),
+            ([f64::NAN, 2.0, 15.0], Refusal::OutOfRange),
+            ([30.0, f64::INFINITY, 15.0], Refusal::OutOfRange),
+            ([30.0, 2.0, 16.0], Refusal::WriteProtected),
+        ] {
+            let (mut image, mut notes) = (image(), Notes::default());
+            assert_eq!(image.write(PARAMETERS, &bytes(values), &mut notes), Err(refusal), "{values:?}");
+            assert!(notes.set.is_empty(), "{values:?}");
+            assert_eq!(image.parameters(), [25.0, 1.0, 15.0]);
+        }
+        let (mut image, mut notes) = (image(), Notes::default());
+        image.write(PARAMETERS, &bytes([30.0, 2.0, 15.0]), &mut notes).unwrap();
+        assert_eq!(notes.set, [(0, 30.0), (1, 2.0)], "what stays the same is no change");
+    }
+
+    #[test]
+    fn signals_and_the_description_cannot_be_written() {
+        let (mut image, mut notes) = (image(), Notes::default());
+        for address in [DESCRIPTION, SIGNAL, TRACE_TOLD, TRACE_CYCLES, TRACE_CHANNELS] {
+            assert_eq!(image.write(address, &[1], &mut notes), Err(Refusal::WriteProtected), "{address:#x}");
+        }
+        assert_eq!(image.write(0x6000_0000, &[1], &mut notes), Err(Refusal::AccessDenied));
+    }
+
+    #[test]
+    fn the_trigger_buffer_is_armed_with_what_was_written() {
+        let (mut image, mut notes) = (image(), Notes::default());
+        let mut put = |image: &mut Image, place: usize, value: u32| {
+            image.write(CONTROL + place as u32 * WIDE, &value.to_le_bytes(), &mut notes)
+        };
+        put(&mut image, trace::LENGTH, 4).unwrap();
+        put(&mut image, trace::PRE_TRIGGER, 4).unwrap();
+        assert_eq!(put(&mut image, ARM, 1), Err(Refusal::Sequence), "no room for the trigger");
+        put(&mut image, trace::PRE_TRIGGER, 1).unwrap();
+        put(&mut image, trace::SLOPE, 3).unwrap();
+        put(&mut image, ARM, 1).unwrap();
+        assert_eq!(read::<4>(&image, CONTROL + ARM as u32 * WIDE), 1_u32.to_le_bytes());
+        for cycle in 100..110 {
+            image.refresh(cycle, &[cycle as f64; COUNT], &[25.0, 1.0, 15.0]);
+        }
+        assert_eq!(read::<4>(&image, CONTROL + ARM as u32 * WIDE), 0_u32.to_le_bytes());
+        assert_eq!(read::<8>(&image, TRACE_TOLD), [4, 0, 0, 0, 4, 0, 0, 0]);
+        assert_eq!(read::<4>(&image, TRACE_CYCLES + 8), 102_u32.to_le_bytes());
+        assert_eq!(read::<8>(&image, TRACE_CHANNELS + CHANNEL_STEP + 16), 102.0_f64.to_le_bytes());
+    }
+}

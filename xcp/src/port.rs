@@ -1,0 +1,255 @@
+//! The place of a slave on the bus: commands wait here for the end of the controller's work in a cycle, answers and DAQ packets
+//! leave.
+//!
+//! In real time a command is answered in the wake-up that it causes, in lockstep in its cycle. At most [`COMMANDS`] are
+//! answered at a time and [`INBOX`] wait; what a flood brings beyond that is dropped and counted. Nothing here allocates,
+//! locks, prints or blocks: what needs a file goes to the [`crate::clerk`] by a queue.
+
+use crate::a2l::{self, A2lError, Described};
+use crate::clerk::{Note, Returned};
+use crate::config::XcpConfig;
+use crate::identifiers;
+use crate::image::{Desk, Image};
+use crate::lock::Lock;
+use crate::packet::{BYTES, Packet};
+use crate::signals::{self, View};
+use crate::slave::{Slave, SlaveCounters, SlaveParts};
+use axis_control::axis::AxisController;
+use axis_control::node::CalibrationPort;
+use axis_control::program::Program;
+use crossbeam_channel::{Receiver, Sender, TrySendError};
+use plant::Axis;
+use protocol::bus::Bus;
+use protocol::can::CanFrame;
+use protocol::frames::{Sensors, ValveCommand};
+
+/// Commands that wait at most: more than the longest block has packets.
+pub const INBOX: usize = 64;
+/// Commands that are answered at a time.
+pub const COMMANDS: usize = 8;
+
+/// What a port counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct PortCounters {
+    /// What the slave counted.
+    #[serde(flatten)]
+    pub slave: SlaveCounters,
+    /// Commands for which there was no room.
+    pub commands_dropped: u64,
+    /// DAQ packets that the bus did not take, or for which there was no room.
+    pub daq_dropped: u64,
+    /// Answers that the bus did not take.
+    pub answers_dropped: u64,
+    /// Parameters that were changed.
+    pub changed: u64,
+}
+
+/// The queues between a port and the clerk.
+pub struct Queues {
+    /// To the clerk.
+    pub notes: Sender<Note>,
+    /// From it.
+    pub returned: Receiver<Returned>,
+}
+
+/// What acts on what was written.
+struct Act<'a> {
+    axis: Axis,
+    cycle: u64,
+    program: &'a mut Program,
+    notes: &'a Sender<Note>,
+    spare: &'a mut Option<Vec<f64>>,
+    changed: &'a mut u64,
+}
+
+impl Desk for Act<'_> {
+    fn set(&mut self, place: usize, value: f64) {
+        let Self { axis, cycle, .. } = *self;
+        // Checked against its table by the image.
+        if self.program.set(place, value).is_ok() {
+            *self.changed += 1;
+            // What a full queue loses is a line for a person; the count stays.
+            let _ = self.notes.try_send(Note::Changed { axis, cycle, place, value });
+        }
+    }
+
+    fn store(&mut self, values: &[f64]) -> bool {
+        let Some(mut copy) = self.spare.take().filter(|copy| copy.capacity() >= values.len()) else {
+            return false;
+        };
+        copy.clear();
+        copy.extend_from_slice(values);
+        match self.notes.try_send(Note::Store { axis: self.axis, values: copy }) {
+            Ok(()) => true,
+            Err(
+                TrySendError::Full(Note::Store { values, .. })
+                | TrySendError::Disconnected(Note::Store { values, .. }),
+            ) => {
+                *self.spare = Some(values);
+                false
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn load(&mut self) -> bool {
+        self.notes.try_send(Note::Load { axis: self.axis }).is_ok()
+    }
+}
+
+/// A slave on the bus.
+pub struct Port {
+    axis: Axis,
+    command_id: u16,
+    response_id: u16,
+    slave: Slave,
+    queues: Queues,
+    /// Room for a copy of the parameters; gone while the clerk has it.
+    spare: Option<Vec<f64>>,
+    inbox: [CanFrame; INBOX],
+    head: usize,
+    waiting: usize,
+    cycle: u64,
+    /// DAQ packets that may still leave in this cycle.
+    may_leave: u32,
+    counters: PortCounters,
+}
+
+impl Port {
+    /// A port for this controller; `random` begins its seeds.
+    ///
+    /// # Errors
+    /// [`A2lError`]: a bug.
+    pub fn new(
+        controller: &AxisController,
+        title: &str,
+        config: &XcpConfig,
+        random: [u8; 16],
+        queues: Queues,
+    ) -> Result<Self, A2lError> {
+        let (axis, program) = (controller.axis(), controller.program());
+        let variables = program.variables();
+        let a2l::Description { bytes, texts } = a2l::description(&Described { axis, title, variables })?;
+        let (command_id, response_id) = identifiers(axis);
+        let slave = Slave::new(SlaveParts {
+            image: Image::new(bytes, variables.to_vec(), program.values()),
+            texts,
+            lock: Lock::new(config.key.clone(), random),
+            daq_per_cycle: config.daq_packets_per_cycle,
+        });
+        Ok(Self {
+            axis,
+            command_id,
+            response_id,
+            slave,
+            queues,
+            spare: Some(Vec::with_capacity(variables.len())),
+            inbox: [CanFrame::new(0, &[]); INBOX],
+            head: 0,
+            waiting: 0,
+            cycle: 0,
+            may_leave: 0,
+            counters: PortCounters::default(),
+        })
+    }
+
+    /// The axis.
+    #[must_use]
+    pub fn axis(&self) -> Axis {
+        self.axis
+    }
+
+    /// What it counted.
+    #[must_use]
+    pub fn counters(&self) -> PortCounters {
+        let daq_dropped = self.counters.daq_dropped + self.slave.daq_dropped();
+        PortCounters { slave: *self.slave.counters(), daq_dropped, ..self.counters }
+    }
+
+    /// Tells a person of keys.
+    fn tell(&mut self, before: &SlaveCounters) {
+        let (axis, cycle) = (self.axis, self.cycle);
+        let after = self.slave.counters();
+        if after.unlocked > before.unlocked {
+            let _ = self.queues.notes.try_send(Note::Unlocked { axis, cycle });
+        }
+        if after.wrong_keys > before.wrong_keys {
+            let _ = self.queues.notes.try_send(Note::WrongKey { axis, cycle });
+        }
+    }
+
+    fn answer(&mut self, packet: Option<Packet>, bus: &mut dyn Bus) {
+        if let Some(packet) = packet
+            && !self.send(packet, bus)
+        {
+            self.counters.answers_dropped += 1;
+        }
+    }
+
+    fn send(&self, packet: [u8; BYTES], bus: &mut dyn Bus) -> bool {
+        bus.send(&CanFrame::new(self.response_id, &packet)).is_ok()
+    }
+}
+
+impl CalibrationPort for Port {
+    fn take(&mut self, frame: &CanFrame) -> bool {
+        if frame.standard_id() != Some(self.command_id) {
+            return false;
+        }
+        if self.waiting == INBOX {
+            self.counters.commands_dropped += 1;
+        } else {
+            self.inbox[(self.head + self.waiting) % INBOX] = *frame;
+            self.waiting += 1;
+        }
+        true
+    }
+
+    fn restart(&mut self) {
+        self.slave.restart();
+    }
+
+    fn observe(
+        &mut self,
+        controller: &AxisController,
+        cycle: u64,
+        sensors: &Sensors,
+        command: &ValveCommand,
+    ) {
+        let signals = signals::sample(&View::new(controller, cycle, sensors, command));
+        self.slave.cycle(cycle, &signals, controller.program().values());
+        self.cycle = cycle;
+        self.may_leave = self.slave.daq_per_cycle();
+    }
+
+    fn serve(&mut self, program: &mut Program, bus: &mut dyn Bus) {
+        while let Ok(Returned { values, stored }) = self.queues.returned.try_recv() {
+            self.spare = Some(values);
+            let event = self.slave.stored().filter(|_| stored);
+            self.answer(event, bus);
+        }
+        for _ in 0..COMMANDS.min(self.waiting) {
+            let frame = self.inbox[self.head];
+            (self.head, self.waiting) = ((self.head + 1) % INBOX, self.waiting - 1);
+            let before = *self.slave.counters();
+            let mut act = Act {
+                axis: self.axis,
+                cycle: self.cycle,
+                program: &mut *program,
+                notes: &self.queues.notes,
+                spare: &mut self.spare,
+                changed: &mut self.counters.changed,
+            };
+            let answer = self.slave.command(frame.data(), self.cycle, &mut act);
+            self.tell(&before);
+            self.answer(answer, bus);
+        }
+        while self.may_leave > 0 {
+            let Some(packet) = self.slave.next_daq() else { break };
+            self.may_leave -= 1;
+            if !self.send(packet, bus) {
+                self.counters.daq_dropped += 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,389 @@
+//! The trigger buffer of the paper's controllers: up to four signals, sampled around the moment in which a fifth crosses a
+//! threshold.
+//!
+//! ```text
+//!   idle ── arm ──► filling ── pre-trigger samples are there ──► armed ── source crosses the threshold ──► triggered
+//!    ▲                                                                                                        │
+//!    └───────────── arm = 0, or the rig began anew ──────────── ready ◄────────── length samples are there ───┘
+//! ```
+//!
+//! A sample is taken every so many cycles; in each of them the source is compared with what it was in the one before. The
+//! sample in which it has crossed is number `pre_trigger_samples`, counted from 0. Cycles that never came leave no sample: each
+//! says its own cycle. What is set counts from the next arming on. The buffer is made at the start; taking a sample allocates
+//! nothing.
+
+use crate::signals::{COUNT, Format, SIGNALS};
+use algorithms::parameters::Parameter;
+
+/// Samples that the buffer holds at most.
+pub const CAPACITY: usize = 4096;
+/// Signals that it records.
+pub const CHANNELS: usize = 4;
+
+/// Places in [`CONTROLS`].
+pub const SOURCE: usize = 0;
+/// Threshold.
+pub const THRESHOLD: usize = 1;
+/// Slope.
+pub const SLOPE: usize = 2;
+/// Samples before the trigger.
+pub const PRE_TRIGGER: usize = 3;
+/// Samples in all.
+pub const LENGTH: usize = 4;
+/// Cycles from sample to sample.
+pub const EVERY: usize = 5;
+/// The first of the channels.
+pub const CHANNEL: usize = 6;
+/// Arms and disarms.
+pub const ARM: usize = CHANNEL + CHANNELS;
+/// Loads the stored parameter set.
+pub const LOAD_SET: usize = ARM + 1;
+
+/// Last place of the table of signals.
+const LAST: f64 = (COUNT - 1) as f64;
+
+/// What can be written besides the parameters of the program. Whole numbers lie in memory as counts of four bytes, others as
+/// floats of eight.
+pub static CONTROLS: [Parameter; LOAD_SET + 1] = [
+    signal("trace.source", 17.0, "signal that is compared with the threshold, by its place"),
+    Parameter::new(("trace.threshold", ""), [-1e9, 1e9], 0.0, "threshold, in the unit of the source"),
+    Parameter::new(("trace.slope", ""), [0.0, 3.0], 0.0, "0 rising, 1 falling, 2 either, 3 at once").whole(),
+    Parameter::new(
+        ("trace.pre_trigger_samples", ""),
+        [0.0, CAPACITY as f64 - 1.0],
+        100.0,
+        "samples before the trigger; below the length",
+    )
+    .whole(),
+    Parameter::new(("trace.length_samples", ""), [1.0, CAPACITY as f64], 1000.0, "samples in all").whole(),
+    Parameter::new(
+        ("trace.sample_time_cycles", "cycles"),
+        [1.0, 60_000.0],
+        1.0,
+        "cycles of 1 ms from sample to sample",
+    )
+    .whole(),
+    signal("trace.channel_1", 1.0, "signal that is recorded, by its place"),
+    signal("trace.channel_2", 5.0, "signal that is recorded, by its place"),
+    signal("trace.channel_3", 15.0, "signal that is recorded, by its place"),
+    signal("trace.channel_4", 17.0, "signal that is recorded, by its place"),
+    Parameter::new(("trace.arm", ""), [0.0, 1.0], 0.0, "1 arms, 0 disarms; reads 1 until it is ready")
+        .whole(),
+    Parameter::new(("set.load", ""), [0.0, 1.0], 0.0, "1 loads the parameter set that was stored last")
+        .whole(),
+];
+
+const fn signal(name: &'static str, default: f64, meaning: &'static str) -> Parameter {
+    Parameter::new((name, ""), [0.0, LAST], default, meaning).whole()
+}
+
+/// How a control lies in memory.
+#[must_use]
+pub fn control_format(place: usize) -> Format {
+    if CONTROLS[place].whole { Format::Long } else { Format::Double }
+}
+
+/// Names of the states.
+pub const STATES: &[&str] = &["idle", "filling", "armed", "triggered", "ready"];
+
+/// What the buffer does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum State {
+    /// Nothing; what it holds stays.
+    Idle = 0,
+    /// It takes the samples before the trigger.
+    Filling = 1,
+    /// It waits for the trigger.
+    Armed = 2,
+    /// It takes the samples after it.
+    Triggered = 3,
+    /// It holds them all.
+    Ready = 4,
+}
+
+/// What it tells of itself, each a count of four bytes, in this order.
+pub const TOLD: [(&str, &str); 4] = [
+    ("trace.state", "what the trigger buffer does"),
+    ("trace.samples", "samples that can be read"),
+    ("trace.trigger_cycle", "the rig's cycle of the trigger; 0 before it"),
+    ("trace.triggers", "how often it has triggered since the start"),
+];
+
+/// Settings, as they were at arming.
+#[derive(Clone, Copy)]
+struct Settings {
+    source: usize,
+    threshold: f64,
+    slope: u8,
+    pre_trigger: usize,
+    length: usize,
+    every: u64,
+    channels: [usize; CHANNELS],
+}
+
+/// The trigger buffer.
+#[derive(Clone)]
+pub struct Trace {
+    settings: Settings,
+    state: State,
+    cycles: Vec<u32>,
+    values: [Vec<f64>; CHANNELS],
+    /// Where the next sample goes.
+    next: usize,
+    held: usize,
+    /// Samples that are still to come after the trigger.
+    to_come: usize,
+    /// What the source was in the last sample.
+    before: Option<f64>,
+    due: u64,
+    trigger_cycle: u32,
+    triggers: u32,
+}
+
+impl Default for Trace {
+    fn default() -> Self {
+        let defaults: [f64; CONTROLS.len()] = std::array::from_fn(|place| CONTROLS[place].default);
+        Self {
+            settings: Settings::of(&defaults),
+            state: State::Idle,
+            cycles: vec![0; CAPACITY],
+            values: std::array::from_fn(|_| vec![0.0; CAPACITY]),
+            next: 0,
+            held: 0,
+            to_come: 0,
+            before: None,
+            due: 0,
+            trigger_cycle: 0,
+            triggers: 0,
+        }
+    }
+}
+
+impl Settings {
+    fn of(controls: &[f64; CONTROLS.len()]) -> Self {
+        let whole = |place: usize| controls[place] as usize;
+        Self {
+            source: whole(SOURCE),
+            threshold: controls[THRESHOLD],
+            slope: controls[SLOPE] as u8,
+            pre_trigger: whole(PRE_TRIGGER),
+            length: whole(LENGTH),
+            every: controls[EVERY] as u64,
+            channels: std::array::from_fn(|channel| whole(CHANNEL + channel)),
+        }
+    }
+}
+
+impl Trace {
+    /// Whether it can be armed so: the pre-trigger leaves room for the trigger.
+    #[must_use]
+    pub fn can_arm(controls: &[f64; CONTROLS.len()]) -> bool {
+        controls[PRE_TRIGGER] < controls[LENGTH]
+    }
+
+    /// Begins anew with these settings, whose ranges were checked; what it held is gone.
+    pub fn arm(&mut self, controls: &[f64; CONTROLS.len()]) {
+        self.settings = Settings::of(controls);
+        self.state = State::Filling;
+        (self.next, self.held, self.before, self.due, self.trigger_cycle) = (0, 0, None, 0, 0);
+    }
+
+    /// Stops, and keeps what it has.
+    pub fn disarm(&mut self) {
+        self.state = State::Idle;
+    }
+
+    /// The rig's time began again: what was being recorded is of another time.
+    pub fn restart(&mut self) {
+        if self.runs() {
+            self.disarm();
+        }
+    }
+
+    /// Whether it records.
+    #[must_use]
+    pub fn runs(&self) -> bool {
+        matches!(self.state, State::Filling | State::Armed | State::Triggered)
+    }
+
+    /// What it does.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Takes the signals of a cycle.
+    pub fn take(&mut self, cycle: u64, signals: &[f64; COUNT]) {
+        if !self.runs() || cycle < self.due {
+            return;
+        }
+        self.due = cycle + self.settings.every;
+        self.put(cycle, signals);
+        let source = signals[self.settings.source];
+        let before = self.before.replace(source);
+        if self.state == State::Filling && self.held > self.settings.pre_trigger {
+            self.state = State::Armed;
+        }
+        match self.state {
+            State::Armed if self.crosses(before, source) => {
+                (self.trigger_cycle, self.triggers) = (cycle as u32, self.triggers.wrapping_add(1));
+                self.held = self.settings.pre_trigger + 1;
+                self.to_come = self.settings.length - self.held;
+                self.state = if self.to_come == 0 { State::Ready } else { State::Triggered };
+            }
+            State::Triggered => {
+                self.to_come -= 1;
+                if self.to_come == 0 {
+                    self.state = State::Ready;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn put(&mut self, cycle: u64, signals: &[f64; COUNT]) {
+        self.cycles[self.next] = cycle as u32;
+        for (values, channel) in self.values.iter_mut().zip(self.settings.channels) {
+            values[self.next] = signals[channel];
+        }
+        self.next = (self.next + 1) % CAPACITY;
+        self.held = (self.held + 1).min(self.settings.length);
+    }
+
+    fn crosses(&self, before: Option<f64>, source: f64) -> bool {
+        let Settings { threshold, slope, .. } = self.settings;
+        let rises = before.is_some_and(|before| before < threshold && source >= threshold);
+        let falls = before.is_some_and(|before| before > threshold && source <= threshold);
+        match slope {
+            0 => rises,
+            1 => falls,
+            2 => rises || falls,
+            _ => true,
+        }
+    }
+
+    /// What it tells of itself, in the order of [`TOLD`].
+    #[must_use]
+    pub fn told(&self) -> [u32; TOLD.len()] {
+        [self.state as u32, self.samples() as u32, self.trigger_cycle, self.triggers]
+    }
+
+    /// Samples that can be read: none before the trigger.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        if self.trigger_cycle_known() { self.held } else { 0 }
+    }
+
+    fn trigger_cycle_known(&self) -> bool {
+        matches!(self.state, State::Triggered | State::Ready)
+            || self.state == State::Idle && self.trigger_cycle != 0
+    }
+
+    /// Cycle of sample `number`, the oldest being 0; 0 for one that is not there.
+    #[must_use]
+    pub fn cycle(&self, number: usize) -> u32 {
+        self.place(number).map_or(0, |place| self.cycles[place])
+    }
+
+    /// Value of sample `number` of a channel; 0 for one that is not there.
+    #[must_use]
+    pub fn value(&self, channel: usize, number: usize) -> f64 {
+        self.place(number).map_or(0.0, |place| self.values[channel][place])
+    }
+
+    fn place(&self, number: usize) -> Option<usize> {
+        (number < self.samples()).then(|| (self.next + CAPACITY - self.held + number) % CAPACITY)
+    }
+
+    /// The signals that it records, as they were set at arming.
+    pub fn channels(&self) -> impl Iterator<Item = &'static str> {
+        self.settings.channels.iter().map(|place| SIGNALS[*place].about.name.as_ref())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn controls(set: &[(usize, f64)]) -> [f64; CONTROLS.len()] {
+        let mut controls = std::array::from_fn(|place| CONTROLS[place].default);
+        set.iter().for_each(|(place, value)| controls[*place] = *value);
+        controls
+    }
+
+    /// The source is signal 3, and the first channel is that.
+    fn armed(set: &[(usize, f64)]) -> Trace {
+        let mut trace = Trace::default();
+        let mut all =
+            vec![(SOURCE, 3.0), (CHANNEL, 3.0), (PRE_TRIGGER, 3.0), (LENGTH, 8.0), (THRESHOLD, 50.0)];
+        all.extend_from_slice(set);
+        trace.arm(&controls(&all));
+        trace
+    }
+
+    fn run(trace: &mut Trace, cycles: impl Iterator<Item = u64>, source: impl Fn(u64) -> f64) {
+        for cycle in cycles {
+            let mut signals = [0.0; COUNT];
+            signals[3] = source(cycle);
+            trace.take(cycle, &signals);
+        }
+    }
+
+    fn cycles(trace: &Trace) -> Vec<u32> {
+        (0..trace.samples()).map(|number| trace.cycle(number)).collect()
+    }
+
+    #[test]
+    fn the_samples_lie_around_the_trigger_whatever_came_before() {
+        for start in [0, 40, 10_000] {
+            let mut trace = armed(&[]);
+            run(&mut trace, 0..start + 100, |cycle| cycle as f64 - start as f64);
+            let trigger = (start + 50) as u32;
+            assert_eq!((trace.state(), trace.told()[2]), (State::Ready, trigger));
+            assert_eq!(cycles(&trace), (trigger - 3..trigger + 5).collect::<Vec<_>>());
+            assert_eq!(trace.value(0, 3), 50.0);
+        }
+    }
+
+    #[test]
+    fn nothing_triggers_before_the_pre_trigger_is_filled() {
+        let mut trace = armed(&[]);
+        run(&mut trace, 0..20, |cycle| if cycle == 2 { 60.0 } else { 0.0 });
+        assert_eq!((trace.state(), trace.samples()), (State::Armed, 0));
+    }
+
+    #[test]
+    fn slopes_are_told_apart() {
+        // Up at 10, down at 20.
+        let pulse = |cycle| if (10..20).contains(&cycle) { 60.0 } else { 0.0 };
+        for (slope, trigger) in [(0.0, 10), (1.0, 20), (2.0, 10), (3.0, 3)] {
+            let mut trace = armed(&[(SLOPE, slope)]);
+            run(&mut trace, 0..40, pulse);
+            assert_eq!(trace.told()[2], trigger, "slope {slope}");
+        }
+    }
+
+    #[test]
+    fn samples_are_so_many_cycles_apart_and_say_what_was_skipped() {
+        let mut trace = armed(&[(EVERY, 10.0), (THRESHOLD, 60.0)]);
+        run(&mut trace, (0..200).filter(|cycle| *cycle != 70), |cycle| cycle as f64);
+        assert_eq!(cycles(&trace), [30, 40, 50, 60, 71, 81, 91, 101]);
+    }
+
+    #[test]
+    fn the_whole_buffer_can_be_used() {
+        let most = CAPACITY as f64;
+        let mut trace = armed(&[(LENGTH, most), (PRE_TRIGGER, most - 1.0), (THRESHOLD, 9000.0)]);
+        run(&mut trace, 0..9100, |cycle| cycle as f64);
+        assert_eq!((trace.state(), trace.samples()), (State::Ready, CAPACITY));
+        assert_eq!((trace.cycle(0), trace.cycle(CAPACITY - 1)), (9000 - CAPACITY as u32 + 1, 9000));
+        assert_eq!(trace.cycle(CAPACITY), 0, "beyond the end there is nothing");
+    }
+
+    #[test]
+    fn a_pre_trigger_as_long_as_the_buffer_cannot_be_armed() {
+        assert!(!Trace::can_arm(&controls(&[(LENGTH, 100.0), (PRE_TRIGGER, 100.0)])));
+        assert!(Trace::can_arm(&controls(&[(LENGTH, 100.0), (PRE_TRIGGER, 99.0)])));
+    }
+}
