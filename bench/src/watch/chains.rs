@@ -1,6 +1,6 @@
 //! The chains of the axis controllers as diagrams: their states, which `rig.dbc` names, and the edges between them.
 //!
-//! The edges are those of the drawings at the heads of `controller/src/chains/*.rs`; a test holds every name against `rig.dbc`.
+//! The edges are those of the drawings at the heads of `axis/src/chains/*.rs`; a test holds every name against `rig.dbc`.
 //! What may happen in any state (a fault, an emergency stop, another phase of the main chain) is drawn from the state in which
 //! it is told of most, where the drawing says "any": a page cannot show arrows from everywhere.
 
