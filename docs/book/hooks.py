@@ -4,6 +4,7 @@ A page keeps its path in the repository, so a link from page to page is the same
 book (a source, a folder) becomes one to the forge. MkDocs is strict: a link that leads nowhere fails the build.
 """
 
+import logging
 import os
 import re
 import subprocess
@@ -14,6 +15,11 @@ from mkdocs.structure.files import File
 ROOT = Path(__file__).resolve().parents[2]
 ASSETS = (".svg", ".png", ".css")
 LINK = re.compile(r"(\]\()([^)\s#]+)(#[^)\s]*)?(\))")
+UNLIKE = {
+    "a fence inside a list": re.compile(r"^ +```", re.MULTILINE),
+    "a list without an empty line before it": re.compile(r"^(?![-*#>|\s]|\d+\. ).+\n(?:[-*]|1\.) ", re.MULTILINE),
+}
+log = logging.getLogger("mkdocs.hooks")
 
 
 def tracked():
@@ -61,4 +67,7 @@ def on_page_markdown(markdown, page, config, files):
 
     # Code between fences is left as it is.
     parts = re.split(r"(^```.*?^```$)", markdown, flags=re.MULTILINE | re.DOTALL)
+    for what, pattern in UNLIKE.items():
+        if any(pattern.search(part) for part in parts if not part.startswith("```")):
+            log.warning("Doc file '%s' contains %s, which MkDocs does not render as the forge does.", page.file.src_uri, what)
     return "".join(part if part.startswith("```") else LINK.sub(to_forge, part) for part in parts)
