@@ -25,29 +25,29 @@ const SIGNALS: [&str; 4] = ["p_a/&#963;", "p_b/&#963;", "x/&#963;", "F/&#963;"];
 
 /// What stands above the page's table.
 const HEAD: &str = "\
-# What each effect changes
+# Effects
 
-The catalogue's effects, each alone on the drive at the geometric middle of the range that sealed rigs and studies draw
-from, against the baseline. Laws, keys and ranges are those of `src/effects/`; the page and its pictures are made by
+This page compares each effect of the catalogue, alone on the drive at the geometric middle of the range that sealed rigs
+and studies draw from, with the baseline. Laws, keys and ranges are those of `src/effects/`; the page and its pictures are made by
 
     cargo run --release -p plant --example effects_page
 
 **Step**: 1 s of rest, then both valves open to 0.6 for 250 ms and shut again; the same commands with and without the
 effect, so that no controller hides the difference. The piston coasts and stays where the trapped air holds it. **Slow
 stroke**: 300 mm there and back at 60 mm/s with rests, followed by a proportional controller (8 openings per metre) on what
-the position sensor shows: what a run of the rig would show. Effects of the linkage and the force sensor's gain are run
-linked, the load pressing and pulling with 150 N in turns of 1.1 s.
+the position sensor shows, as in a run of the rig. Effects of the linkage and the force sensor's gain are run
+linked, with the load alternately pressing and pulling with 150 N for 1.1 s each.
 
-Differences are of what the drive's sensors show without noise, in units of the sensor's noise with its rounding: SIGMA.
+Differences are those of the drive's sensors without noise, in units of the sensor's noise with its rounding: SIGMA.
 
-In a picture the upper panel is the baseline's position; below it are the differences of pressure a, pressure b, position
-and force over time, each on a scale of its own, whose ends stand at its left; the grey band is the noise.
+The upper panel of a picture is the baseline's position. Below it are the differences of pressure a, pressure b, position
+and force over time, each on a separate scale with its limits at the left; the grey band is the noise.
 ";
 
 /// What the table's numbers are.
 const TABLE_HEAD: &str = "\
-Largest mean over 10 ms, so that a break-away that comes a few milliseconds sooner or later does not count as a force of 6 N.
-A needle of that size is in most pictures: the friction falls from 35 to 26 N as the piston breaks away.
+The figures are the largest means over 10 ms, so that a break-away a few milliseconds earlier or later does not count as a force
+of 6 N. Most pictures have a spike of that size: the friction falls from 35 to 26 N as the piston breaks away.
 ";
 
 fn main() -> std::io::Result<()> {
