@@ -2,6 +2,8 @@
 
 use crate::rehearsed::{self, Run};
 use crate::{Trial, TrialError};
+use axis_control::axis::AxisRecord;
+use axis_control::setup::{FileArguments, Inputs};
 use bench::figures::{self, Figures, position};
 use bench::record::Record;
 use bench::series::{Series, Span};
