@@ -1,10 +1,9 @@
-//! The baseline's own parameters from records: what fits best when nothing is missing, with errors, and what the records
-//! cannot tell.
+//! Calibration: baseline parameters without effects, with standard errors.
 //!
-//! Gauss-Newton over all factors at once, sensitivities taken anew at each point. A record cannot tell a parameter whose
-//! error is not clearly below its tolerance, nor two whose errors hang together.
+//! Gauss-Newton over all factors, relinearised at each iterate. A parameter whose error is not clearly below its tolerance is not
+//! determined by the records.
 //!
-//! [`finer`] goes on from there to the numbers behind them, which the command `calibrate` tells as well.
+//! [`finer`] fits the numbers behind them, which the command `calibrate` reports as well.
 //!
 //! Source: Neugebauer 2011, section 3.2 (identification of the model's parameters); effects.md, Parameters that may
 //! merely be wrong.
@@ -17,14 +16,14 @@ use crate::refit::{Around, Refit, refit};
 use crate::report::Quantity;
 use plant::RigParameters;
 
-/// Points at most.
+/// Maximum number of iterates.
 const POINTS: usize = 8;
-/// Fall of the loss below which it has settled.
+/// Fall of the loss below which it has converged.
 const CONVERGED: f64 = 1.0;
-/// Share of the tolerance above which an error says that the record does not tell.
+/// Share of the tolerance above which an error means that the records do not determine the parameter.
 const UNRESOLVED: f64 = 0.7;
 
-/// The parameters that fit best, effects left out.
+/// Fitted parameters without effects.
 #[derive(Clone, Debug)]
 pub struct Calibrated {
     /// The fit.
@@ -51,7 +50,7 @@ pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
 }
 
 impl Calibrated {
-    /// The rig with the parameters that fit best.
+    /// The calibrated rig.
     #[must_use]
     pub fn rig(&self, rig: &RigParameters) -> RigParameters {
         with_factors(rig, &self.fit.factors)
@@ -63,7 +62,7 @@ impl Calibrated {
 pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
     let (parameter, measured) = (PARAMETERS[at], engine.windows()[0].record().measured);
     let (before, unit) = parameter.value(engine.rig(), measured);
-    // What was simulated: a number is held at the end of its range, and rest at what slides.
+    // The simulated value: numbers are clamped to their ranges, and the break-away force to the sliding force.
     let value = if unit.is_empty() {
         before * fit.factors[at]
     } else {

@@ -1,6 +1,6 @@
-//! What may be missing: every effect of the catalogue at every place that the records can show, and how its numbers are moved.
+//! Candidates: every effect of the catalogue at every observable place, and the scaling of its numbers.
 //!
-//! Fits move coordinates in place of the file's numbers, so that 0 is the baseline and 1 about the strongest that occurs:
+//! Fits use dimensionless coordinates: 0 is the baseline, 1 about the strongest amplitude that occurs:
 //!
 //! ```text
 //!   neutral value n      z = (a - n) / largest drawn change
@@ -9,7 +9,7 @@
 //!   shape                z = (a - default) / drawn width          (changes nothing while the amplitude is 0)
 //! ```
 //!
-//! An effect that the rig file has already is the baseline there: its coordinates count from the file's numbers.
+//! The coordinates of an effect that the rig file already has count from the file's numbers.
 
 use plant::Axis;
 use plant::RigParameters;
@@ -17,14 +17,14 @@ use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Part, Place, Sheet};
 use plant::parameters::ParameterError;
 
-/// Ratio of the largest to the smallest drawn value from which a key is moved by its logarithm.
+/// Ratio of the largest to the smallest drawn value above which a key is scaled logarithmically.
 const DECADES: f64 = 30.0;
 /// Neutral values from which on a key counts as neutral at infinity, as a multiple of the largest drawn one.
 const FAR: f64 = 10.0;
-/// Coordinates beyond which nothing is looked for: a half more than the strongest that occurs.
+/// Largest coordinate of a fit: half more than the strongest that occurs.
 const FARTHEST: f64 = 1.5;
 
-/// Effects whose traces change their shape as they grow.
+/// Effects whose traces are nonlinear in the amplitude.
 const BENT: [&str; 6] = [
     "valve-dead-zone",
     "valve-hysteresis",
@@ -48,7 +48,7 @@ pub struct Candidate {
     present: Option<[f64; MOST_KEYS]>,
 }
 
-/// How a key is moved.
+/// Scaling of a key.
 #[derive(Clone, Copy, Debug)]
 enum Scale {
     Linear { neutral: f64, unit: f64 },
@@ -103,7 +103,7 @@ impl Scale {
 }
 
 impl Candidate {
-    /// All candidates that records of these axes can show beside a rig.
+    /// All candidates that records of these axes can show.
     #[must_use]
     pub fn all(rig: &RigParameters, measured: [bool; 2], linked: bool, without: &[String]) -> Vec<Candidate> {
         let shown = |place: &Place| match place.part {
@@ -136,8 +136,8 @@ impl Candidate {
         Scale::of(&self.sheet.keys[key], self.present.map(|numbers| numbers[key]))
     }
 
-    /// What a key is in the baseline: the rig file's number, or where the effect is not on what changes nothing; `None` for
-    /// shapes and for effects that only their absence makes none.
+    /// Baseline value of a key: the rig file's number, else the neutral value; `None` for shapes and for effects without a
+    /// neutral value.
     #[must_use]
     pub fn baseline(&self, key: usize) -> Option<f64> {
         let neutral = self.sheet.keys[key].neutral.filter(|neutral| neutral.is_finite());
@@ -146,7 +146,7 @@ impl Candidate {
 
     /// Whether the rig file has it.
     #[must_use]
-    pub fn is_present(&self) -> bool {
+    pub(crate) fn is_present(&self) -> bool {
         self.present.is_some()
     }
 
@@ -156,19 +156,19 @@ impl Candidate {
         format!("{} {}", self.sheet.name, self.place)
     }
 
-    /// Coordinates of the baseline: amplitudes 0, shapes at their defaults; the rig file's numbers where it has the effect.
+    /// Coordinates of the baseline: all 0.
     #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         vec![0.0; self.sheet.keys.len()]
     }
 
-    /// Whether a key changes nothing while the amplitudes are those of the baseline.
+    /// Whether a key has no influence at zero amplitude.
     #[must_use]
-    pub fn is_shape(&self, key: usize) -> bool {
+    pub(crate) fn is_shape(&self, key: usize) -> bool {
         key > 0 && !self.is_present() && self.sheet.keys[key].neutral.is_none()
     }
 
-    /// Whether the effect goes over into the baseline as its amplitude does.
+    /// Whether the effect vanishes continuously with its amplitude.
     #[must_use]
     pub fn is_anchored(&self) -> bool {
         self.is_present() || self.sheet.keys[0].neutral.is_some()
@@ -183,7 +183,7 @@ impl Candidate {
         [ends[0].min(ends[1]), ends[0].max(ends[1])]
     }
 
-    /// Where a fit looks for a key's coordinate.
+    /// Bounds of a key's coordinate in a fit.
     #[must_use]
     pub fn reach(&self, key: usize) -> [f64; 2] {
         let [least, most] = self.range(key);
@@ -218,7 +218,7 @@ impl Candidate {
 
     /// The coordinate of a number of a key.
     #[must_use]
-    pub fn coordinate(&self, key: usize, number: f64) -> f64 {
+    pub(crate) fn coordinate(&self, key: usize, number: f64) -> f64 {
         self.scale(key).coordinate(number)
     }
 
@@ -233,9 +233,9 @@ impl Candidate {
         rig.with_effect(self.sheet.name, &self.place.to_string(), &named)
     }
 
-    /// Coordinates at which the effect is simulated once before anything is fitted: what it looks like, weak and strong.
+    /// Coordinates of the screening simulations.
     #[must_use]
-    pub fn probes(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn probes(&self) -> Vec<Vec<f64>> {
         let keys = self.sheet.keys.len();
         let at = |key: usize, z: f64| {
             let mut coordinates = self.origin();
@@ -257,7 +257,7 @@ impl Candidate {
             probes.push(at(key, 0.4));
         }
         if self.sheet.name == "position-dependent-friction" {
-            // A bump elsewhere looks like nothing near the one in the middle.
+            // A bump elsewhere does not resemble the one in the middle.
             for centre in [-0.45, 0.45] {
                 let mut coordinates = at(0, 0.3);
                 coordinates[1] = centre;

@@ -34,7 +34,7 @@ use std::collections::BTreeMap;
 pub(crate) use time::FEWEST_ROWS;
 
 /// Kind of the finding that an axis stood at the end of its stroke all the time.
-pub const PARKED: &str = "parked";
+pub(crate) const PARKED: &str = "parked";
 
 /// A record's check with what follows for each of its samples.
 #[derive(Clone, Debug)]

@@ -53,7 +53,7 @@ pub struct RecordArguments {
     pub mapping: Option<PathBuf>,
     /// Refuse records with columns that the measurement file does not know.
     #[arg(long)]
-    pub strict: bool,
+    pub(crate) strict: bool,
     /// Threads; the results do not depend on them. Default: all cores.
     #[arg(long)]
     pub threads: Option<usize>,
@@ -133,7 +133,7 @@ pub struct VerifyArguments {
     pub mapping: Option<PathBuf>,
     /// Refuse a record with columns that the measurement file does not know.
     #[arg(long)]
-    pub strict: bool,
+    pub(crate) strict: bool,
     /// Folder for verification.json, made if missing; without it nothing is written.
     #[arg(long)]
     pub out: Option<PathBuf>,

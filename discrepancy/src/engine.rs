@@ -1,4 +1,4 @@
-//! The records of a run of the workflow with everything that is simulated of them.
+//! The training records with the simulations of them.
 //!
 //! ```text
 //!   e      = readings - baseline                     what the baseline leaves
@@ -6,8 +6,8 @@
 //!   C_j    = effect j at a probe - baseline
 //! ```
 //!
-//! All in windows, whitened, with what the windows' starts explain taken out ([`crate::windows`]). Simulations run on all
-//! cores; what they give is gathered in the order of the candidates, so that two runs have the same bits.
+//! All columns are whitened, with the start states of the windows projected out ([`crate::windows`]). Simulations run on all
+//! cores and are gathered in a fixed order, so that two runs have the same bits.
 
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
@@ -16,28 +16,28 @@ use plant::{Batch, RigParameters};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// Change of a factor by which the sensitivity to a parameter is taken.
+/// Change of a factor in finite differences.
 pub(crate) const FACTOR_CHANGE: f64 = 0.01;
 
-/// How far the level of noise is corrected: an effect that is seen in every window must not pass for noise.
+/// Bounds of the noise level correction: an effect in every window must not pass for noise.
 const LEVELS: [f64; 2] = [0.6, 1.05];
 
-/// Models whose sensitivities are kept: naming asks for the same ones several times, at a fifth of its time.
+/// Size of the cache of sensitivities, which saves a fifth of the time of naming.
 const KEPT: usize = 4;
 
 /// A rig, the factors of its parameters, and the sensitivities to them.
 type Sensitivities = (RigParameters, [f64; COUNT], Vec<Vec<f64>>);
 
-/// The records, and the baseline's readings.
+/// Records, windows and the baseline rig.
 #[derive(Debug)]
 pub struct Engine<'a> {
     windows: Vec<Windows<'a>>,
     rig: RigParameters,
     rows: usize,
     freedom: Vec<f64>,
-    /// What the quiet windows say that the noise is too small or large.
+    /// Noise level by the quietest windows, as a factor on its power.
     level: f64,
-    /// What was asked for last, the latest at the end.
+    /// Cache of sensitivities, latest last.
     kept: Mutex<Vec<Sensitivities>>,
 }
 
@@ -56,10 +56,10 @@ impl<'a> Engine<'a> {
         engine
     }
 
-    /// The same records with starts where another rig meets them best: where rods are linked, micrometres decide which of them
-    /// touch, and a rig may only be held against readings from where it would have been itself.
+    /// The same records with the start states re-estimated under another rig. On linked rods micrometres decide whether they
+    /// touch, so that each rig needs its own start states.
     #[must_use]
-    pub fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
+    pub(crate) fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
         let windows: Vec<Windows<'a>> =
             self.windows.par_iter().map(|windows| Windows::new(windows.record(), rig)).collect();
         let freedom = windows.iter().flat_map(Windows::freedom).map(|freedom| freedom * self.level).collect();
@@ -75,7 +75,7 @@ impl<'a> Engine<'a> {
 
     /// Whether a record was made with linked rods.
     #[must_use]
-    pub fn is_linked(&self) -> bool {
+    pub(crate) fn is_linked(&self) -> bool {
         self.windows.iter().any(|windows| windows.record().linked)
     }
 
@@ -97,7 +97,7 @@ impl<'a> Engine<'a> {
         self.rows
     }
 
-    /// Degrees of freedom of each window, times what the quiet windows say that the noise is too small or large.
+    /// Degrees of freedom of each window times the noise level.
     #[must_use]
     pub fn freedom(&self) -> &[f64] {
         &self.freedom
@@ -109,19 +109,19 @@ impl<'a> Engine<'a> {
         self.windows.iter().flat_map(|windows| windows.simulate(rig)).collect()
     }
 
-    /// The same in longer steps, for differences.
+    /// The same with longer steps, for differences.
     #[must_use]
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.windows.iter().flat_map(|windows| windows.simulate_coarsely(rig)).collect()
     }
 
-    /// The same, kept with where each window went, for [`Engine::simulate_where`].
+    /// The same, kept for [`Engine::simulate_where`].
     #[must_use]
     pub fn pass(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
         self.windows.par_iter().map(|windows| windows.pass(rig)).collect()
     }
 
-    /// What a neighbour of the rig that passed shows, which differs in some windows alone: [`Windows::simulate_where`].
+    /// Readings of a neighbour of the reference rig: [`Windows::simulate_where`].
     #[must_use]
     pub fn simulate_where(
         &self,
@@ -133,9 +133,9 @@ impl<'a> Engine<'a> {
         windows.flat_map(|(windows, passed)| windows.simulate_where(rig, passed, &differs)).collect()
     }
 
-    /// The same of several rigs that differ in numbers of the baseline: on all cores, and side by side where that pays.
+    /// The same for several rigs that differ in baseline numbers, on all cores and in batches.
     fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
-        // Rigs with effects do not run in lanes, and are shared out one by one; the others as far as cores are fewer.
+        // Rigs with effects do not run in lanes and are distributed one by one.
         let alone = rigs.iter().any(|rig| !rig.effects().is_empty());
         let to_each = rigs.len().div_ceil(rayon::current_num_threads());
         let at_once = if alone { 1 } else { to_each.clamp(1, Batch::GROUP) };
@@ -150,7 +150,7 @@ impl<'a> Engine<'a> {
         rigs.par_chunks(at_once).flat_map_iter(simulate).collect()
     }
 
-    /// What each rig of the first half shows more than its fellow of the second half, over what they differ by.
+    /// Finite differences: each rig of the first half minus its counterpart of the second half, over `change`.
     #[must_use]
     pub(crate) fn differences(&self, rigs: &[RigParameters], change: f64) -> Vec<Vec<f64>> {
         let simulated = self.simulate_side_by_side(rigs);
@@ -163,13 +163,13 @@ impl<'a> Engine<'a> {
         up.par_iter().zip(down).map(difference).collect()
     }
 
-    /// What is left of the readings beside a simulation.
+    /// Whitened residual of a simulation.
     #[must_use]
     pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
         self.each(simulated, |windows, simulated, _| windows.residual(simulated), simulated)
     }
 
-    /// What one simulation differs from another by.
+    /// Difference of two simulations, processed like a residual.
     #[must_use]
     pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
         self.each(simulated, Windows::difference, from)
@@ -191,7 +191,7 @@ impl<'a> Engine<'a> {
         all
     }
 
-    /// Sensitivities of a rig's readings to the factors of all parameters, at these factors; an effect may be switched on.
+    /// Sensitivities of a rig's readings to all parameter factors, by central differences at `factors`.
     ///
     /// # Panics
     /// When another thread panicked here.
@@ -206,7 +206,7 @@ impl<'a> Engine<'a> {
             factors[at] += change;
             with_factors(rig, &factors)
         };
-        // All upwards, then all downwards.
+        // First all increments, then all decrements.
         let rigs: Vec<RigParameters> = [FACTOR_CHANGE, -FACTOR_CHANGE]
             .into_iter()
             .flat_map(|change| (0..COUNT).map(move |at| around(at, change)))
@@ -221,8 +221,8 @@ impl<'a> Engine<'a> {
     }
 }
 
-/// By how much the quietest windows are off what noise gives: the noise as it was estimated is right to some per cent only, and
-/// over 200 windows a few per cent would look like a large excess.
+/// Noise level: the lowest decile of chi2 per degree of freedom over its expectation. The estimated noise is right to some per
+/// cent only, which over 200 windows would look like a large excess.
 fn level(residual: &[f64], rows: usize, freedom: &[f64]) -> f64 {
     let mut quiet: Vec<f64> = residual
         .chunks_exact(rows)

@@ -19,7 +19,6 @@ mod parameters;
 
 use crate::report::{Quantity, decimals};
 use edits::Edits;
-pub use parameters::key_of_parameter;
 use plant::effects::sheet::{EffectKey, Sheet};
 use plant::effects::tabulated::Tabulated;
 use plant::effects::{SHEETS, sheet};
@@ -168,7 +167,7 @@ pub fn extend(
 ///
 /// # Errors
 /// [`ExtendError`] for a file that cannot take them and for numbers that a rig file must not hold.
-pub fn add_tables(
+pub(crate) fn add_tables(
     rig_text: &str,
     file: &str,
     tables: &[Tabulated],

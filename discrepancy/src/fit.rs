@@ -1,18 +1,16 @@
-//! Fits to windows: what remains of a record when some columns explain a part of it.
+//! Robust least squares of columns over windows.
 //!
 //! ```text
 //!   minimise  sum_k f_k ln(|e_k - C_k a|^2 / f_k) + sum_j (a_j / tolerance_j)^2         window k, f_k degrees of freedom
 //! ```
 //!
-//! The logarithm makes each window count by how many times its noise it is off, so that a few windows around a
-//! break-away, or an effect that is seen in few of them, do not drown the others; where a window is within its noise it
-//! is least squares. Minimised by reweighting: each window's weight is f_k / |e_k - C_k a|^2.
+//! The logarithm bounds the influence of a window, so that a few windows around a break-away do not dominate; within the noise it
+//! is least squares. It is minimised by iterative reweighting: the weight of a window is f_k / |e_k - C_k a|^2.
 //!
-//! What the columns give is kept as products, window by window: any selection of them is solved without touching the samples
-//! again.
+//! Normal equations are kept for each window, so that any selection of columns is solved without the samples.
 //!
 //! Source: discrepancy-notes.md, 3, 6 (clustered scores, weights on windows and not on samples). Lange, Little, Taylor 1989, JASA
-//! 84(408): the likelihood of windows whose scale nobody knows.
+//! 84(408): likelihood with unknown scale.
 
 use crate::windows::dot;
 use nalgebra::{DMatrix, DVector};
@@ -20,21 +18,21 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Passes of reweighting.
 const PASSES: usize = 12;
-/// Change of the loss below which it has settled.
+/// Fall of the loss below which it has converged.
 const CONVERGED: f64 = 1e-3;
 
-/// Smallest chi2 per degree of freedom that a window counts with: one that is nearly empty is no better than a good one.
-pub const LEAST: f64 = 1e-3;
+/// Lower bound of the chi2 per degree of freedom of a window.
+pub(crate) const LEAST: f64 = 1e-3;
 
 /// The loss of windows with these squares and degrees of freedom.
 #[must_use]
-pub fn loss(squares: &[f64], freedom: &[f64]) -> f64 {
+pub(crate) fn loss(squares: &[f64], freedom: &[f64]) -> f64 {
     squares.iter().zip(freedom).map(|(square, freedom)| freedom * (square / freedom).max(LEAST).ln()).sum()
 }
 
 /// Products of a residual and some columns, window by window.
 #[derive(Clone, Debug)]
-pub struct Products {
+pub(crate) struct Products {
     columns: usize,
     /// Degrees of freedom of each window.
     freedom: Vec<f64>,
@@ -48,21 +46,21 @@ pub struct Products {
 
 /// A fit of some columns.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub(crate) struct Fit {
     /// Coefficient of each column that took part.
-    pub coefficients: Vec<f64>,
-    /// What was minimised.
-    pub loss: f64,
+    pub(crate) coefficients: Vec<f64>,
+    /// Minimum of the loss.
+    pub(crate) loss: f64,
     /// |e - C a|^2 of each window.
-    pub squares: Vec<f64>,
-    /// Weight of each window in the end.
-    pub weights: Vec<f64>,
+    pub(crate) squares: Vec<f64>,
+    /// Final weight of each window.
+    pub(crate) weights: Vec<f64>,
 }
 
 impl Products {
     /// The products of a residual with columns, all window by window of `rows` numbers.
     #[must_use]
-    pub fn new(residual: &[f64], columns: &[&[f64]], freedom: &[f64], rows: usize) -> Self {
+    pub(crate) fn new(residual: &[f64], columns: &[&[f64]], freedom: &[f64], rows: usize) -> Self {
         let windows = freedom.len();
         let information = (0..windows)
             .map(|window| {
@@ -89,8 +87,8 @@ impl Products {
         products
     }
 
-    /// Takes another residual of the same columns.
-    pub fn set_residual(&mut self, residual: &[f64], columns: &[&[f64]], rows: usize) {
+    /// Replaces the residual.
+    pub(crate) fn set_residual(&mut self, residual: &[f64], columns: &[&[f64]], rows: usize) {
         let windows = residual.chunks_exact(rows);
         self.squares = windows.clone().map(|residual| dot(residual, residual)).collect();
         self.scores = windows
@@ -103,25 +101,19 @@ impl Products {
 
     /// Columns.
     #[must_use]
-    pub fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.columns
-    }
-
-    /// Degrees of freedom of each window.
-    #[must_use]
-    pub fn freedom(&self) -> &[f64] {
-        &self.freedom
     }
 
     /// The loss of windows with these squares.
     #[must_use]
-    pub fn loss(&self, squares: &[f64]) -> f64 {
+    pub(crate) fn loss(&self, squares: &[f64]) -> f64 {
         loss(squares, &self.freedom)
     }
 
     /// Weights of windows with these squares.
     #[must_use]
-    pub fn weights(&self, squares: &[f64]) -> Vec<f64> {
+    pub(crate) fn weights(&self, squares: &[f64]) -> Vec<f64> {
         let weight = |(square, freedom): (&f64, &f64)| freedom / square.max(LEAST * freedom);
         squares.iter().zip(&self.freedom).map(weight).collect()
     }
@@ -145,7 +137,12 @@ impl Products {
 
     /// Weighted normal equations of some columns, with ridges 1 / tolerance^2.
     #[must_use]
-    pub fn normal(&self, chosen: &[usize], weights: &[f64], ridges: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+    pub(crate) fn normal(
+        &self,
+        chosen: &[usize],
+        weights: &[f64],
+        ridges: &[f64],
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let count = chosen.len();
         let mut matrix = DMatrix::zeros(count, count);
         let mut vector = DVector::zeros(count);
@@ -168,13 +165,13 @@ impl Products {
 
     /// The best coefficients of some columns; `ridges` as in [`Products::normal`].
     #[must_use]
-    pub fn fit(&self, chosen: &[usize], ridges: &[f64]) -> Fit {
+    pub(crate) fn fit(&self, chosen: &[usize], ridges: &[f64]) -> Fit {
         self.fit_from(chosen, ridges, &vec![0.0; chosen.len()])
     }
 
-    /// The same where what is believed to be 0 is not at 0 to begin with: ridges hold the sums of `from` and the coefficients.
+    /// The same with prior means at `-from`: ridges act on the sums of `from` and the coefficients.
     #[must_use]
-    pub fn fit_from(&self, chosen: &[usize], ridges: &[f64], from: &[f64]) -> Fit {
+    pub(crate) fn fit_from(&self, chosen: &[usize], ridges: &[f64], from: &[f64]) -> Fit {
         let mut weights = self.weights(&self.squares);
         let mut coefficients = vec![0.0; chosen.len()];
         let mut squares = self.squares.clone();
@@ -207,11 +204,10 @@ impl Products {
         Fit { coefficients, loss, squares, weights }
     }
 
-    /// The loss of all windows, those of each of some folds by the coefficients that the others ask for; `ridges` and `from` as
-    /// in [`Products::fit_from`]. Where the residual is the best of the columns already, the difference to [`Products::loss`] is
-    /// what they only learned. Folds are stretches.
+    /// Cross-validated loss: each fold, a contiguous stretch of windows, is judged with the coefficients of the others; `ridges`
+    /// and `from` as in [`Products::fit_from`]. At a minimum, the difference to [`Products::loss`] is overfitting.
     #[must_use]
-    pub fn unseen_loss(&self, chosen: &[usize], ridges: &[f64], from: &[f64], folds: usize) -> f64 {
+    pub(crate) fn unseen_loss(&self, chosen: &[usize], ridges: &[f64], from: &[f64], folds: usize) -> f64 {
         let all = self.weights(&self.squares);
         let windows = self.squares.len();
         let of = |fold: usize| fold * windows / folds..(fold + 1) * windows / folds;
@@ -227,9 +223,14 @@ impl Products {
         self.loss(&judged.collect::<Vec<_>>())
     }
 
-    /// For each column beyond the first few: its weighted score in each window and its information, the first few taken out.
+    /// For each further column: its weighted window scores and its information, with the first columns projected out.
     #[must_use]
-    pub fn cleared_scores(&self, first: &[usize], weights: &[f64], ridges: &[f64]) -> Vec<(Vec<f64>, f64)> {
+    pub(crate) fn cleared_scores(
+        &self,
+        first: &[usize],
+        weights: &[f64],
+        ridges: &[f64],
+    ) -> Vec<(Vec<f64>, f64)> {
         let count = first.len();
         let (matrix, _) = self.normal(first, weights, ridges);
         let inverse = matrix.try_inverse().unwrap_or_else(|| DMatrix::zeros(count, count));
@@ -265,9 +266,9 @@ impl Products {
             .collect()
     }
 
-    /// Covariance of the coefficients of a fit whose errors hang together within windows: A^-1 (sum_k w_k^2 s_k s_k') A^-1.
+    /// Sandwich covariance of the coefficients, clustered by windows: A^-1 (sum_k w_k^2 s_k s_k') A^-1.
     #[must_use]
-    pub fn covariance(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<DMatrix<f64>> {
+    pub(crate) fn covariance(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<DMatrix<f64>> {
         let (matrix, _) = self.normal(chosen, &fit.weights, ridges);
         let inverse = matrix.try_inverse()?;
         let count = chosen.len();
@@ -292,26 +293,25 @@ impl Products {
                 }
             }
         }
-        // What is known beforehand counts as one more window.
+        // The prior counts as one more window.
         for row in 0..count {
             middle[(row, row)] += ridges[row];
         }
         Some(&inverse * middle * &inverse)
     }
 
-    /// Standard errors by leaving out one window after the other: where few windows tell a number, they follow it, and what
-    /// is left in them is no measure of its error. Two of them hold the truth as often as two of a normal distribution do,
-    /// however few windows tell. Source: Bell, McCaffrey 2002, Survey Methodology 28(2): the jackknife's variance, and
-    /// Student's distribution with as many degrees of freedom as windows tell.
+    /// Delete-one-window jackknife standard errors. Where few windows determine a number, residuals understate its error. Errors
+    /// are scaled so that two of them cover as two of a normal distribution do. Source: Bell, McCaffrey 2002, Survey Methodology
+    /// 28(2): jackknife variance with Student's distribution and Satterthwaite degrees of freedom.
     #[must_use]
-    pub fn jackknife(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<Vec<f64>> {
+    pub(crate) fn jackknife(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<Vec<f64>> {
         let each: Vec<[usize; 1]> = (0..chosen.len()).map(|at| [at]).collect();
         self.jackknife_of_sums(chosen, fit, ridges, &each)
     }
 
-    /// The same of sums of coefficients, each given by places in `chosen`.
+    /// The same for sums of coefficients, each given by places in `chosen`.
     #[must_use]
-    pub fn jackknife_of_sums<S: AsRef<[usize]>>(
+    pub(crate) fn jackknife_of_sums<S: AsRef<[usize]>>(
         &self,
         chosen: &[usize],
         fit: &Fit,
@@ -345,7 +345,7 @@ impl Products {
             let believed: f64 =
                 places.iter().flat_map(|row| places.iter().map(|at| believed[(*row, *at)])).sum();
             let sum: f64 = squares.clone().sum();
-            // Of normal changes the fourth power is three times the variance's square.
+            // For normal changes the fourth moment is three times the squared variance.
             let telling = 3.0 * sum * sum / squares.map(|square| square * square).sum::<f64>().max(1e-300);
             ((1.0 - 1.0 / windows) * sum * widened(telling).powi(2) + believed.max(0.0)).sqrt()
         };
@@ -353,13 +353,13 @@ impl Products {
     }
 }
 
-/// What a standard error from a few numbers is multiplied with, so that two of them hold what two hold when many tell it.
+/// Factor on a standard error of few degrees of freedom that gives two of them the coverage of two normal ones.
 fn widened(freedom: f64) -> f64 {
     let share = Normal::standard().cdf(2.0);
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| student.inverse_cdf(share) / 2.0)
 }
 
-/// Solves symmetric equations that may be nearly singular, columns brought to one scale.
+/// Solves nearly singular symmetric equations after diagonal scaling.
 fn solve(matrix: DMatrix<f64>, vector: &DVector<f64>) -> Option<DVector<f64>> {
     let count = vector.len();
     let scales: Vec<f64> = (0..count).map(|at| matrix[(at, at)].max(1e-12).sqrt()).collect();

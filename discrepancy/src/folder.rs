@@ -29,7 +29,7 @@ pub enum FolderError {
 
 /// A folder that takes the results of one run.
 #[derive(Debug)]
-pub struct Folder {
+pub(crate) struct Folder {
     path: PathBuf,
     /// Files that are read, as the file system knows them.
     inputs: Vec<PathBuf>,
@@ -40,7 +40,10 @@ impl Folder {
     ///
     /// # Errors
     /// [`FolderError::Write`].
-    pub fn open<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<Self, FolderError> {
+    pub(crate) fn open<'a>(
+        path: &Path,
+        inputs: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Result<Self, FolderError> {
         fs::create_dir_all(path).map_err(|why| FolderError::Write { file: path.to_owned(), why })?;
         // What is not there is missed by whoever reads it.
         let inputs = inputs.into_iter().filter_map(|file| fs::canonicalize(file).ok()).collect();
@@ -49,7 +52,7 @@ impl Folder {
 
     /// Its path, as given.
     #[must_use]
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
@@ -57,7 +60,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`FolderError::Input`] when it is one of those that are read.
-    pub fn file(&self, name: impl AsRef<Path>) -> Result<PathBuf, FolderError> {
+    pub(crate) fn file(&self, name: impl AsRef<Path>) -> Result<PathBuf, FolderError> {
         let file = self.path.join(name);
         let known = fs::canonicalize(&file).is_ok_and(|path| self.inputs.contains(&path));
         if known { Err(FolderError::Input { file }) } else { Ok(file) }
@@ -67,7 +70,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`FolderError::Input`] when one of its files is read here, [`FolderError::Write`] when one cannot be taken away.
-    pub fn clear(&self, model: &Path) -> Result<(), FolderError> {
+    pub(crate) fn clear(&self, model: &Path) -> Result<(), FolderError> {
         if !self.path.join("report.json").exists() {
             return Ok(());
         }
@@ -90,7 +93,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`FolderError`].
-    pub fn write(&self, name: impl AsRef<Path>, text: &str) -> Result<(), FolderError> {
+    pub(crate) fn write(&self, name: impl AsRef<Path>, text: &str) -> Result<(), FolderError> {
         write(&self.file(name)?, text)
     }
 
@@ -98,7 +101,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`FolderError`].
-    pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), FolderError> {
+    pub(crate) fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), FolderError> {
         let mut text = serde_json::to_string_pretty(value).expect("reports hold nothing that JSON does not");
         text.push('\n');
         self.write(name, &text)
@@ -109,7 +112,7 @@ impl Folder {
 ///
 /// # Errors
 /// [`FolderError::Write`].
-pub fn write(file: &Path, text: &str) -> Result<(), FolderError> {
+pub(crate) fn write(file: &Path, text: &str) -> Result<(), FolderError> {
     write_whole(file, text).map_err(|why| FolderError::Write { file: file.to_owned(), why })
 }
 

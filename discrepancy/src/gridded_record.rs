@@ -1,14 +1,14 @@
-//! A record as the simulation needs it: inputs and samples of every millisecond, and where the pistons were.
+//! A record on a grid of 1 ms: inputs, samples and smoothed states of every period.
 //!
 //! ```text
 //!   record ──► grid of 1 ms ──► inputs held over each period, samples or None, points (x, v, p_a, p_b) by local parabolas
 //! ```
 //!
-//! Rows are put on the grid by their nearest millisecond; a period without a row has no samples, and its command is that before.
-//! A window that lacks more than a few commands in a row is not simulated ([`GriddedRecord::gaps`]).
+//! Rows go to their nearest millisecond. A period without a row has no samples and keeps the command before. A window with a
+//! longer run of missing commands is not simulated ([`GriddedRecord::gaps`]).
 //!
-//! The points are where windows start; what is left of their noise is estimated with each window. At rest the speed is zero and
-//! nothing else (`course/still.rs`).
+//! Windows start at the points; their remaining errors are estimated with each window. At rest the speed is exactly zero
+//! (`gridded_record/rest.rs`).
 //!
 //! Source: rig-model.md, Measurement file; discrepancy-notes.md, 1. Savitzky, Golay 1964, Anal. Chem. 36(8): local parabolas.
 
@@ -19,27 +19,27 @@ use crate::check::Checked;
 use crate::records::{Channel, Record, Signal};
 use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
 use rest::{Rate, Still};
-pub use subsample::{SEARCHED_S, searched_share};
+pub(crate) use subsample::searched_share;
 
-/// Channels of an axis that are simulated: position, force, pressures a and b.
-pub const CHANNELS: usize = 4;
+/// Simulated channels of an axis: position, force, pressures a and b.
+pub(crate) const CHANNELS: usize = 4;
 /// Their signals.
-pub const SIGNALS: [Signal; CHANNELS] =
+pub(crate) const SIGNALS: [Signal; CHANNELS] =
     [Signal::Position, Signal::Force, Signal::PressureA, Signal::PressureB];
 /// Samples to each side of a local parabola of the position.
 const POSITION_REACH: usize = 10;
 /// The same of a pressure.
 const PRESSURE_REACH: usize = 5;
-/// Differences that a channel's memory is told from at a time, and how many such blocks at rest it takes.
+/// Differences in a block of the autocorrelation estimate, and the fewest blocks at rest.
 const MEMORY_BLOCK: usize = 25;
 const FEWEST_AT_REST: usize = 10;
-/// Memory and jitter below which there is none.
+/// Autocorrelation and jitter below which they count as zero.
 const LEAST_MEMORY: f64 = 0.15;
 const LEAST_JITTER_S: f64 = 2e-5;
-/// Samples in a row whose scatter is looked at, and the speed from which on motion adds to it.
+/// Samples in a block of the jitter estimate, and the lowest speed of a block.
 const JITTER_BLOCK: usize = 20;
 const JITTER_SPEED_M_PER_S: f64 = 0.1;
-/// Longest run of periods without a command that a window bears.
+/// Longest run of missing commands in a window.
 pub(crate) const HELD_LONGEST: usize = 3;
 
 /// A record on its grid.
@@ -47,43 +47,43 @@ pub(crate) const HELD_LONGEST: usize = 3;
 pub struct GriddedRecord {
     /// File of the record.
     pub name: String,
-    /// Whether the load's eye sat in the carriage.
+    /// Whether the rods were linked.
     pub linked: bool,
     /// Weights on the carriage, kg.
     pub added_mass_kg: f64,
     /// Which axes were measured, drive and load.
     pub measured: [bool; 2],
-    /// What acts over each period.
+    /// Inputs of each period.
     pub inputs: Vec<Inputs>,
     /// Readings at the start of each period, in the order of [`SIGNALS`], rig coordinates, the load's offset taken off.
     pub samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
-    /// Where each axis was at the start of each period.
+    /// Smoothed state of each axis at the start of each period.
     pub points: Vec<[Point; 2]>,
     /// Standard deviation of each reading, its rounding included.
     pub noise: [[f64; CHANNELS]; 2],
-    /// How much of a reading's noise is still there a period later, 0 to 1.
+    /// Lag-1 autocorrelation of the noise, 0 to 1.
     pub memory: [[f64; CHANNELS]; 2],
-    /// By how much the instants of sampling are off, rms, s.
-    pub jitter_s: f64,
-    /// Periods whose command nobody knows, or whose points nothing supports.
-    pub gaps: Vec<bool>,
+    /// Sampling jitter, rms, s.
+    pub(crate) jitter_s: f64,
+    /// Periods without a known command or without a smoothed state.
+    pub(crate) gaps: Vec<bool>,
 }
 
-/// Mechanical state and pressures of an axis, in its own extension.
+/// Mechanical state and pressures of an axis, along its extension.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
-    /// How far the rod is out, m.
+    /// Extension of the rod, m.
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 at rest.
-    pub rod_velocity_m_per_s: f64,
-    /// The rate that a record cannot tell from it: of creeping for what seems at rest, 0 for what is slow.
-    pub or_else_m_per_s: Option<f64>,
+    pub(crate) rod_velocity_m_per_s: f64,
+    /// An indistinguishable rate: that of creep where the piston seems at rest, 0 where it is slow.
+    pub(crate) or_else_m_per_s: Option<f64>,
     /// Absolute pressures of the chambers a and b, Pa.
-    pub pressures_pa: [f64; 2],
+    pub(crate) pressures_pa: [f64; 2],
 }
 
 impl Point {
-    /// Changes by which sensitivities to x, v, p_a, p_b are taken: m, m/s, Pa, Pa. Small, so that the course stays what it is.
+    /// Steps of finite differences in x, v, p_a, p_b: m, m/s, Pa, Pa. Small, so that no stick-slip event moves.
     pub(crate) const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
 
     /// The point with one of its numbers nudged, in the order of [`Point::NUDGES`].
@@ -154,7 +154,7 @@ impl GriddedRecord {
         rig: &RigParameters,
     ) -> Result<GriddedRecord, GriddingError> {
         let file = record.file().display().to_string();
-        // A load that is parked and not linked shows nothing, and its position may be at the end of the sensor's range.
+        // A parked, unlinked load carries no information, and its position may be clipped.
         let measured = Axis::ALL.map(|axis| {
             record.channel(Channel::Of(axis, Signal::Position)).is_some()
                 && (record.setup().linked || !checked.is_parked(axis))
@@ -202,7 +202,7 @@ impl GriddedRecord {
         self.inputs.len()
     }
 
-    /// Whether there is none.
+    /// Whether it is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.inputs.is_empty()
@@ -225,7 +225,7 @@ impl GriddedRecord {
         let channels = [Signal::Valve].into_iter().chain(SIGNALS).map(|signal| Channel::Of(axis, signal));
         let channels: Vec<Channel> = channels.collect();
         for (row, place) in places.iter().enumerate() {
-            // A row that says nothing must not take the place of one that does.
+            // An empty row must not replace a full one.
             if !channels
                 .iter()
                 .any(|channel| record.value(*channel, row).is_some() && checked.is_usable(*channel, row))
@@ -254,7 +254,7 @@ impl GriddedRecord {
         ];
         for at in 0..CHANNELS {
             let noise = checked.noise(Channel::Of(axis, SIGNALS[at])).unwrap_or(specified[at]);
-            // A record that shows less than its rounding has the rounding's.
+            // Rounding is a lower bound of the noise.
             self.noise[i][at] = noise.max(steps[at] / 12.0_f64.sqrt());
         }
         hold(&mut commands, &mut self.gaps);
@@ -267,7 +267,7 @@ impl GriddedRecord {
         let position = parabolas(&positions, POSITION_REACH);
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
         let mut still = Still::new(&position, &positions, self.noise[i][0]);
-        // Means of noise that lasts are less sure than those of as many readings on their own.
+        // Autocorrelation widens the error of a mean.
         let share = memory(&positions, &still.resting(), self.noise[i][0]);
         if share > 0.0 {
             let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
@@ -321,7 +321,7 @@ fn memory(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
     if share < LEAST_MEMORY { 0.0 } else { share.min(0.95) }
 }
 
-/// How far the instants of sampling are off, from what motion adds to the spread of positions around their parabolas.
+/// Sampling jitter: the part of the scatter of positions around their parabolas that grows with the speed.
 fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: &[bool]) -> f64 {
     let squares = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
         let mut blocks: Vec<f64> = (0..positions.len() / JITTER_BLOCK)
@@ -342,7 +342,7 @@ fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: 
         if slope.abs() < JITTER_SPEED_M_PER_S { None } else { Some((square(at)? - still) / (slope * slope)) }
     });
     let Some(variance) = moving.get(moving.len() / 2) else { return 0.0 };
-    // A parabola takes up a part of what scatters around it.
+    // A parabola absorbs part of the scatter.
     let m = POSITION_REACH as f64;
     let kept =
         1.0 - 3.0 * (3.0 * m * m + 3.0 * m - 1.0) / ((2.0 * m - 1.0) * (2.0 * m + 1.0) * (2.0 * m + 3.0));
@@ -350,9 +350,9 @@ fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: 
     if jitter_s < LEAST_JITTER_S { 0.0 } else { jitter_s }
 }
 
-/// The grid's place of each row; rows whose time jumps back share the place of the one before.
+/// Grid index of each row; rows whose time jumps back share that of the row before.
 ///
-/// A row whose time cannot be stays where the row before is: none of its samples counts.
+/// A row with an impossible time keeps the index before it; its samples do not count.
 fn places(record: &Record, checked: &Checked) -> Vec<usize> {
     let times = record.time_s();
     let is_good = |row: usize| record.channels().any(|channel| checked.is_usable(channel, row));
@@ -371,7 +371,7 @@ fn places(record: &Record, checked: &Checked) -> Vec<usize> {
         .collect()
 }
 
-/// Holds commands over short gaps, and marks long ones.
+/// Holds commands over short gaps and marks long ones.
 fn hold(commands: &mut [Option<f64>], gaps: &mut [bool]) {
     let mut since = 0;
     for place in 0..commands.len() {
@@ -387,14 +387,14 @@ fn hold(commands: &mut [Option<f64>], gaps: &mut [bool]) {
     }
 }
 
-/// A local parabola at its middle: value, and slope per period.
+/// Value and slope per period of a local parabola at its centre.
 #[derive(Clone, Copy, Debug)]
 struct Parabola {
     value: f64,
     slope: f64,
 }
 
-/// A parabola around each place, by least squares over what is there; `None` where less than half of it is.
+/// Least-squares parabola around each place; `None` where less than half of the samples exist.
 fn parabolas(values: &[Option<f64>], reach: usize) -> Vec<Option<Parabola>> {
     (0..values.len())
         .map(|place| {
@@ -422,7 +422,7 @@ fn parabolas(values: &[Option<f64>], reach: usize) -> Vec<Option<Parabola>> {
         .collect()
 }
 
-/// Solves three equations by elimination with pivots; `None` when they are none.
+/// Solves three equations by Gauss-Jordan elimination; `None` where they are singular.
 fn solve(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
     for pivot in 0..3 {
         let best = (pivot..3).max_by(|a, b| rows[*a][pivot].abs().total_cmp(&rows[*b][pivot].abs()))?;

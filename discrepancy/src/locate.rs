@@ -4,20 +4,19 @@
 //!   course ──► windows of 20 ms ──► unknown force, flows, sensor offset ──► bars, regimes, maps, series
 //! ```
 //!
-//! A balance whose unknown input is as large as its propagated noise is closed; one that stands above it lacks something, and
-//! the input's course over position, speed and pressures says what. A chamber that lacks a leak does not lift the force, since
-//! windows start at the measured pressures; a sensor fault does lift two balances, in a ratio that the geometry fixes
-//! ([`ratio`]).
+//! A balance is closed when its unknown input is as large as its propagated noise. Otherwise a term is missing, and its
+//! dependence on position, speed and pressures suggests which. A leak does not raise the force, since windows start at the
+//! measured pressures; a sensor fault raises two balances in a ratio fixed by geometry ([`ratio`]).
 //!
 //! Source: discrepancy-notes.md, 2 and 9, and Pipeline 4. Unknown inputs: Gillijns, De Moor 2007, Automatica 43(1).
 
-pub mod estimate;
-pub mod linkage;
-pub mod maps;
-pub mod noise_colour;
-pub mod ratio;
-pub mod regime;
-pub mod simulated;
+pub(crate) mod estimate;
+pub(crate) mod linkage;
+pub(crate) mod maps;
+pub(crate) mod noise_colour;
+pub(crate) mod ratio;
+pub(crate) mod regime;
+pub(crate) mod simulated;
 
 use crate::gridded_record::GriddedRecord;
 use crate::report::{BalanceBar, Location, RegimeCell, UnknownInput};
@@ -26,7 +25,7 @@ use plant::{Axis, PERIOD_S, RigParameters};
 use regime::{REGIMES, Regimes};
 
 /// Periods of a window.
-pub const WINDOW: usize = 20;
+pub(crate) const WINDOW: usize = 20;
 /// What an unknown input may depend on.
 pub const VARIABLES: [WindowVariable; 12] = [
     variable("x", "m", 0, 1),
@@ -42,7 +41,7 @@ pub const VARIABLES: [WindowVariable; 12] = [
     variable("t", "s", 3, 1),
     variable("dp/dt", "Pa/s", 2, 2),
 ];
-/// Where some of them stand there.
+/// Indices of some of them.
 pub(crate) const POSITION: usize = 0;
 pub(crate) const VELOCITY: usize = 1;
 pub(crate) const SPEED: usize = 2;
@@ -50,7 +49,7 @@ pub(crate) const DIRECTION: usize = 3;
 pub(crate) const FORCE: usize = 9;
 pub(crate) const TIME: usize = 10;
 /// From m^3/s to Nl/min.
-pub const NORMAL_LITRES_PER_MINUTE: f64 = 6e4;
+pub(crate) const NORMAL_LITRES_PER_MINUTE: f64 = 6e4;
 /// Most points of a series in the report.
 const SERIES: usize = 1500;
 
@@ -61,9 +60,9 @@ pub struct WindowVariable {
     pub name: &'static str,
     /// Its unit; empty for a number.
     pub unit: &'static str,
-    /// How much it costs: of those that explain nearly as much the cheapest is told first.
+    /// Complexity: of variables that explain nearly as much the simplest comes first.
     pub(crate) costs: usize,
-    /// Nodes that it is in a formula.
+    /// Nodes in a formula.
     pub(crate) nodes: usize,
 }
 
@@ -76,7 +75,7 @@ const fn variable(name: &'static str, unit: &'static str, costs: usize, nodes: u
 pub struct Located {
     /// For the report.
     pub location: Location,
-    /// The unknown inputs themselves, one series for each balance that the records tell something about.
+    /// Unknown inputs, one series for each observable balance.
     pub unknowns: Vec<UnknownSeries>,
 }
 
@@ -87,39 +86,37 @@ pub struct UnknownSeries {
     pub balance: String,
     /// N or Nl/min.
     pub unit: &'static str,
-    /// Windows that tell something about it, in the order of the records.
+    /// Windows in which it is observable, in the order of the records.
     pub points: Vec<UnknownPoint>,
 }
 
 /// The unknown input of a window.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownPoint {
-    /// Which record.
-    pub record: usize,
     /// Which window of it.
-    pub window: usize,
-    /// Estimate, in the series' unit; positive along the own extension of the axis, or into the chamber.
+    pub(crate) window: usize,
+    /// Estimate, in the series' unit; positive along the extension of the axis, or into the chamber.
     pub(crate) value: f64,
-    /// Its standard deviation when nothing is missing.
+    /// Its null standard deviation.
     pub(crate) deviation: f64,
-    /// In the order of [`VARIABLES`], positions and speeds in the own extension of the axis.
+    /// In the order of [`VARIABLES`], positions and speeds along the extension of the axis.
     pub(crate) variables: [f64; VARIABLES.len()],
-    /// Change of the estimate by an offset of the pressure sensors a and b, per Pa.
+    /// Sensitivity of the estimate to an offset of the pressure sensors a and b, per Pa.
     pub(crate) per_pressure_offset: [f64; 2],
-    /// What went on in the window.
+    /// Regimes of the window.
     pub(crate) regimes: Regimes,
 }
 
 impl UnknownPoint {
     /// The estimate over its standard deviation.
     #[must_use]
-    pub fn over_noise(&self) -> f64 {
+    pub(crate) fn over_noise(&self) -> f64 {
         self.value / self.deviation
     }
 }
 
 impl UnknownSeries {
-    /// rms of the estimates over their standard deviations; 1 is nothing. `None` without a point.
+    /// rms of the estimates over their standard deviations; 1 for a closed balance. `None` without a point.
     #[must_use]
     pub fn over_noise(&self) -> Option<f64> {
         over_noise(self.points.iter())
@@ -135,12 +132,12 @@ fn over_noise<'a>(points: impl Iterator<Item = &'a UnknownPoint>) -> Option<f64>
     (count > 0).then(|| (sum / f64::from(count)).sqrt())
 }
 
-/// Estimates the unknown inputs of all records against a baseline; `progress` hears of each record.
+/// Estimates the unknown inputs of all records under a baseline; `progress` gets a line for each record.
 pub fn locate(rig: &RigParameters, gridded: &[GriddedRecord], progress: &mut dyn FnMut(&str)) -> Located {
     let mut unknowns = Unknowns::default();
-    for (record, gridded) in gridded.iter().enumerate() {
-        progress(&format!("locate: {} of {}, {:.0} s", record + 1, gridded.len(), seconds(gridded.len())));
-        estimate(rig, gridded, record, &mut unknowns);
+    for (index, gridded) in gridded.iter().enumerate() {
+        progress(&format!("locate: {} of {}, {:.0} s", index + 1, gridded.len(), seconds(gridded.len())));
+        estimate(rig, gridded, &mut unknowns);
     }
     let series = unknowns.into_series();
     let bars = series.iter().filter_map(bar).collect();
@@ -187,7 +184,7 @@ fn cells(series: &UnknownSeries) -> Vec<RegimeCell> {
     REGIMES.iter().filter_map(cell).collect()
 }
 
-/// A series for a picture: neighbours joined by their weighted mean until it is short enough.
+/// Decimates a series for a picture by weighted means of neighbours.
 fn thinned(series: &UnknownSeries) -> UnknownInput {
     let join = series.points.len().div_ceil(SERIES).max(1);
     let mut thin = UnknownInput {

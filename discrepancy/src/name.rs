@@ -1,4 +1,4 @@
-//! Names what is missing: screened, fitted in the simulator, compared, accepted or refused.
+//! Names missing effects by forward selection: screen linearly, refit in the simulator, accept or reject, eliminate backwards.
 //!
 //! ```text
 //!   parameters alone ──► screening of all candidates ──► the best fitted in the simulator ──► takes enough?
@@ -7,9 +7,9 @@
 //!   each that joined is taken out once: what is not missed goes; what fits as well as one of them is its alternative
 //! ```
 //!
-//! An effect joins when it takes a good share of what the model leaves, with an amplitude no smaller than a share of what occurs.
-//! It stays when, beside all that joined, the loss without it is higher by several times what nothing gains there. What is left
-//! after three, or beside an explanation that leaves much, is outside the catalogue.
+//! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
+//! from the whole model raises the loss by a multiple of the null threshold. A misfit that three effects leave, or that a poor
+//! explanation leaves, is outside the catalogue.
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
@@ -36,78 +36,78 @@ use rayon::prelude::*;
 use round::{Contenders, Round};
 use start_states::{Restarted, refit_with_starts};
 
-/// Effects at most.
+/// Maximum number of effects.
 const MOST: usize = 3;
-/// Steps of a candidate's first fit.
+/// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
-/// How often a model is fitted with sensitivities of its own at most, and the fall of the loss that ends it.
+/// Maximum number of relinearisations of the parameter sensitivities, and the fall of the loss that ends them.
 const RELINEARISATIONS: usize = 4;
 const CONVERGED: f64 = 1.0;
-/// Mean excess of a window's logarithm from which on a model that leaves it is no explanation.
+/// Mean log ratio of a window's chi2 to its degrees of freedom above which a model is inadequate.
 const EXCESS: f64 = 0.08;
-/// The same of linked records, where micrometres decide when the eye meets the carriage: records of nothing leave up to 0.2.
+/// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
 const EXCESS_LINKED: f64 = 0.3;
-/// Screened gain below which nothing is fitted: the best of some forty candidates gains half of it by chance.
+/// Screened gain below which no candidate is fitted: the best of some forty candidates gains half of it by chance.
 pub(crate) const WORTH_A_FIT: f64 = 25.0;
-/// What each number of an effect costs: it must be worth more than one more candidate tried.
+/// Penalty for each fitted number of an effect.
 pub(crate) const NUMBER_COSTS: f64 = 8.0;
-/// Multiple of the threshold of nothing that is asked of the first effect.
+/// Multiple of the null threshold required of a single effect.
 const SAFETY: f64 = 2.0;
-/// Share of what the parameters leave that the first effect must take.
+/// Share of the loss after calibration that the first effect must remove.
 const TAKES_FIRST: f64 = 0.1;
-/// Share of what a model leaves that one more effect must take.
+/// Share of the remaining loss that each further effect must remove.
 const TAKES: f64 = 0.3;
-/// Share of the smallest change that occurs below which an effect is none.
+/// Smallest amplitude, as a share of the smallest change that occurs.
 const FLOOR: f64 = 0.6;
-/// Share of what the parameters leave that may stay beside an explanation.
+/// Share of the loss after calibration that an explanation may leave.
 const STAYS: f64 = 0.3;
-/// Mean logarithm by which an explanation lowers what windows leave, from which on it is one: to a sixth. A law of another form
-/// than the catalogue's leaves more than noise, and is this effect all the same.
+/// Mean log reduction of chi2 that makes a model adequate whatever it leaves (1.8: to a sixth). A law of a slightly different
+/// form leaves more than noise and is still this effect.
 const REDUCES: f64 = 1.8;
-/// Effects that are none without their first number: without cracking pressure a check valve is the resistance of a line, and
-/// where rods are linked, damping alone takes up what starts within micrometres leave.
+/// Effects defined by their first number alone: a check valve without cracking pressure is a line resistance, and on linked rods
+/// damping alone absorbs the errors of the start states.
 const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
 
-/// What takes the place of an effect of a model just as well.
+/// An effect that explains the records as well as one of the model.
 #[derive(Clone, Debug)]
 pub struct Alternative {
-    /// A model with it, last, in the round in which the other one joined.
+    /// The model with it as the last effect, fitted in the round in which the other one joined.
     pub fit: Refit,
-    /// Share of the excess that goes with it.
+    /// Share of the excess that it removes.
     pub share: f64,
 }
 
-/// What naming found.
+/// The result of naming.
 #[derive(Debug)]
 pub struct Found {
-    /// The parameters alone.
-    pub calibrated: Calibrated,
-    /// The model that explains the records.
+    /// Calibration: parameters without effects.
+    pub(crate) calibrated: Calibrated,
+    /// The selected model.
     pub model: Refit,
-    /// The model as it is told: parameters that it does not need are what the file says. Of one that explains too little, the
-    /// parameters alone.
+    /// The model to report: parameters that it does not need are back at the rig file's values. For an inadequate model, the
+    /// calibration alone.
     pub reported: Refit,
-    /// What takes the place of each of its effects just as well.
+    /// Alternatives to each of its effects.
     pub alternatives: Vec<Vec<Alternative>>,
-    /// Share of the excess that goes with each effect.
+    /// Share of the excess that each effect removes.
     pub shares: Vec<f64>,
-    /// All candidates as first screened, the best first.
-    pub screened: Vec<Screened>,
-    /// Those that were fitted, each as the last effect of its model: first alone, then beside what joined.
+    /// First screening of all candidates, best first.
+    pub(crate) screened: Vec<Screened>,
+    /// All fits, each with its candidate as the last effect.
     pub fitted: Vec<Refit>,
-    /// Loss that nothing may gain.
-    pub threshold: f64,
-    /// Screening's columns, for limits.
+    /// 99th percentile of the gain under the null distribution.
+    pub(crate) threshold: f64,
+    /// Columns of the screening.
     pub columns: Columns,
-    /// Loss with the parameters alone, as screening sees it.
-    pub null_loss: f64,
-    /// Smallest coordinate of each candidate's amplitude that would have been accepted; `None` where nothing is seen of it.
+    /// Null loss: parameters alone, linearised.
+    pub(crate) null_loss: f64,
+    /// Detection limit of each candidate as a coordinate of its amplitude; `None` where the record does not excite it.
     pub limits: Vec<Option<f64>>,
-    /// Whether the model leaves more than it may.
+    /// Whether the model is inadequate.
     pub inadequate: bool,
 }
 
-/// Names what is missing from a baseline.
+/// Selects the effects that are missing from the baseline.
 #[must_use]
 pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn FnMut(&str)) -> Found {
     let ones = [1.0; COUNT];
@@ -125,7 +125,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     let mut model = calibrated.fit.clone();
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
-    // Of each effect that joined, the fits of its round, the best first.
+    // For each accepted effect the fits of its round, best first.
     let mut rounds: Vec<Vec<Refit>> = Vec::new();
     for number in 0..MOST {
         let here = restarted.as_ref().unwrap_or(engine);
@@ -140,8 +140,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         let best_restarted = round.take_engine();
         let there = best_restarted.as_ref().unwrap_or(here);
         let Some(best) = round.fits.first_mut() else { break };
-        // What nothing gains is told by what the best model leaves: what it explains is no noise. What another effect still adds
-        // is none either: a model that may be needed beside another one joins, and is taken out at the end if it is not.
+        // The null distribution is drawn from the residual of the best model, since explained signal is not noise. No threshold
+        // applies here: an effect that turns out unnecessary is eliminated at the end.
         if !takes(&model, best) {
             break;
         }
@@ -192,8 +192,8 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     }
 }
 
-/// Takes what is told of a part of the records to all of them: its numbers, fitted there, with their errors there.
-pub fn on_all(engine: &Engine<'_>, found: &mut Found) {
+/// Refits the reported model on all of the records, where the search used a part of them.
+pub(crate) fn on_all(engine: &Engine<'_>, found: &mut Found) {
     let Some(rig) = rig_of(engine.rig(), &found.reported.placed, &found.reported.factors) else { return };
     let restarted = engine.is_linked().then(|| engine.with_starts_under(&rig));
     let needed = found.reported.factors.map(|factor| factor != 1.0);
@@ -202,13 +202,13 @@ pub fn on_all(engine: &Engine<'_>, found: &mut Found) {
     }
 }
 
-/// Sensitivities of the parameters at a model.
+/// Parameter sensitivities linearised at a model.
 fn around_of(engine: &Engine<'_>, model: &Refit) -> Around {
     let rig = rig_of(engine.rig(), &model.placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
     Around { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
 }
 
-/// Fits a model again with sensitivities taken at itself, until that no longer helps.
+/// Refits a model with sensitivities relinearised at itself until the loss converges.
 fn relinearise(engine: &Engine<'_>, model: &Refit) -> Refit {
     let mut best = model.clone();
     for _ in 0..RELINEARISATIONS {
@@ -224,16 +224,16 @@ fn relinearise(engine: &Engine<'_>, model: &Refit) -> Refit {
     best
 }
 
-/// Whether a model's last effect takes a good share of what the model before it leaves.
+/// Whether a model's last effect removes the required share of the loss before it.
 fn takes(before: &Refit, after: &Refit) -> bool {
     let gain = before.loss - after.loss;
     let share = if before.placed.is_empty() { TAKES_FIRST } else { TAKES };
     gain > (share * before.loss).max(WORTH_A_FIT)
 }
 
-/// Whether one of an effect's amplitudes is no smaller than a share of what occurs.
+/// Whether one of an effect's amplitudes is above the floor.
 #[must_use]
-pub fn is_large(placed: &Placed) -> bool {
+pub(crate) fn is_large(placed: &Placed) -> bool {
     let candidate = &placed.candidate;
     let keys = if DEFINED_BY_FIRST.contains(&candidate.sheet.name) { 1 } else { placed.coordinates.len() };
     (0..keys)
@@ -241,10 +241,10 @@ pub fn is_large(placed: &Placed) -> bool {
         .any(|key| placed.coordinates[key].abs() >= least_coordinate(candidate, key))
 }
 
-/// The smallest coordinate of an amplitude that counts as an effect.
+/// Amplitude floor of a key, as a coordinate.
 fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     let ends = candidate.sheet.keys[key].drawn.map(|number| candidate.coordinate(key, number));
-    // A range that holds the neutral value has no smallest change, and what the rig file has already may be off by little.
+    // A range that contains the neutral value has no smallest change, and an effect already in the rig file may be off by little.
     if candidate.is_present() || ends[0] * ends[1] < 0.0 {
         0.05
     } else {
@@ -252,8 +252,7 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     }
 }
 
-/// From which coordinate of its amplitude on a candidate would have been named: it must stand out of nothing, be worth a fit, and
-/// be no smaller than what counts as an effect.
+/// Detection limits: the amplitude at which a candidate would exceed the null threshold, the gain worth a fit and the floor.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
     let limits = null.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {
@@ -262,7 +261,7 @@ fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<
     limits.into_iter().zip(&columns.candidates).map(floored).collect()
 }
 
-/// Screens all candidates against what a model leaves, its own derivatives beside.
+/// Screens all candidates against a model's residual, with the derivatives of its effects as extra columns.
 fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<Screened>) {
     let around = around_of(engine, model);
     let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");

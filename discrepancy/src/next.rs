@@ -1,14 +1,14 @@
-//! What to measure next: the experiment that best separates what a record leaves ambiguous.
+//! Experiment design: the experiment that best discriminates between ambiguous explanations.
 //!
 //! ```text
 //!   explanations ──► each entry of the menu, rehearsed as if each were true ──► T of each pair
 //!                                                 ──► most pairs apart, then the largest least T
 //! ```
 //!
-//! T is the expected gain in chi2 of the true explanation over its rival with a refitted amplitude, against noise and against
-//! what no model explains (`next/divergence.rs`); 25, five standard deviations, are wanted. Repetitions add up against noise:
-//! an experiment that reaches 25 in [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`remedies`] says what
-//! would and the controller cannot do: tilting, uncoupling, a locked piston.
+//! T is the expected gain in chi2 of the true explanation over its rival with refitted amplitude, with noise and model error
+//! (`next/divergence.rs`); the target is 25, five standard deviations. Repetitions average noise: an experiment that reaches 25
+//! within [`MOST_REPETITIONS`] is proposed with so many. Where none does, [`remedies`] names a manual measurement: tilting,
+//! uncoupling, locking the piston.
 //!
 //! | file | holds |
 //! |---|---|
@@ -22,10 +22,10 @@
 //! 1965.
 
 pub mod closed_loop;
-pub mod divergence;
+pub(crate) mod divergence;
 pub mod menu;
-pub mod nuisance;
-pub mod remedies;
+pub(crate) mod nuisance;
+pub(crate) mod remedies;
 
 use crate::report::Next;
 use closed_loop::drive;
@@ -34,17 +34,17 @@ use menu::{Entry, MENU};
 use plant::RigParameters;
 use rayon::prelude::*;
 
-/// Divergence that is wanted: five standard deviations.
-pub const WANTED: f64 = 25.0;
-/// Most repetitions that are proposed.
-pub const MOST_REPETITIONS: u32 = 6;
+/// Target divergence: five standard deviations.
+pub(crate) const WANTED: f64 = 25.0;
+/// Maximum number of repetitions.
+pub(crate) const MOST_REPETITIONS: u32 = 6;
 
-/// A rig that explains the records.
+/// A model that explains the records.
 #[derive(Clone, Debug)]
 pub struct Explanation {
-    /// The baseline with what is missing, in fitted numbers.
+    /// The baseline with the missing effects, numbers fitted.
     pub rig: RigParameters,
-    /// What is missing, as `line-delay drive` or `parameter:mass`.
+    /// Its effects, as `line-delay drive` or `parameter:mass`.
     pub names: Vec<String>,
 }
 
@@ -54,23 +54,23 @@ impl Explanation {
     }
 }
 
-/// How an entry of the menu does.
+/// Divergences of an entry of the menu.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judged {
     /// The entry.
     pub name: &'static str,
-    /// Each ordered pair: the true one, its rival, how they differ.
+    /// For each ordered pair: the true explanation, its rival, their divergence.
     pub pairs: Vec<(usize, usize, Divergence)>,
 }
 
-/// What is proposed.
+/// The proposed experiment.
 #[derive(Clone, Debug)]
 pub struct Proposal {
     /// For the report; [`Next::experiment`] is the file's name.
     pub next: Next,
     /// Text of the experiment file, if one is proposed.
-    pub experiment_toml: Option<String>,
-    /// All entries of the menu, in its order; those that cannot be rehearsed are left out.
+    pub(crate) experiment_toml: Option<String>,
+    /// All entries of the menu that can be rehearsed, in its order.
     pub table: Vec<Judged>,
 }
 
@@ -81,7 +81,7 @@ impl Judged {
         self.pairs.iter().map(|pair| pair.2.in_repetitions(1)).fold(f64::INFINITY, f64::min)
     }
 
-    /// T of the pairs that reach what is wanted in [`MOST_REPETITIONS`], in so many.
+    /// T in `times` repetitions of the pairs that reach the target within [`MOST_REPETITIONS`].
     fn apart(&self, times: u32) -> impl Iterator<Item = f64> {
         let enough = self.pairs.iter().filter(|pair| pair.2.in_repetitions(MOST_REPETITIONS) >= WANTED);
         enough.map(move |pair| pair.2.in_repetitions(times))
@@ -94,11 +94,10 @@ impl Judged {
     }
 }
 
-/// The experiment that best separates these explanations, and what would where none does.
+/// Proposes the experiment that best discriminates between explanations, or a manual measurement where none does.
 ///
-/// `axes_measured` are drive and load. What is proposed is judged together with the records that it adds to, on the axes that all
-/// of them show: where that is one alone, entries that link the rods are left out, since it tells nothing of what the other does.
-/// `progress` gets a line for each entry of the menu.
+/// `axes_measured` are drive and load. The new record will be used together with the present ones, on their common axes. Where
+/// that is one axis, entries with linked rods are left out. `progress` gets a line for each entry of the menu.
 pub fn propose(
     baseline: &RigParameters,
     explanations: &[Explanation],
@@ -117,8 +116,7 @@ pub fn propose(
     Proposal { next, experiment_toml, table }
 }
 
-/// T of all ordered pairs in an entry; `None` when it cannot be rehearsed with one of the rigs, does not end with it or comes
-/// near an end of its stroke.
+/// T of all ordered pairs in an entry; `None` where a rehearsal fails, does not end or comes near an end of the stroke.
 #[must_use]
 pub fn judge(
     entry: &Entry,
@@ -146,7 +144,7 @@ pub fn judge(
 fn choose(explanations: &[Explanation], table: &[Judged]) -> (Next, Option<String>) {
     let titles: Vec<String> = explanations.iter().map(Explanation::title).collect();
     let alike = format!("{} explain the records alike", listed(&titles));
-    // Of equals the first of the menu.
+    // Ties go to the first of the menu.
     let better = |one: &Judged, other: &Judged| {
         let key = |judged: &Judged| (judged.apart(1).count(), judged.least_apart(1));
         key(one) > key(other)

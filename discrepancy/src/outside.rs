@@ -1,20 +1,18 @@
-//! What the catalogue does not have: the balance that disagrees most, what its unknown input depends on, its curve, a formula.
+//! Terms outside the catalogue: the worst balance, the variables of its unknown input, its curve, a formula.
 //!
 //! ```text
 //!   unknown inputs ──► balance ──► dependence on each variable ──► pairs ──► parsimony ──► curve ──► formula
 //! ```
 //!
-//! It is made from the disagreement with the model as it stands: after calibration, and with what was named already in the rig.
-//! Nothing is said of a balance whose windows are within their noise and follow no variable.
+//! The unknown inputs are those of the calibrated model. A balance within its noise that depends on no variable is not reported.
 //!
-//! Of variables that do nearly as well the simplest is told first; where two together do much better than any alone, as in a
-//! friction over position, both lead the list, and a surface over both stands beside the curve. A constant is told as the
-//! variable `constant`.
+//! Of variables with nearly the same R2 the simplest comes first. Where a pair has a much higher R2 than any one, as for a
+//! friction over position, the pair leads, with a surface beside the curve. A constant is the variable `constant`.
 //!
 //! Source: discrepancy-notes.md, 9 and Pipeline 8.
 
-pub mod dependence;
-pub mod formula;
+pub(crate) mod dependence;
+pub(crate) mod formula;
 
 use crate::locate::maps::{map, surface};
 use crate::locate::{TIME, UnknownSeries, VARIABLES};
@@ -22,33 +20,33 @@ use crate::report::{Curve, Dependence, Outside};
 pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
 
-/// Share of the best variable's R2 that is nearly as good.
+/// Share of the best R2 that is nearly as good.
 const NEARLY: f64 = 0.9;
-/// R2 by which a pair must do better than its better half.
+/// Least gain in R2 of a pair.
 const PAIR: f64 = 0.15;
-/// R2 below which a variable is no half of a pair: its bins only learned single windows.
+/// Least R2 of a variable of a pair; below, its bins overfit.
 const HALF: f64 = -0.1;
-/// R2 above which a variable goes before the constant: a law through 0 has a mean too.
+/// R2 above which a variable precedes the constant: a law through 0 has a mean too.
 const STRONG: f64 = 0.5;
-/// over_noise from which windows alone say that something is missing.
+/// over_noise that is significant by itself.
 const LIFTED: f64 = 1.15;
-/// Standard deviations of shifted R2 by which a variable must stand out where the windows alone say nothing: one in a billion for
-/// one test, for some hundred tests of tails that are not quite Gaussian.
+/// Significance of R2 against shifted series where over_noise is not significant: one in a billion for one test, for some hundred
+/// tests with non-Gaussian tails.
 const STANDS_OUT: f64 = 7.0;
-/// Standard errors from 0 of a mean that is something.
+/// Significance of a mean, in standard errors.
 const MEAN: f64 = 6.0;
-/// Windows that a balance needs.
+/// Fewest windows of a balance.
 const LEAST: usize = 100;
 
-/// A balance with what was found of it.
+/// A balance with its tests.
 struct Found<'a> {
     series: &'a UnknownSeries,
     sample: Sample,
-    /// For each variable R2, p value, and how far R2 stands out of shifted ones.
+    /// For each variable R2, p value, and the significance of R2 against shifted series.
     tests: Vec<(f64, f64, f64)>,
 }
 
-/// What is missing that the catalogue does not have; `None` where nothing is.
+/// Describes the term outside the catalogue; `None` where no balance is significant.
 pub fn outside(unknowns: &[UnknownSeries], progress: &mut dyn FnMut(&str)) -> Option<Outside> {
     let mut best: Option<(f64, Found<'_>)> = None;
     for series in unknowns.iter().filter(|series| series.points.len() >= LEAST) {
@@ -101,8 +99,7 @@ impl Found<'_> {
         }
     }
 
-    /// Variables that explain something, the strongest first, the simplest first among those nearly as strong; and the first two
-    /// of them where they do much better together.
+    /// Variables with positive R2, strongest first, simplest first among nearly equal ones; and the pair where it leads.
     fn order(&self) -> (Vec<usize>, Option<[usize; 2]>) {
         let r2 = |variable: &usize| self.tests[*variable].0;
         let mut order: Vec<usize> = (0..VARIABLES.len()).filter(|variable| r2(variable) > 0.0).collect();
@@ -119,7 +116,7 @@ impl Found<'_> {
         (order, Some(pair))
     }
 
-    /// The pair of variables that explains most, time left out: with another it is but a name of each window.
+    /// The pair of variables with the largest R2, without time, which with another would identify single windows.
     fn pair(&self) -> Option<([usize; 2], f64)> {
         let mut best: Option<([usize; 2], f64)> = None;
         for left in 0..VARIABLES.len() {
@@ -138,7 +135,7 @@ impl Found<'_> {
     }
 }
 
-/// A map with each bin drawn to its neighbours by their weights, and a band that is narrower for it.
+/// Smooths a map by weighted means of neighbouring bins, its band accordingly.
 fn smooth(mut curve: Curve, variable: &str) -> Curve {
     let weights: Vec<f64> = curve.band.iter().map(|band| band.powi(-2)).collect();
     let values = curve.value.clone();

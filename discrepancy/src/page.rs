@@ -31,45 +31,45 @@ use crate::report::{Report, Verdict};
 use bench::page_style::{document, escaped};
 
 /// Numbers of one signal over time, in the unit that stands beside them; what is missing is not finite.
-pub type Values = Vec<f64>;
+pub(crate) type Values = Vec<f64>;
 
 /// A signal of a record with both models, sample by sample.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trace {
+pub(crate) struct Trace {
     /// As a column of the record, `drive_position_m`.
-    pub signal: String,
+    pub(crate) signal: String,
     /// SI.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Times, s.
-    pub time_s: Values,
+    pub(crate) time_s: Values,
     /// What the record says.
-    pub measured: Values,
+    pub(crate) measured: Values,
     /// What the baseline says.
-    pub before: Values,
+    pub(crate) before: Values,
     /// What the extended model says; empty when there is none.
-    pub after: Values,
+    pub(crate) after: Values,
     /// Measured minus baseline, free of what the windows' start states take up.
-    pub before_residual: Values,
+    pub(crate) before_residual: Values,
     /// Measured minus extended model; empty when there is none.
-    pub after_residual: Values,
+    pub(crate) after_residual: Values,
     /// Standard deviation of the sensor's noise, its rounding included; 0 where nobody knows it.
-    pub noise: f64,
+    pub(crate) noise: f64,
 }
 
 /// What the pictures are made of.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pictures {
     /// The record.
-    pub record: String,
+    pub(crate) record: String,
     /// Whether nothing was fitted on it.
-    pub held_out: bool,
+    pub(crate) held_out: bool,
     /// Its signals.
-    pub traces: Vec<Trace>,
+    pub(crate) traces: Vec<Trace>,
 }
 
 /// The page.
 #[must_use]
-pub fn page(report: &Report, pictures: &Pictures) -> String {
+pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
     let bad = report.verdict == Verdict::BadData;
     let mut sections = vec![
         ("disagreement", "Measured against simulated", pictures::before(report, pictures)),

@@ -1,7 +1,7 @@
-//! Numbers of the baseline that may merely be wrong: carried along by every fit, and reported when one is off.
+//! Baseline parameters as nuisance parameters: fitted in every model, and reported when significantly off.
 //!
-//! Each is a factor on one or several keys of the rig file. Tolerances are what a builder knows of such a rig before it is
-//! measured; data soon outweighs them. Source: effects.md, Parameters that may merely be wrong.
+//! Each is a factor on one or several keys of the rig file, with a prior whose width is what a builder knows of such a rig.
+//! Source: effects.md, Parameters that may merely be wrong.
 
 use plant::RigParameters;
 use plant::parameters::{ParameterError, table};
@@ -11,9 +11,9 @@ use plant::parameters::{ParameterError, table};
 pub struct Parameter {
     /// Name in reports.
     pub name: &'static str,
-    /// Keys of the rig file that it scales, the one that is reported first.
+    /// Keys of the rig file that it scales, the reported one first.
     pub keys: &'static [&'static str],
-    /// Standard deviation of its factor, before anything is measured.
+    /// Prior standard deviation of its factor.
     pub tolerance: f64,
 }
 
@@ -53,7 +53,7 @@ pub const PARAMETERS: [Parameter; 9] = [
 const SLIDING: &str = "friction.sliding_force_n";
 const BREAK_AWAY: &str = "friction.break_away_force_n";
 
-/// How many there are.
+/// Number of parameters.
 pub const COUNT: usize = PARAMETERS.len();
 
 impl Parameter {
@@ -71,7 +71,7 @@ impl Parameter {
     /// Value and unit in a rig file, of the first axis that is measured; of tables 1, without a unit: their common factor.
     #[must_use]
     pub fn value(&self, rig: &RigParameters, measured: [bool; 2]) -> (f64, &'static str) {
-        // Of both axes together, only a factor says what both have in common.
+        // For both axes together the mass is a common factor.
         if self.name == "parameter:mass" && measured == [true; 2] {
             return (1.0, "");
         }
@@ -84,8 +84,8 @@ impl Parameter {
     }
 }
 
-/// The rig with all factors applied. A number that would leave its range is held at its end, and a break-away force that would be
-/// below the sliding one at that; numbers that the rest of the file contradicts stay what they are.
+/// The rig with all factors applied. Numbers are clamped to their ranges and the break-away force to the sliding force; numbers
+/// inconsistent with the rest of the file stay unchanged.
 #[must_use]
 pub fn with_factors(rig: &RigParameters, factors: &[f64; COUNT]) -> RigParameters {
     let mut changes: Vec<(&str, Vec<f64>)> = Vec::new();

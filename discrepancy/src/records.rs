@@ -23,9 +23,10 @@ mod foreign;
 mod measurement;
 mod table;
 
-pub use channel::{Channel, Quantity, Signal};
+pub(crate) use channel::Quantity;
+pub use channel::{Channel, Signal};
 pub use error::ReadError;
-pub use mapping::{Mapping, MappingError};
+pub use mapping::Mapping;
 
 use plant::Axis;
 use std::path::{Path, PathBuf};
@@ -227,7 +228,7 @@ impl Record {
 
     /// Whether the record has any channel of the axis.
     #[must_use]
-    pub fn has_axis(&self, axis: Axis) -> bool {
+    pub(crate) fn has_axis(&self, axis: Axis) -> bool {
         self.channels().any(|channel| matches!(channel, Channel::Of(channel_axis, _) if channel_axis == axis))
     }
 

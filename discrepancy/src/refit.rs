@@ -1,12 +1,12 @@
-//! Fits effects in the simulator itself: their numbers by Gauss-Newton, the parameters that may be wrong linearly beside them.
+//! Fits effects in the simulator: their coordinates by Gauss-Newton, the baseline parameters linearly.
 //!
 //! ```text
 //!   e(z) = readings - simulation with the effects at z       columns: N (parameters), d simulation / d z_i
 //!   fit of the columns to e(z) -> step of z, shorter until the loss falls; ridges hold how far all of it is from the file
 //! ```
 //!
-//! Derivatives are differences over a twentieth of the coordinate, two hundredths of its unit at least, never exact ones: through
-//! stick and slip those of a single trajectory say nothing. Source: discrepancy-notes.md, pipeline 6.
+//! Derivatives are finite differences over a twentieth of the coordinate and at least 0.02, since exact derivatives through stick
+//! and slip are useless. Source: discrepancy-notes.md, pipeline 6.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
@@ -15,27 +15,27 @@ use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use plant::RigParameters;
 
-/// Change of a coordinate by which derivatives are taken, at least and in proportion.
+/// Smallest step of finite differences, and its share of the coordinate.
 const CHANGE: f64 = 0.02;
 const CHANGE_SHARE: f64 = 0.05;
-/// Steps at most, how often one is made shorter, and to what share of it.
+/// Maximum steps, maximum backtracking steps and their factor.
 const STEPS: usize = 7;
 const SHORTENINGS: usize = 3;
 const SHORTER: f64 = 0.4;
-/// Fall of the loss below which a fit has settled.
+/// Fall of the loss below which a fit has converged.
 const CONVERGED: f64 = 0.3;
-/// Standard deviations of coordinates before anything is measured: amplitudes, shapes.
+/// Prior standard deviations of coordinates: amplitudes, shapes.
 const AMPLITUDE_TOLERANCE: f64 = 3.0;
 const SHAPE_TOLERANCE: f64 = 0.7;
-/// By how much a parameter may be off at most: one that is off by more is another rig.
+/// Bound of the relative deviation of a parameter.
 pub(crate) const MOST_OFF: f64 = 0.3;
-/// What each parameter that is off costs, as a number of an effect does: a sensor that shows four per cent too little is a better
-/// explanation than all masses, frictions and areas off by as much.
+/// Penalty for each parameter off its file value. A sensor that reads four per cent low is a better explanation than all masses,
+/// frictions and areas off by as much.
 const PARAMETER_COSTS: f64 = NUMBER_COSTS;
-/// From where on a parameter counts as off.
+/// Relative deviation at which half of the penalty is due.
 const COUNTS_AS_OFF: f64 = 0.005;
 
-/// One effect at some coordinates.
+/// An effect at given coordinates.
 #[derive(Clone, Debug)]
 pub struct Placed {
     /// Which.
@@ -44,7 +44,7 @@ pub struct Placed {
     pub coordinates: Vec<f64>,
 }
 
-/// Some effects and the parameters beside them, fitted.
+/// A fitted model: effects and parameters.
 #[derive(Clone, Debug)]
 pub struct Refit {
     /// The effects.
@@ -53,45 +53,49 @@ pub struct Refit {
     pub factors: [f64; COUNT],
     /// The loss, priors and a penalty for each number of an effect and each parameter that is off included.
     pub loss: f64,
-    /// Squares of each window.
-    pub squares: Vec<f64>,
+    /// Squared residuals of each window.
+    pub(crate) squares: Vec<f64>,
     /// Standard errors of all coordinates, in the order of the effects and their keys, then of the factors; clustered by windows.
     pub errors: Vec<f64>,
     /// How many times larger the clustered variance is than the plain one, for the first amplitude; at least 1.
-    pub inflation: f64,
+    pub(crate) inflation: f64,
 }
 
-/// Sensitivities around a point, and the factors that they were taken at.
+/// Parameter sensitivities and the point of linearisation.
 #[derive(Clone, Debug)]
 pub struct Around {
-    /// Columns of the parameters.
+    /// Sensitivities to the parameters.
     pub columns: Vec<Vec<f64>>,
-    /// Factors at which they were taken.
+    /// Factors at that point.
     pub factors: [f64; COUNT],
 }
 
 impl Around {
-    /// How far each parameter is from what is believed of it.
+    /// Deviations of the parameters from the prior means.
     #[must_use]
     pub fn off(&self) -> Vec<f64> {
         self.factors.iter().map(|factor| factor - 1.0).collect()
     }
 }
 
-/// The rig with some effects and factors; `None` where the numbers do not fit together.
+/// The rig with effects and factors; `None` where the numbers are inconsistent.
 #[must_use]
-pub fn rig_of(rig: &RigParameters, placed: &[Placed], factors: &[f64; COUNT]) -> Option<RigParameters> {
+pub(crate) fn rig_of(
+    rig: &RigParameters,
+    placed: &[Placed],
+    factors: &[f64; COUNT],
+) -> Option<RigParameters> {
     placed.iter().try_fold(with_factors(rig, factors), |rig, placed| {
         placed.candidate.rig(&rig, &placed.coordinates).ok()
     })
 }
 
-/// Ridges of the parameters, for how far their factors are from 1.
+/// Prior precisions of the parameter factors.
 pub(crate) fn parameter_ridges() -> Vec<f64> {
     PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect()
 }
 
-/// How many parameters are off, those that are so by little counted in part.
+/// Number of parameters off their file values, small deviations counted in part.
 fn parameters_off(factors: &[f64; COUNT]) -> f64 {
     factors
         .iter()
@@ -100,18 +104,18 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
         .sum()
 }
 
-/// What so many numbers of effects and the parameters that are off cost.
+/// Penalty of a model.
 pub(crate) fn costs(numbers: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
     penalty * numbers as f64 + PARAMETER_COSTS * parameters_off(factors)
 }
 
-/// Ridge of a coordinate.
+/// Prior precision of a coordinate.
 pub(crate) fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
     let tolerance = if candidate.is_shape(key) { SHAPE_TOLERANCE } else { AMPLITUDE_TOLERANCE };
     tolerance.powi(-2)
 }
 
-/// Which coordinates of the effects are moved: all of them, place in `placed` and key.
+/// All coordinates of the effects: place in `placed`, and key.
 fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
     placed
         .iter()
@@ -120,9 +124,9 @@ fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// The loss of some effects where they are, the parameters fitted beside; infinite where the rig cannot have them.
+/// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
 #[must_use]
-pub fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
+pub(crate) fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
     let Some(rig) = rig_of(engine.rig(), placed, &around.factors) else { return f64::INFINITY };
     let residual = engine.residual(&engine.simulate_coarsely(&rig));
     let columns: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).collect();
@@ -130,7 +134,7 @@ pub fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
     products.fit_from(&(0..COUNT).collect::<Vec<_>>(), &parameter_ridges(), &around.off()).loss
 }
 
-/// A point of a fit: where, and what is left there.
+/// An iterate of a fit.
 struct Point {
     placed: Vec<Placed>,
     simulated: Vec<f64>,
@@ -138,17 +142,17 @@ struct Point {
     fit: Fit,
 }
 
-/// Fits some effects from a start. `penalty` is what each number that is moved costs.
+/// Fits effects from a start; `penalty` is due for each coordinate.
 ///
-/// `None` when the start is none that the rig can have.
+/// `None` where no rig can have the start.
 #[must_use]
 pub fn refit(engine: &Engine<'_>, around: &Around, start: &[Placed], penalty: f64) -> Option<Refit> {
     refit_steps(engine, around, start, penalty, STEPS)
 }
 
-/// The same with another number of steps at most; 0 only tells how good the start is.
+/// The same with another maximum of steps; 0 evaluates the start.
 #[must_use]
-pub fn refit_steps(
+pub(crate) fn refit_steps(
     engine: &Engine<'_>,
     around: &Around,
     start: &[Placed],
@@ -226,7 +230,7 @@ pub fn refit_steps(
         }
     }
     let (products, all_ridges, chosen) = last?;
-    // At the point itself: parameters as fitted there, coordinates where they are.
+    // At the final iterate: parameters as fitted, coordinates unchanged.
     let mut at_point = point.fit.clone();
     at_point.coefficients.extend(std::iter::repeat_n(0.0, moved.len()));
     let covariance = products.covariance(&chosen, &at_point, &all_ridges);
@@ -249,8 +253,8 @@ pub fn refit_steps(
     Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
 }
 
-/// What each coordinate of a model changes, per unit of it, in the order of the effects and their keys; `simulated` is what the
-/// model shows. `None` where the rig cannot have a neighbour of it.
+/// Sensitivities to each coordinate of a model, in the order of effects and keys; `simulated` are its readings. `None` where a
+/// neighbouring rig does not exist.
 pub(crate) fn coordinate_columns(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],
@@ -260,7 +264,7 @@ pub(crate) fn coordinate_columns(
     moved(placed).iter().map(|(at, key)| derivative(engine, factors, placed, simulated, *at, *key)).collect()
 }
 
-/// What a coordinate changes, per unit of it; towards the inside where the range ends.
+/// Sensitivity to a coordinate, by a one-sided difference that stays inside the range.
 pub(crate) fn derivative(
     engine: &Engine<'_>,
     factors: &[f64; COUNT],

@@ -1,7 +1,7 @@
-//! `report.json`: what the workflow found, as data. Schema: `discrepancy/docs/report.md`.
+//! `report.json`: results of the workflow. Schema: `discrepancy/docs/report.md`.
 //!
-//! Every list has an order that follows from the records alone, and nothing in it depends on time, threads or machine:
-//! two runs write the same bytes. Only `gap` and `verification` know the held-out record.
+//! Lists have a deterministic order, and nothing depends on time, threads or machine: two runs write the same bytes. Only `gap`
+//! and `verification` know the held-out record.
 
 use plant::effects::sheet::{Part, Place};
 use serde::{Deserialize, Serialize};
@@ -10,25 +10,25 @@ use std::collections::BTreeMap;
 /// Version of the schema; a new optional field does not change it.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// What the workflow says in the end.
+/// Verdict of the workflow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Nothing is missing above the detection limits.
+    /// No effect is missing above the detection limits.
     NothingMissing,
-    /// Only numbers of the baseline are off.
+    /// Only baseline parameters are off.
     ParametersOnly,
-    /// Effects are missing, and these are they.
+    /// Effects are missing and named.
     Named,
-    /// Effects are missing, and several explain the records alike.
+    /// Effects are missing, and several explain the records equally well.
     Ambiguous,
-    /// Something is missing that the catalogue does not have.
+    /// A term outside the catalogue is missing.
     OutsideCatalogue,
     /// A record cannot be used.
     BadData,
 }
 
-/// All that the workflow found.
+/// Results of the workflow.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// [`SCHEMA_VERSION`].
@@ -41,27 +41,27 @@ pub struct Report {
     pub inputs: InputFiles,
     /// Missing effects, the best first.
     pub named: Vec<NamedEffect>,
-    /// Numbers of the baseline that were off, and no others.
+    /// Baseline parameters that were significantly off.
     pub parameters: Vec<Quantity>,
-    /// Numbers that the model moved along by too little to call them off; the extended rig file has them.
-    pub carried: Vec<Quantity>,
-    /// What is missing that the catalogue does not have.
+    /// Parameters that the model moved by an insignificant amount; the extended rig file has them.
+    pub(crate) carried: Vec<Quantity>,
+    /// The missing term outside the catalogue.
     pub outside: Option<Outside>,
     /// Per signal of the held-out record, as `drive_position_m`; empty without `--test`.
     pub gap: BTreeMap<String, Gap>,
-    /// More of the held-out record; null without `--test`.
+    /// Further figures of the held-out record; null without `--test`.
     pub verification: Option<Verification>,
     /// All candidates, the best first.
     pub candidates: Vec<Candidate>,
     /// Effects that the training records do not excite.
-    pub not_excited: Vec<EffectPlace>,
+    pub(crate) not_excited: Vec<EffectPlace>,
     /// Smallest amplitude of each other effect that would have been named.
-    pub detection_limits: Vec<DetectionLimit>,
+    pub(crate) detection_limits: Vec<DetectionLimit>,
     /// Where model and records disagree.
     pub location: Option<Location>,
     /// Fitness of the records.
     pub checks: Vec<RecordCheck>,
-    /// The experiment that would tell what is ambiguous apart, or why there is none.
+    /// The experiment that resolves the ambiguity, or why there is none.
     pub next: Option<Next>,
 }
 
@@ -75,7 +75,7 @@ pub struct InputFiles {
     /// Axes that all of them show, drive or load; empty for a model of one balance and for records that cannot be used.
     #[serde(default)]
     pub axes: Vec<String>,
-    /// Share of them that was searched; the numbers of what was found are those of all.
+    /// Share of them that was searched; the final fit uses all.
     #[serde(default = "all")]
     pub searched_share: f64,
 }
@@ -120,11 +120,11 @@ pub struct Quantity {
     pub unit: String,
     /// One standard error; null when the records do not bound the number.
     pub standard_error: Option<f64>,
-    /// What the rig file said, where it says something.
+    /// Value in the rig file; null where it has none.
     pub before: Option<f64>,
 }
 
-/// A missing effect with what is known of it.
+/// A missing effect with its numbers.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct NamedEffect {
     /// Name in the catalogue.
@@ -134,15 +134,15 @@ pub struct NamedEffect {
     pub place: Where,
     /// Its numbers, in the order of its sheet.
     pub parameters: Vec<Quantity>,
-    /// Share of the excess of the training records that goes when it is added.
+    /// Share of the excess of the training records that it removes.
     pub share_explained: f64,
-    /// What explains these records as well.
+    /// Effects that explain these records as well.
     pub alternatives: Vec<NamedEffect>,
 }
 
 /// An effect at a place.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EffectPlace {
+pub(crate) struct EffectPlace {
     /// Name in the catalogue.
     pub effect: String,
     /// Where.
@@ -150,7 +150,7 @@ pub struct EffectPlace {
     pub place: Where,
 }
 
-/// How a candidate did.
+/// Result of a candidate.
 #[derive(Clone, Debug, Serialize)]
 pub struct Candidate {
     /// Name in the catalogue.
@@ -158,21 +158,21 @@ pub struct Candidate {
     /// Where.
     #[serde(rename = "where")]
     pub place: Where,
-    /// Gain of the linear screening over the calibrated threshold of nothing: above 1 it stands out.
-    pub score: f64,
-    /// Share of the excess that goes with it alone, after its refit in the simulator; null when it was not refitted.
+    /// Screened gain over the null threshold; above 1 it is significant.
+    pub(crate) score: f64,
+    /// Share of the excess that it removes alone, after its refit; null when it was not refitted.
     pub share_explained: Option<f64>,
     /// Its amplitude, refitted or linear, in the unit of its sheet.
     pub amplitude: f64,
     /// Unit of the amplitude.
     pub unit: String,
-    /// What became of it, in words.
+    /// Outcome, in words.
     pub fate: String,
 }
 
-/// The smallest amplitude that these records would have shown.
+/// Detection limit of an effect.
 #[derive(Clone, Debug, Serialize)]
-pub struct DetectionLimit {
+pub(crate) struct DetectionLimit {
     /// Name in the catalogue.
     pub effect: String,
     /// Where.
@@ -191,12 +191,12 @@ pub struct DetectionLimit {
 pub struct Outside {
     /// As in [`BalanceBar::balance`].
     pub balance: String,
-    /// What it depends on, the strongest first, with the significance of the dependence.
+    /// Variables that it depends on, strongest first.
     pub variables: Vec<Dependence>,
     /// The missing term over its first variable.
     pub curve: Option<Curve>,
-    /// The same over its first two, where these tell much more together than either alone.
-    pub surface: Option<Surface>,
+    /// The same over its first two, where their joint R2 is much larger.
+    pub(crate) surface: Option<Surface>,
     /// A short formula, if one fits.
     pub formula: Option<String>,
     /// Whether the extended rig file has it, as the tables.
@@ -217,7 +217,7 @@ pub struct TableTerm {
     /// x, v, |v|, sign(v), u, p_a, p_b, p_a-p_b or x sign(v).
     pub variable: String,
     /// Its unit.
-    pub variable_unit: String,
+    pub(crate) variable_unit: String,
     /// Unit of the term, N or Nl/min.
     pub unit: String,
     /// Points, growing.
@@ -232,9 +232,9 @@ pub struct Dependence {
     /// x, v, |v|, sign(v), p_a, p_b, p_a-p_b, u, du/dt, F, t, dp/dt, or constant for a term that is always there.
     pub variable: String,
     /// Share of the variance explained on folds it was not fitted on.
-    pub r2: f64,
-    /// One and the circular shifts that reached this much, over one and all 200.
-    pub p_value: f64,
+    pub(crate) r2: f64,
+    /// Permutation p value over 200 circular shifts: (1 + shifts that reach R2) / 201.
+    pub(crate) p_value: f64,
 }
 
 /// A smooth curve with a band.
@@ -243,7 +243,7 @@ pub struct Curve {
     /// The variable, and its unit.
     pub variable: String,
     /// Unit of the variable.
-    pub variable_unit: String,
+    pub(crate) variable_unit: String,
     /// Unit of the term.
     pub unit: String,
     /// Values of the variable.
@@ -256,11 +256,11 @@ pub struct Curve {
 
 /// A surface over two variables with a band; null where too few points are.
 #[derive(Clone, Debug, Serialize)]
-pub struct Surface {
+pub(crate) struct Surface {
     /// The variables.
     pub variables: [String; 2],
     /// Their units.
-    pub variable_units: [String; 2],
+    pub(crate) variable_units: [String; 2],
     /// Unit of the term.
     pub unit: String,
     /// Values of the first variable, and of the second.
@@ -280,35 +280,35 @@ pub struct Gap {
     pub after: f64,
     /// Noise of the sensor alone.
     pub floor: f64,
-    /// Share of the excess power over the floor that went, 1 - (after^2 - floor^2) / (before^2 - floor^2), at most 1; null
-    /// when there was too little to tell.
+    /// Closed share of the excess power over the floor, 1 - (after^2 - floor^2) / (before^2 - floor^2), at most 1; null when the
+    /// excess is insignificant.
     pub closed: Option<f64>,
 }
 
-/// What the held-out record says of both models, frozen.
+/// Figures of both models on the held-out record.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verification {
     /// The record.
     pub record: String,
     /// Windowed chi2 per degree of freedom of the baseline.
-    pub chi2_before: f64,
+    pub(crate) chi2_before: f64,
     /// Of the extended model.
-    pub chi2_after: f64,
-    /// 95 % range of the same for nothing missing.
-    pub chi2_null: [f64; 2],
+    pub(crate) chi2_after: f64,
+    /// 95 % null range of the same.
+    pub(crate) chi2_null: [f64; 2],
     /// Per signal: normalised rms error of a free run, in percent of the signal's range.
-    pub free_run_nrmse_percent: BTreeMap<String, BeforeAfter>,
+    pub(crate) free_run_nrmse_percent: BTreeMap<String, BeforeAfter>,
     /// Per signal: lag-1 autocorrelation of the windowed residuals.
-    pub whiteness: BTreeMap<String, BeforeAfter>,
-    /// What the free run did that a rig cannot, in words; empty when nothing.
-    pub physical: Vec<String>,
+    pub(crate) whiteness: BTreeMap<String, BeforeAfter>,
+    /// Unphysical events of the free run, in words.
+    pub(crate) physical: Vec<String>,
     /// Whether the extended model is better by more than three clustered standard errors and no signal worse by more than 2 %.
     pub confirmed: bool,
 }
 
-/// A figure of both models.
+/// A figure before and after.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct BeforeAfter {
+pub(crate) struct BeforeAfter {
     /// Baseline.
     pub before: f64,
     /// Extended model.
@@ -321,9 +321,9 @@ pub struct Location {
     /// One for each balance.
     pub balances: Vec<BalanceBar>,
     /// One for each balance and regime.
-    pub regimes: Vec<RegimeCell>,
+    pub(crate) regimes: Vec<RegimeCell>,
     /// Unknown inputs over their strongest variables.
-    pub maps: Vec<Curve>,
+    pub(crate) maps: Vec<Curve>,
     /// Series of the unknown inputs, thinned out for a picture.
     pub series: Vec<UnknownInput>,
     /// Balances that move together as a fault of a sensor would move them, in words; null when none do.
@@ -335,7 +335,7 @@ pub struct Location {
 pub struct BalanceBar {
     /// `drive.flow-a`, `drive.flow-b`, `drive.force`, `drive.force-sensor`, the load's, `linkage`.
     pub balance: String,
-    /// rms of the unknown input over its propagated noise; 1 is nothing.
+    /// rms of the unknown input over its propagated noise; 1 for a closed balance.
     pub over_noise: f64,
     /// rms of the unknown input.
     pub rms: f64,
@@ -345,11 +345,11 @@ pub struct BalanceBar {
 
 /// The disagreement of a balance in a regime.
 #[derive(Clone, Debug, Serialize)]
-pub struct RegimeCell {
+pub(crate) struct RegimeCell {
     /// As in [`BalanceBar::balance`].
     pub balance: String,
     /// hold, onset, motion-out, motion-in, near-ends, valve-edge.
-    pub regime: String,
+    pub(crate) regime: String,
     /// Windows of this regime.
     pub windows: usize,
     /// As in [`BalanceBar::over_noise`].
@@ -371,7 +371,7 @@ pub struct UnknownInput {
     pub noise: f64,
 }
 
-/// Whether a record can be used, and what was noticed.
+/// Check of a record.
 #[derive(Clone, Debug, Serialize)]
 pub struct RecordCheck {
     /// The file.
@@ -382,13 +382,13 @@ pub struct RecordCheck {
     pub rows: usize,
     /// Last time minus first, s.
     pub length_s: f64,
-    /// What was noticed.
+    /// Findings.
     pub findings: Vec<Finding>,
     /// Noise and quantum of each channel, estimated from the record.
     pub channels: BTreeMap<String, ChannelCheck>,
 }
 
-/// Something noticed in a record.
+/// A finding of the check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// gap, repeated-time, jumping-time, clipped, stuck, wrong-unit, swapped-pressures, force-sign, lost-samples, …
@@ -397,16 +397,16 @@ pub struct Finding {
     pub column: Option<String>,
     /// First line of the file that it is about.
     pub line: Option<u64>,
-    /// Whether the record cannot be used for it; else what it says is borne, or left out.
+    /// Whether it makes the record unusable; otherwise it is tolerated, or the samples are left out.
     pub fatal: bool,
     /// What, where, and what to do.
     pub text: String,
 }
 
-/// What a channel is made of.
+/// Noise and quantum of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ChannelCheck {
-    /// Standard deviation of its noise, in SI; null when it cannot be told.
+    /// Standard deviation of its noise, in SI; null when unknown.
     pub noise: Option<f64>,
     /// Smallest step between its values, in SI; null when it has none.
     pub quantum: Option<f64>,
@@ -416,7 +416,7 @@ pub struct ChannelCheck {
 
 /// Decimals of a value that is rounded to the second digit of its standard error.
 #[must_use]
-pub fn decimals(standard_error: f64) -> usize {
+pub(crate) fn decimals(standard_error: f64) -> usize {
     (1.0 - standard_error.log10().floor()).clamp(0.0, 12.0) as usize
 }
 
@@ -425,10 +425,10 @@ pub fn decimals(standard_error: f64) -> usize {
 pub struct Next {
     /// Why.
     pub reason: String,
-    /// Experiment that can be run, its file beside the report; null when none on this rig tells them apart.
+    /// File of the experiment beside the report; null when none discriminates.
     pub experiment: Option<String>,
-    /// Expected divergence of what is ambiguous, in squared standard deviations; 25 is wanted.
-    pub divergence: Option<f64>,
-    /// What would tell them apart where no experiment of this rig does.
+    /// Expected divergence of the alternatives, in squared standard deviations; the target is 25.
+    pub(crate) divergence: Option<f64>,
+    /// Manual measurement that resolves the ambiguity where no experiment does.
     pub otherwise: Option<String>,
 }

@@ -1,7 +1,7 @@
-//! Screening: how much each candidate would explain, from simulations at its probes, and where its fit should start.
+//! Linear screening: gain and starting point of each candidate, from one simulation at each of its probes.
 //!
-//! Each probe is one column; with the parameters' columns beside it, its coefficient says how strong the effect would be if its
-//! traces grew in proportion to it. They do not quite: a probe is also judged as it is, and the fit in the simulator decides.
+//! Each probe is one column. Fitted jointly with the parameters' columns, its coefficient is the amplitude of an effect whose
+//! traces were proportional to it. Screening only ranks; the refit decides.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
@@ -10,19 +10,19 @@ use crate::parameters::COUNT;
 use crate::refit::{Around, Placed, parameter_ridges};
 use rayon::prelude::*;
 
-/// All columns of a screening.
+/// Columns of a screening.
 #[derive(Debug)]
 pub struct Columns {
     /// The candidates.
     pub candidates: Vec<Candidate>,
-    /// Of each candidate its probes, and their columns' places.
-    pub probes: Vec<Vec<(Vec<f64>, usize)>>,
+    /// Probes of each candidate, with the indices of their columns.
+    pub(crate) probes: Vec<Vec<(Vec<f64>, usize)>>,
     columns: Vec<Vec<f64>>,
 }
 
-/// What screening found of a candidate.
+/// Screening result of a candidate.
 #[derive(Clone, Debug)]
-pub struct Screened {
+pub(crate) struct Screened {
     /// Place in [`Columns::candidates`].
     pub at: usize,
     /// Loss with it.
@@ -65,9 +65,10 @@ impl Columns {
         &self.columns[place]
     }
 
-    /// Screens all candidates against a residual; `beside` are columns that are fitted with each (effects already in the model).
+    /// Null loss, and the screening of all candidates against a residual; `beside` are columns fitted with each (effects already
+    /// in the model).
     #[must_use]
-    pub fn screen(
+    pub(crate) fn screen(
         &self,
         engine: &Engine<'_>,
         around: &Around,
@@ -100,7 +101,7 @@ impl Columns {
     ) -> Option<Screened> {
         let always = basic.len();
         let candidate = self.candidates[at];
-        // Probes of the amplitude lead, each alone; those of further keys that go over into the baseline join.
+        // Probes of the amplitude enter one at a time; probes of further keys with a neutral value join.
         let (leading, joining): (Vec<_>, Vec<_>) =
             self.probes[at].iter().partition(|(probe, _)| probe[0] != 0.0);
         let mut best: Option<(f64, Vec<f64>)> = None;
@@ -119,7 +120,7 @@ impl Columns {
                 let [least, most] = candidate.range(0);
                 let coefficient = fit.coefficients[always];
                 let amplitude = coefficient * probe[0];
-                // On the wrong side of the baseline it explains nothing.
+                // An amplitude beyond the neutral value is no explanation.
                 let outside = amplitude <= least.max(-10.0) || amplitude >= most.min(10.0);
                 if outside && amplitude.signum() != probe[0].signum() {
                     continue;

@@ -1,18 +1,17 @@
-//! Where a rig's pistons were, by readings that its sensors may have changed.
+//! Inverts the sensor models of a rig: from readings to states.
 //!
 //! ```text
 //!   y(t) = g x(t - d) + o     =>     x(t) = (y(t + d) - o) / g          a lag of tau delays smooth motion by tau
 //! ```
 //!
-//! Windows start where the record says that the pistons were. When the rig under simulation has a sensor that lies, it was
-//! somewhere else: the start is moved by what is known of the sensor, so that the readings, and not the truth, begin at the
-//! record's. Source: effects.md, Sensors.
+//! Windows start from recorded readings. If the simulated rig has a sensor with delay, gain or offset, the true state differs
+//! from the reading; the start state is corrected by the inverse of the sensor. Source: effects.md, Sensors.
 
 use crate::gridded_record::{GriddedRecord, Point};
 use plant::effects::sheet::{Element, Part};
 use plant::{Axis, PERIOD_S, RigParameters};
 
-/// What stands between a quantity and its reading.
+/// Sensor model of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reading {
     delay_s: f64,
@@ -28,18 +27,18 @@ impl Reading {
     }
 }
 
-/// The readings of position and both pressures of each axis.
+/// Inverse of the position and pressure sensors of each axis.
 #[derive(Clone, Copy, Debug)]
-pub struct SensorInverse {
+pub(crate) struct SensorInverse {
     axes: [[Reading; 3]; 2],
     stroke_m: f64,
     is_true: bool,
 }
 
 impl SensorInverse {
-    /// What the sensors of a rig do.
+    /// Takes the sensor models from the effects of a rig.
     #[must_use]
-    pub fn of(rig: &RigParameters) -> Self {
+    pub(crate) fn of(rig: &RigParameters) -> Self {
         let mut axes = [[Reading::TRUE; 3]; 2];
         for effect in rig.effects() {
             let axis = match effect.place.part {
@@ -71,9 +70,9 @@ impl SensorInverse {
         SensorInverse { axes, stroke_m: rig.cylinder().stroke_m, is_true }
     }
 
-    /// The points from which the readings begin as the record's at a period; `own` are the record's points there, made better.
+    /// True states whose readings are those of the record at a period; `starts` are its estimated points there.
     #[must_use]
-    pub fn points(&self, record: &GriddedRecord, period: usize, starts: &[Point; 2]) -> [Point; 2] {
+    pub(crate) fn points(&self, record: &GriddedRecord, period: usize, starts: &[Point; 2]) -> [Point; 2] {
         let mut points = *starts;
         if self.is_true {
             return points;
@@ -101,13 +100,13 @@ impl SensorInverse {
     }
 }
 
-/// A number of the record's points some time after a period.
+/// A number of the points at some time after a period, interpolated.
 fn at(record: &GriddedRecord, axis: usize, period: usize, delay_s: f64, of: &dyn Fn(&Point) -> f64) -> f64 {
     let place = (period as f64 + delay_s / PERIOD_S).min((record.len() - 1) as f64);
     let (before, share) = (place.floor() as usize, place.fract());
     let after = (before + 1).min(record.len() - 1);
     let [before, after] = [before, after].map(|place| of(&record.points[place][axis]));
-    // Between rest and motion there is no half-way.
+    // Rest and motion are not interpolated.
     if share == 0.0 || before == 0.0 || after == 0.0 {
         return if share < 0.5 { before } else { after };
     }

@@ -26,7 +26,7 @@
 mod extended;
 mod filter;
 mod fit;
-pub mod model;
+pub(crate) mod model;
 mod pictures;
 mod record_checks;
 mod report;
@@ -35,8 +35,7 @@ mod select;
 mod terms;
 
 pub use extended::extended_model_text;
-pub use filter::LowPass;
-pub use model::{Kind, Model};
+pub(crate) use model::Model;
 
 use crate::check::FEWEST_ROWS;
 use crate::page::Pictures;
@@ -169,7 +168,7 @@ pub enum BalanceError {
 
 /// Whether a text is a model file: TOML with a `kind` at its top. A rig file has none.
 #[must_use]
-pub fn is_model_file(text: &str) -> bool {
+pub(crate) fn is_model_file(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("kind"))
 }
 

@@ -1,18 +1,16 @@
-//! What the catalogue does not have, added to the rig as a table: its points fitted in the simulator, parameters beside them.
+//! Terms outside the catalogue as tables of the rig file: points and parameters fitted in the simulator.
 //!
 //! ```text
 //!   balance of ──► each variable that the plant knows, screened ──► three fitted ──► the best: more points, while they pay
 //!   `outside`      (of a flow: into a, into b, into both)           from the curve   └──► second variable?
 //! ```
 //!
-//! The curve of an unknown input is no table yet: it is estimated beside a prior that draws it to 0, in windows of 20 ms that
-//! know nothing of the next ones, and beside parameters that have taken up a part of it. So it is only where the fit begins.
-//! What is minimised is the loss of naming, over the same windows; each point costs as a number of an effect does. A table that
-//! leaves the training windows no better is not added, nor is one that only learned them: each fifth of the windows is judged
-//! by the straight lines of a fit without it.
+//! The curve of an unknown input is shrunk by its prior, comes from independent windows of 20 ms, and parameters have absorbed a
+//! part of it. It only starts the fit. The loss, the windows and the penalty for each number are those of naming. A table is not
+//! added if it does not lower the training loss, or if the five-fold cross-validated loss of the linearised model does not fall.
 //!
-//! The parameters that were off alone are fitted along, since what a table looks for must not be put on them. In the end all go
-//! back to what the file says, and only those that the tables need join again: alone, they took up a part of what was missing.
+//! The parameters that were off in the calibration are fitted jointly. In the end all return to the rig file's values, and
+//! forward selection readmits those that the tables need.
 //!
 //! Source: discrepancy-notes.md, Pipeline 8; [`crate::refit`] for the fit.
 
@@ -30,39 +28,38 @@ use fit::{Beside, Lines, Model, Point, Tied};
 use plant::effects::tabulated::{self, Balance, Tabulated, Variable, interpolated};
 use plant::{Axis, RigParameters};
 
-/// What is fitted of all that is screened: a variable that explains an unknown input best need not predict the windows best.
+/// Number of screened tables that are fitted.
 const TRIED: usize = 3;
-/// Points of a first table: a ripple is lost between few, and a law over the position and the direction has two sides.
+/// Points of a first table; a law over position and direction has two branches.
 const POINTS: usize = 8;
 const DIRECTED_POINTS: usize = 32;
-/// By how many times finer ones have more.
+/// Refinement factors.
 const FINER: [usize; 2] = [2, 4];
-/// Most points of a table that a rig can have.
+/// Maximum number of points of a table.
 const MOST_POINTS: usize = tabulated::POINTS[1];
-/// Steps of a first fit, and of one that counts.
+/// Steps of a first fit, and of a final one.
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
-/// Share of the loss that a table must take to be added, and one over a second variable of what the first one left.
+/// Share of the loss that a table must remove, and a second one of the remaining loss.
 const TAKES: f64 = 0.05;
 const TAKES_MORE: f64 = 0.15;
 
-/// Tables with the parameters beside them.
+/// Tables and parameters.
 #[derive(Clone, Debug)]
-pub struct Tables {
+pub(crate) struct Tables {
     /// The tables.
-    pub terms: Vec<TableTerm>,
+    pub(crate) terms: Vec<TableTerm>,
     /// Parameters that are off beside them.
-    pub parameters: Vec<Quantity>,
-    /// Share of the loss of the parameters alone that goes with the tables, at most 1.
-    pub share_explained: f64,
+    pub(crate) parameters: Vec<Quantity>,
+    /// Share of the calibration loss that the tables remove, at most 1.
+    pub(crate) share_explained: f64,
 }
 
-/// The tables that explain an unknown input, or why there are none; `told` is the parameters alone, those
-/// that are needed.
+/// Tables for an unknown input, or the reason why there are none; `reported` is the calibration with the needed parameters.
 ///
 /// # Errors
 /// The reason in words.
-pub fn tabulate(
+pub(crate) fn tabulate(
     engine: &Engine<'_>,
     calibrated: &Calibrated,
     reported: &Refit,
@@ -108,7 +105,7 @@ pub fn tabulate(
     })
 }
 
-/// The model with the parameters that it needs beside its tables, and which; the others are what the file says.
+/// The model with the needed parameters, and which; the others are at the rig file's values.
 fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
     let all = Model { free: [true; COUNT], ..best.model.clone() };
     let held = Point::of(engine, best.model.clone().held([false; COUNT]));
@@ -119,13 +116,13 @@ fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
     let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
         return (bare, [false; COUNT]);
     };
-    // Far from where the tables were fitted, the lines that are known do for the first steps.
+    // The known linearisation serves for the first steps.
     let is_in = |at: &usize| needed.get(*at).is_none_or(|needed| *needed);
     let columns: Vec<&[f64]> = (0..lines.len()).filter(is_in).map(|at| lines[at]).collect();
     (fit::fit(engine, fit::steps(engine, start, &columns), STEPS), needed)
 }
 
-/// What a table can be over: a variable, or nothing.
+/// Argument of a table: a variable, or none for a constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Over {
     Variable(Variable),
@@ -148,8 +145,8 @@ struct Seek<'a> {
 }
 
 impl Seek<'_> {
-    /// The best model with one more variable but `used`, and which; `None` where no rig can have any. All are screened by
-    /// straight lines, the best are fitted.
+    /// The best model with one more variable other than `used`; `None` where no rig can have any. All are screened linearly and
+    /// the best are fitted.
     fn best(&self, from: &Point, used: Option<Over>) -> Option<(Point, Over)> {
         let sets: &[&[Balance]] = match self.balance {
             Balance::Force => &[&[Balance::Force]],
@@ -158,7 +155,7 @@ impl Seek<'_> {
         };
         let lines = Lines::of(self.engine, from.model.clone())?;
         let all = Variable::ALL.into_iter().map(Over::Variable).chain([Over::Constant]);
-        // Each balance's lines once, however many sets it is in.
+        // Linearised once for each balance.
         let flat = |over: Over, balance: Balance| {
             let mut tied = self.table(over, balance)?;
             tied.table.value.fill(0.0);
@@ -184,7 +181,7 @@ impl Seek<'_> {
         let fitted = screened.iter().take(TRIED).filter_map(|(_, over, beside)| {
             let balances: Vec<Balance> = beside.iter().map(|table| table.balance()).collect();
             let start = self.start(&from.model, *over, &balances)?;
-            // Beside a table with many points, which is fitted well already, the lines of the screening do.
+            // Beside a fitted table the linearisation of the screening suffices.
             let point = if from.model.tables.is_empty() {
                 fit::fit(self.engine, start, FIRST_STEPS)
             } else {
@@ -208,7 +205,7 @@ impl Seek<'_> {
         Some(model)
     }
 
-    /// A model with tables of some balances, at their curves or at 0, whichever does better.
+    /// A model with tables of some balances, started at their curves or at 0, whichever has the smaller loss.
     fn start(&self, model: &Model, over: Over, balances: &[Balance]) -> Option<Point> {
         let from = [false, true].map(|is_flat| self.with(model, over, balances, is_flat));
         let [curved, flat] = from.map(|model| Point::of(self.engine, model?));
@@ -218,12 +215,12 @@ impl Seek<'_> {
         }
     }
 
-    /// Where a variable of a table stands among those that unknown inputs are told over; no curve is over the last one.
+    /// Index of a table variable among those of unknown inputs.
     fn place(variable: Variable) -> Option<usize> {
         VARIABLES.iter().position(|known| known.name == variable.name())
     }
 
-    /// What a variable was in a window.
+    /// Value of a variable in a window.
     fn value(variable: Variable, point: &UnknownPoint) -> f64 {
         let of = |variable: Variable| Self::place(variable).map_or(0.0, |place| point.variables[place]);
         match variable {
@@ -240,7 +237,7 @@ impl Seek<'_> {
             Over::Constant => Variable::Extension,
             Over::Variable(variable) => variable,
         };
-        // What turns with the direction is a friction.
+        // Only friction changes sign with the direction.
         if variable == Variable::DirectedExtension && balance != Balance::Force {
             return None;
         }
@@ -271,7 +268,7 @@ impl Seek<'_> {
         Some(Tied { table, is_constant: over == Over::Constant, seen })
     }
 
-    /// The same with more points, as long as they are worth what they cost.
+    /// Refines the table while the loss, penalty included, falls.
     fn finer(&self, start: Point) -> Point {
         let mut best = fit::fit(self.engine, start, STEPS);
         for times in FINER {
@@ -296,8 +293,8 @@ impl Seek<'_> {
     }
 }
 
-/// Points of a table over sorted values: half by how many there are, half by how far they reach, so that neither a crowd at rest
-/// nor a single fast stroke takes all.
+/// Knots over sorted values: placed half by rank, half by distance, so that neither a cluster at rest nor a single fast stroke
+/// dominates.
 fn knots(seen: &[f64], count: usize) -> Vec<f64> {
     let (Some(least), Some(most)) = (seen.first(), seen.last()) else { return Vec::new() };
     let width = most - least;
@@ -318,7 +315,7 @@ fn knots(seen: &[f64], count: usize) -> Vec<f64> {
     at
 }
 
-/// A table as the report tells it.
+/// A table as in the report.
 fn term(table: &Tabulated) -> TableTerm {
     TableTerm {
         balance: format!("{}.{}", table.axis.name(), table.balance.name()),
@@ -330,9 +327,9 @@ fn term(table: &Tabulated) -> TableTerm {
     }
 }
 
-/// The tables of a report as a rig has them; those that no rig can have are left out.
+/// Tables of a report as tables of a rig; invalid ones are left out.
 #[must_use]
-pub fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
+pub(crate) fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
     let table = |term: &TableTerm| {
         let (axis, balance) = place(&term.balance)?;
         let variable = Variable::ALL.into_iter().find(|known| known.name() == term.variable)?;
@@ -341,7 +338,7 @@ pub fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
     terms.iter().filter_map(table).collect()
 }
 
-/// The rig with more tables than it has.
+/// The rig with additional tables.
 fn with_tables(rig: &RigParameters, tables: &[Tied]) -> Option<RigParameters> {
     let mut all = rig.tabulated().to_vec();
     all.extend(tables.iter().map(|tied| tied.table.clone()));

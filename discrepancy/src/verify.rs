@@ -5,23 +5,21 @@
 //!   whole record, open loop ──► free run: error in percent of the range, what a rig cannot do
 //! ```
 //!
-//! Figures of windows are robust in two ways, which both models and the draws of nothing share:
+//! Window figures are robust in two ways, alike for both models and the null draws:
 //!
-//! - *Left out* are the 2 % of the windows, at least one, in which the extended model is worst: around a stop or a
-//!   break-away microseconds decide, and one such window would outweigh all others. Both models leave out the same
-//!   windows; for a gap they are those of its signal, for chi2 and whiteness those of all signals together. Whether the
-//!   extended model is better is asked of all windows.
-//! - *Level*: the noise of a channel is known to some per cent only. The tenth of the windows in which the better of both models
-//!   leaves least tells it anew, within [`LEVELS`].
+//! - *Trimming*: the 2 % of the windows, at least one, in which the extended model is worst are left out, since one window around
+//!   a break-away would outweigh all others. Both models leave out the same windows: those of the signal for a gap, those of all
+//!   signals together for chi2 and whiteness. The test of improvement uses all windows.
+//! - *Level*: the noise of a channel is known to some per cent only. The lowest decile of the windows, by the better of both
+//!   models, corrects it within [`LEVELS`].
 //!
-//! Better means by more than three standard errors of the sum of f_k ln(before_k / after_k) over windows k, each window a cluster
-//! of its own: as in [`crate::fit`], a window counts by how many times its noise it is off. An effect that fewer than ten windows
-//! show cannot pass, whatever its size.
+//! The extended model is better if the mean of f_k ln(before_k / after_k) over windows k exceeds three standard errors, clustered
+//! by windows, as in the loss of [`crate::fit`]. An effect in fewer than ten windows cannot pass, whatever its size.
 //!
-//! What noise alone leaves comes from simulated residuals, with memory and errors of the sampling instant as the course has them.
-//! The range of nothing comes from whole records that the extended model would have left itself: their starts are looked for as
-//! those of the record are. Source: discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s).
-//! Cameron, Gelbach, Miller 2008, Rev. Econ. Stat. 90(3): clusters.
+//! Expected power comes from drawn noise with the autocorrelation and jitter of the record. The null range of chi2 comes from
+//! synthetic records of the extended model, whose start states are estimated as those of the record are. Source:
+//! discrepancy-notes.md, 1, 3; rig-model.md, Accuracy (a free run is judged after 0.1 s). Cameron, Gelbach, Miller 2008, Rev.
+//! Econ. Stat. 90(3): clusters.
 
 mod free_run;
 mod null_power;
@@ -39,28 +37,28 @@ use plant::{Axis, RigParameters};
 use power::{Power, kept, levels, pooled};
 use std::collections::BTreeMap;
 
-/// How far the noise of a channel may be corrected, as a factor on its power.
-pub const LEVELS: [f64; 2] = [0.75, 1.15];
-/// Standard errors by which the extended model must be better.
+/// Bounds of the noise level correction, as a factor on the power.
+pub(crate) const LEVELS: [f64; 2] = [0.75, 1.15];
+/// Significance of an improvement, in standard errors.
 const BETTER_ERRORS: f64 = 3.0;
-/// By how much a signal's rms may grow.
+/// Largest ratio of a signal's rms after to before.
 const WORSE: f64 = 1.02;
-/// Spreads of nothing that an excess must have: below, the share of it that went could not be told to a tenth.
+/// Smallest excess in null standard deviations; below, the closed share is not known to a tenth.
 const EXCESS_SPREADS: f64 = 10.0;
 
-/// What a held-out record says.
+/// Result of a held-out record.
 #[derive(Clone, Debug)]
-pub struct Verified {
+pub(crate) struct Verified {
     /// The gap of each signal, by its column.
-    pub gap: BTreeMap<String, Gap>,
+    pub(crate) gap: BTreeMap<String, Gap>,
     /// Everything else.
-    pub verification: Verification,
+    pub(crate) verification: Verification,
     /// Series for the page.
-    pub traces: Vec<Trace>,
+    pub(crate) traces: Vec<Trace>,
 }
 
-/// Judges both models on a record that nothing was fitted on.
-pub fn verify(
+/// Compares both models on a record that was not used in any fit.
+pub(crate) fn verify(
     before: &RigParameters,
     after: &RigParameters,
     record: &GriddedRecord,
@@ -112,17 +110,17 @@ pub fn verify(
     Verified { gap, verification, traces }
 }
 
-/// A model on the record's windows.
+/// A model in the windows of the record.
 pub(crate) struct Model<'a> {
     windows: Windows<'a>,
     /// Readings over their noise.
     simulated: Vec<f64>,
-    /// What they leave.
+    /// Whitened residual.
     residual: Vec<f64>,
 }
 
 impl<'a> Model<'a> {
-    /// Each model has the freedom of its own windows' starts.
+    /// Each model has its own start states.
     fn new(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         let windows = Windows::with_estimated_starts(record, rig);
         let simulated = windows.simulate(rig);
@@ -137,7 +135,7 @@ fn column(axis: usize, at: usize) -> String {
     Channel::Of(Axis::ALL[axis], SIGNALS[at]).column()
 }
 
-/// The gap of a lane whose noise is `noise` in its unit, `spread` that of the pooled power of nothing.
+/// Gap of a lane; `noise` in its unit, `spread` the null standard deviation of the pooled power.
 fn signal_gap(models: &[Power; 2], lane: usize, noise: f64, spread: f64) -> Gap {
     let [before, after] = models.each_ref().map(|power| power.lane(lane));
     let kept = kept(&after);
@@ -152,7 +150,7 @@ fn signal_gap(models: &[Power; 2], lane: usize, noise: f64, spread: f64) -> Gap 
     }
 }
 
-/// Whether a model's windows are better by more than [`BETTER_ERRORS`], each window a cluster.
+/// Whether the mean log improvement exceeds [`BETTER_ERRORS`], clustered by windows.
 fn is_better(before: &Power, after: &Power) -> bool {
     let gains: Vec<f64> = before
         .joint()

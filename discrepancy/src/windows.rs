@@ -1,17 +1,17 @@
-//! A record in windows of 400 ms, each simulated from where the record says that the pistons were.
+//! Multiple shooting: a record in windows of 400 ms, each simulated from a start state estimated from the record.
 //!
 //! ```text
 //!   e_k = M_k (y_k - f_k(start_k; rig)) / sigma          window k: readings y, simulation f, noise sigma
 //!   M_k = 1 - Q_k Q_k'                                   Q_k: what a change of x, v, p_a, p_b at the window's start explains
 //! ```
 //!
-//! Spool, lagged flows and whatever effects remember go on from window to window; mechanics and pressures start anew from the
-//! record's points, whose errors M_k takes out to first order. A direction of the start that is worth less than one standard
-//! deviation over the whole window is left in: at rest the speed is none.
+//! Spool, lagged flows and the memories of effects continue from window to window. Mechanical states and pressures restart from
+//! the record's points, whose errors M_k projects out to first order. A direction of the start state that changes the window by
+//! less than one standard deviation is not projected out: at rest the speed is zero.
 //!
-//! Where a piston stops, breaks away or turns, the force jumps, and microseconds decide on which side of a sample: a reading of
-//! the force that differs from those around it more than noise can is put back to their median, in residuals and sensitivities
-//! alike [rig-model.md, Accuracy].
+//! The force jumps where a piston stops, breaks away or reverses, and microseconds decide on which side of a sample. A force
+//! reading that differs from its neighbours by more than noise is replaced by their median, in residuals and sensitivities alike
+//! [rig-model.md, Accuracy].
 //!
 //! Source: discrepancy-notes.md, 1 (naming over the length of windows: as good from 100 ms to 2 s), 6.
 
@@ -28,52 +28,52 @@ pub(crate) use starts::{first_state, set_state, state_at};
 use whiten::{SPIKE, drift};
 
 /// Periods of a window.
-pub const WINDOW: usize = 400;
-/// Place of the force among the readings.
+pub(crate) const WINDOW: usize = 400;
+/// Index of the force among the channels.
 pub(crate) const FORCE: usize = 1;
-/// Steps of a period where only a difference is wanted.
+/// Integration substeps of a period for differences.
 const COARSE_SUBSTEPS: u32 = 5;
 
-/// The windows of a course under a rig, with what their starts explain.
+/// The windows of a record, with the subspaces that their start states span.
 #[derive(Debug)]
 pub struct Windows<'a> {
     record: &'a GriddedRecord,
     rig: RigParameters,
     /// First period of each window.
     starts: Vec<usize>,
-    /// Where each window begins, those that are not judged included.
+    /// Start state of each window, unjudged ones included.
     points: Vec<[Point; 2]>,
     /// Axis and channel of each lane.
     lanes: Vec<(usize, usize)>,
-    /// Readings over their noise, window by window, period by period, lane by lane; 0 where there is none.
+    /// Readings over their noise by window, period and lane; 0 where there is none.
     readings: Vec<f64>,
     valid: Vec<bool>,
-    /// What an error of the sampling instant would change in each reading, in standard deviations.
+    /// Change of each reading by one standard deviation of the sampling instant, over its noise.
     drifts: Vec<f64>,
-    /// Orthonormal, per window.
+    /// Orthonormal basis of the start sensitivities of each window.
     bases: Vec<Vec<Vec<f64>>>,
 }
 
 impl<'a> Windows<'a> {
-    /// The windows of a course, their starts' sensitivities under a baseline rig.
+    /// The windows of a record, with start sensitivities under a baseline rig.
     #[must_use]
     pub fn new(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         Self::with_recorded_starts(record, rig).estimate_starts(0)
     }
 
-    /// The same with starts where the readings are met best.
+    /// The same with estimated start states.
     ///
-    /// What starts explain is taken out of a residual to first order only, and what effects remember goes on from window to
-    /// window: where the points are far off, as those of a sensor that lags, both need the start itself.
+    /// The projection is of first order only, and memories of effects continue from window to window. Where the points are far
+    /// off, as behind a lagging sensor, both need a better start state.
     #[must_use]
-    pub fn with_estimated_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
+    pub(crate) fn with_estimated_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         Self::with_recorded_starts(record, rig).estimate_starts(START_PASSES)
     }
 
     fn with_recorded_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         let measured = (0..2).filter(|axis| record.measured[*axis]);
         let lanes: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
-        // The first window fills lags and memories, and is not judged [rig-model.md: a record is judged after 0.1 s].
+        // The first window fills lags and memories and is not judged [rig-model.md: a record is judged after 0.1 s].
         let starts: Vec<usize> = (1..record.len() / WINDOW)
             .map(|window| window * WINDOW)
             .filter(|start| !record.gaps[*start..start + WINDOW].contains(&true))
@@ -104,13 +104,13 @@ impl<'a> Windows<'a> {
         &self.rig
     }
 
-    /// The course.
+    /// The record.
     #[must_use]
     pub fn record(&self) -> &'a GriddedRecord {
         self.record
     }
 
-    /// How many windows there are.
+    /// Number of windows.
     #[must_use]
     pub fn count(&self) -> usize {
         self.starts.len()
@@ -118,7 +118,7 @@ impl<'a> Windows<'a> {
 
     /// First period of each window.
     #[must_use]
-    pub fn starts(&self) -> &[usize] {
+    pub(crate) fn starts(&self) -> &[usize] {
         &self.starts
     }
 
@@ -142,19 +142,19 @@ impl<'a> Windows<'a> {
         valid.zip(&self.bases).map(|(valid, basis)| valid.saturating_sub(basis.len()).max(1) as f64).collect()
     }
 
-    /// Readings over their noise that this rig would have given, without noise and rounding.
+    /// Noise-free readings of a rig over their noise.
     #[must_use]
     pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
         self.run(vec![self.plant(rig)]).remove(0)
     }
 
-    /// The same in longer steps: half the time, good enough for what one simulation differs from another by.
+    /// The same with longer steps: half the cost, accurate enough for differences.
     #[must_use]
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.simulate_side_by_side(std::slice::from_ref(rig)).remove(0)
     }
 
-    /// The same of several rigs, each with the bits that it has alone: those without effects cost a third side by side.
+    /// The same for several rigs, each with the bits of a run on its own. Rigs without effects cost a third in a batch.
     #[must_use]
     pub fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
         self.run(rigs.iter().map(|rig| self.plant(rig).with_substeps(COARSE_SUBSTEPS)).collect())
@@ -169,7 +169,7 @@ impl<'a> Windows<'a> {
         let inverse: Vec<SensorInverse> = plants.iter().map(|plant| SensorInverse::of(plant.rig())).collect();
         let mut batch = Batch::new(plants);
         let mut next = 0;
-        // Windows that are not judged are simulated as well: memories go on.
+        // Unjudged windows are simulated as well, since memories continue.
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             for (at, inverse) in inverse.iter().enumerate() {
                 let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
@@ -187,7 +187,7 @@ impl<'a> Windows<'a> {
         simulated
     }
 
-    /// What is left of the readings beside a simulation: without single jumps of the force and what the starts explain.
+    /// Whitened residual of a simulation, force spikes removed and start states projected out.
     #[must_use]
     pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
         let mut left = self.raw_residual(simulated);
@@ -195,7 +195,7 @@ impl<'a> Windows<'a> {
         left
     }
 
-    /// The same with what the starts explain.
+    /// The same without the projection.
     fn raw_residual(&self, simulated: &[f64]) -> Vec<f64> {
         let mut left: Vec<f64> =
             self.readings.iter().zip(simulated).map(|(reading, simulated)| reading - simulated).collect();
@@ -203,7 +203,7 @@ impl<'a> Windows<'a> {
         left
     }
 
-    /// What one simulation differs from another by, treated as a residual is.
+    /// Difference of two simulations, processed like a residual.
     #[must_use]
     pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
         let mut differs: Vec<f64> = simulated.iter().zip(from).map(|(value, from)| value - from).collect();
@@ -221,7 +221,7 @@ impl<'a> Windows<'a> {
         windows.zip(&self.bases).for_each(|(window, basis)| project(window, basis));
     }
 
-    /// Without what was not read and single jumps of the force, whitened.
+    /// Zeroes missing readings, removes force spikes and whitens.
     fn clean(&self, values: &mut [f64]) {
         for (value, _) in values.iter_mut().zip(&self.valid).filter(|(_, valid)| !**valid) {
             *value = 0.0;
@@ -242,7 +242,7 @@ impl<'a> Windows<'a> {
     }
 }
 
-/// Takes out what an orthonormal basis explains.
+/// Projects values on the complement of an orthonormal basis.
 pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
     for direction in basis {
         let share = dot(values, direction);
@@ -252,7 +252,7 @@ pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
 
 /// Sum of products, in four lanes that are added in one order.
 #[must_use]
-pub fn dot(left: &[f64], right: &[f64]) -> f64 {
+pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (left_chunks, right_chunks) = (left.chunks_exact(4), right.chunks_exact(4));
     let rest: f64 = left_chunks.remainder().iter().zip(right_chunks.remainder()).map(|(a, b)| a * b).sum();

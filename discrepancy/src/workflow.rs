@@ -1,11 +1,11 @@
-//! The whole workflow: records and a rig in, a report and what goes with it out.
+//! The whole workflow, from records and rig file to report, page and extended rig file.
 //!
 //! ```text
 //!   records ─► check ─► course ─► parameters alone ─► locate ─► name ─► extend ─┬─► report, page, rig.toml
 //!                 └─ cannot be used: bad-data                   next ◄── alike  └─► verify: opens the held-out record, alone
 //! ```
 //!
-//! Everything but [`Report::gap`] and [`Report::verification`] is done before the held-out record is opened.
+//! All but [`Report::gap`] and [`Report::verification`] is computed before the held-out record is opened.
 
 mod findings;
 mod reported;
@@ -26,13 +26,13 @@ use crate::single_equation::is_model_file;
 use crate::tabulate::{tables, tabulate};
 use crate::verify::verify;
 pub(crate) use findings::empty;
-pub use findings::place_name;
+pub(crate) use findings::place_name;
 use findings::{report_of, summary};
 use plant::{Axis, ParameterError, RigParameters};
-pub use reported::{Reported, ReportedOutside};
+pub use reported::Reported;
 use std::path::{Path, PathBuf};
 
-/// What the workflow is asked.
+/// Inputs of the workflow.
 #[derive(Clone, Debug, Default)]
 pub struct Task {
     /// The rig file.
@@ -43,22 +43,22 @@ pub struct Task {
     pub test: Option<PathBuf>,
     /// How records are read.
     pub options: ReadOptions,
-    /// Effects that are no candidates.
+    /// Effects excluded from the candidates.
     pub without: Vec<String>,
 }
 
-/// What it gives.
+/// Outputs of the workflow.
 #[derive(Debug)]
 pub struct Outcome {
-    /// What was found.
+    /// The report.
     pub report: Report,
-    /// The rig file with it; `None` when a record cannot be used.
+    /// The extended rig file; `None` when a record cannot be used.
     pub extended: Option<String>,
     /// Series for the page.
     pub pictures: Pictures,
     /// File of the proposed experiment.
     pub experiment: Option<String>,
-    /// Why the held-out record was not judged, where one was given and was not.
+    /// Why a given held-out record was not judged.
     pub not_judged: Option<String>,
 }
 
@@ -139,12 +139,12 @@ impl RigFile {
     }
 }
 
-/// A record with its check, and its course when it can be used.
+/// A checked record, gridded when it can be used.
 #[derive(Debug)]
 pub struct Opened {
     /// The check.
     pub checked: Checked,
-    /// The course; `None` when the record cannot be used.
+    /// The gridded record; `None` when it cannot be used.
     pub gridded: Option<GriddedRecord>,
 }
 
@@ -171,7 +171,7 @@ pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<O
 /// Runs the whole workflow.
 ///
 /// # Errors
-/// [`WorkflowError`]; a record that cannot be used is none, but a verdict.
+/// [`WorkflowError`]; a record that cannot be used is a verdict, not an error.
 pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, WorkflowError> {
     let rig_file = RigFile::read(&task.rig)?;
     let rig = &rig_file.rig;
@@ -210,7 +210,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     progress("locating");
     report.location = Some(locate(rig, &records, progress).location);
     if report.verdict == Verdict::OutsideCatalogue {
-        // Beside what the parameters explain: a wrong mass is no unknown force.
+        // Under the calibrated rig, so that a wrong mass is not an unknown force.
         let calibrated = found.calibrated.rig(rig);
         let unknowns = locate(&calibrated, &records, progress).unknowns;
         report.outside = outside(&unknowns, progress);
@@ -238,7 +238,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     report.summary = summary(&report);
     let text = extended(&rig_file, &reported)?;
     let after = RigParameters::from_toml(&text, "extended rig.toml")?;
-    // What was found stays, whatever the held-out record is like.
+    // The findings stand whatever the held-out record is like.
     let (pictures, not_judged) = match held_out(task, rig, &after, &records, &mut report, progress) {
         Ok(pictures) => (pictures, None),
         Err(error) => (Pictures::default(), Some(error.to_string())),
@@ -246,13 +246,12 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     Ok(Outcome { report, extended: Some(text), pictures, experiment, not_judged })
 }
 
-/// About this share of each record.
+/// Subsamples each record.
 fn parts(records: &[GriddedRecord], share: f64) -> Vec<GriddedRecord> {
     records.iter().map(|record| record.thinned(share).unwrap_or_else(|| record.clone())).collect()
 }
 
-/// Judges the extended model on the held-out record, which is opened here and nowhere else; without one, draws the
-/// training record.
+/// Judges the extended model on the held-out record, which is opened only here; without one, draws the training record.
 fn held_out(
     task: &Task,
     rig: &RigParameters,
@@ -284,7 +283,7 @@ fn held_out(
     Ok(Pictures { record: record.name.clone(), held_out: true, traces: verified.traces })
 }
 
-/// The axes of a held-out record that the training records show as well: of the others nothing was fitted.
+/// Axes that held-out and training records share.
 fn judged_axes(record: &GriddedRecord, trained: [bool; 2]) -> Result<[bool; 2], String> {
     let shared = [0, 1].map(|axis| record.measured[axis] && trained[axis]);
     if shared == [false, false] {
@@ -316,7 +315,7 @@ pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, Exten
     add_tables(&text, &rig_file.file, &tables(terms), &reported.inputs.train)
 }
 
-/// The experiment that tells apart what a report could not; `None` when there is nothing to tell apart.
+/// Proposes an experiment for an ambiguous report; `None` when it is not ambiguous.
 #[must_use]
 pub fn proposal(rig_file: &RigFile, reported: &Reported, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
     proposal_for(rig_file, reported, reported.measured(), progress)
@@ -368,8 +367,7 @@ fn open_all(
         .collect()
 }
 
-/// Takes what all records show: an axis that one of them lacks is left out of the others. Linked rods move together, so that no
-/// axis of theirs can be left out.
+/// Restricts records to their common axes. No axis of linked rods can be left out, since they move together.
 pub(crate) fn on_shared_axes(records: &mut [GriddedRecord]) -> Result<(), WorkflowError> {
     let shared = [0, 1].map(|axis| records.iter().all(|record| record.measured[axis]));
     let lacks =
@@ -382,13 +380,13 @@ pub(crate) fn on_shared_axes(records: &mut [GriddedRecord]) -> Result<(), Workfl
     Ok(())
 }
 
-/// The axis whose mass a mass is that has a unit: of both together only a factor is told.
+/// The axis of a mass in kg; for both axes the mass is a common factor.
 #[must_use]
 pub(crate) fn weighed(measured: [bool; 2]) -> Axis {
     if measured == [false, true] { Axis::Load } else { Axis::Drive }
 }
 
-/// What makes records unusable, in words.
+/// Fatal findings of the records, in words.
 fn fatal(checks: &[report::RecordCheck]) -> String {
     let findings = checks.iter().flat_map(|check| &check.findings).filter(|finding| finding.fatal);
     findings.map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("; ")

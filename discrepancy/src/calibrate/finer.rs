@@ -1,11 +1,11 @@
-//! The numbers of the rig file behind the parameters: the dead volume, and each point of the valve's tables.
+//! Calibration of single rig file numbers: the dead volume and each point of the valve tables.
 //!
 //! ```text
 //!   number = the file's x factor of the parameter that scales it x its own factor       one Gauss-Newton fit of all factors
 //! ```
 //!
-//! A parameter holds what all points of a table have in common: a point that no record reaches goes along with it.
-//! Naming does without these numbers: a dead volume that is off is an effect of the catalogue.
+//! A parameter is the common factor of all points of a table, so that points outside the records follow it. Naming does not use
+//! these numbers: a wrong dead volume is an effect of the catalogue.
 //!
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
@@ -18,7 +18,7 @@ use crate::report::Quantity;
 use plant::RigParameters;
 use plant::parameters::table::KEYS;
 
-/// Keys with the standard deviation of each of their numbers' factors, before anything is measured.
+/// Keys with the prior standard deviation of their factors.
 const FINER: [(&str, f64); 3] = [
     ("cylinder.dead_volume_cm3", 0.3),
     ("valve.kv_supply_m3_per_h", 0.05),
@@ -26,10 +26,10 @@ const FINER: [(&str, f64); 3] = [
 ];
 /// The parameter that scales the tables.
 const KV_SCALE: &str = "parameter:kv-scale";
-/// Shares of a step that are tried, until a rig can be so.
+/// Step fractions until the rig is valid.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 
-/// One number of a key that can be off: the place in the key's list.
+/// A number of a key: its place in the list.
 #[derive(Clone, Copy, Debug)]
 struct Number {
     key: &'static str,
@@ -37,16 +37,16 @@ struct Number {
     tolerance: f64,
 }
 
-/// What the records say of every number.
+/// Result for every number.
 #[derive(Clone, Debug)]
 pub struct Finer {
-    /// The parameters, then the numbers, as people read them.
+    /// Parameters, then numbers, for display.
     pub quantities: Vec<Quantity>,
-    /// The same as a rig file takes them: points of tables with what they have in common.
+    /// The same for the rig file: points of tables multiplied by their common factor.
     pub changed: Vec<Quantity>,
 }
 
-/// Fits the numbers beside the parameters; `None` when no rig can have what fits best.
+/// Fits numbers and parameters jointly; `None` where no rig can have the result.
 #[must_use]
 pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let rig = engine.rig();
@@ -60,7 +60,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     factors.resize(ridges.len(), 1.0);
     let mut best: Option<(Vec<f64>, Products, Fit)> = None;
     for _ in 0..POINTS {
-        // Where a number came to the end of its range, what was found before stands.
+        // At the end of a range the last iterate stands.
         let Some((tried, columns)) = with(rig, &numbers, &factors).zip(columns(engine, &numbers, &factors))
         else {
             break;
@@ -81,7 +81,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         }
     }
     let (at, products, fit) = best?;
-    // Points of tables with what they have in common, as the rig file takes them.
+    // Points of tables times their common factor.
     let in_file = numbers
         .iter()
         .zip(COUNT..)
@@ -108,7 +108,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         .collect();
     changed.retain(|quantity| quantity.standard_error.is_some());
     let is_resolved = |at: usize| factor_errors[COUNT + at] < UNRESOLVED * numbers[at].tolerance;
-    // Points of a table go together, so that it does not fall where one of them is left behind.
+    // All points of a table change together, so that it stays monotonic.
     let is_changed = |key: &str| {
         let any = (0..numbers.len()).any(|at| numbers[at].key == key && is_resolved(at));
         any || (rig.numbers(key).len() > 1 && quantities[scale].standard_error.is_some())
@@ -135,8 +135,8 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     Some(Finer { quantities, changed })
 }
 
-/// Those that are not 0, since at a spool opening without flow the dead zone says it, and that can be changed either way: points
-/// of a table that are equal cannot, and go along with the others.
+/// Numbers that are not 0 and can change either way. Points without flow belong to the dead zone; equal points of a table cannot
+/// move alone.
 fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
     let has_neighbours = |number: &Number| {
         [FACTOR_CHANGE, -FACTOR_CHANGE].iter().all(|change| {
@@ -151,7 +151,7 @@ fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
     FINER.into_iter().flat_map(of_key).filter(has_neighbours).collect()
 }
 
-/// The rig with all factors; `None` where one leaves its range, or a table would fall.
+/// The rig with all factors; `None` where one leaves its range or a table is not monotonic.
 fn with(rig: &RigParameters, numbers: &[Number], factors: &[f64]) -> Option<RigParameters> {
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
@@ -171,7 +171,7 @@ fn with(rig: &RigParameters, numbers: &[Number], factors: &[f64]) -> Option<RigP
     rig.with_all(lists.iter().map(|(key, list)| (*key, list.as_slice()))).ok()
 }
 
-/// The factors after a step, or as much of it as a rig can have.
+/// The factors after the largest valid fraction of a step.
 fn moved(rig: &RigParameters, numbers: &[Number], factors: &[f64], step: &[f64]) -> Option<Vec<f64>> {
     SHARES.iter().find_map(|share| {
         let moved: Vec<f64> = factors
@@ -183,7 +183,7 @@ fn moved(rig: &RigParameters, numbers: &[Number], factors: &[f64], step: &[f64])
     })
 }
 
-/// Sensitivities of the readings to all factors.
+/// Sensitivities to all factors.
 fn columns(engine: &Engine<'_>, numbers: &[Number], factors: &[f64]) -> Option<Vec<Vec<f64>>> {
     let around = |change: f64| {
         (0..factors.len()).map(move |at| {

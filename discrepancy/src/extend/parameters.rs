@@ -18,7 +18,7 @@ pub(super) fn names() -> Vec<&'static str> {
 ///
 /// Only the mass differs between the axes. The carriage, which the force sensor moves, is scaled with the drive's mass.
 #[must_use]
-pub fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static str>> {
+pub(crate) fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static str>> {
     let parameter = PARAMETERS.iter().find(|parameter| parameter.name == name)?;
     let of_axis = |key: &&&str| name != "parameter:mass" || (**key == "mass.load_kg") == (axis == Axis::Load);
     Some(parameter.keys.iter().filter(of_axis).copied().collect())

@@ -1,6 +1,6 @@
 //! What is written is what was found, and nothing else changes.
 
-use super::parameters::names;
+use super::parameters::{key_of_parameter, names};
 use super::*;
 use plant::Axis;
 use plant::effects::tabulated::{Balance, Variable};

@@ -1,43 +1,43 @@
-//! Where a piston rests, where it creeps, and where the record does not tell.
+//! Classifies each period: rest, creep, or undecided.
 //!
-//! What rests needs the break-away force to go on, what creeps does not; and a parabola of a score of samples cannot tell a
-//! millimetre per second from none. So rest is what is slow for a while, creeping what then goes evenly one way for longer, and
-//! where neither is sure the other rate stands beside: a simulation finds out which of them meets the readings.
+//! A piston at rest needs the break-away force, a creeping one does not, and a parabola over 21 samples does not resolve 1 mm/s.
+//! Rest is slow for a while; creep is slow and steady in one direction for longer. Where neither is certain, the alternative rate
+//! is kept, and the simulation decides by the residual.
 
 use super::{POSITION_REACH, Parabola};
 use plant::PERIOD_S;
 
-/// Periods that a piston must seem at rest around an instant to be at rest in it.
+/// Periods to each side that must be slow at rest.
 const REST_REACH: usize = 12;
-/// Standard errors of a parabola's slope below which it is slow.
+/// Threshold of a slow slope, in standard errors.
 const SLOW_ERRORS: f64 = 3.5;
-/// Halves of the stretches that tell whether it creeps, periods, and the fastest that is called creeping.
+/// Half-widths of the stretches compared for creep, periods, and the fastest creep.
 const CREEP_REACHES: [usize; 2] = [50, 100];
 const CREEP_FASTEST_M_PER_S: f64 = 0.01;
-/// Standard errors by which two means differ that are not of a piston at rest.
+/// Significance of a difference of two means, in standard errors.
 const CREEP_ERRORS: f64 = 4.0;
 
-/// A channel of positions, looked at for rest.
+/// Positions of an axis and where they rest.
 pub(super) struct Still<'a> {
     parabolas: &'a [Option<Parabola>],
     positions: &'a [Option<f64>],
     noise_m: f64,
     slow: Vec<bool>,
-    /// The resting position where it seems at rest, over all of [`REST_REACH`] to each side.
+    /// Mean position where it seems at rest over [`REST_REACH`] to each side.
     rests: Vec<Option<f64>>,
 }
 
-/// Where a piston was and how fast.
+/// Position and rate of a piston.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rate {
     pub(super) position_m: f64,
     pub(super) rate_m_per_s: f64,
-    /// What the record cannot tell from it.
+    /// An indistinguishable rate.
     pub(super) or_else_m_per_s: Option<f64>,
 }
 
 impl<'a> Still<'a> {
-    /// `noise_m` is what makes means unsure: that of readings on their own, or more where noise lasts.
+    /// `noise_m` is the effective noise of means, larger than that of readings where noise is autocorrelated.
     pub(super) fn new(parabolas: &'a [Option<Parabola>], positions: &'a [Option<f64>], noise_m: f64) -> Self {
         // Standard error of the slope of a parabola over 2 n + 1 samples: sigma sqrt(3 / (n (n + 1) (2 n + 1))).
         let n = POSITION_REACH as f64;
@@ -49,12 +49,12 @@ impl<'a> Still<'a> {
         still
     }
 
-    /// Whether it seems at rest.
+    /// Periods that seem at rest.
     pub(super) fn resting(&self) -> Vec<bool> {
         self.rests.iter().map(Option::is_some).collect()
     }
 
-    /// Position and rate; `None` where no parabola is.
+    /// Position and rate; `None` without a parabola.
     pub(super) fn rate(&self, place: usize) -> Option<Rate> {
         let Parabola { value, slope } = self.parabolas[place]?;
         let rate_of = |position_m: f64, rate_m_per_s: f64, or_else_m_per_s: Option<f64>| {
@@ -81,7 +81,7 @@ impl<'a> Still<'a> {
         (creep_m < self.least_m(half)).then(|| mean(&near))
     }
 
-    /// The speed where it goes the same way before, around and after, m/s.
+    /// Rate of a steady motion before, around and after a period, m/s.
     fn creep_evenly(&self, place: usize, reach: usize) -> Option<f64> {
         let most_m = CREEP_FASTEST_M_PER_S * reach as f64 * PERIOD_S;
         let ways = [
@@ -95,14 +95,14 @@ impl<'a> Still<'a> {
         evenly.then(|| ways[1] / (reach as f64 * PERIOD_S))
     }
 
-    /// The speed where it may creep: over the shortest stretch around, m/s.
+    /// Rate of possible creep over the shortest stretch, m/s.
     fn creep(&self, place: usize) -> Option<f64> {
         let [reach, _] = CREEP_REACHES;
         let way = self.way(place, reach)?;
         (way.abs() > self.least_m(reach)).then(|| way / (reach as f64 * PERIOD_S))
     }
 
-    /// How much further it was in the stretch after a place than in that before, on average; `None` at the record's ends.
+    /// Mean of the stretch after a place minus that before; `None` at the ends of the record.
     fn way(&self, place: usize, reach: usize) -> Option<f64> {
         let stretch = |from: usize| {
             let near: Vec<f64> = self.positions.get(from..from + reach)?.iter().flatten().copied().collect();
@@ -111,7 +111,7 @@ impl<'a> Still<'a> {
         Some(stretch(place)? - stretch(place.checked_sub(reach)?)?)
     }
 
-    /// What two means of so many readings differ by when it is not at rest.
+    /// Smallest significant difference of two means of so many readings.
     fn least_m(&self, count: usize) -> f64 {
         CREEP_ERRORS * self.noise_m * (2.0 / count as f64).sqrt()
     }
@@ -126,7 +126,7 @@ mod tests {
     use super::super::parabolas;
     use super::*;
 
-    /// What is told of the middle of a course.
+    /// Rate in the middle of a record.
     fn rate_of(way: &dyn Fn(f64) -> f64) -> Rate {
         // Micrometres of scatter, as a wide sensor's: 20 um rms.
         let scatter = |at: f64| 28e-6 * (0.9 * at).sin();

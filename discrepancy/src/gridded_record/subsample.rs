@@ -1,23 +1,23 @@
-//! A part of a long record, for what costs by the second: blocks of windows, spread evenly over it.
+//! Subsampling of a long record: blocks of windows, spread evenly.
 //!
 //! ```text
 //!   |......|lead|judged judged judged judged judged|............|lead|judged ...
 //! ```
 //!
-//! The first window of a block only fills lags and memories, as after a hole, and counts as one ([`GriddedRecord::gaps`]).
+//! The first window of a block only fills lags and memories and counts as a gap ([`GriddedRecord::gaps`]).
 
 use super::GriddedRecord;
 use crate::windows::WINDOW;
 
-/// Windows of a block, its first one included.
+/// Windows of a block, the first included.
 const BLOCK: usize = 6;
 
-/// Seconds of measured axes that are searched for what is missing; the numbers of what was found come from all of the records.
-pub const SEARCHED_S: f64 = 20.0;
+/// Seconds of measured axes in the search; the final fit uses all of the records.
+pub(crate) const SEARCHED_S: f64 = 20.0;
 
-/// Share of some records that is searched.
+/// Share of the records that is searched.
 #[must_use]
-pub fn searched_share(records: &[GriddedRecord]) -> f64 {
+pub(crate) fn searched_share(records: &[GriddedRecord]) -> f64 {
     let axes = |record: &GriddedRecord| record.measured.iter().filter(|measured| **measured).count();
     let all_s: f64 =
         records.iter().map(|record| record.len() as f64 * plant::PERIOD_S * axes(record) as f64).sum();
@@ -25,9 +25,9 @@ pub fn searched_share(records: &[GriddedRecord]) -> f64 {
 }
 
 impl GriddedRecord {
-    /// About this share of the record; `None` where that is all of it, or where it has too few blocks to choose from.
+    /// About this share of the record; `None` where that is all of it or where it has too few blocks.
     #[must_use]
-    pub fn thinned(&self, share: f64) -> Option<GriddedRecord> {
+    pub(crate) fn thinned(&self, share: f64) -> Option<GriddedRecord> {
         let blocks = self.len() / (BLOCK * WINDOW);
         let wanted = (share * blocks as f64).round().max(1.0) as usize;
         if share >= 1.0 || wanted >= blocks {
@@ -41,7 +41,7 @@ impl GriddedRecord {
             ..self.clone()
         };
         for chosen in 0..wanted {
-            // The middle of each of so many equal parts.
+            // The middle block of each of `wanted` equal parts.
             let block = (2 * chosen + 1) * blocks / (2 * wanted);
             let places = block * BLOCK * WINDOW..(block + 1) * BLOCK * WINDOW;
             part.inputs.extend_from_slice(&self.inputs[places.clone()]);

@@ -1,4 +1,4 @@
-//! The unknown inputs of a window by least squares around the simulation.
+//! Unknown inputs of a window by regularised least squares on the linearised simulation.
 //!
 //! ```text
 //! r = J theta + noise       theta = x, v, p_a, p_b at the start | force, its ramp | flow a, flow b | offset of the force sensor
@@ -8,15 +8,14 @@
 //! r residuals over the noise of their channel, J sensitivities by finite differences, L weak priors (L_u those of the unknown
 //! inputs). Coloured noise is made white ([`super::noise_colour`]). Where constants do not describe a window, its deviations are
 //! widened by what is left, sqrt(chi2 / degrees of freedom) [Birge 1932]: a break-away inside it is no force. At rest a force
-//! moves nothing, and a window whose posterior is no tighter than a tenth of the prior tells nothing of that input. The ramp
-//! takes up what a force does within a window; it is not reported.
+//! moves nothing: an input whose posterior is not tighter than a tenth of its prior is not observable in that window. The ramp
+//! absorbs changes of the force within a window; it is not reported.
 //!
-//! Where a small force and its opposite do not do the same the other way, a piston stops, breaks away or turns in the window: a
-//! finite difference there is no sensitivity, and the window tells nothing but the offset.
+//! Where the responses to a small force and its opposite are not antisymmetric, the piston stops, breaks away or reverses. Finite
+//! differences fail there, and only the offset is estimated.
 //!
-//! Position alone tells the force to some newton, the force sensor ten times better. So windows are solved twice, with and
-//! without an offset of the force sensor. Where the offsets of a record are nothing, the force is that of the solution without
-//! them.
+//! Position alone determines the force to some newtons, the force sensor ten times better. Windows are solved with and without an
+//! offset of the force sensor; where the offsets of a record are insignificant, the solution without them counts.
 //!
 //! Source: discrepancy-notes.md, 2; Kay 1993, Fundamentals of Statistical Signal Processing I, 4.5 and 11.5.
 
@@ -35,27 +34,28 @@ const FORCE: usize = 4;
 const FLOW_A: usize = 6;
 const FLOW_B: usize = 7;
 const OFFSET: usize = 8;
-/// Place of the force's opposite nudge among the looks.
+/// Index of the opposite force nudge.
 const OPPOSITE: usize = OFFSET + 1;
-/// How far each is nudged: m, m/s, Pa, Pa, N, N, m^3/s, m^3/s; the offset's sensitivity is known.
+/// Steps of finite differences: m, m/s, Pa, Pa, N, N, m^3/s, m^3/s; the sensitivity to the offset is known.
 const NUDGES: [f64; OFFSET] = [1e-5, 5e-4, 200.0, 200.0, 1.0, 1.0, 3e-5, 3e-5];
-/// Standard deviations of the weak priors, in the same units. A guess: some ten times what points and effects are.
+/// Standard deviations of the weak priors, in the same units. A guess: some ten times the errors of points and the size of
+/// effects.
 const PRIORS: [f64; NUMBERS] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 100.0];
 /// Prior of the force sensor's offset in the solution without one, N.
 const NO_OFFSET_N: f64 = 1e-3;
-/// Share of the prior above which a window tells nothing.
+/// Ratio of posterior to prior above which an input is not observable.
 const NOTHING: f64 = 0.1;
-/// Share of a nudge's effect by which its opposite may differ: beyond it a window stands on a kink.
+/// Largest asymmetry of the response to a nudge and its opposite.
 const KINK: f64 = 0.2;
-/// Windows before a record or what follows a gap counts: memories fill [rig-model.md: judged after 0.1 s].
+/// Windows skipped at the start and after a gap, in which memories fill [rig-model.md: judged after 0.1 s].
 const FILLING: usize = 5;
-/// Above this the offsets of the force sensor are something.
+/// Threshold of significant offsets of the force sensor.
 const OFFSET_OVER_NOISE: f64 = 1.15;
 
 type Normal = SMatrix<f64, NUMBERS, NUMBERS>;
 type Theta = SVector<f64, NUMBERS>;
 
-/// The unknown inputs of all balances, as they are gathered.
+/// Collected unknown inputs of all balances.
 #[derive(Debug, Default)]
 pub(super) struct Unknowns {
     /// flow-a, flow-b, force, force-sensor of each axis.
@@ -87,16 +87,16 @@ impl Unknowns {
 /// A window and axis, solved.
 struct Solved {
     from: usize,
-    /// Whether a force moves the window as much as its opposite does.
+    /// Whether the response to a force is antisymmetric.
     smooth: bool,
-    /// Mean of what the force sensor reads in the baseline, N.
+    /// Mean force reading of the baseline, N.
     baseline_force_n: f64,
     /// With and without an offset of the force sensor.
     free: Solution,
     bound: Solution,
 }
 
-/// A solution: estimates, their deviations without unknown inputs, and what a pressure offset would make of them.
+/// A solution: estimates, null standard deviations, and sensitivities to a pressure offset.
 struct Solution {
     theta: Theta,
     deviation: Theta,
@@ -105,7 +105,7 @@ struct Solution {
 }
 
 /// Estimates the unknown inputs of a record and appends them.
-pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, record: usize, unknowns: &mut Unknowns) {
+pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &mut Unknowns) {
     let Some(mut pass) = Pass::new(rig, gridded) else { return };
     let axes: Vec<usize> = (0..2).filter(|axis| gridded.measured[*axis]).collect();
     let colours =
@@ -113,7 +113,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, record: usi
     let nudges = nudges();
     let mut solved: [Vec<Solved>; 2] = [Vec::new(), Vec::new()];
     let mut filled = 0;
-    // The last window needs a period behind it.
+    // The last window needs one more period.
     for window in 0..(gridded.len() - 1) / WINDOW {
         let from = window * WINDOW;
         let whole = !gridded.gaps[from..=from + WINDOW].iter().any(|gap| *gap);
@@ -129,16 +129,9 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, record: usi
         pass.go_on(from, WINDOW);
     }
     for axis in axes {
-        gather(rig, gridded, record, axis, &solved[axis], &mut unknowns.axes[axis]);
+        gather(rig, gridded, axis, &solved[axis], &mut unknowns.axes[axis]);
     }
-    linkage::gather(
-        rig,
-        gridded,
-        record,
-        pass.contact_n(),
-        [colours[0][0], colours[1][0]],
-        &mut unknowns.linkage,
-    );
+    linkage::gather(rig, gridded, pass.contact_n(), [colours[0][0], colours[1][0]], &mut unknowns.linkage);
 }
 
 /// The baseline, a nudge of each number but the last, and the force's nudge the other way.
@@ -157,7 +150,7 @@ fn nudges() -> Vec<Nudge> {
     nudges
 }
 
-/// A window of an axis beside its looks.
+/// A window of an axis with its nudged simulations.
 struct Seen<'a> {
     gridded: &'a GriddedRecord,
     axis: usize,
@@ -223,7 +216,7 @@ impl Seen<'_> {
         let baseline = self.looks[0][self.axis][at][channel];
         let mut row = Theta::zeros();
         for number in 0..OFFSET {
-            // A speed that is known to be 0 is no unknown.
+            // A speed known to be 0 is not estimated.
             if number != 1 || !rests {
                 row[number] =
                     (self.looks[number + 1][self.axis][at][channel] - baseline) / NUDGES[number] * weight;
@@ -235,7 +228,7 @@ impl Seen<'_> {
         Some((row, (sample - baseline) * weight))
     }
 
-    /// Whether a small force and its opposite do the same the other way: not so where a piston stops, breaks away or turns.
+    /// Whether the responses to a small force and its opposite are antisymmetric.
     fn is_smooth(&self) -> bool {
         let (mut sum, mut difference) = (0.0, 0.0);
         for at in 0..WINDOW {
@@ -253,13 +246,13 @@ impl Seen<'_> {
         self.gridded.noise[self.axis][channel]
     }
 
-    /// Whether the contact's force is what this axis' sensor read: then it tells nothing else.
+    /// Whether this axis' force reading is used as the contact force, and so is no measurement.
     fn force_is_input(&self) -> bool {
         self.gridded.linked && self.axis == usize::from(self.gridded.measured[1])
     }
 }
 
-/// What the readings of a window say.
+/// Normal equations of a window.
 struct Equations {
     normal: Normal,
     right: Theta,
@@ -274,12 +267,12 @@ impl Equations {
         let precision = Theta::from_fn(|number, _| prior(number).powi(-2));
         let p = (self.normal + Normal::from_diagonal(&precision)).cholesky()?.inverse();
         let theta = p * self.right;
-        // What stays of the residuals: a window that constants do not describe has wider deviations.
+        // Remaining residuals widen the deviations.
         let left = self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
         let birge = (left / self.freedom).max(1.0).sqrt();
         let mut deviation = Theta::zeros();
         for number in 0..NUMBERS {
-            // Unknown inputs are 0 here; start values are somewhere within their priors.
+            // Under the null, unknown inputs are 0 and start values vary within their priors.
             let unknown: f64 = (FORCE..NUMBERS).map(|at| (p[(number, at)] / prior(at)).powi(2)).sum();
             deviation[number] = (p[(number, number)] - unknown).max(0.0).sqrt() * birge;
         }
@@ -292,11 +285,10 @@ impl Equations {
     }
 }
 
-/// Appends what the windows of an axis tell.
+/// Appends the unknown inputs of the windows of an axis.
 fn gather(
     rig: &RigParameters,
     gridded: &GriddedRecord,
-    record: usize,
     axis: usize,
     solved: &[Solved],
     balances: &mut [Vec<UnknownPoint>; 4],
@@ -318,12 +310,11 @@ fn gather(
             }
             let mut variables = variables(gridded, axis, *from, balance);
             if balance == 3 {
-                // Over what the sensor reads itself, its every error would be a law.
+                // Its own reading would correlate with every error of the sensor.
                 variables[super::FORCE] = *baseline_force_n;
             }
             let scale = if balance < 2 { NORMAL_LITRES_PER_MINUTE } else { 1.0 };
             balances[balance].push(UnknownPoint {
-                record,
                 window: from / WINDOW,
                 value: solution.theta[number] * scale,
                 deviation: solution.deviation[number] * scale,
@@ -335,7 +326,7 @@ fn gather(
     }
 }
 
-/// Whether a window tells something of an unknown input.
+/// Whether an unknown input is observable in a window.
 fn is_informative(solution: &Solution, number: usize) -> bool {
     solution.posterior[number] < NOTHING * PRIORS[number] && solution.deviation[number] > 0.0
 }

@@ -1,12 +1,11 @@
-//! The linkage as a balance of its own: the rods' distance against the force that it passes.
+//! The balance of the linkage: contact law against measured force.
 //!
 //! ```text
 //! unknown = F - F_c(d),  in contact:  k (d -+ gap/2) + c dd/dt against the measured force, mean over a window
 //! ```
 //!
-//! Only windows count in which the rods touch on one side throughout: the distance of rods that do not touch is free within the
-//! gap. Two positions of 20 um are some 13 N in a window of 20 ms at 2e6 N/m, whereas the force's own noise is a tenth of a
-//! newton.
+//! Only windows with contact on one side throughout count. Position noise of 20 um in both sensors is some 13 N in a window of 20
+//! ms at 2e6 N/m; the noise of the force is a tenth of a newton.
 //!
 //! Source: rig-model.md, Masses and linkage.
 
@@ -17,14 +16,13 @@ use super::{UnknownPoint, VARIABLES, WINDOW};
 use crate::gridded_record::GriddedRecord;
 use plant::{PERIOD_S, RigParameters};
 
-/// Force above which the rods touch beyond doubt, over the noise of its sensor.
+/// Force of certain contact, over the noise of its sensor.
 const TOUCHING: f64 = 10.0;
 
 /// Appends the linkage's windows of a record with both axes.
 pub(super) fn gather(
     rig: &RigParameters,
     gridded: &GriddedRecord,
-    record: usize,
     contact_n: &[f64],
     position_colours: [f64; 2],
     points: &mut Vec<UnknownPoint>,
@@ -67,7 +65,6 @@ pub(super) fn gather(
         let mut variables: [f64; VARIABLES.len()] = variables(gridded, 0, from, 2);
         variables[super::FORCE] = forces.iter().sum::<f64>() / WINDOW as f64;
         points.push(UnknownPoint {
-            record,
             window,
             value: sum_n / count - linkage.damping_n_s_per_m * parted_m_per_s,
             deviation: stiff_n.hypot(damped_n).hypot(gridded.noise[1][1] / n.sqrt()),

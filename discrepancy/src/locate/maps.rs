@@ -1,20 +1,20 @@
-//! Unknown inputs over the variable that they follow most closely, as means of 20 bins with a band; over two as a surface.
+//! Binned means of unknown inputs over their strongest variables, with bands; over two variables as a surface.
 
 use super::{UnknownPoint, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Surface};
 
 /// Bins of a map.
-pub const BINS: usize = 20;
+pub(crate) const BINS: usize = 20;
 /// Maps of a balance.
 const MAPS: usize = 2;
 /// Bins of a surface: of its first variable, and of its second.
 const SURFACE: [usize; 2] = [10, 3];
-/// Points that a bin needs to be told.
+/// Fewest points of a bin.
 const LEAST: usize = 5;
-/// Balances above this are drawn.
+/// Smallest over_noise of a drawn balance.
 const DRAWN: f64 = 1.1;
 
-/// The maps of all balances that stand out, each over its strongest variables.
+/// Maps of all significant balances over their strongest variables.
 pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
     let mut maps = Vec::new();
     for series in series.iter().filter(|series| series.over_noise().is_some_and(|over| over > DRAWN)) {
@@ -26,9 +26,9 @@ pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
     maps
 }
 
-/// The map of a series over a variable; the curve's variable tells the balance too.
+/// Map of a series over a variable; the curve's variable names the balance too.
 #[must_use]
-pub fn map(series: &UnknownSeries, variable: usize) -> Curve {
+pub(crate) fn map(series: &UnknownSeries, variable: usize) -> Curve {
     let mut curve = Curve {
         variable: format!("{} over {}", series.balance, VARIABLES[variable].name),
         variable_unit: VARIABLES[variable].unit.to_owned(),
@@ -56,7 +56,7 @@ pub fn map(series: &UnknownSeries, variable: usize) -> Curve {
 
 /// The surface of a series over two variables.
 #[must_use]
-pub fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
+pub(crate) fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
     let places = [0, 1].map(|side| {
         let values: Vec<f64> = series.points.iter().map(|point| point.variables[variables[side]]).collect();
         few_bins(&values, SURFACE[side])
@@ -65,7 +65,7 @@ pub fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
     let of = |is_in: &dyn Fn(usize) -> bool| -> Vec<&UnknownPoint> {
         (0..series.points.len()).filter(|at| is_in(*at)).map(|at| &series.points[at]).collect()
     };
-    // Values that many points share leave bins empty.
+    // Tied values leave bins empty.
     let kept = [0, 1].map(|side| {
         let there = |place: &usize| !of(&|at| bin(at, side) == *place).is_empty();
         (0..SURFACE[side]).filter(there).collect::<Vec<_>>()
@@ -97,27 +97,27 @@ pub fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
     }
 }
 
-/// Mean of some points, the better known ones counting more.
+/// Weighted mean.
 fn mean(points: &[&UnknownPoint], of: impl Fn(&UnknownPoint) -> f64) -> f64 {
     let weights: f64 = points.iter().map(|point| point.deviation.powi(-2)).sum();
     points.iter().map(|point| of(point) * point.deviation.powi(-2)).sum::<f64>() / weights
 }
 
-/// Their value and two standard errors of it; `None` of too few.
+/// Weighted mean and two standard errors; `None` for too few points.
 fn mean_and_band(points: &[&UnknownPoint]) -> Option<(f64, f64)> {
     if points.len() < LEAST {
         return None;
     }
     let weights: f64 = points.iter().map(|point| point.deviation.powi(-2)).sum();
     let value = mean(points, |point| point.value);
-    // The scatter around the mean is more than the noise where other things move the input too.
+    // The scatter exceeds the noise where other variables act too.
     let scatter = mean(points, |point| (point.value - value).powi(2)) / (points.len() - 1) as f64;
     Some((value, 2.0 * scatter.max(1.0 / weights).sqrt()))
 }
 
-/// The bin of each value: equally many in each as far as equal values allow, since those share one.
+/// Quantile bin of each value; ties share a bin.
 #[must_use]
-pub fn bins(values: &[f64]) -> Vec<usize> {
+pub(crate) fn bins(values: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|left, right| values[*left].total_cmp(&values[*right]).then(left.cmp(right)));
     let mut places = vec![0; values.len()];
@@ -134,9 +134,9 @@ pub fn bins(values: &[f64]) -> Vec<usize> {
     places
 }
 
-/// At most so many bins; where there are no more values than that, as of a sign, each has its own.
+/// At most `most` bins; one for each distinct value where there are no more.
 #[must_use]
-pub fn few_bins(values: &[f64], most: usize) -> Vec<usize> {
+pub(crate) fn few_bins(values: &[f64], most: usize) -> Vec<usize> {
     let mut apart = values.to_vec();
     apart.sort_unstable_by(f64::total_cmp);
     apart.dedup();
@@ -181,15 +181,7 @@ mod tests {
             (variables[POSITION], variables[DIRECTION]) = (x, direction);
             let value = 20.0 * x * direction + if at.is_multiple_of(2) { 0.1 } else { -0.1 };
             let (per_pressure_offset, regimes) = ([0.0; 2], Regimes::default());
-            UnknownPoint {
-                record: 0,
-                window: at,
-                value,
-                deviation: 0.1,
-                variables,
-                per_pressure_offset,
-                regimes,
-            }
+            UnknownPoint { window: at, value, deviation: 0.1, variables, per_pressure_offset, regimes }
         };
         let points = (0..1200)
             .map(point)

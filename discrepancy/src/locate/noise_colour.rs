@@ -1,27 +1,26 @@
-//! How much a sensor's noise remembers, from its readings at rest, and rows made white by it.
+//! AR(1) coefficient of sensor noise, from readings at rest.
 //!
 //! ```text
 //! n_k = phi n_(k-1) + e_k        phi = 3 - var(second differences) / var(first differences)        at rest
 //! ```
 //!
-//! Differences forget the level, and without their mean the drift; with a command that has not changed for a while, mostly at
-//! rest, they are the noise's own; windows that move more than the median's are left out. A second of it tells phi to less than
-//! a tenth.
+//! Differences remove the level, and their mean removes drift. Windows with a constant command count, without those whose
+//! variance exceeds the median by far. A second determines phi to a tenth.
 //!
 //! Source: Box, Jenkins, Reinsel 2008, Time Series Analysis, 3.2.
 
 use super::WINDOW;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 
-/// Resting windows that an estimate needs.
+/// Fewest resting windows.
 const LEAST: usize = 15;
-/// Below this the noise counts as white: three standard errors of the estimate from a second.
+/// Threshold of white noise: three standard errors of an estimate from a second.
 const WHITE: f64 = 0.15;
-/// A window's variance over the median's that is no noise.
+/// Ratio to the median variance above which a window moved.
 const JOLT: f64 = 3.0;
-/// Difference of phi that a second of readings does not tell.
+/// Difference of phi that a second of readings does not resolve.
 const ALIKE: f64 = 0.2;
-/// Largest phi that is believed.
+/// Upper bound of phi.
 const MOST: f64 = 0.95;
 
 /// phi of each channel of an axis.
@@ -44,17 +43,17 @@ pub(super) fn colours(record: &GriddedRecord, axis: usize) -> [f64; CHANNELS] {
     }
     let colours = windows.map(colour);
     let mean = colours.iter().sum::<f64>() / CHANNELS as f64;
-    // One filter before one converter: channels as alike as a second can tell share their mean.
+    // One filter before one converter: channels without a significant difference share their mean.
     if colours.iter().all(|phi| (phi - mean).abs() < ALIKE) { [mean; CHANNELS] } else { colours }
 }
 
-/// phi of the variances of first and second differences of many windows.
+/// phi from the variances of first and second differences.
 fn colour(mut windows: Vec<[f64; 2]>) -> f64 {
     if windows.len() < LEAST {
         return 0.0;
     }
     windows.sort_by(|left, right| left[0].total_cmp(&right[0]));
-    // A jolt in a window that seemed at rest is no noise.
+    // Excludes windows with a jolt.
     let most = JOLT * windows[windows.len() / 2][0];
     let calm = windows.iter().filter(|window| window[0] <= most);
     let [first, second] = calm.fold([0.0; 2], |sum, window| [sum[0] + window[0], sum[1] + window[1]]);
@@ -62,14 +61,14 @@ fn colour(mut windows: Vec<[f64; 2]>) -> f64 {
     if phi < WHITE { 0.0 } else { phi.min(MOST) }
 }
 
-/// Mean square around the mean, which is next to nothing: the sum of differences is that of both ends alone.
+/// Variance around the mean.
 fn variance(values: Vec<f64>) -> f64 {
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;
     values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n
 }
 
-/// By how much coloured noise widens a mean of many readings.
+/// Factor of AR(1) noise on the standard error of a mean.
 pub(super) fn widens(phi: f64) -> f64 {
     ((1.0 + phi) / (1.0 - phi)).sqrt()
 }

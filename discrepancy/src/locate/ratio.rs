@@ -4,20 +4,20 @@
 //! o_F = sum g_F d / s^2 / sum g_F^2 / s^2        of the force, and the same of the chamber's flow
 //! ```
 //!
-//! d unknown input of a window, s its deviation, g what an offset of 1 Pa would make of it: about -A for the force. Two
-//! estimates that each stand out and agree are one fault of a sensor, not two faults of the rig.
+//! d unknown input of a window, s its deviation, g its sensitivity to an offset of 1 Pa: about -A for the force. Two significant
+//! estimates that agree indicate one sensor fault.
 //!
 //! Source: discrepancy-notes.md, 2.
 
 use super::UnknownSeries;
 use plant::Axis;
 
-/// Standard errors that an offset must stand out by.
+/// Significance of an offset, in standard errors.
 const STANDS_OUT: f64 = 5.0;
-/// Share by which the two may differ: a gain or a lag is no constant offset.
+/// Largest relative difference: a gain or a lag is no constant offset.
 const AGREES: f64 = 0.35;
 
-/// What is to be told of the pressure sensors of an axis.
+/// Notes on the pressure sensors of an axis.
 pub(super) fn notes(axis: Axis, series: &[UnknownSeries]) -> Vec<String> {
     let find =
         |balance: &str| series.iter().find(|series| series.balance == format!("{}.{balance}", axis.name()));

@@ -1,4 +1,4 @@
-//! What went on in a window: at rest, just broken away, moving out or in, near an end, after a valve edge.
+//! Regimes of a window: rest, after break-away, motion out or in, near an end, after a valve edge.
 //!
 //! A window is in one of hold, onset, motion-out and motion-in, and besides in near-ends and valve-edge where it is so.
 
@@ -7,7 +7,7 @@ use crate::gridded_record::{GriddedRecord, Point};
 use plant::RigParameters;
 
 /// The regimes, in the order of the report.
-pub const REGIMES: [&str; 6] = ["hold", "onset", "motion-out", "motion-in", "near-ends", "valve-edge"];
+pub(crate) const REGIMES: [&str; 6] = ["hold", "onset", "motion-out", "motion-in", "near-ends", "valve-edge"];
 /// How long after leaving rest the onset lasts, periods.
 const ONSET: usize = 100;
 /// How far from an end of the stroke is near, m.
@@ -19,7 +19,7 @@ const AFTER_EDGE: usize = 20;
 
 /// The regimes of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Regimes {
+pub(crate) struct Regimes {
     in_regime: [bool; REGIMES.len()],
 }
 
@@ -42,7 +42,7 @@ impl Regimes {
 
     /// Whether the window is in a regime.
     #[must_use]
-    pub fn contains(&self, regime: &str) -> bool {
+    pub(crate) fn contains(&self, regime: &str) -> bool {
         REGIMES.iter().zip(self.in_regime).any(|(name, within)| *name == regime && within)
     }
 }

@@ -1,25 +1,25 @@
-//! A window in the simulator, with nudges of its initial state and of its unknown inputs.
+//! Simulates a window with perturbed start state and unknown inputs.
 //!
-//! Windows begin where the course was; spool, lagged flows and what effects remember go on from the plant before. When linked,
-//! the contact force is an input of both axes and not simulated: at 2 N per micrometre the positions do not tell it. It acts as
-//! a hand would, so that the force sensors read it as they do in the rig [rig-model.md, Masses and linkage]. So the axes do not
-//! know each other, and one run nudges both.
+//! Windows start at the record's points; spool, lagged flows and memories of effects continue. When linked, the measured contact
+//! force is an input of both axes, since positions do not determine it at 2 N per micrometre. It acts as a hand force, so that
+//! the force sensors read it as on the rig [rig-model.md, Masses and linkage]. The axes are then independent, and one run
+//! perturbs both.
 //!
-//! An unknown force acts as a hand too; what the sensor would read of the hand is put back. An unknown flow is added to the
-//! stored air at the end of each period.
+//! An unknown force acts as a hand force, without its reading by the sensor. An unknown flow is added to the stored air at the
+//! end of each period.
 
 use super::WINDOW;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 use crate::windows::state_at;
 use plant::{Inputs, PERIOD_S, Plant, RigParameters, Setup};
 
-/// Readings of a window, as whoever has no noise sees them.
+/// Noise-free readings of a window.
 pub(super) type Readings = [[[f64; CHANNELS]; WINDOW]; 2];
 
-/// A change of a window, in the own extension of each axis.
+/// A perturbation of a window, along the extension of each axis.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Nudge {
-    /// Of extension, m; rod velocity, m/s; pressures a and b, Pa.
+    /// Extension, m; rod velocity, m/s; pressures a and b, Pa.
     pub(super) start: [[f64; 4]; 2],
     /// Force through the whole window, N.
     pub(super) force_n: [f64; 2],
@@ -29,7 +29,7 @@ pub(super) struct Nudge {
     pub(super) flows_m3_per_s: [[f64; 2]; 2],
 }
 
-/// The plant that goes along a record.
+/// A plant that follows a record.
 pub(super) struct Pass<'a> {
     record: &'a GriddedRecord,
     contact_n: Vec<f64>,
@@ -54,7 +54,7 @@ impl<'a> Pass<'a> {
         &self.contact_n
     }
 
-    /// The readings of the window at a period with each nudge; `None` when it is a state that the rig cannot be in.
+    /// Readings of the window at a period with each nudge; `None` for a state that the rig cannot have.
     pub(super) fn look(&self, from: usize, nudges: &[Nudge]) -> Option<Vec<Readings>> {
         nudges.iter().map(|nudge| self.run(from, nudge)).collect()
     }
@@ -77,7 +77,7 @@ impl<'a> Pass<'a> {
             let share = (at as f64 + 0.5) / WINDOW as f64 * 2.0 - 1.0;
             let forces = [0, 1].map(|axis| nudge.force_n[axis] + nudge.ramp_n[axis] * share);
             let inputs = self.inputs(from + at, forces);
-            // What is read is the contact's force of the instant, what acts over the period the mean of both its ends.
+            // The sensor reads the contact force of the instant; the mean of both ends acts over the period.
             let contact_n = self.contact_n[from + at];
             let instant = Inputs {
                 hand_force_carriage_n: contact_n + forces[0],
@@ -100,11 +100,11 @@ impl<'a> Pass<'a> {
         Some([0, 1].map(|axis| read.map(|readings| readings[axis])))
     }
 
-    /// Goes on to the next window, seated where the record was.
+    /// Advances to the next window from the state of the record.
     pub(super) fn go_on(&mut self, from: usize, periods: usize) {
         if !self.record.gaps[from] {
             let start = state_at(&self.plant, &self.record.points[from], self.record.measured);
-            // Points that the rig cannot have come of a broken record; the plant then goes on alone.
+            // Impossible points come from a broken record; the plant then continues from its state.
             let _ = self.plant.go_on_in(&start);
         }
         for at in from..from + periods {
@@ -113,7 +113,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// What acts over a period: commands, the contact's force, and unknown forces along the own extensions, N.
+    /// Inputs of a period: commands, contact force, and unknown forces along the extensions, N.
     fn inputs(&self, at: usize, forces_n: [f64; 2]) -> Inputs {
         let contact_n = 0.5 * (self.contact_n[at] + self.contact_n[(at + 1).min(self.contact_n.len() - 1)]);
         Inputs {
@@ -124,7 +124,7 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// The contact's force from what the sensors read: -F of the load, or of the drive without what its carriage takes.
+/// Contact force from the sensors: -F of the load, or that of the drive minus the inertia of the carriage.
 fn contact_forces(rig: &RigParameters, record: &GriddedRecord) -> Vec<f64> {
     if !record.linked {
         return vec![0.0; record.len()];

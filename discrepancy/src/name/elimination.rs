@@ -1,4 +1,4 @@
-//! What stays of the effects that joined a model, and what would take their place as well.
+//! Backward elimination of effects, swaps between rounds, and alternatives.
 
 use super::null_distribution::NullDistribution;
 use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, around_of, relinearise};
@@ -8,19 +8,18 @@ use crate::refit::{Placed, Refit, refit_steps};
 use crate::screen::Columns;
 use rayon::prelude::*;
 
-/// What came close in a round, that is tried again when another effect has joined.
+/// Runners-up of an earlier round that are tried again after another effect joined.
 const SWAPPED: usize = 3;
-/// Fits that differ by less than this, in inflated standard deviations squared, cannot be told apart: noise alone makes the wrong
-/// one of two better by more in one record of 700 at most, however alike they are.
+/// Fits are indistinguishable when their losses differ by less than this times the variance inflation. Noise alone makes the
+/// wrong one of two better by more in one record of 700 at most.
 const ALIKE: f64 = 9.0;
-/// The same as a share of what the effect takes, or of what it leaves if that is less: where the model is not exact, what is
-/// missing besides may decide between them.
+/// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
 const ALIKE_SHARE: f64 = 0.02;
-/// Multiple of the threshold of nothing that is asked of every further effect, since a model is never exact, least of all one
-/// with another effect fitted in it.
+/// Multiple of the null threshold required of every further effect, since no model is exact.
 const SAFETY_BESIDE: f64 = 3.0;
 
-/// Puts what came close in an earlier round in the place of what won it: beside the effects that joined since, it may win.
+/// Swaps the winner of an earlier round for one of its runners-up where that lowers the loss beside the effects that joined
+/// since.
 pub(super) fn swap(
     engine: &Engine<'_>,
     model: &mut Refit,
@@ -49,7 +48,7 @@ pub(super) fn swap(
         .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
     let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
     let best = relinearise(engine, &best);
-    // Beside the other effects the one that came in explains more; the one that went stays as an alternative where it is as good.
+    // The replaced effect stays as an alternative where it fits as well.
     let refits = &mut rounds[at];
     let came = refits.remove(rank);
     let is_alike = model.loss - best.loss < alike(&best, calibrated);
@@ -58,12 +57,12 @@ pub(super) fn swap(
     *model = best;
 }
 
-/// By how much the loss of an explanation may be larger for the records not to tell it from the best.
+/// Largest difference in loss at which an explanation is indistinguishable from the best.
 fn alike(best: &Refit, calibrated: &Calibrated) -> f64 {
     (ALIKE * best.inflation).max(ALIKE_SHARE * best.loss.min(calibrated.fit.loss - best.loss))
 }
 
-/// Takes out effects that are not missed: by more than what nothing gains beside the whole model.
+/// Eliminates effects whose removal raises the loss by less than a multiple of the null threshold.
 pub(super) fn drop_unneeded<'a>(
     engine: &Engine<'a>,
     calibrated: &Calibrated,
@@ -108,7 +107,7 @@ pub(crate) fn same(left: &Placed, right: &Placed) -> bool {
     left.candidate.sheet.name == right.candidate.sheet.name && left.candidate.place == right.candidate.place
 }
 
-/// What takes the place of an effect of the model just as well, the share of the excess that goes with that effect given.
+/// Alternatives to an effect of the model; `share` is the share of the excess that the effect removes.
 pub(super) fn alternatives(
     placed: &Placed,
     share: f64,
@@ -136,7 +135,7 @@ pub(super) fn alternatives(
         .collect()
 }
 
-/// Share of the excess that goes with each effect: what went in the round in which it joined.
+/// Share of the excess that each effect removed in the round in which it joined.
 pub(super) fn shares(model: &Refit, rounds: &[Vec<Refit>], calibrated: &Calibrated, excess: f64) -> Vec<f64> {
     let whole = (excess / calibrated.fit.loss.max(1e-9)).clamp(0.0, 1.0);
     let mut before = calibrated.fit.loss;

@@ -1,11 +1,11 @@
-//! The last steps of a fit, all numbers of the model in the simulator, and their standard errors there.
+//! Gauss-Newton on all numbers of a model in the simulator, with backtracking, and their standard errors.
 //!
 //! ```text
 //!   effects and needed parameters ──► Gauss-Newton on all of them ──► accepted only when the simulator leaves less
 //! ```
 //!
-//! Naming moves the parameters by straight lines: good enough to compare models that have them in common, but what a straight
-//! line promised is not what the simulator leaves.
+//! Forward selection moves the parameters on the linearised model, which suffices to compare models. The final numbers come from
+//! the simulator.
 
 use super::NUMBER_COSTS;
 use super::null_distribution::FAR_OFF;
@@ -19,21 +19,22 @@ use crate::windows::dot;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Steps at most, how often one is made shorter, and to what share of it.
+/// Maximum steps, maximum backtracking steps and their factor.
 const STEPS: usize = 6;
 const SHORTENINGS: i32 = 4;
 const SHORTER: f64 = 0.4;
-/// How often windows are left out of a step at most, and from where on they are: standard deviations of a window's squares.
+/// Maximum number of exclusions of windows from a step, and the excess over the predicted squares that excludes one, in standard
+/// deviations.
 const DOUBTS: usize = 4;
 const BROKEN: f64 = 6.0;
-/// Fall of the loss below which a fit has settled.
+/// Fall of the loss below which a fit has converged.
 const CONVERGED: f64 = 0.3;
 
-/// Shares of the parameters' way that are tried where straight lines may have led too far.
+/// Step fractions of the backtracking line search on the linearised parameter step.
 const WAYS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
-/// The parameters of a model, as far as the simulator goes along with what straight lines promised of them: beside an effect that
-/// is still missing they may be led where nothing is right any more.
+/// Backtracking line search on the linearised parameter step: the step fraction with the smallest simulated loss. While an effect
+/// is missing, the linearised step may lead far off.
 pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = WAYS.map(|way| model.factors.map(|factor| 1.0 + way * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {
@@ -44,27 +45,28 @@ pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     tried[best.expect("one at least")]
 }
 
-/// A model fitted in the simulator to the end, all parameters beside, with what its numbers cost; itself where that is no better.
+/// Fits all parameters and coordinates of a model in the simulator, penalties included; returns the model itself where the loss
+/// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
     fit.loss += costs(numbers(&fit.placed).len(), &fit.factors, NUMBER_COSTS);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 
-/// A model where the simulator was asked.
+/// A simulated model.
 struct Point {
     placed: Vec<Placed>,
     factors: [f64; COUNT],
     simulated: Vec<f64>,
     residual: Vec<f64>,
-    /// Squares of each window.
+    /// Squared residuals of each window.
     squares: Vec<f64>,
-    /// What they and what is believed cost.
+    /// Loss of the windows and of the priors.
     loss: f64,
 }
 
-/// Fits a model in the simulator, parameters that are not `needed` held at what the file says; `None` where the rig cannot
-/// have it.
+/// Fits a model in the simulator with the parameters that are not `needed` at the rig file's values; `None` where no rig can have
+/// it.
 pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
     let mut factors = model.factors;
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
@@ -110,7 +112,7 @@ fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Opt
     Some(Point { placed, factors, simulated, residual, squares, loss })
 }
 
-/// Ridge and value of each coordinate of the effects.
+/// Prior precision and value of each coordinate of the effects.
 fn numbers(placed: &[Placed]) -> Vec<(f64, f64)> {
     placed
         .iter()
@@ -124,18 +126,18 @@ fn numbers(placed: &[Placed]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Straight lines around a point.
+/// Linearisation at a point.
 struct Lines {
-    /// What each number changes, parameters first.
+    /// Sensitivities, parameters first.
     columns: Vec<Vec<f64>>,
-    /// What is believed of each.
+    /// Prior precisions.
     ridges: Vec<f64>,
-    /// How far each is from what is believed.
+    /// Deviations from the prior means.
     from: Vec<f64>,
 }
 
 impl Lines {
-    /// Products without what some windows say of the lines.
+    /// Normal equations with the sensitivities of some windows set to zero.
     fn products(&self, engine: &Engine<'_>, point: &Point, out: &[usize]) -> Products {
         let mut columns = Cow::from(&self.columns);
         if !out.is_empty() {
@@ -158,8 +160,7 @@ fn around(engine: &Engine<'_>, point: &Point) -> Option<Lines> {
     Some(Lines { columns, ridges, from })
 }
 
-/// The best point along the lines that is better than this one: with all windows, and without those that are far off, whose
-/// lines may lead anywhere.
+/// The better of two Gauss-Newton steps: with all windows, and without outlying windows, whose linearisation is unreliable.
 fn stepped(engine: &Engine<'_>, point: &Point, lines: &Lines, chosen: &[usize]) -> Option<Point> {
     let far: Vec<usize> = (0..engine.freedom().len())
         .filter(|window| point.squares[*window] > FAR_OFF * engine.freedom()[*window])
@@ -169,8 +170,8 @@ fn stepped(engine: &Engine<'_>, point: &Point, lines: &Lines, chosen: &[usize]) 
     [with_all, without].into_iter().flatten().min_by(|left, right| left.loss.total_cmp(&right.loss))
 }
 
-/// A better point along the lines, those of some windows left out. Where the simulator does not do what a window's lines
-/// promise, they are left out as well: around a break-away, what a small change does says nothing of a smaller one.
+/// A Gauss-Newton step that lowers the loss, without the windows `out`. Windows whose squares exceed the linearised prediction,
+/// as around a break-away, are excluded too; then the step is shortened.
 fn along(
     engine: &Engine<'_>,
     point: &Point,
@@ -204,7 +205,7 @@ fn along(
     None
 }
 
-/// The point a share of a step away.
+/// The point after a fraction of a step.
 fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share: f64) -> Option<Point> {
     let (mut placed, mut factors) = (from.placed.clone(), from.factors);
     let mut changes = vec![0.0; COUNT + numbers(&placed).len()];
@@ -223,8 +224,7 @@ fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share:
     point(engine, placed, factors)
 }
 
-/// Standard errors beside all parameters, in the order of [`Refit::errors`]: which parameters are needed was told by the same
-/// records.
+/// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.
 fn errors(engine: &Engine<'_>, lines: &Lines, point: &Point) -> Vec<f64> {
     let products = lines.products(engine, point, &[]);
     let all: Vec<usize> = (0..products.columns()).collect();

@@ -1,12 +1,11 @@
-//! Which parameters a model needs beside its effects: the others go back to what the file says, and it is fitted again without
-//! them.
+//! Backward elimination of parameters: those that the model does not need return to the rig file's values, and it is refitted.
 //!
 //! ```text
 //!   loss with all ──► the one that is missed least goes, while its going costs less than it is worth ──► fitted again
 //! ```
 //!
-//! Parameters that a fit left free take up noise, and of two that hang together both move where one is off. A rig that had only
-//! the largest of them would be none of a fit: what is told, what the extended file has and what is judged is one model.
+//! Free parameters absorb noise, and of two correlated ones both move where one is off. The report, the extended rig file and the
+//! held-out test use the one refitted model.
 
 use super::around_of;
 use super::gauss_newton::fit_selected;
@@ -15,11 +14,11 @@ use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS};
 use crate::refit::{Refit, coordinate_columns, coordinate_ridge, parameter_ridges, rig_of};
 
-/// Fall of the loss for which a parameter is moved: three and a half standard errors.
+/// Rise of the loss at which a parameter is kept: three and a half standard errors.
 const NEEDED: f64 = 12.0;
 
-/// The model with only the parameters that it needs, fitted in the simulator to the end; with all, where it cannot do without the
-/// others.
+/// The model refitted with the needed parameters only; with all parameters where the loss rises by more than the linearised
+/// estimate.
 pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(all) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
     let Some(needed) = needed(engine, &all) else { return all };
@@ -30,13 +29,13 @@ pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
     }
 }
 
-/// Which parameters are needed, by straight lines around the model; `None` where all are, or where it has no neighbours.
+/// Needed parameters by the linearised model; `None` where all are needed, or where no derivative exists.
 fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
     let around = around_of(engine, model);
     let simulated = engine.simulate(&rig_of(engine.rig(), &model.placed, &model.factors)?);
     let coordinates = coordinate_columns(engine, &model.factors, &model.placed, &simulated)?;
     let mut residual = engine.residual(&simulated);
-    // From where the file is: what is fitted then is how far each parameter is off.
+    // Shifts the residual to the rig file's values, so that the coefficients are deviations from them.
     for (column, factor) in around.columns.iter().zip(model.factors) {
         residual.iter_mut().zip(column).for_each(|(value, column)| *value += (factor - 1.0) * column);
     }

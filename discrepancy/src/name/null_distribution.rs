@@ -1,4 +1,4 @@
-//! What nothing gains: the threshold of a model, and the smallest amplitudes that would have been accepted.
+//! Sign-flip null distribution of the gain: the acceptance threshold and the detection limits.
 //!
 //! Source: discrepancy-notes.md, 4 (thresholds from this very record) and pipeline 1.
 
@@ -11,23 +11,23 @@ use crate::windows::dot;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Draws of nothing for the threshold.
+/// Draws of the null distribution.
 const NULLS: usize = 300;
-/// Share of them that stays below it.
+/// Quantile of the draws that is the threshold.
 const NULL_SHARE: f64 = 0.99;
-/// A generator's seed: the threshold is part of the result, and has the same bits each run.
+/// Fixed seed: the threshold is part of the result and has the same bits in each run.
 const SEED: u64 = 0xd15c_4e9a_0c1e_5e11;
 
-/// Chi2 per degree of freedom from which on a window is far off, and the share of the windows that may be: of a model that
-/// leaves the others within their noise, these few say that a break-away came at another moment, and nothing of the model.
+/// Chi2 per degree of freedom of an outlying window, and the largest share of outliers that is excluded. In such a window the
+/// break-away came at another moment.
 pub(super) const FAR_OFF: f64 = 3.0;
 const FEW: f64 = 0.05;
 
-/// What a model leaves, against all candidates, window by window.
+/// Window scores of all candidates against a model's residual.
 pub(super) struct NullDistribution {
-    /// Windows that are far off, where they are few: they count neither here nor for what is missed.
+    /// Excluded outlying windows.
     far: Vec<usize>,
-    /// Of each probe: candidate, coordinate of the amplitude, scores of the windows, information.
+    /// For each probe: candidate, coordinate of the amplitude, window scores, information.
     probes: Vec<(usize, f64, Vec<f64>, f64)>,
 }
 
@@ -62,7 +62,7 @@ impl NullDistribution {
         NullDistribution { far, probes }
     }
 
-    /// By how much a fit that lacks something is worse, windows that are far off left out.
+    /// Rise of the loss of a reduced model, without the outlying windows.
     pub(super) fn missed(&self, engine: &Engine<'_>, without: &Refit, model: &Refit) -> f64 {
         let of = |window: &usize| {
             let [without, with] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
@@ -71,8 +71,8 @@ impl NullDistribution {
         without.loss - model.loss - self.far.iter().map(of).sum::<f64>()
     }
 
-    /// The gain that a share of records of nothing stays below: random signs of the windows keep what hangs together within each,
-    /// and take away what hangs together with a candidate.
+    /// Quantile of the largest gain of any candidate when the sign of each window is drawn at random. Sign flips keep the
+    /// correlation within a window and destroy that with a candidate.
     pub(super) fn threshold(&self) -> f64 {
         let windows = self.probes.first().map_or(0, |(_, _, scores, _)| scores.len());
         let mut random = Pcg64::seed_from_u64(SEED);
@@ -93,7 +93,7 @@ impl NullDistribution {
         most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
     }
 
-    /// Smallest coordinate of each candidate's amplitude that gains so much.
+    /// Smallest amplitude coordinate of each candidate that reaches a gain.
     pub(super) fn limits(&self, candidates: usize, gain: f64) -> Vec<Option<f64>> {
         let mut limits: Vec<Option<f64>> = vec![None; candidates];
         for (at, z, _, information) in self.probes.iter().filter(|(_, z, _, _)| *z != 0.0) {
@@ -106,7 +106,7 @@ impl NullDistribution {
     }
 }
 
-/// Windows that are far off, where they are few.
+/// Outlying windows; none where they are more than a few.
 fn far_off(residual: &[f64], rows: usize, freedom: &[f64]) -> Vec<usize> {
     let squares = residual.chunks_exact(rows).map(|window| dot(window, window));
     let off = squares.zip(freedom).enumerate();

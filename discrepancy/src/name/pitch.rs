@@ -1,4 +1,4 @@
-//! The pitch of a ripple: a fit that begins at another one ends at a side of the peak that is none.
+//! Grid search for the pitch of a ripple, since a local fit ends in a side lobe.
 //!
 //! ```text
 //!   ripple off ──► a column for each of so many pitches ──► the one that explains most, its amplitude as it says ──► fitted
@@ -13,12 +13,12 @@ use crate::parameters::COUNT;
 use crate::refit::{Refit, coordinate_columns, coordinate_ridge, parameter_ridges, refit_steps, rig_of};
 use rayon::prelude::*;
 
-/// Pitches that are tried.
+/// Grid points of the pitch.
 const PITCHES: u32 = 40;
-/// Coordinate of the amplitude at which a ripple is simulated.
+/// Amplitude coordinate at which the ripples are simulated.
 const PROBE: f64 = 0.3;
 
-/// The model with the ripple of its last effect where it explains most, if that explains more; other effects have none.
+/// The model with the best pitch of its last effect, if it lowers the loss; unchanged for effects without a ripple.
 pub(super) fn at_best_pitch(engine: &Engine<'_>, model: &Refit) -> Refit {
     best(engine, model).filter(|other| other.loss < model.loss).unwrap_or_else(|| model.clone())
 }

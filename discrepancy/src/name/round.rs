@@ -1,4 +1,4 @@
-//! One round of the search: which candidate would join the model.
+//! One round of forward selection: which candidate joins the model.
 //!
 //! ```text
 //!   screened ──► the few that gain most ──► each fitted beside the model ──► the best of them again, with sensitivities of
@@ -15,39 +15,38 @@ use crate::refit::{Around, Placed, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
 use rayon::prelude::*;
 
-/// Candidates that are fitted in the simulator at most, in each round.
+/// Maximum number of candidates refitted in the simulator in each round.
 const CONTENDERS: usize = 6;
-/// Share of the best screened gain below which a candidate is not fitted.
+/// Smallest screened gain of a refitted candidate, as a share of the best.
 const CONTENDS: f64 = 0.35;
-/// Share of the last round's threshold below which no further effect is fitted.
+/// Smallest screened gain of a further effect, as a share of the last round's threshold.
 const LOOKED_FOR: f64 = 0.5;
-/// Share of a screened gain that the simulator may deny before other amplitudes are tried.
+/// Share of the predicted gain that the simulator may lack before other starting amplitudes are tried.
 const BELIEVED: f64 = 0.2;
-/// Amplitudes that are tried then.
+/// Those amplitudes.
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
-/// How many contenders are fitted with sensitivities of their own.
+/// Number of contenders that are relinearised.
 const REFINED: usize = 3;
-/// Share of what the best takes within which others come close.
+/// Fits are close when their losses differ by less than this share of the best gain.
 const CLOSE: f64 = 0.02;
-/// What stands between linked rods: screening sees little of it, since starts were moved to where the rig without it meets the
-/// readings.
+/// The gap of the linkage. Screening underrates it, since the start states were estimated without it.
 const BACKLASH: &str = "coupling-backlash";
 
-/// Candidates that are worth a fit.
+/// Candidates to refit.
 pub(super) struct Contenders {
-    /// Loss of the model without any of them, as screening sees it.
+    /// Null loss of the screening.
     null_loss: f64,
-    /// The one that gains most first.
+    /// Best first.
     best: Vec<Screened>,
-    /// A gap between linked rods, however little screening sees of it.
+    /// The gap of linked rods, whatever its screened gain.
     gap: Option<Screened>,
 }
 
 impl Contenders {
-    /// Of all candidates those that are not in the model yet and gain much; `None` where none gains enough.
+    /// Selects the candidates outside the model with the largest gains; `None` where none gains enough.
     ///
-    /// The last round's threshold is that of a residual in which much was still missing: it tells when to stop looking, not what
-    /// to refuse.
+    /// The last round's threshold came from a residual with unexplained signal: it decides when to stop searching, not what to
+    /// reject.
     pub(super) fn of(
         (null_loss, screened): (f64, Vec<Screened>),
         engine: &Engine<'_>,
@@ -74,17 +73,16 @@ impl Contenders {
     }
 }
 
-/// Models with one effect more.
+/// Models with one more effect.
 pub(super) struct Round<'a> {
-    /// The best first.
+    /// Best first.
     pub(super) fits: Vec<Refit>,
-    /// Those of them that were fitted again, each with its home.
+    /// Their relinearised refits, each with its start states.
     restarted: Vec<Restarted<'a>>,
 }
 
 impl<'a> Round<'a> {
-    /// Fits a model with each of the contenders, `point` the parameters' sensitivities at the model; `None` where none can be
-    /// fitted.
+    /// Fits the model with each contender; `point` holds the parameter sensitivities. `None` where no fit is possible.
     pub(super) fn fitted(
         engine: &Engine<'a>,
         point: &Around,
@@ -101,8 +99,8 @@ impl<'a> Round<'a> {
             })
             .collect();
         sort(&mut fits);
-        // Sensitivities of the parameters were those of the model before: the best get their own. What they gain is held against
-        // what the parameters alone reach with the same sensitivities.
+        // These fits used the sensitivities of the model without the effect; the best are relinearised. Gains compare with the
+        // null loss of the same sensitivities.
         let gain = null_loss - fits.first()?.loss;
         let near = fits.iter().take(REFINED).filter(|fit| null_loss - fit.loss >= 0.5 * gain).count().max(1);
         let restarted = fits[..near]
@@ -125,8 +123,8 @@ impl<'a> Round<'a> {
         Some(round)
     }
 
-    /// Where others come close to the best, fits all of them in the simulator to the end: with straight lines of the parameters,
-    /// one that leads all of them far from the file may pass the one that is right.
+    /// Where several fits are close, fits all numbers of each in the simulator: with linearised parameters, a wrong effect that
+    /// moves all parameters may beat the right one.
     fn run_off(&mut self, engine: &Engine<'a>, model: &Refit) {
         let Some(best) = self.fits.first().map(|fit| fit.loss) else { return };
         let is_close = |fit: &&Refit| fit.loss - best < CLOSE * (model.loss - best);
@@ -139,12 +137,12 @@ impl<'a> Round<'a> {
         sort(&mut self.fits);
     }
 
-    /// Fits a gap from another width than the one that screening says.
+    /// Fits the gap from other starting widths than the screened one.
     fn with_gap(&mut self, engine: &Engine<'a>, point: &Around, model: &Refit, gap: &Screened) {
         let start = gap_start(engine, point, &model.placed, &gap.start);
         let Some(fit) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
         let restarted = refit_with_starts(engine, &relinearise(engine, &fit), NUMBER_COSTS);
-        // The one fitted from where screening said is the same effect, and no alternative to it.
+        // The fit from the screened width is the same effect, not an alternative.
         let is_gap = |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &gap.start));
         if self.fits.iter().filter(|other| is_gap(other)).all(|other| restarted.fit.loss < other.loss) {
             self.fits.retain(|other| !is_gap(other));
@@ -153,12 +151,12 @@ impl<'a> Round<'a> {
         }
     }
 
-    /// What is smaller than what occurs is no explanation, however well it fits.
+    /// Drops fits below the amplitude floor, however well they fit.
     pub(super) fn keep_large(&mut self) {
         self.fits.retain(|fit| fit.placed.last().is_some_and(is_large));
     }
 
-    /// The records as the best model meets them, where it has a home of its own.
+    /// The engine with the start states of the best model, where they were re-estimated.
     pub(super) fn take_engine(&mut self) -> Option<Engine<'a>> {
         let best = self.fits.first()?;
         self.restarted
@@ -172,8 +170,8 @@ fn sort(fits: &mut [Refit]) {
     fits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 }
 
-/// Where a candidate's fit begins: where screening says, unless the simulator finds it far worse there than screening does; then
-/// at the best of some amplitudes.
+/// Start of a candidate's fit: the screened amplitude, or the best of some amplitudes where the simulator's loss there is far
+/// above the predicted one.
 fn best_start(
     engine: &Engine<'_>,
     point: &Around,

@@ -1,23 +1,23 @@
-//! Models of linked rods, fitted from where they say themselves that the pistons were.
+//! Refits of models of linked rods with the window start states re-estimated under the model itself.
 
 use super::around_of;
 use crate::engine::Engine;
 use crate::refit::{Around, Placed, Refit, loss_at, refit, rig_of};
 use rayon::prelude::*;
 
-/// Amplitudes of a gap that are tried.
+/// Starting amplitudes of a gap.
 const AMPLITUDES: [f64; 5] = [0.12, 0.25, 0.45, 0.7, 1.0];
-/// How often a model of linked rods and the starts that it says follow each other, and the share of the loss that ends it.
+/// Maximum number of alternations between start states and model, and the relative fall of the loss that ends them.
 const MOVES: usize = 3;
 const MOVED: f64 = 0.05;
 
-/// A model, and the records as they are met best by it; `None` where its own starts make no difference.
+/// A fitted model, and the engine whose start states were estimated under it; `None` where the rods are not linked.
 pub(super) struct Restarted<'a> {
     pub(super) engine: Option<Engine<'a>>,
     pub(super) fit: Refit,
 }
 
-/// Fits a model again from where it says itself that the pistons were, where that matters.
+/// Refits a model of linked rods, alternating with estimates of the window start states under it.
 pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty: f64) -> Restarted<'a> {
     let mut best = Restarted { engine: None, fit: model.clone() };
     for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
@@ -38,8 +38,8 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty:
     best
 }
 
-/// Where the fit of a gap begins: where the records are met best from its own home. From the home of a rig with another one it is
-/// worse, however right it is.
+/// Start of the fit of a gap: the amplitude with the smallest loss, each under its own start states. Under the start states of
+/// another gap even the true one fits badly.
 pub(super) fn gap_start(
     engine: &Engine<'_>,
     point: &Around,

@@ -4,8 +4,7 @@
 //!   experiment ──► controllers with the baseline's numbers ──► rehearsal of the explanation's rig ──► commands, true points
 //! ```
 //!
-//! The run is what the experiment would be if the explanation were true: another rig is driven otherwise, and what its
-//! controllers do then is part of what it shows. The sensors' noise is that of one seed.
+//! The run is the experiment if the explanation were true, closed loop included. Sensor noise has one seed.
 
 use super::menu::{Entry, program};
 use crate::gridded_record::Point;
@@ -16,7 +15,7 @@ use plant::{Axis, Inputs, RigParameters, Scene, SceneError, SetupError, State, T
 use protocol::frames::MainChainState;
 use rehearsal::{Rehearsal, RehearsalParts};
 
-/// Longest run, periods: what is behind it is not looked at.
+/// Longest run, periods.
 const LONGEST: usize = 30_000;
 /// Range of a rod that rests, m.
 const PARKED_M: f64 = 1e-3;
@@ -24,7 +23,7 @@ const PARKED_M: f64 = 1e-3;
 const NEAR_M: f64 = 2e-3;
 /// Seed of the sensors' noise.
 const SEED: u64 = 1;
-/// The experiment begins when the initial positioning is over, whatever an effect does to standstill and error.
+/// Loose criteria of standstill, so that an effect does not keep the experiment from starting.
 const UNSETTLED: [&str; 6] = [
     "drive.settled.still_m=0.1",
     "drive.settled.position_error_m=0.5",
@@ -48,14 +47,14 @@ pub enum ClosedLoopError {
     Setup(#[from] SetupError),
 }
 
-/// What a run left.
+/// Result of a run.
 #[derive(Clone, Debug)]
 pub struct ClosedLoopRun {
     /// Whether the rods were linked.
     pub linked: bool,
     /// State at the start.
     pub start: State,
-    /// What acted over each period.
+    /// Inputs of each period.
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.
     pub points: Vec<[Point; 2]>,
@@ -66,9 +65,9 @@ pub struct ClosedLoopRun {
 }
 
 impl ClosedLoopRun {
-    /// Whether the experiment is one for this rig: it begins, it ends, and no rod that it moves comes near an end of its stroke.
+    /// Whether the experiment suits this rig: it begins, it ends, and no moved rod comes near an end of its stroke.
     #[must_use]
-    pub fn ends_well(&self, stroke_m: f64) -> bool {
+    pub(crate) fn ends_well(&self, stroke_m: f64) -> bool {
         let Some(began) = self.began else { return false };
         let keeps_away = |axis: usize| {
             let of = |point: &[Point; 2]| point[axis].extension_m;
@@ -114,7 +113,7 @@ pub fn drive(
     Ok(ClosedLoopRun { linked: scene.linked, start, inputs, points, began, done })
 }
 
-/// Where both axes are.
+/// States of both axes.
 fn points_of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
     std::array::from_fn(|i| {
         let axis = &truth.axes[i];

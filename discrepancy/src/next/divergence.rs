@@ -1,4 +1,4 @@
-//! How far two explanations of one record lie apart in another experiment.
+//! Expected discrimination between two explanations in an experiment.
 //!
 //! ```text
 //! J_i  = M (readings of explanation i - readings of the baseline) / noise     in windows of 100 ms, driven as if i were true
@@ -7,17 +7,14 @@
 //! T_ij = D_ij / (1 + e^2 |J_i|^2)                                             e = 1/16: no model is better than that
 //! ```
 //!
-//! D is the expected gain in chi2 of the true explanation over its rival; lengths and cosines leave out what numbers of the
-//! baseline explain (`nuisance.rs`). Where signatures are hundreds of standard deviations long, D is large for any two that
-//! are not equal; but forms that differ from the catalogue's and numbers that are a little off leave a share of the signature
-//! itself. T counts that share e as noise: it is D while a signature is weak, and of strong ones T >= 25 means a cosine below
-//! 0.95, which is what the workflow calls different. The amplitude is refitted although the first record bounds it: T is
-//! rather too small than too large.
+//! D is the expected gain in chi2 of the true explanation over its rival; the inner product excludes nuisance parameters
+//! (`nuisance.rs`). For signatures of hundreds of standard deviations D is large for any two that differ, but model error leaves
+//! a share e of the signature. T counts that share as noise: it equals D for a weak signature, and for a strong one T >= 25 means
+//! a cosine below 0.95. The amplitude is refitted although the first record bounds it, so that T is conservative.
 //!
-//! Windows begin at the true x, v, p_a, p_b of the run; what else moves (spool, lagged flow, memories of effects) goes on
-//! from the window before, of each plant its own. The first window is left out: memories fill in it. Readings of the force
-//! next to a stop, a break-away or a contact count for nothing: a difference of microseconds there is one of hundreds of
-//! newtons in a sample.
+//! Windows start at the true x, v, p_a, p_b of the run; spool, lagged flow and memories of effects continue in each plant. The
+//! first window is left out, since memories fill in it. Force readings next to a stop, a break-away or a contact are excluded:
+//! microseconds there are hundreds of newtons in a sample.
 //!
 //! Source: discrepancy-notes.md, 1 and pipeline 9; Hunter and Reiner 1965, Technometrics 7(3): designs for discriminating
 //! between two rival models.
@@ -28,51 +25,51 @@ use crate::gridded_record::{CHANNELS, Point};
 use crate::windows::{FORCE, dot, project, state_at};
 use plant::{Inputs, Plant, RigParameters, State, Truth};
 
-/// Share of a signature that forms and numbers leave unexplained: 25 = (1 - 0.95^2) / e^2.
+/// Model error as a share of the signature: 25 = (1 - 0.95^2) / e^2.
 const MODEL_ERROR: f64 = 1.0 / 16.0;
 /// Periods of a window.
 const WINDOW: usize = 100;
-/// Slower than this a piston is at rest, m/s: bristles creep.
+/// Speed below which a piston is at rest, m/s: bristles creep.
 const REST_M_PER_S: f64 = 1e-5;
-/// Share of its length below which what is left of a direction is rounding.
+/// Relative length below which an orthogonalised direction is rounding.
 const RANK: f64 = 1e-6;
 
-/// What rigs read in the windows of a run.
+/// Simulates rigs in the windows of a run.
 struct Observer<'a> {
     driven: &'a ClosedLoopRun,
     measured: Vec<usize>,
     noise: [f64; CHANNELS],
 }
 
-/// Whitened readings of all windows; those of the force at events are marked.
+/// Whitened readings of all windows; force readings at events are marked.
 struct Run {
     readings: Vec<f64>,
     jumps: Vec<bool>,
     starts: Vec<State>,
 }
 
-/// How one explanation differs from a rival.
+/// Divergence of an explanation from a rival.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
     /// |J|^2 of the true one, squared standard deviations.
-    pub square: f64,
+    pub(crate) square: f64,
     /// Cosine of the two signatures, 0 to 1.
-    pub cosine: f64,
+    pub(crate) cosine: f64,
 }
 
 impl Divergence {
     /// T of so many repetitions, in squared standard deviations.
     #[must_use]
-    pub fn in_repetitions(&self, times: u32) -> f64 {
+    pub(crate) fn in_repetitions(&self, times: u32) -> f64 {
         let square = self.square * f64::from(times);
         square * (1.0 - self.cosine * self.cosine) / (1.0 + MODEL_ERROR * MODEL_ERROR * square)
     }
 }
 
-/// Divergence of the first of `rigs`, which the run was driven by, from each of the others. `numbers` are baselines whose numbers
-/// are off by a prior standard deviation each.
+/// Divergence of the first of `rigs`, which made the run, from each of the others. `numbers` are baselines with one parameter off
+/// by a prior standard deviation each.
 #[must_use]
-pub fn divergences(
+pub(crate) fn divergences(
     driven: &ClosedLoopRun,
     baseline: &RigParameters,
     rigs: &[&RigParameters],
@@ -147,8 +144,8 @@ impl<'a> Observer<'a> {
         self.driven.inputs.len() / WINDOW
     }
 
-    /// Where the axes are at the start of a window, at rest where they creep: there friction holds a piston up to the break-away
-    /// force, whichever way, as the workflow takes it. One that came to rest sliding would give way to one sign of a nudge alone.
+    /// Start states of a window, with creep set to rest, as in the workflow: friction then holds the piston in both directions. A
+    /// piston still sliding would respond to one sign of a nudge only.
     fn points(&self, window: usize) -> [Point; 2] {
         self.driven.points[window * WINDOW].map(|point| {
             let creeps = point.rod_velocity_m_per_s.abs() < REST_M_PER_S;
@@ -212,7 +209,7 @@ impl<'a> Observer<'a> {
         out: &mut [bool],
     ) -> Vec<Vec<f64>> {
         let baseline = &base.readings[window * self.rows()..][..self.rows()];
-        // Axes that are not linked know nothing of each other: one run nudges both, and each has its own readings.
+        // Unlinked axes are independent: one run perturbs both.
         let together: Vec<Vec<usize>> = if self.driven.linked {
             self.measured.iter().map(|axis| vec![*axis]).collect()
         } else {
@@ -255,19 +252,19 @@ fn plant_in(rig: &RigParameters, state: &State) -> Plant {
     Plant::in_state(rig, &of_rig(rig, state)).expect("a state of a run is one that the rig can be in")
 }
 
-/// The state with what this rig's supply gives at most: another rig's run may have had more.
+/// The state with the supply pressure limited to this rig's.
 fn of_rig(rig: &RigParameters, state: &State) -> State {
     State { supply_pressure_pa: state.supply_pressure_pa.min(rig.supply().pressure_pa), ..*state }
 }
 
-/// Which way an axis goes, and whether the rods touch.
+/// Direction of an axis, and whether the rods touch.
 fn phase(truth: &Truth, axis: usize) -> (i8, bool) {
     let velocity = truth.axes[axis].rod_velocity_m_per_s;
     let way = if velocity.abs() < REST_M_PER_S { 0 } else { velocity.signum() as i8 };
     (way, truth.contact_force_n != 0.0)
 }
 
-/// An orthonormal basis of columns without the rows that count for nothing, by Gram and Schmidt, each direction twice.
+/// Orthonormal basis of columns without excluded rows, by Gram-Schmidt with reorthogonalisation.
 fn basis(columns: Vec<Vec<f64>>, out: &[bool]) -> Vec<Vec<f64>> {
     let mut kept: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for mut column in columns {

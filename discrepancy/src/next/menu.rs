@@ -23,7 +23,7 @@ impl Entry {
 
     /// Whether it links the rods.
     #[must_use]
-    pub fn is_linked(&self) -> bool {
+    pub(crate) fn is_linked(&self) -> bool {
         self.toml.lines().any(|line| line.trim_end() == "linked = true")
     }
 }

@@ -1,4 +1,4 @@
-//! Numbers of the baseline that may be off as well: what their refit would explain separates nothing.
+//! Nuisance parameters of the design: signatures count only outside their span.
 //!
 //! ```text
 //! <a, b> = a.b - (N'a).(1 + N'N)^-1 (N'b)          N: change of the readings with one prior standard deviation of each number
@@ -16,8 +16,8 @@ use plant::{ParameterError, RigParameters};
 /// One prior standard deviation of a number, relative.
 const TOLERANCE: f64 = 0.03;
 
-/// All of them but the area, which a drawing tells.
-pub fn numbers() -> impl Iterator<Item = &'static Parameter> {
+/// All but the area, which is known from the drawing.
+pub(crate) fn numbers() -> impl Iterator<Item = &'static Parameter> {
     PARAMETERS.iter().filter(|parameter| parameter.name != "parameter:piston-area")
 }
 
@@ -25,13 +25,13 @@ pub fn numbers() -> impl Iterator<Item = &'static Parameter> {
 ///
 /// # Errors
 /// [`ParameterError`] when it leaves its range.
-pub fn off(rig: &RigParameters, parameter: &Parameter) -> Result<RigParameters, ParameterError> {
+pub(crate) fn off(rig: &RigParameters, parameter: &Parameter) -> Result<RigParameters, ParameterError> {
     parameter.scaled(rig, 1.0 + TOLERANCE)
 }
 
-/// The product of signatures that leaves out what the numbers explain.
+/// Inner product of signatures with nuisance parameters marginalised.
 #[derive(Debug)]
-pub struct Product<'a> {
+pub(crate) struct Product<'a> {
     numbers: &'a [Vec<f64>],
     inverse: DMatrix<f64>,
 }
@@ -39,7 +39,7 @@ pub struct Product<'a> {
 impl<'a> Product<'a> {
     /// The product for these changes of the readings.
     #[must_use]
-    pub fn new(numbers: &'a [Vec<f64>]) -> Self {
+    pub(crate) fn new(numbers: &'a [Vec<f64>]) -> Self {
         let count = numbers.len();
         let gram = DMatrix::from_fn(count, count, |row, column| {
             f64::from(u8::from(row == column)) + dot(&numbers[row], &numbers[column])
@@ -51,7 +51,7 @@ impl<'a> Product<'a> {
 
     /// The product of two signatures.
     #[must_use]
-    pub fn of(&self, left: &[f64], right: &[f64]) -> f64 {
+    pub(crate) fn of(&self, left: &[f64], right: &[f64]) -> f64 {
         let along = |signature: &[f64]| {
             DVector::from_iterator(
                 self.numbers.len(),

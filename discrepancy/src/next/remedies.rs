@@ -1,16 +1,16 @@
-//! What would separate effects where no experiment of this rig does: what a person can do and the controller cannot.
+//! Manual measurements that discriminate between effects where no experiment does.
 //!
 //! Source: effects.md, the column of twins; discrepancy-notes.md, 11 and pipeline 9.
 
 use super::Explanation;
 
-/// Effects that something would tell from each other, and what.
+/// Effects that a measurement discriminates, and the measurement.
 struct Remedy {
     among: &'static [&'static str],
     what: &'static str,
 }
 
-/// In this order: the first that knows both sides of a pair.
+/// The first entry that contains both sides of a pair counts.
 const REMEDIES: &[Remedy] = &[
     Remedy {
         among: &[
@@ -108,12 +108,12 @@ const REMEDIES: &[Remedy] = &[
     },
 ];
 
-/// Where nothing better is known.
+/// Fallback.
 const ELSE: &str = "a larger amplitude: what differs here lies below the sensors' noise";
 
-/// What would separate these pairs, each remedy once; `None` without pairs.
+/// Measurements for these pairs, each once; `None` without pairs.
 #[must_use]
-pub fn of_pairs(explanations: &[Explanation], pairs: &[(usize, usize)]) -> Option<String> {
+pub(crate) fn of_pairs(explanations: &[Explanation], pairs: &[(usize, usize)]) -> Option<String> {
     let mut remedies: Vec<&str> = Vec::new();
     for (one, other) in pairs {
         let what = of_pair(&explanations[*one].names, &explanations[*other].names);
@@ -124,9 +124,9 @@ pub fn of_pairs(explanations: &[Explanation], pairs: &[(usize, usize)]) -> Optio
     (!remedies.is_empty()).then(|| remedies.join("; "))
 }
 
-/// What would separate two explanations.
+/// Measurement for two explanations.
 #[must_use]
-pub fn of_pair(one: &[String], other: &[String]) -> &'static str {
+pub(crate) fn of_pair(one: &[String], other: &[String]) -> &'static str {
     let only = |these: &[String], those: &[String]| -> Vec<String> {
         let effect = |name: &String| name.split(' ').next().unwrap_or_default().to_owned();
         these.iter().filter(|name| !those.contains(name)).map(effect).collect()

@@ -5,8 +5,8 @@
 //! p  = (1 + shifts whose R2 is as large) / (1 + shifts)     200 circular shifts of the input against the variable
 //! ```
 //!
-//! d unknown input, w = 1/deviation^2, 20 bins with equally many windows or of equal width, whichever tells more. A shift keeps
-//! how slowly both go, and breaks what ties them; so a slow drift is not taken for a law.
+//! d unknown input, w = 1/deviation^2, 20 bins of equal count or equal width, whichever has the larger R2. A circular shift keeps
+//! both autocorrelations and destroys the dependence, so that a slow drift is not taken for a law.
 //!
 //! Source: discrepancy-notes.md, 9 and Pipeline 8.
 
@@ -14,24 +14,24 @@ use crate::locate::maps::{BINS, bins, few_bins};
 use crate::locate::{UnknownSeries, VARIABLES};
 
 /// Circular shifts.
-pub const SHIFTS: usize = 200;
+pub(crate) const SHIFTS: usize = 200;
 /// Windows of a block of a fold: 0.2 s, so that both folds see each stroke in all its parts.
 const BLOCK: usize = 10;
 /// Bins to each side of a pair.
 const PAIR_BINS: usize = 6;
 
-/// An unknown input without what is not needed for its law.
+/// Values, weights, variables and folds of an unknown input.
 #[derive(Clone, Debug)]
-pub struct Sample {
+pub(crate) struct Sample {
     values: Vec<f64>,
     weights: Vec<f64>,
     variables: Vec<[f64; VARIABLES.len()]>,
     folds: Vec<usize>,
 }
 
-/// Which bin each window is in.
+/// The bin of each window.
 #[derive(Clone, Debug)]
-pub struct Bins {
+pub(crate) struct Bins {
     places: Vec<usize>,
     count: usize,
 }
@@ -39,14 +39,14 @@ pub struct Bins {
 impl Bins {
     /// Bins of a variable.
     #[must_use]
-    pub fn of(sample: &Sample, variable: usize) -> Self {
+    pub(crate) fn of(sample: &Sample, variable: usize) -> Self {
         let values: Vec<f64> = sample.variables.iter().map(|variables| variables[variable]).collect();
         Bins { places: bins(&values), count: BINS }
     }
 
-    /// Bins of equal width: a pulse that few windows have stands in bins of its own.
+    /// Bins of equal width, which isolate a pulse of few windows.
     #[must_use]
-    pub fn even(sample: &Sample, variable: usize) -> Self {
+    pub(crate) fn even(sample: &Sample, variable: usize) -> Self {
         let values = || sample.variables.iter().map(|variables| variables[variable]);
         let least = values().fold(f64::INFINITY, f64::min);
         let width = (values().fold(f64::NEG_INFINITY, f64::max) - least) / BINS as f64;
@@ -56,7 +56,7 @@ impl Bins {
 
     /// Bins of a pair of variables.
     #[must_use]
-    pub fn of_pair(sample: &Sample, left: usize, right: usize) -> Self {
+    pub(crate) fn of_pair(sample: &Sample, left: usize, right: usize) -> Self {
         let of = |variable: usize| {
             few_bins(
                 &sample.variables.iter().map(|variables| variables[variable]).collect::<Vec<_>>(),
@@ -72,9 +72,9 @@ impl Bins {
 }
 
 impl Sample {
-    /// A series without what is not needed.
+    /// Takes the sample of a series.
     #[must_use]
-    pub fn of(series: &UnknownSeries) -> Self {
+    pub(crate) fn of(series: &UnknownSeries) -> Self {
         let points = &series.points;
         Sample {
             values: points.iter().map(|point| point.value).collect(),
@@ -85,7 +85,7 @@ impl Sample {
     }
 
     /// Value, weight and variables of each window.
-    pub fn rows(&self) -> impl Iterator<Item = (f64, f64, &[f64; VARIABLES.len()])> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (f64, f64, &[f64; VARIABLES.len()])> {
         self.values
             .iter()
             .zip(&self.weights)
@@ -93,9 +93,9 @@ impl Sample {
             .map(|((value, weight), variables)| (*value, *weight, variables))
     }
 
-    /// R2 over a variable, its p value, and by how many standard deviations it stands out of shifted ones.
+    /// R2 over a variable, its p value, and its distance from the shifted ones in standard deviations.
     #[must_use]
-    pub fn test(&self, variable: usize) -> (f64, f64, f64) {
+    pub(crate) fn test(&self, variable: usize) -> (f64, f64, f64) {
         let both = [Bins::of(self, variable), Bins::even(self, variable)];
         let most = |shift: usize| {
             both.iter().map(|bins| self.explained(bins, shift)).fold(f64::NEG_INFINITY, f64::max)
@@ -110,9 +110,9 @@ impl Sample {
         (r2, (1 + reached) as f64 / (1 + SHIFTS) as f64, stands_out)
     }
 
-    /// R2 of bin means on the fold that they are not from, with the input shifted by some windows.
+    /// Cross-validated R2 of bin means, with the input shifted by some windows.
     #[must_use]
-    pub fn explained(&self, bins: &Bins, shift: usize) -> f64 {
+    pub(crate) fn explained(&self, bins: &Bins, shift: usize) -> f64 {
         let n = self.values.len();
         let from = |at: usize| (at + shift) % n;
         let mut sums = vec![[[0.0; 2]; 2]; bins.count];
@@ -139,29 +139,29 @@ impl Sample {
         if whole > 0.0 { 1.0 - left / whole } else { 0.0 }
     }
 
-    /// Weighted squares beyond those of noise.
+    /// Weighted squares beyond their expectation.
     #[must_use]
-    pub fn excess(&self) -> f64 {
+    pub(crate) fn excess(&self) -> f64 {
         self.squares() - self.values.len() as f64
     }
 
     /// The weighted mean over its standard error.
     #[must_use]
-    pub fn mean_over_error(&self) -> f64 {
+    pub(crate) fn mean_over_error(&self) -> f64 {
         let (sum, weight) = self.mean();
         sum / weight.sqrt()
     }
 
     /// Share of the squares that the mean explains.
     #[must_use]
-    pub fn constant_share(&self) -> f64 {
+    pub(crate) fn constant_share(&self) -> f64 {
         let (sum, weight) = self.mean();
         sum * sum / weight / self.squares()
     }
 
     /// Weighted sum of squares.
     #[must_use]
-    pub fn squares(&self) -> f64 {
+    pub(crate) fn squares(&self) -> f64 {
         self.values.iter().zip(&self.weights).map(|(value, weight)| weight * value * value).sum()
     }
 

@@ -4,8 +4,7 @@
 //! d = a f(variables) + b       a, b by weighted least squares       at most five nodes
 //! ```
 //!
-//! The shortest formula wins that explains nearly as much as the best; one that explains less than most of what bins of any
-//! variable explain is none.
+//! The shortest formula within a share of the best gain is taken, if it explains most of what bins of any variable explain.
 //!
 //! Source: discrepancy-notes.md, Pipeline 8. Short laws before good ones: Udrescu, Tegmark 2020, Science Advances 6(16).
 
@@ -13,11 +12,11 @@ use super::dependence::{Bins, Sample};
 use crate::locate::{DIRECTION, POSITION, SPEED, TIME, VARIABLES, VELOCITY, WindowVariable};
 use std::f64::consts::TAU;
 
-/// Share of the best formula's gain that a shorter one may miss.
+/// Share of the best gain that a shorter formula must reach.
 const NEARLY: f64 = 0.95;
 /// Share of what bins explain that a formula must explain.
 const ENOUGH: f64 = 0.8;
-/// Periods of a ripple over x that are tried, m: 4 mm to 400 mm in steps of 2 %.
+/// Grid of ripple periods over x, m: 4 mm to 400 mm in steps of 2 %.
 const SHORTEST_M: f64 = 0.004;
 const PERIODS: usize = 232;
 
@@ -34,7 +33,7 @@ struct Form {
 
 /// The shortest formula that explains an unknown input, its numbers in the units of the report.
 #[must_use]
-pub fn formula(sample: &Sample, unit: &str) -> Option<String> {
+pub(crate) fn formula(sample: &Sample, unit: &str) -> Option<String> {
     let fits: Vec<(Form, [f64; 2], f64)> = forms()
         .into_iter()
         .map(|form| {
@@ -59,7 +58,7 @@ pub fn formula(sample: &Sample, unit: &str) -> Option<String> {
     })
 }
 
-/// What bins of the best variable explain, in weighted squares, the mean included.
+/// Weighted squares explained by bins of the best variable, the mean included.
 fn binned(sample: &Sample) -> f64 {
     let mean = sample.constant_share() * sample.squares();
     let variable = |at: &usize| *at != TIME;
@@ -102,7 +101,7 @@ fn form(
     Form { nodes, text: text.to_owned(), unit: unit.to_owned(), law: Box::new(law), constant }
 }
 
-/// Factor, constant, and the weighted squares that go.
+/// Factor, constant, and the weighted squares removed.
 fn fit(sample: &Sample, form: &Form) -> ([f64; 2], f64) {
     let (mut ff, mut f, mut one, mut fd, mut d) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (value, weight, variables) in sample.rows() {

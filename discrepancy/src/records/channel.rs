@@ -83,7 +83,7 @@ impl Channel {
 
     /// Its place in [`Channel::ALL`].
     #[must_use]
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         match self {
             Channel::Of(axis, signal) => axis.index() * Signal::ALL.len() + signal as usize,
             Channel::SupplyPressure => Self::COUNT - 1,
@@ -98,13 +98,13 @@ impl Channel {
 
     /// The channel of a column in `measurement.csv`; `None` for time, and for what that file does not hold.
     #[must_use]
-    pub fn of_column(name: &str) -> Option<Channel> {
+    pub(crate) fn of_column(name: &str) -> Option<Channel> {
         Self::of_mapping(name).filter(|channel| !channel.foreign_only())
     }
 
     /// The channel that a mapping calls so.
     #[must_use]
-    pub fn of_mapping(name: &str) -> Option<Channel> {
+    pub(crate) fn of_mapping(name: &str) -> Option<Channel> {
         Self::ALL.into_iter().find(|channel| channel.to_string() == name)
     }
 

@@ -20,7 +20,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A low pass in sections of second order.
 #[derive(Clone, Debug)]
-pub struct LowPass {
+pub(crate) struct LowPass {
     order: usize,
     sections: Vec<Section>,
 }
@@ -35,13 +35,13 @@ struct Section {
 impl LowPass {
     /// A Butterworth low pass; `edge_ratio` is its -3 dB frequency over the Nyquist frequency, above 0 and below 1.
     #[must_use]
-    pub fn butterworth(order: usize, edge_ratio: f64) -> Self {
+    pub(crate) fn butterworth(order: usize, edge_ratio: f64) -> Self {
         Self::of(order, edge_ratio, 1.0, 1.0, 1.0)
     }
 
     /// A Chebyshev I low pass; `edge_ratio` is the frequency at which its ripple ends over the Nyquist frequency.
     #[must_use]
-    pub fn chebyshev(order: usize, ripple_db: f64, edge_ratio: f64) -> Self {
+    pub(crate) fn chebyshev(order: usize, ripple_db: f64, edge_ratio: f64) -> Self {
         let square = 10.0_f64.powf(ripple_db / 10.0) - 1.0;
         let bend = (1.0 / square.sqrt()).asinh() / order as f64;
         let at_rest = if order.is_multiple_of(2) { 1.0 / (1.0 + square).sqrt() } else { 1.0 };
@@ -69,7 +69,7 @@ impl LowPass {
 
     /// The samples, run forth and back; as long as they were. Fewer than two samples come back as they are.
     #[must_use]
-    pub fn zero_phase(&self, samples: &[f64]) -> Vec<f64> {
+    pub(crate) fn zero_phase(&self, samples: &[f64]) -> Vec<f64> {
         let Some((first, last)) = samples.first().zip(samples.last()).filter(|_| samples.len() > 1) else {
             return samples.to_vec();
         };

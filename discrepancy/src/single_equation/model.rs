@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Which balance a model is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub(crate) enum Kind {
     /// One mass: `m a = F_applied - F_friction - F_offset`.
     Mass,
     /// Slow strokes of one chamber: `F_ext = A p + F_friction + F_offset`.
@@ -22,53 +22,53 @@ pub enum Kind {
 
 /// A checked model file.
 #[derive(Clone, Debug)]
-pub struct Model {
+pub(crate) struct Model {
     /// Which balance.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// What it is called in reports.
-    pub name: String,
+    pub(crate) name: String,
     /// Where its records' columns are told; `None` for `measurement.csv`.
-    pub mapping: Option<PathBuf>,
+    pub(crate) mapping: Option<PathBuf>,
     /// Rig file that a chamber's numbers come from.
-    pub rig: Option<PathBuf>,
+    pub(crate) rig: Option<PathBuf>,
     /// Where each quantity is.
     pub(super) channels: BTreeMap<String, Channel>,
     /// How records are processed.
-    pub processing: Processing,
+    pub(crate) processing: Processing,
     /// How selection is folded and what it asks.
-    pub selection: Selection,
+    pub(crate) selection: Selection,
     /// Which of the baseline's columns are fitted.
-    pub baseline: Baseline,
+    pub(crate) baseline: Baseline,
     /// What was added.
-    pub terms: Vec<TermEntry>,
+    pub(crate) terms: Vec<TermEntry>,
 }
 
 /// How a record becomes rows.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Processing {
+pub(crate) struct Processing {
     /// Samples are interpolated linearly to this distance, s.
-    pub period_s: f64,
+    pub(crate) period_s: f64,
     /// Edge of the position's (and pressure's) zero-phase Butterworth, Hz; 0 for none.
-    pub low_pass_hz: f64,
+    pub(crate) low_pass_hz: f64,
     /// Its order.
-    pub low_pass_order: usize,
+    pub(crate) low_pass_order: usize,
     /// Samples of a moving average of the position before its speed is taken; 1 for none.
-    pub moving_average: usize,
+    pub(crate) moving_average: usize,
     /// Every how many samples there is a row; more than 1 goes through a zero-phase Chebyshev I.
-    pub decimate: usize,
+    pub(crate) decimate: usize,
     /// Its order.
-    pub decimate_order: usize,
+    pub(crate) decimate_order: usize,
     /// Its ripple, dB.
     pub(super) decimate_ripple_decibel: f64,
     /// Its edge over the Nyquist frequency of the rows.
     pub(super) decimate_edge: f64,
     /// Rows that are slower are left out, mm/s.
-    pub speed_above_mm_per_s: f64,
+    pub(crate) speed_above_mm_per_s: f64,
     /// Rows outside are left out, mm.
-    pub position_mm: [f64; 2],
+    pub(crate) position_mm: [f64; 2],
     /// Rows within this of an end of a record are fitted, but nothing is selected by them, s: a zero-phase filter's ends.
-    pub ends_s: f64,
+    pub(crate) ends_s: f64,
 }
 
 impl Default for Processing {
@@ -92,17 +92,17 @@ impl Default for Processing {
 /// What selection asks.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Selection {
+pub(crate) struct Selection {
     /// Folds in time of each record.
-    pub blocks: usize,
+    pub(crate) blocks: usize,
     /// Bands of position, and of speed, that are folds as well.
-    pub bands: usize,
+    pub(crate) bands: usize,
     /// Least share of the residual's power that a term must take on folds in time; half of it on bands.
     pub(super) share_floor: f64,
     /// Most terms; 0 searches for none, and tells the residuals of the model as it is.
-    pub most: usize,
+    pub(crate) most: usize,
     /// Pitches that the machine has, of a screw or of teeth, mm: candidates for ripples of their own, beside the scan.
-    pub pitches_mm: Vec<f64>,
+    pub(crate) pitches_mm: Vec<f64>,
 }
 
 impl Default for Selection {
@@ -114,13 +114,13 @@ impl Default for Selection {
 /// Which columns the baseline has besides mass or area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Baseline {
+pub(crate) struct Baseline {
     /// Viscous friction; by default of a mass.
-    pub viscous: Option<bool>,
+    pub(crate) viscous: Option<bool>,
     /// Sliding friction.
-    pub sliding: bool,
+    pub(crate) sliding: bool,
     /// Constant force or flow.
-    pub offset: bool,
+    pub(crate) offset: bool,
 }
 
 impl Default for Baseline {
@@ -131,13 +131,13 @@ impl Default for Baseline {
 
 /// A term that was added to the model; its numbers are told for people, and fitted again with the others.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TermEntry {
+pub(crate) struct TermEntry {
     /// Name in the catalogue.
-    pub effect: String,
+    pub(crate) effect: String,
     /// Which form of it; empty where there is one.
-    pub form: String,
+    pub(crate) form: String,
     /// Numbers that shape it, in the units of their names.
-    pub shape: BTreeMap<String, f64>,
+    pub(crate) shape: BTreeMap<String, f64>,
 }
 
 #[derive(Deserialize)]
@@ -196,7 +196,7 @@ impl Model {
     ///
     /// # Errors
     /// [`BalanceError`] with the key, its value and what is allowed.
-    pub fn read(file: &Path) -> Result<Self, BalanceError> {
+    pub(crate) fn read(file: &Path) -> Result<Self, BalanceError> {
         let text = std::fs::read_to_string(file)
             .map_err(|error| BalanceError::Open { file: file.into(), reason: error.to_string() })?;
         Self::from_toml(&text, file)
@@ -206,7 +206,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Model::read`].
-    pub fn from_toml(text: &str, file: &Path) -> Result<Self, BalanceError> {
+    pub(crate) fn from_toml(text: &str, file: &Path) -> Result<Self, BalanceError> {
         let read: File = toml::from_str(text)
             .map_err(|error| BalanceError::Syntax { file: file.into(), reason: error.to_string() })?;
         let refuse = |key: &str, value: String, allowed: &str| BalanceError::Value {

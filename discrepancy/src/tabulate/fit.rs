@@ -5,8 +5,8 @@
 //!   step of z, shortened until the loss falls
 //! ```
 //!
-//! [`crate::refit`] moves the coordinates of effects and takes parameters linearly; here parameters are simulated too, since a
-//! table would take up what their straight lines leave.
+//! [`crate::refit`] takes parameters linearly; here they are simulated too, since a table would absorb the error of their
+//! linearisation.
 
 use super::with_tables;
 use crate::engine::{Engine, FACTOR_CHANGE};
@@ -19,34 +19,34 @@ use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
 
-/// The same of a value: N, Nl/min; and in proportion.
+/// Steps of finite differences: N, Nl/min; and as a share of the value.
 const FORCE_CHANGE_N: f64 = 1.0;
 const FLOW_CHANGE_NL_PER_MIN: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.05;
-/// Standard deviations of values before anything is measured: beyond what occurs.
+/// Prior standard deviations of values, beyond what occurs.
 const FORCE_TOLERANCE_N: f64 = 200.0;
 const FLOW_TOLERANCE_NL_PER_MIN: f64 = 200.0;
-/// Steps that are taken with the same derivatives: those of a table with many points cost many times a step.
+/// Steps with the same derivatives, which cost many times a step.
 const ALONG: usize = 3;
-/// Shortened steps that are tried.
+/// Step fractions of the line search.
 const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
-/// Fall of the loss below which a fit has settled.
+/// Fall of the loss below which a fit has converged.
 const CONVERGED: f64 = 1.0;
-/// Parts of the records that are left out in turn, to see what a model only learned.
+/// Folds of the cross-validation.
 const FOLDS: usize = 5;
 
-/// A table whose values are moved.
+/// A table with fitted values.
 #[derive(Clone, Debug)]
 pub(super) struct Tied {
     pub(super) table: Tabulated,
-    /// Whether all values are one.
+    /// Whether all values are equal.
     pub(super) is_constant: bool,
-    /// What its variable was in the windows, sorted.
+    /// Sorted values of its variable in the windows.
     pub(super) seen: Vec<f64>,
 }
 
 impl Tied {
-    /// Whether one of its values is anything to a window.
+    /// Whether a point acts in a window.
     fn acts(&self, point: usize, reach: &Reach) -> bool {
         let Tabulated { axis, variable, at, .. } = &self.table;
         let before = point.checked_sub(1).map_or(f64::NEG_INFINITY, |before| at[before]);
@@ -59,12 +59,12 @@ impl Tied {
 #[derive(Clone, Debug)]
 pub(super) struct Model {
     pub(super) factors: [f64; COUNT],
-    /// Which of them are moved.
+    /// Which of them are free.
     pub(super) free: [bool; COUNT],
     pub(super) tables: Vec<Tied>,
 }
 
-/// What is moved.
+/// A free number.
 #[derive(Clone, Copy, Debug)]
 enum Coordinate {
     Factor(usize),
@@ -73,12 +73,12 @@ enum Coordinate {
 }
 
 impl Model {
-    /// Parameters alone; those that are not free are what the file says.
+    /// Parameters without tables; those not free are at the rig file's values.
     pub(super) fn alone(factors: [f64; COUNT], free: [bool; COUNT]) -> Self {
         Model { factors, free: [true; COUNT], tables: Vec::new() }.held(free)
     }
 
-    /// The same with only some parameters free, the others what the file says.
+    /// The same with only some parameters free, the others at the rig file's values.
     pub(super) fn held(mut self, free: [bool; COUNT]) -> Self {
         self.free = free;
         for (factor, _) in self.factors.iter_mut().zip(free).filter(|(_, free)| !free) {
@@ -120,7 +120,7 @@ impl Model {
         model
     }
 
-    /// How far a coordinate is moved for a derivative.
+    /// Finite difference step of a coordinate.
     fn change(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
             Coordinate::Factor(_) => FACTOR_CHANGE,
@@ -146,7 +146,7 @@ impl Model {
         tolerance.powi(-2)
     }
 
-    /// How far a coordinate is from nothing.
+    /// Deviation of a coordinate from its neutral value.
     fn off(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
             Coordinate::Factor(at) => self.factors[at] - 1.0,
@@ -154,7 +154,7 @@ impl Model {
         }
     }
 
-    /// What coordinates cost that are far from nothing, and points that there are.
+    /// Prior penalty of the factors and penalty for the points.
     fn costs(&self) -> f64 {
         let factors: f64 =
             (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].tolerance).powi(2)).sum();
@@ -164,17 +164,17 @@ impl Model {
     }
 }
 
-/// A model and what it leaves.
+/// A simulated model.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
     pub(super) model: Model,
     residual: Vec<f64>,
-    /// Of the windows, and what the model costs.
+    /// Loss of the windows plus penalties.
     pub(super) loss: f64,
 }
 
 impl Point {
-    /// `None` where no rig can be so.
+    /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
         let squares: Vec<f64> =
@@ -183,7 +183,7 @@ impl Point {
         loss.is_finite().then_some(Point { model, residual, loss })
     }
 
-    /// The parameters of the model with their errors, as a fit of no effect; the lines are its own.
+    /// The parameters with standard errors, as a fit without effects; `lines` is the linearisation at the model.
     pub(super) fn as_refit(&self, engine: &Engine<'_>, lines: &Lines) -> Refit {
         let moved = self.model.moved();
         let mut errors = vec![f64::INFINITY; COUNT];
@@ -203,7 +203,7 @@ impl Point {
     }
 }
 
-/// Derivatives of a model by some coordinates; `passed` is what it shows.
+/// Sensitivities of a model to some coordinates; `passed` is its reference run.
 fn columns(
     engine: &Engine<'_>,
     model: &Model,
@@ -230,14 +230,14 @@ fn columns(
         .collect()
 }
 
-/// Straight lines around a model: what each of its coordinates changes.
+/// Linearisation of a model.
 pub(super) struct Lines {
     model: Model,
     passed: Vec<ReferenceRun>,
     columns: Vec<Vec<f64>>,
 }
 
-/// A table of zeros, which changes nothing yet, and what each of its values would change.
+/// A table of zeros with the sensitivities to its values.
 pub(super) struct Beside {
     tied: Tied,
     columns: Vec<Vec<f64>>,
@@ -250,20 +250,20 @@ impl Beside {
 }
 
 impl Lines {
-    /// The lines of a model; `None` where no rig can be so.
+    /// Linearises a model; `None` where no rig can have it.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let passed = engine.pass(&model.rig(engine)?);
         let columns = columns(engine, &model, &model.moved(), &passed)?;
         Some(Lines { model, passed, columns })
     }
 
-    /// Those of the model and of some tables more.
+    /// Columns of the model and of further tables.
     pub(super) fn with<'a>(&'a self, tables: &[&'a Beside]) -> Vec<&'a [f64]> {
         let more = tables.iter().flat_map(|beside| &beside.columns);
         self.columns.iter().chain(more).map(Vec::as_slice).collect()
     }
 
-    /// The lines of one more table, all zeros; `None` where no rig can have it.
+    /// Linearises one more table of zeros; `None` where no rig can have it.
     pub(super) fn beside(&self, engine: &Engine<'_>, tied: Tied) -> Option<Beside> {
         let mut model = self.model.clone();
         model.tables.push(tied.clone());
@@ -271,7 +271,7 @@ impl Lines {
         Some(Beside { tied, columns: columns(engine, &model, &moved, &self.passed)? })
     }
 
-    /// The loss of the windows of each fold by what the other folds say of the model: what it costs is no part of it.
+    /// Cross-validated loss of the linearised model, without penalties.
     pub(super) fn unseen_loss(&self, engine: &Engine<'_>, point: &Point) -> f64 {
         let columns = self.with(&[]);
         let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
@@ -281,7 +281,7 @@ impl Lines {
         products.unseen_loss(&(0..columns.len()).collect::<Vec<_>>(), &ridges, &from, FOLDS)
     }
 
-    /// The loss that the lines promise of the model, `point`, with some tables more.
+    /// Predicted loss of the linearised model with further tables.
     pub(super) fn promised(&self, engine: &Engine<'_>, point: &Point, tables: &[&Beside]) -> f64 {
         let mut model = self.model.clone();
         model.tables.extend(tables.iter().map(|beside| beside.tied.clone()));
@@ -292,8 +292,7 @@ impl Lines {
     }
 }
 
-/// Parameters that a model needs beside its tables, one after the other while the loss falls by `gain`, by the straight lines of
-/// all parameters and tables.
+/// Forward selection of parameters beside the tables on the linearised model, while the loss falls by `gain`.
 pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain: f64) -> [bool; COUNT] {
     let mut needed = [false; COUNT];
     let model = Model { free: [true; COUNT], ..point.model.clone() };
@@ -323,7 +322,7 @@ pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain:
     needed
 }
 
-/// Moves a model until its loss falls no more.
+/// Gauss-Newton until convergence.
 pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
     let mut point = start;
     for _ in 0..steps {
@@ -337,7 +336,7 @@ pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
     point
 }
 
-/// Some steps along the same straight lines, one for each coordinate that the model moves.
+/// Steps with the same sensitivities, one column for each free coordinate.
 pub(super) fn steps(engine: &Engine<'_>, start: Point, lines: &[&[f64]]) -> Point {
     let moved = start.model.moved();
     let ridges: Vec<f64> = moved.iter().map(|coordinate| start.model.ridge(*coordinate)).collect();
@@ -355,7 +354,7 @@ pub(super) fn steps(engine: &Engine<'_>, start: Point, lines: &[&[f64]]) -> Poin
     point
 }
 
-/// The longest step along straight lines that is a better one.
+/// Backtracking line search: the longest step that lowers the loss.
 fn along(
     engine: &Engine<'_>,
     point: &Point,

@@ -1,4 +1,4 @@
-//! The whole record in open loop: started from its first samples at rest, moved by its commands, judged after 0.1 s.
+//! Open-loop simulation of the whole record from its first samples at rest, judged after 0.1 s.
 
 use crate::gridded_record::{CHANNELS, GriddedRecord, Point};
 use crate::report::BeforeAfter;
@@ -13,12 +13,12 @@ const HIGHEST: f64 = 1.1;
 /// How far a rod may be beyond its stops, m: rounding.
 const BEYOND_M: f64 = 1e-9;
 
-/// What a free run gave.
+/// Result of a free run.
 #[derive(Debug)]
 pub(super) struct FreeRun {
     /// Of each axis and channel, rms error in percent of the range of the readings; `None` where there are none.
     pub(super) nrmse_percent: [[Option<f64>; CHANNELS]; 2],
-    /// What a rig cannot do.
+    /// Unphysical events.
     pub(super) unphysical: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What the windows of a record show of a model that lacks nothing: noise, drawn many times.
+//! Null distribution of the residual power, from draws of noise and synthetic records.
 
 use super::Model;
 use super::power::{Power, kept, levels, pooled, sums};
@@ -7,16 +7,16 @@ use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-/// Residuals of noise.
+/// Draws of noise.
 const DRAWS: u64 = 60;
-/// Records that the model itself would have left.
+/// Synthetic records.
 const RECORDS: u64 = 8;
-/// The range is a result and has the same bits each run.
+/// Fixed seed: the range is a result and has the same bits in each run.
 const SEED: u64 = 0x7e1d_0c7a_11ed_0006;
-/// Standard normal of 97.5 %.
+/// 97.5th percentile of the standard normal.
 const TWO_SIDED: f64 = 1.96;
 
-/// Figures of noise alone.
+/// Null figures.
 #[derive(Debug)]
 pub(super) struct NullPower {
     /// Mean sum of squares of each window and lane, window by window.
@@ -30,8 +30,8 @@ pub(super) struct NullPower {
 }
 
 impl NullPower {
-    /// Of a model on a record; of a long one, what records that the model left would show is drawn of a `part` of it alone, whose
-    /// spread is larger as it has fewer windows.
+    /// Of a model on a record. For a long record the synthetic records cover a `part`, and their spread is scaled by the number
+    /// of windows.
     pub(super) fn new(model: &Model<'_>, part: Option<&Model<'_>>) -> Self {
         let (mut null, of_noise) = Self::of_noise(&model.windows);
         let (mean, of_records) = match part {
@@ -46,14 +46,14 @@ impl NullPower {
         null
     }
 
-    /// Everything but the range, and the deviation of the joint power of noise.
+    /// All but the range, and the standard deviation of the joint power of noise.
     fn of_noise(windows: &Windows<'_>) -> (Self, f64) {
         let lanes = windows.lanes().len();
         let draws: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
             .map(|draw| sums(&windows.noise(&mut Pcg64::seed_from_u64(SEED ^ draw)), lanes))
             .collect();
-        // Windows differ in their directions of freedom; lanes without samples have nothing.
+        // Windows differ in their degrees of freedom; lanes without samples have none.
         let mut expected = vec![0.0; windows.count() * lanes];
         for draw in &draws {
             expected.iter_mut().zip(draw).for_each(|(sum, value)| *sum += value / DRAWS as f64);
@@ -63,7 +63,7 @@ impl NullPower {
             .map(|lane| powers.iter().map(|power| power.quiet()[lane]).sum::<f64>() / DRAWS as f64)
             .collect();
         let mut null = NullPower { expected, quiet, spreads: Vec::new(), range: [1.0; 2] };
-        // Every draw is treated as a record is: its levels are told from itself, its worst windows are left out.
+        // Each draw is processed like a record: level correction and trimming.
         let powers: Vec<Power> = powers.iter().map(|power| power.over(&levels(power, &null))).collect();
         let of_lane = |power: &Power, lane: usize| {
             let squares = power.lane(lane);
@@ -76,8 +76,8 @@ impl NullPower {
         (null, of_noise)
     }
 
-    /// Mean and deviation of the joint power of records that the model would have left: around a stop or a break-away a start
-    /// that is known to some micrometres leaves more than noise, right as the model is.
+    /// Mean and standard deviation of the joint power of synthetic records. Around a stop or a break-away even the true model
+    /// leaves more than noise, since start states are known to micrometres only.
     fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
         let lanes = model.windows.lanes().len();
         let left: Vec<f64> = (0..RECORDS)

@@ -1,20 +1,20 @@
-//! What residuals have in each window and lane, over what noise alone gives there.
+//! Residual power of each window and lane over its null expectation.
 
 use super::LEVELS;
 use super::null_power::NullPower;
 use crate::windows::WINDOW;
 
-/// Share of the windows that is left out, the worst of the extended model.
+/// Share of trimmed windows.
 const LEFT_OUT: f64 = 0.02;
-/// Share of the windows that tells the level of the noise: its quantile.
+/// Quantile of the windows that measures the noise level.
 const QUIET: f64 = 0.1;
 
-/// Squares of a window, and what noise alone would have.
+/// Squares of a window and their null expectation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Squares {
     /// Sum of squared residuals, in squares of the noise.
     pub(super) sum: f64,
-    /// Mean of the same for noise; 0 where there are no samples.
+    /// Null expectation; 0 without samples.
     pub(super) expected: f64,
 }
 
@@ -43,7 +43,7 @@ pub(super) fn sums(residual: &[f64], lanes: usize) -> Vec<f64> {
 }
 
 impl Power {
-    /// Sums of squares where noise alone has `expected`.
+    /// Sums of squares and their null expectations.
     pub(super) fn new(sums: &[f64], expected: &[f64], lanes: usize) -> Self {
         let squares = sums
             .iter()
@@ -64,7 +64,7 @@ impl Power {
         Power { lanes: self.lanes, squares }
     }
 
-    /// The same with a level of noise taken out of each lane.
+    /// The same with the level of each lane divided out.
     pub(super) fn over(&self, levels: &[f64]) -> Power {
         let squares = self
             .squares
@@ -91,7 +91,7 @@ impl Power {
         self.squares.chunks_exact(self.lanes).map(sum).collect()
     }
 
-    /// The quantile of each lane's windows that tells its level, over what noise alone has on average.
+    /// The quantile of each lane's windows that measures its level.
     pub(super) fn quiet(&self) -> Vec<f64> {
         (0..self.lanes)
             .map(|lane| {
@@ -115,21 +115,21 @@ pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
         .collect()
 }
 
-/// Which windows are judged: without the worst.
+/// Windows that remain after trimming.
 pub(super) fn kept(squares: &[Squares]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..squares.len()).filter(|at| squares[*at].expected > 0.0).collect();
     // A stable sort: equal windows stay in their order.
     order.sort_by(|left, right| squares[*right].over().total_cmp(&squares[*left].over()));
     let out = (LEFT_OUT * order.len() as f64).ceil() as usize;
     let mut kept: Vec<bool> = squares.iter().map(|squares| squares.expected > 0.0).collect();
-    // One window is judged however few there are.
+    // At least one window remains.
     for at in order.iter().take(out.min(order.len().saturating_sub(1))) {
         kept[*at] = false;
     }
     kept
 }
 
-/// Power over that of noise, of the windows that are judged; 0 without any.
+/// Pooled power ratio of the remaining windows; 0 without any.
 pub(super) fn pooled(squares: &[Squares], kept: &[bool]) -> f64 {
     let (sum, expected) = squares
         .iter()
@@ -139,7 +139,7 @@ pub(super) fn pooled(squares: &[Squares], kept: &[bool]) -> f64 {
     if expected > 0.0 { sum / expected } else { 0.0 }
 }
 
-/// Lag-1 autocorrelation of a lane within the windows that are judged.
+/// Lag-1 autocorrelation of a lane in the remaining windows.
 pub(super) fn neighbours(residual: &[f64], lane: usize, lanes: usize, kept: &[bool]) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
     for (window, _) in residual.chunks_exact(WINDOW * lanes).zip(kept).filter(|(_, kept)| **kept) {

@@ -1,4 +1,4 @@
-//! What a held-out record says of models that are known to be right, wrong or nothing.
+//! Held-out figures of models that are known to be right, wrong or unchanged.
 
 use super::*;
 use crate::gridded_record::Point;

@@ -1,4 +1,4 @@
-//! Series for the page: measured, both models window by window, and what each leaves.
+//! Series for the page: measured, both models window by window, and their residuals.
 
 use super::{Model, column};
 use crate::page::Trace;

@@ -1,23 +1,23 @@
-//! One simulation kept with where it went, so that a neighbour of its rig is simulated only in the windows where they differ.
+//! A simulation kept with its states, so that a neighbouring rig is simulated only in the windows where the two differ.
 //!
 //! ```text
 //!   rig ──► reference_run: readings, the state that each window begins in, how far each variable reaches in it
 //!   rig with one point of a table moved ──► windows that reach the point anew, each from its state; the others are known
 //! ```
 //!
-//! The point of a table acts between its neighbours alone, so that half of the windows and more show nothing of it. All that a
-//! rig without effects knows of what went before is its state.
+//! A point of a table acts between its neighbours only, so that half of the windows or more do not depend on it. The state of a
+//! rig without effects holds all of its past.
 
 use super::{COARSE_SUBSTEPS, WINDOW, Windows};
 use crate::sensor_inverse::SensorInverse;
 use plant::effects::tabulated::Variable;
 use plant::{Axis, Plant, RigParameters, State};
 
-/// What a rig shows in the windows of a record, and where it went.
+/// Readings of a rig in the windows of a record, with start states and ranges of the variables.
 #[derive(Clone, Debug)]
 pub struct ReferenceRun {
     simulated: Vec<f64>,
-    /// The state that each judged window begins in; empty where states do not tell all, as with effects that remember.
+    /// Start state of each judged window; empty for rigs with effects, whose memories are no part of it.
     states: Vec<State>,
     reaches: Vec<Reach>,
 }
@@ -30,7 +30,7 @@ impl ReferenceRun {
     }
 }
 
-/// Least and largest value of each variable of a table in a window.
+/// Smallest and largest value of each table variable in a window.
 #[derive(Clone, Copy, Debug)]
 pub struct Reach([[[f64; 2]; Variable::ALL.len()]; 2]);
 
@@ -48,7 +48,7 @@ impl Reach {
         }
     }
 
-    /// Whether a variable of an axis is anywhere between two values.
+    /// Whether a variable of an axis lies between two values anywhere in the window.
     #[must_use]
     pub fn meets(&self, axis: Axis, variable: Variable, between: [f64; 2]) -> bool {
         let place = Variable::ALL.iter().position(|known| *known == variable).expect("all of them");
@@ -58,7 +58,7 @@ impl Reach {
 }
 
 impl Windows<'_> {
-    /// Simulates a rig in longer steps and keeps where it went.
+    /// Simulates a rig with longer steps and keeps its states.
     #[must_use]
     pub fn pass(&self, rig: &RigParameters) -> ReferenceRun {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
@@ -93,8 +93,8 @@ impl Windows<'_> {
         reference_run
     }
 
-    /// What a neighbour of the rig that passed shows: it differs in windows of which `differs` is true alone, and in nothing that
-    /// a window's start depends on.
+    /// Readings of a neighbour of the reference rig. They differ only in the windows where `differs` is true, and start states do
+    /// not depend on the difference.
     #[must_use]
     pub fn simulate_where(
         &self,

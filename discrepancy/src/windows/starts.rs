@@ -1,4 +1,4 @@
-//! Where windows begin: what a start explains, and starts that are moved to where their readings are met best.
+//! Start states of windows: their sensitivities, and their estimation.
 
 use super::{COARSE_SUBSTEPS, WINDOW, Windows, dot, project};
 use crate::gridded_record::{GriddedRecord, Point};
@@ -7,35 +7,35 @@ use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
 use rand_pcg::Pcg64;
 use std::iter::once;
 
-/// How far a start may move at a time where the rods are linked.
+/// Largest move of a start state in one step where the rods are linked.
 const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
-/// Share of a step that is tried next when the whole met the readings worse.
+/// Backtracking factor.
 const SHORTER: f64 = 0.3;
-/// Rates at which a piston that seems at rest may slide, m/s: too slow to be seen, and yet it needs no break-away to go on.
+/// Speeds of a piston that seems at rest, m/s: too slow to measure, but sliding pistons need no break-away force.
 const SLIDES_M_PER_S: [f64; 2] = [1e-4, -1e-4];
-/// By how many squares of the noise another rate must meet a window's readings better.
+/// Fall of a window's squares at which another speed is taken.
 const MET_BETTER: f64 = 10.0;
-/// How often the starts of a linked record are moved after each search.
+/// Gauss-Newton passes after each search on linked records.
 const LINKED_PASSES: usize = 3;
-/// Shifts of the pistons against each other that are searched, either way: as far as two sensors' noise, then nearer.
+/// Grids of relative shifts of the two pistons: first over the noise of two sensors, then finer.
 const SHIFTS_M: [[f64; 3]; 2] = [[30e-6, 70e-6, 120e-6], [5e-6, 12e-6, 25e-6]];
-/// The same of others, where it is asked for.
+/// Gauss-Newton passes on other records.
 pub(super) const START_PASSES: usize = 2;
-/// Standard deviations by which a nudge changes a reading of the force at most; more is a jump.
+/// Largest change of a force reading by a nudge, in standard deviations; more is a jump.
 const JUMP: f64 = 0.5;
-/// How far the points may be from the truth, generously: m, m/s, Pa, Pa.
+/// Prior standard deviations of the start state: m, m/s, Pa, Pa.
 const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 
-/// Absolute pressure that no chamber of a rig falls below, whatever a noisy point says, Pa.
+/// Lower bound of a chamber's absolute pressure, Pa.
 const LEAST_PA: f64 = 1e4;
 
 impl Windows<'_> {
-    /// Starts where the readings are met best after so many passes, as linked ones have them anyway, and what they explain.
+    /// Estimates the start states in `passes` passes (linked records always), then their sensitivities.
     pub(super) fn estimate_starts(mut self, passes: usize) -> Self {
         self.choose_rates();
         if self.record.linked {
-            // A micrometre of the eye in its gap is two newtons: the record's points are too coarse. First the side of the gap
-            // on which each window is met best, then from there.
+            // A micrometre of the eye in its gap is two newtons, so the record's points are too coarse. A grid search finds the
+            // side of the gap, then Gauss-Newton starts there.
             for shifts_m in SHIFTS_M {
                 self.shift_linked(&shifts_m);
                 self.improve_starts(LINKED_PASSES);
@@ -47,7 +47,7 @@ impl Windows<'_> {
         self
     }
 
-    /// Takes rates that the record cannot tell from those of its points, where the readings are met better by them.
+    /// Replaces the speed of a start state by an indistinguishable one where the readings fit better.
     fn choose_rates(&mut self) {
         let mut squares: Option<Vec<f64>> = None;
         for slide_m_per_s in SLIDES_M_PER_S {
@@ -76,8 +76,8 @@ impl Windows<'_> {
         }
     }
 
-    /// Moves each window's start to where its readings say that it was; steps that meet them worse, as around a break-away, are
-    /// taken back and made shorter.
+    /// Gauss-Newton on the start state of each window. Steps that raise the squares, as around a break-away, are undone and
+    /// shortened.
     fn improve_starts(&mut self, passes: usize) {
         if passes == 0 {
             return;
@@ -102,14 +102,14 @@ impl Windows<'_> {
         }
     }
 
-    /// Moves them by shares of the way, one for each window, given what is left of the readings.
+    /// Moves the start states by a fraction of the step, one for each window; `left` is the residual.
     fn move_starts(&mut self, left: &[f64], shares: &[f64]) {
         let rows = self.rows();
         let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
         for (at, columns) in self.sensitivities().iter().enumerate() {
             let residual = &left[at * rows..][..rows];
             let count = columns.len();
-            // What is known of a start beforehand, in units of its doubt.
+            // Prior precision, in units of the prior standard deviation.
             let mut matrix = DMatrix::<f64>::identity(count, count);
             for row in 0..count {
                 for column in 0..count {
@@ -126,7 +126,7 @@ impl Windows<'_> {
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
                 point.extension_m += part(0);
-                // What rests, rests: a speed of its own would only let it slide and stick again.
+                // A piston at rest stays at rest: a speed would only let it slide and stick again.
                 if point.rod_velocity_m_per_s != 0.0 {
                     point.rod_velocity_m_per_s += part(1);
                 }
@@ -136,8 +136,8 @@ impl Windows<'_> {
         }
     }
 
-    /// Moves the pistons of each window's start towards each other or apart, by that of some shifts from which its readings are
-    /// met best: on the wrong side of the gap no step is short enough.
+    /// Grid search over relative shifts of the pistons in each window. On the wrong side of the gap no Gauss-Newton step is short
+    /// enough.
     fn shift_linked(&mut self, shifts_m: &[f64]) {
         let points = self.points.clone();
         let mut squares = self.raw_squares();
@@ -162,7 +162,7 @@ impl Windows<'_> {
         }
     }
 
-    /// Squares of what each window leaves, starts as they are.
+    /// Squared residuals of each window at the present start states.
     fn raw_squares(&self) -> Vec<f64> {
         self.squares_of(&self.simulate(&self.rig))
     }
@@ -171,10 +171,10 @@ impl Windows<'_> {
         self.raw_residual(simulated).chunks_exact(self.rows()).map(|window| dot(window, window)).collect()
     }
 
-    /// The same windows of a record that this rig would have left, with noise: it began where these windows begin, of which the
-    /// new ones know no more than what the record's points say. `simulated` is what the rig shows without noise.
+    /// A synthetic record of this rig in the same windows: `simulated` plus drawn noise. Its start states are estimated anew from
+    /// the record's points.
     #[must_use]
-    pub fn redrawn(&self, simulated: &[f64], random: &mut Pcg64) -> Self {
+    pub(crate) fn redrawn(&self, simulated: &[f64], random: &mut Pcg64) -> Self {
         let noise = self.raw_noise(random);
         let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + noise).collect();
         let points = (0..self.points.len()).map(|window| self.record.points[window * WINDOW]).collect();
@@ -192,7 +192,7 @@ impl Windows<'_> {
         windows.estimate_starts(START_PASSES)
     }
 
-    /// Puts the measured axes of a plant where the record says that they were; one number of it nudged.
+    /// Sets the measured axes of a plant to the start state of a window, with one number nudged.
     fn set_state(&self, plant: &mut Plant, start: usize, nudged: Option<(usize, usize)>) {
         let mut points = self.points[start / WINDOW];
         if let Some((axis, number)) = nudged {
@@ -201,7 +201,7 @@ impl Windows<'_> {
         set_state(plant, self.record, &points);
     }
 
-    /// What a change of each number of a window's start changes, by as much as it is doubted.
+    /// Sensitivities of the readings to each number of the start state, per prior standard deviation.
     pub(super) fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
         let mut plant = self.plant(&self.rig).with_substeps(COARSE_SUBSTEPS);
         let rows = self.rows();
@@ -232,7 +232,7 @@ impl Windows<'_> {
                 for ((value, straight), valid) in column.iter_mut().zip(&straight).zip(valid) {
                     *value = if *valid { *value - straight } else { 0.0 };
                 }
-                // Before the small change is scaled up: a jump that moves by a sample is no part of it.
+                // Removes jumps that moved by a sample before the difference is scaled up.
                 self.flatten(&mut column, JUMP);
                 let scale = DOUBT[*number] / Point::NUDGES[*number];
                 column.iter_mut().for_each(|value| *value *= scale);
@@ -246,7 +246,7 @@ impl Windows<'_> {
     }
 }
 
-/// The state in which a simulation of a course begins: as a run starts, with the record's set-up.
+/// Initial state of a simulation of a record: that of a run with the record's set-up.
 #[must_use]
 pub(crate) fn first_state(record: &GriddedRecord, rig: &RigParameters) -> State {
     let stroke_m = rig.cylinder().stroke_m;
@@ -264,7 +264,7 @@ pub(crate) fn first_state(record: &GriddedRecord, rig: &RigParameters) -> State 
     state
 }
 
-/// A plant's state with these points on the measured axes; the rest stays its own.
+/// A plant's state with these points on the measured axes, otherwise unchanged.
 #[must_use]
 pub(crate) fn state_at(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
     let mut state = *plant.state();
@@ -273,10 +273,10 @@ pub(crate) fn state_at(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) 
     for i in (0..2).filter(|i| measured[*i]) {
         let (axis_state, point, axis) = (&mut state.axes[i], &points[i], &truth.axes[i]);
         let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - axis_state.extension_m;
-        // The volumes are the plant's own: an effect may have changed them.
+        // Volumes come from the plant, since an effect may change them.
         let volume_a_m3 = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
         let volume_b_m3 = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
-        // Rounding may leave the stroke by a bit.
+        // Rounding may leave the stroke.
         axis_state.extension_m = (axis_state.extension_m + way_m).clamp(0.0, cylinder.stroke_m);
         axis_state.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
         axis_state.stored_air_a_j = point.pressures_pa[0].max(LEAST_PA) * volume_a_m3;
@@ -285,17 +285,17 @@ pub(crate) fn state_at(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) 
     state
 }
 
-/// Puts the measured axes of a plant at these points.
+/// Sets the measured axes of a plant to these points.
 pub(crate) fn set_state(plant: &mut Plant, record: &GriddedRecord, points: &[Point; 2]) {
     let state = state_at(plant, points, record.measured);
     plant.go_on_in(&state).expect("the points of a record are states of the rig");
 }
 
-/// An orthonormal basis of some columns, those left out that are worth less than one standard deviation.
+/// Orthonormal basis of some columns, without directions below one standard deviation.
 pub(super) fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut column in columns {
-        // Twice, as rounding asks for.
+        // Twice, against rounding.
         project(&mut column, &basis);
         project(&mut column, &basis);
         let length = dot(&column, &column).sqrt();

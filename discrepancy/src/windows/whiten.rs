@@ -1,5 +1,4 @@
-//! What noise is like: jumps of the force, errors of the sampling instant, noise that lasts longer than a period, and
-//! draws of it.
+//! Noise model: force spikes, sampling jitter, autocorrelated noise, and draws of it.
 
 use super::{FORCE, WINDOW, Windows, dot};
 use crate::gridded_record::GriddedRecord;
@@ -8,21 +7,21 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
 
-/// Readings to each side that a reading of the force is compared with.
+/// Neighbours to each side in the median filter of the force.
 const SPIKE_REACH: usize = 4;
-/// Standard deviations by which it may differ from their median.
+/// Largest deviation from the median, in standard deviations.
 pub(super) const SPIKE: f64 = 6.0;
 
 impl Windows<'_> {
-    /// The residual of a model that lacks nothing: noise, treated as a residual is.
+    /// A draw of noise, processed like a residual.
     #[must_use]
-    pub fn noise(&self, random: &mut Pcg64) -> Vec<f64> {
+    pub(crate) fn noise(&self, random: &mut Pcg64) -> Vec<f64> {
         let mut noise = self.raw_noise(random);
         self.reduce(&mut noise);
         noise
     }
 
-    /// Noise as the course has it, its memory and the sampling instants' errors included.
+    /// A draw of noise with the autocorrelation and the jitter of the record.
     pub(super) fn raw_noise(&self, random: &mut Pcg64) -> Vec<f64> {
         let width = self.lanes.len();
         let memories: Vec<f64> =
@@ -42,8 +41,8 @@ impl Windows<'_> {
         noise
     }
 
-    /// Takes account of errors of the sampling instant, which all readings of an instant share, and of noise that lasts longer
-    /// than a period: with d the drift of an instant's readings, (1 + d d')^(-1/2) and then e_n - r e_(n-1) over sqrt(1 - r^2).
+    /// Whitens a window: jitter, common to all readings of an instant, by (1 + d d')^(-1/2) with d their rates times the jitter
+    /// over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
         let width = self.lanes.len();
         let drifts = &self.drifts[at * self.rows()..][..self.rows()];
@@ -64,7 +63,7 @@ impl Windows<'_> {
                 if !(self.valid[at * self.rows() + place] && self.valid[at * self.rows() + before]) {
                     continue;
                 }
-                // Where the instants are off, the noise of neighbours has less in common.
+                // Jitter lowers the correlation of neighbours.
                 let correlation = memory / (1.0 + drifts[place] * drifts[place]);
                 window[place] =
                     (window[place] - correlation * window[before]) / (1.0 - correlation * correlation).sqrt();
@@ -72,8 +71,7 @@ impl Windows<'_> {
         }
     }
 
-    /// Puts readings of the force that differ from those around them by more than `limit` back to their median, in every lane of
-    /// `values`, periods one after the other.
+    /// Replaces force readings that differ from the median of their neighbours by more than `limit` with that median.
     pub(super) fn flatten(&self, values: &mut [f64], limit: f64) {
         let width = self.lanes.len();
         for lane in (0..width).filter(|lane| self.lanes[*lane].1 == FORCE) {
@@ -94,18 +92,18 @@ impl Windows<'_> {
     }
 }
 
-/// Rate of a reading times the error of the sampling instant, over its noise.
+/// Rate of a reading times the jitter, over its noise.
 pub(super) fn drift(record: &GriddedRecord, at: usize, axis: usize, channel: usize) -> f64 {
     if record.jitter_s == 0.0 {
         return 0.0;
     }
     let (before, after) = (at.saturating_sub(1), (at + 1).min(record.len() - 1));
     if channel == FORCE {
-        // Contacts of linked rods are shorter than a period: their difference is no rate.
+        // Contacts of linked rods are shorter than a period, so that the difference is no rate.
         if record.linked {
             return 0.0;
         }
-        // No parabola follows it; its readings' own noise is a few hundredths of what counts here.
+        // A central difference: the noise of the force is a few hundredths of the rates that matter here.
         let [before, after] = [before, after].map(|at| record.samples[at][axis][FORCE]);
         let change = after.zip(before).map_or(0.0, |(after, before)| after - before);
         return change / (2.0 * PERIOD_S) * record.jitter_s / record.noise[axis][FORCE];

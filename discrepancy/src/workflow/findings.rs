@@ -1,4 +1,4 @@
-//! What naming found, as a report: verdict, names with their numbers, candidates, limits, and the verdict in words.
+//! Report of the naming: verdict, effects with numbers, candidates, detection limits, summary.
 
 use crate::calibrate::quantity;
 use crate::engine::Engine;
@@ -10,12 +10,12 @@ use crate::report::{
     Where,
 };
 
-/// Standard errors by which a parameter must be off to be told.
+/// Significance of a reported parameter, in standard errors.
 const OFF_ERRORS: f64 = 4.0;
-/// The least that it must be off by.
+/// Smallest relative deviation of a reported parameter.
 const OFF_LEAST: f64 = 0.01;
 
-/// What naming found, as a report.
+/// Report of the naming.
 pub(super) fn report_of(engine: &Engine<'_>, found: &Found) -> Report {
     let named = named(found);
     let (parameters, carried) = parameters(engine, &found.reported);
@@ -91,7 +91,7 @@ fn named_effect(placed: &Placed, errors: &[f64], share: f64, alternatives: Vec<N
     }
 }
 
-/// Parameters that are off, and those that a model moved by too little to say so.
+/// Parameters that are significantly off, and those that the model moved by less.
 fn parameters(engine: &Engine<'_>, model: &Refit) -> (Vec<Quantity>, Vec<Quantity>) {
     let errors = &model.errors[model.errors.len() - COUNT..];
     let by = |at: usize| (model.factors[at] - 1.0).abs();
@@ -145,7 +145,7 @@ fn candidates(found: &Found) -> Vec<report::Candidate> {
         .collect()
 }
 
-/// What the records would not have shown at all, and from what amplitude on they would have shown the rest.
+/// Candidates that the records do not excite, and the detection limits of the others.
 fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
     let mut not_excited = Vec::new();
     let mut limits = Vec::new();
@@ -174,7 +174,7 @@ fn limits(found: &Found) -> (Vec<EffectPlace>, Vec<DetectionLimit>) {
     (not_excited, limits)
 }
 
-/// A report without anything in it.
+/// An empty report.
 pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
     Report {
         schema_version: SCHEMA_VERSION,
@@ -234,9 +234,9 @@ pub(super) fn summary(report: &Report) -> String {
     }
 }
 
-/// A place as rig files name it.
+/// Name of a place in rig files.
 #[must_use]
-pub fn place_name(place: &Where) -> String {
+pub(crate) fn place_name(place: &Where) -> String {
     match &place.element {
         Some(element) => format!("{}.{element}", place.axis),
         None => place.axis.clone(),

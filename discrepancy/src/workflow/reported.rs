@@ -1,9 +1,9 @@
-//! What steps after a report need of it, read back from its file.
+//! The part of a report that later steps read back from its file.
 
 use crate::report::{InputFiles, NamedEffect, Quantity, Report, TableTerm};
 use plant::Axis;
 
-/// What a report says of effects and parameters, as other steps need it.
+/// Effects and parameters of a report.
 #[derive(Clone, Debug, serde::Deserialize)]
 pub struct Reported {
     /// Effects, the best first.
@@ -12,10 +12,10 @@ pub struct Reported {
     pub parameters: Vec<Quantity>,
     /// Parameters that the model moved by less.
     #[serde(default)]
-    pub carried: Vec<Quantity>,
+    pub(crate) carried: Vec<Quantity>,
     /// Files.
     pub inputs: InputFiles,
-    /// What the catalogue does not have.
+    /// Term outside the catalogue.
     #[serde(default)]
     pub outside: Option<ReportedOutside>,
 }
@@ -35,7 +35,7 @@ impl From<&Report> for Reported {
     }
 }
 
-/// The tables of what the catalogue does not have.
+/// Tables of a term outside the catalogue.
 #[derive(Clone, Debug, Default, serde::Deserialize)]
 pub struct ReportedOutside {
     /// Terms that were added.
