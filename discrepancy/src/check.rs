@@ -8,8 +8,8 @@
 //! ```
 //!
 //! A finding is fatal when the record as a whole would mislead: a channel in another unit, two channels swapped, a sign that is
-//! wrong, time that goes backwards. What is bad in one place is left out there and told. Effects of the catalogue are no
-//! findings: a sensor that is off by a few per cent is for the workflow to name, not for the check to refuse.
+//! wrong, time that goes backwards. Local defects are left out and reported. Effects of the catalogue are no findings: the
+//! workflow names a sensor that is off by a few per cent, and the check does not refuse it.
 //!
 //! Kinds and their limits: `discrepancy/docs/checks.md`.
 
@@ -19,7 +19,6 @@ mod notes;
 mod quantum;
 mod range;
 mod signs;
-mod smooth;
 mod stuck;
 mod time;
 mod units;
@@ -39,7 +38,7 @@ pub(crate) const PARKED: &str = "parked";
 /// A record's check with what follows for each of its samples.
 #[derive(Clone, Debug)]
 pub struct Checked {
-    /// What is told.
+    /// Report of the check.
     pub report: RecordCheck,
     /// For each channel (by [`Channel::index`]) and row whether the sample can be used; empty for a channel without bad ones.
     pub unusable: Vec<Vec<bool>>,
@@ -52,7 +51,7 @@ impl Checked {
         !self.unusable[channel.index()].get(row).copied().unwrap_or(false)
     }
 
-    /// What makes it unusable, a line for each finding.
+    /// Fatal findings, one line each.
     #[must_use]
     pub fn why_not(&self) -> String {
         let fatal = self.report.findings.iter().filter(|finding| finding.fatal);
@@ -72,13 +71,13 @@ impl Checked {
         });
     }
 
-    /// Standard deviation of a channel's noise, its rounding included; `None` when the record does not tell.
+    /// Standard deviation of a channel's noise, rounding included; `None` when unknown.
     #[must_use]
     pub fn noise(&self, channel: Channel) -> Option<f64> {
         self.report.channels.get(&channel.column()).and_then(|check| check.noise)
     }
 
-    /// Whether the axis stood at the end of its stroke all the time, its position sensor at its limit: it tells nothing.
+    /// Whether the axis was parked at the end of its stroke, its position sensor at the limit.
     #[must_use]
     pub fn is_parked(&self, axis: Axis) -> bool {
         let column = Channel::Of(axis, Signal::Position).column();
@@ -109,7 +108,7 @@ pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     stuck::check(&mut notes, rig, &grid);
     let channels =
         record.channels().map(|channel| (channel.column(), channel_check(channel, &notes, &grid))).collect();
-    // Signs are asked of numbers that mean what they say.
+    // Signs are tested only where units are right.
     if !notes.is_fatal() {
         signs::check(&mut notes, rig, &grid);
     }
@@ -120,7 +119,7 @@ pub fn check(record: &Record, rig: &RigParameters) -> Checked {
 fn channel_check(channel: Channel, notes: &Notes, grid: &Grid) -> ChannelCheck {
     let values = grid.series(notes, channel);
     let present: Vec<f64> = values.iter().flatten().copied().collect();
-    // A command is what it is: it has steps and no noise.
+    // A command has steps and no noise.
     let noise = if matches!(channel, Channel::Of(_, Signal::Valve)) { None } else { noise::of(&values) };
     ChannelCheck { noise, quantum: quantum::of(&present), unusable: notes.share_unusable(channel) }
 }

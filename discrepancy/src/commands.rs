@@ -1,4 +1,4 @@
-//! What each command does: reads, runs the steps, writes the files and says in a few lines what came out.
+//! The commands: read, run the steps, write the files, print a summary.
 //!
 //! Results go to files and standard output; progress goes to standard error. A record that cannot be used leaves a report with
 //! the verdict `bad-data`, and the exit code for bad input. What was found is printed before it is written, so that a full disk
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Instant;
 
-/// Why a command did not do what it should.
+/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
     /// A step of the workflow.
@@ -38,7 +38,7 @@ pub enum CommandError {
     /// A result cannot be written.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file that cannot be read, or standard output that takes nothing.
+    /// A file that cannot be read, or standard output that cannot be written.
     #[error("{file}: {why}")]
     File {
         /// The file.
@@ -57,7 +57,7 @@ pub enum CommandError {
     /// A record cannot be used.
     #[error("{0}")]
     BadData(String),
-    /// The catalogue does not have what is to be left out.
+    /// An excluded effect that the catalogue does not have.
     #[error("--without {name}: unknown effect; the catalogue has {known}")]
     UnknownEffect {
         /// As given.
@@ -106,7 +106,7 @@ fn threads(count: Option<usize>) {
     }
 }
 
-/// Tells what is going on, with the time since the start.
+/// Prints progress with the time since the start.
 fn progress() -> impl FnMut(&str) {
     let began = Instant::now();
     move |text: &str| eprintln!("discrepancy: {:5.1} s: {text}", began.elapsed().as_secs_f64())
@@ -216,7 +216,7 @@ fn known_effects(without: &[String]) -> Result<(), CommandError> {
     Err(CommandError::UnknownEffect { name: name.clone(), known })
 }
 
-/// A held-out record that is missing is told before a minute of work, without being opened.
+/// Refuses a missing held-out record before the work, without opening it.
 fn is_there(file: &Path) -> Result<(), CommandError> {
     std::fs::metadata(file)
         .map_or_else(|why| Err(CommandError::File { file: file.to_owned(), why }), |_| Ok(()))
@@ -365,7 +365,7 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     Ok(if *confirmed { Exit::Good } else { Exit::BoundBroken })
 }
 
-/// `verification.json`: what a report has under the same names.
+/// `verification.json`: these fields of a report.
 #[derive(serde::Serialize)]
 struct VerifiedFile<'a> {
     gap: &'a BTreeMap<String, Gap>,
@@ -411,7 +411,7 @@ fn read_report(path: &Path) -> Result<Reported, CommandError> {
     serde_json::from_slice(&bytes).map_err(|why| CommandError::Report { file: path.to_owned(), why })
 }
 
-/// The folder that a step is told to write into; opened before the work, so that one that cannot be had costs none.
+/// The output folder, opened before the work.
 fn folder(arguments: &RecordArguments) -> Result<Option<Folder>, CommandError> {
     let inputs = || [&arguments.rig].into_iter().chain(&arguments.train).chain(&arguments.mapping);
     Ok(arguments.out.as_ref().map(|out| Folder::open(out, inputs())).transpose()?)

@@ -11,6 +11,7 @@
 
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
+use crate::stats::order_statistic;
 use crate::windows::{Reach, ReferenceRun, Windows, dot};
 use plant::{Batch, RigParameters};
 use rayon::prelude::*;
@@ -229,8 +230,8 @@ fn level(residual: &[f64], rows: usize, freedom: &[f64]) -> f64 {
         .zip(freedom)
         .map(|(window, freedom)| dot(window, window) / freedom)
         .collect();
-    quiet.sort_unstable_by(f64::total_cmp);
-    let Some(quantile) = quiet.get(quiet.len() / 10) else { return 1.0 };
+    let decile = quiet.len() / 10;
+    let Some(quantile) = order_statistic(&mut quiet, decile) else { return 1.0 };
     let mean = freedom.iter().sum::<f64>() / freedom.len() as f64;
     // The lowest tenth of chi2 / f ends 1.28 standard deviations below 1.
     (quantile / (1.0 - 1.28 * (2.0 / mean).sqrt())).clamp(LEVELS[0], LEVELS[1])

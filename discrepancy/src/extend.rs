@@ -1,4 +1,4 @@
-//! The rig file with what was found: new effects, numbers that were off, and nothing else touched.
+//! Writes the extended rig file: new effects and changed numbers; all other bytes stay.
 //!
 //! ```text
 //!   rig.toml ──► spans of its keys and values ──► edits of the text ──► read again as a rig
@@ -105,7 +105,7 @@ pub enum ExtendError {
     /// What came out is no rig, as when a value is out of its range.
     #[error("the extended rig file would be refused: {0}")]
     Refused(ParameterError),
-    /// The file is written in a way that nothing can be added to.
+    /// The layout of the file does not allow an addition.
     #[error(
         "{file}: cannot add {what} to a file written like this: {reason}; write it as a table of its own"
     )]

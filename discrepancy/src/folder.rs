@@ -66,7 +66,7 @@ impl Folder {
         if known { Err(FolderError::Input { file }) } else { Ok(file) }
     }
 
-    /// Takes away what an earlier close left, `model` the name of its model; only where there was one.
+    /// Removes the results of an earlier close; `model` is the name of its model.
     ///
     /// # Errors
     /// [`FolderError::Input`] when one of its files is read here, [`FolderError::Write`] when one cannot be taken away.

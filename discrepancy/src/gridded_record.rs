@@ -17,6 +17,7 @@ mod subsample;
 
 use crate::check::Checked;
 use crate::records::{Channel, Record, Signal};
+use crate::stats::{mean, mean_and_variance, median};
 use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
 use rest::{Rate, Still};
 pub(crate) use subsample::searched_share;
@@ -307,41 +308,36 @@ fn memory(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
                 .map(|at| if resting[at] { Some(values[at + 1]? - values[at]?) } else { None })
                 .collect();
             let differences = differences?;
-            let mean = differences.iter().sum::<f64>() / MEMORY_BLOCK as f64;
-            let squares: f64 = differences.iter().map(|difference| (difference - mean).powi(2)).sum();
-            Some(squares / (MEMORY_BLOCK as f64 - 1.0))
+            Some(mean_and_variance(&differences).1)
         })
         .collect();
     if variances.len() < FEWEST_AT_REST {
         return 0.0;
     }
-    variances.sort_unstable_by(f64::total_cmp);
-    let spread = variances[variances.len() / 2].sqrt();
+    let spread = median(&mut variances).map_or(0.0, f64::sqrt);
     let share = 1.0 - spread * spread / (2.0 * noise * noise);
     if share < LEAST_MEMORY { 0.0 } else { share.min(0.95) }
 }
 
 /// Sampling jitter: the part of the scatter of positions around their parabolas that grows with the speed.
 fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: &[bool]) -> f64 {
-    let squares = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
+    let median_of = |of: &dyn Fn(usize) -> Option<f64>| -> Option<f64> {
         let mut blocks: Vec<f64> = (0..positions.len() / JITTER_BLOCK)
             .filter_map(|block| {
                 let values: Option<Vec<f64>> =
                     (block * JITTER_BLOCK..(block + 1) * JITTER_BLOCK).map(of).collect();
-                values.map(|values| values.iter().sum::<f64>() / JITTER_BLOCK as f64)
+                values.map(|values| mean(&values))
             })
             .collect();
-        blocks.sort_unstable_by(f64::total_cmp);
-        blocks
+        median(&mut blocks)
     };
     let square = |at: usize| Some((positions[at]? - parabolas[at]?.value).powi(2));
-    let still = squares(&|at| if resting[at] { square(at) } else { None });
-    let Some(still) = still.get(still.len() / 2).copied() else { return 0.0 };
-    let moving = squares(&|at| {
+    let Some(still) = median_of(&|at| if resting[at] { square(at) } else { None }) else { return 0.0 };
+    let moving = median_of(&|at| {
         let slope = parabolas[at]?.slope / PERIOD_S;
         if slope.abs() < JITTER_SPEED_M_PER_S { None } else { Some((square(at)? - still) / (slope * slope)) }
     });
-    let Some(variance) = moving.get(moving.len() / 2) else { return 0.0 };
+    let Some(variance) = moving else { return 0.0 };
     // A parabola absorbs part of the scatter.
     let m = POSITION_REACH as f64;
     let kept =

@@ -19,6 +19,7 @@
 //! | [`extend`] | the rig file with what was found |
 //! | [`locate`] | unknown inputs of each balance: where model and records disagree |
 //! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
+//! | `stats` | order statistics and means |
 //! | [`tabulate`] | the same added to the rig as a table |
 //! | [`next`] | the experiment that would tell apart what a record does not |
 //! | [`verify`] | the held-out record: both models, frozen |
@@ -49,6 +50,7 @@ pub mod report;
 pub(crate) mod screen;
 pub(crate) mod sensor_inverse;
 pub mod single_equation;
+pub(crate) mod stats;
 pub(crate) mod tabulate;
 pub(crate) mod verify;
 pub mod windows;

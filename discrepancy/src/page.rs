@@ -1,4 +1,4 @@
-//! What was found, as one page that a person understands in a minute: opens offline, without script, with nothing from elsewhere.
+//! The report as one self-contained page: opens offline, without scripts.
 //!
 //! First the verdict in a sentence with the names, then the disagreement as a picture, what is known of each name, the picture
 //! after; below that the evidence, in the order in which somebody who doubts the verdict would ask for it. A section that has
@@ -48,7 +48,7 @@ pub(crate) struct Trace {
     pub(crate) before: Values,
     /// What the extended model says; empty when there is none.
     pub(crate) after: Values,
-    /// Measured minus baseline, free of what the windows' start states take up.
+    /// Measured minus baseline, with start states projected out.
     pub(crate) before_residual: Values,
     /// Measured minus extended model; empty when there is none.
     pub(crate) after_residual: Values,
@@ -61,7 +61,7 @@ pub(crate) struct Trace {
 pub struct Pictures {
     /// The record.
     pub(crate) record: String,
-    /// Whether nothing was fitted on it.
+    /// Whether it is a held-out record.
     pub(crate) held_out: bool,
     /// Its signals.
     pub(crate) traces: Vec<Trace>,
@@ -84,7 +84,7 @@ pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
         ("records", "The records", checks::checks(report)),
     ];
     if bad {
-        // Of a record that cannot be used, what is wrong with it comes first.
+        // For an unusable record its findings come first.
         sections.rotate_right(1);
     }
     sections.retain(|(_, _, markup)| !markup.is_empty());

@@ -6,9 +6,8 @@
 //!   foreign CSV + mapping (TOML) ──┘            set-up of the rig, file and line of each row, warnings
 //! ```
 //!
-//! A record is what was measured and nothing else: a sample that is not there is `None`, never NaN and never made up. Whether the
-//! record is fit for use (holes, clipping, stuck channels, units that cannot be) is not decided here; what the reader noticed
-//! stands in [`Record::warnings`].
+//! A record holds measurements only: a missing sample is `None`, never NaN and never interpolated. The check decides whether it
+//! can be used; warnings of the reader are in [`Record::warnings`].
 //!
 //! Forms and keys: `discrepancy/docs/records.md`. Sources: rig-model.md, Measurement file; bus.md, Time and Frames.
 
@@ -34,7 +33,7 @@ use std::path::{Path, PathBuf};
 /// How a record is read; the default reads everything that rig and rehearsal write.
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
-    /// What happens to columns that no record has.
+    /// Treatment of unknown columns.
     pub unknown: Unknown,
     /// The mapping file of a foreign CSV.
     pub mapping: Option<PathBuf>,
@@ -42,7 +41,7 @@ pub struct ReadOptions {
     pub logged_by: LoggedBy,
 }
 
-/// What happens to columns and comments that rig-model.md does not list.
+/// Treatment of columns and comments that rig-model.md does not list.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Unknown {
     /// Left out, with a warning.
@@ -69,7 +68,7 @@ pub enum Form {
     Measurement,
     /// `bus.log`.
     BusLog,
-    /// Somebody else's CSV.
+    /// Foreign CSV.
     Foreign,
 }
 
@@ -82,12 +81,12 @@ pub struct RigSetup {
     pub added_mass_kg: f64,
 }
 
-/// Something that a person should know of a record.
+/// A warning of the reader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
     /// Line in the file, from 1; `None` when it is about the file as a whole.
     pub line: Option<u64>,
-    /// What, and what follows from it.
+    /// The warning and its consequence.
     pub text: String,
 }
 
@@ -232,7 +231,7 @@ impl Record {
         self.channels().any(|channel| matches!(channel, Channel::Of(channel_axis, _) if channel_axis == axis))
     }
 
-    /// What the reader noticed.
+    /// Warnings of the reader.
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings

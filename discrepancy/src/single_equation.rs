@@ -5,9 +5,8 @@
 //!                                                                                   held-out record, frozen ─► both residuals
 //! ```
 //!
-//! Somebody's record seldom holds a whole rig. What can be said of one balance is said here: there is nothing to simulate,
-//! each term is a
-//! column, and selection is that of `select`. Nothing of the held-out record is read before the terms are chosen and fitted.
+//! Foreign records seldom hold a whole rig. One balance needs no simulation: each term is a column, and selection is that of
+//! `select`. Nothing of the held-out record is read before the terms are chosen and fitted.
 //!
 //! | file | holds |
 //! |---|---|
@@ -41,6 +40,7 @@ use crate::check::FEWEST_ROWS;
 use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions, Record};
 use crate::report::{Report, Verdict};
+use crate::stats::order_statistic;
 use fit::{Columns, Cut, Fit, Rows, residual, rms};
 use plant::RigParameters;
 use runs::Run;
@@ -156,7 +156,7 @@ pub enum BalanceError {
     /// No training record.
     #[error("a balance needs one training record at least")]
     NoRecord,
-    /// Columns of the baseline that the records cannot tell apart.
+    /// Collinear columns of the baseline.
     #[error(
         "the training records cannot tell {columns} apart: add one in which they differ, or switch one off under [baseline]"
     )]
@@ -177,7 +177,7 @@ pub(crate) fn is_model_file(text: &str) -> bool {
 pub struct Closed {
     /// What was found.
     pub report: Report,
-    /// Why nothing was judged.
+    /// Why the held-out records were not judged.
     pub not_judged: Option<String>,
     /// Series for the page.
     pub pictures: Pictures,
@@ -223,7 +223,7 @@ struct Study {
     time: Cut,
     families: Vec<Prepared>,
     found: Found,
-    /// Columns of the baseline and of what was taken.
+    /// Columns of the baseline and of the selected terms.
     extended: Columns,
     extended_fit: Fit,
 }
@@ -367,11 +367,12 @@ fn rows_of(runs: &[Run]) -> Rows {
     }
 }
 
-/// Whether folds in bands of speed leave a speed out that the others can tell.
+/// Whether folds in bands of speed are identifiable from the others.
 fn speeds_apart(speeds: &[f64]) -> bool {
-    let mut sorted = speeds.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() * 9 / 10] > SPEEDS_APART * sorted[sorted.len() / 10]
+    let mut speeds = speeds.to_vec();
+    let count = speeds.len();
+    let mut decile = |tenths: usize| order_statistic(&mut speeds, count * tenths / 10).unwrap_or(0.0);
+    decile(9) > SPEEDS_APART * decile(1)
 }
 
 fn base_columns(model: &Model, runs: &[Run]) -> Result<Columns, BalanceError> {

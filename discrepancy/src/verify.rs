@@ -31,6 +31,7 @@ use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::page::Trace;
 use crate::records::Channel;
 use crate::report::{BeforeAfter, Gap, Verification};
+use crate::stats::mean_and_variance;
 use crate::windows::Windows;
 use null_power::NullPower;
 use plant::{Axis, RigParameters};
@@ -163,8 +164,7 @@ fn is_better(before: &Power, after: &Power) -> bool {
     if count < 2.0 {
         return false;
     }
-    let mean = gains.iter().sum::<f64>() / count;
-    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let (mean, variance) = mean_and_variance(&gains);
     mean > BETTER_ERRORS * (variance / count).sqrt()
 }
 

@@ -1,10 +1,10 @@
-//! Rows on a regular grid of their own period, so that lags and differences mean what they say where rows are missing.
+//! Rows on a regular grid of the record's period, so that lags and differences stay right where rows are missing.
 
 use super::notes::Notes;
-use super::smooth::median;
 use crate::records::{Channel, Record};
+use crate::stats::median;
 
-/// Places of a record's rows in units of its own period.
+/// Indices of a record's rows in units of its period.
 #[derive(Debug)]
 pub(super) struct Grid {
     /// Usual time from row to row, s.

@@ -6,14 +6,13 @@
 //!   V_k = white + coloured (6 - 8 r^k + 2 r^2k) / 6 + motion k^4          r = exp(-1 / memory)
 //! ```
 //!
-//! White noise has the same V at every lag k; noise with a memory grows into its own; a motion that is locally a parabola in
-//! speed grows with k^4. The three are told apart by least squares without negative shares, and the noise is the square root of
-//! white + coloured. Blocks are chosen by their slow drift, which says next to nothing of the noise itself: choosing those with
-//! the least noise would find too little.
+//! White noise has the same V at every lag k, autocorrelated noise a V that grows to a plateau, and a smooth motion one that
+//! grows with k^4. Non-negative least squares separates the three; the noise is the square root of white + coloured. Blocks are
+//! selected by their slow drift, which is independent of the noise, so that the selection does not bias it.
 //!
 //! Source: the lags are those of a variogram of second differences, Cressie 1993, Statistics for Spatial Data, 2.4.
 
-use super::smooth::median;
+use crate::stats::median;
 
 /// Samples of a block.
 const BLOCK: usize = 200;
@@ -24,14 +23,14 @@ const QUIETEST: f64 = 0.08;
 const FEWEST: usize = 8;
 /// Lags, in samples.
 const LAGS: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 16, 24];
-/// Memories of coloured noise that are tried, in samples.
+/// Grid of correlation times of coloured noise, in samples.
 const MEMORIES: [f64; 7] = [2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0];
 /// Drift over a block, in standard deviations of the noise, up to which it is quiet.
 const DRIFT: f64 = 1.0;
 /// How far a quiet block's lags may lie above the mean of the quietest.
 const ABOVE: f64 = 2.2;
 
-/// What a block shows.
+/// Statistics of a block.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     drift: f64,
@@ -118,7 +117,7 @@ fn fitted(lags: &[f64; LAGS.len()]) -> f64 {
             let left = (-(lag as f64) / memory).exp();
             (6.0 - 8.0 * left + 2.0 * left * left) / 6.0
         });
-        // Sets of terms from the plainest on: one more must fit better to be taken.
+        // Sets of terms from the simplest on; a further term must improve the fit.
         for set in [0b001, 0b010, 0b101, 0b011, 0b110, 0b111] {
             let terms = [&white, &coloured, &motion];
             let Some((error, shares)) = shares(lags, &terms, set) else { continue };

@@ -1,4 +1,4 @@
-//! What a check writes down: findings, and samples that are left out.
+//! Findings of a check, and samples that are left out.
 
 use crate::records::{Channel, Record, Signal};
 use crate::report::Finding;
@@ -12,7 +12,7 @@ pub(super) struct Notes<'a> {
     pub(super) unusable: Vec<Vec<bool>>,
 }
 
-/// What a finding is about.
+/// Subject of a finding.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Subject {
     /// The column's channel; `None` for time and for the record as a whole.
@@ -26,7 +26,7 @@ impl<'a> Notes<'a> {
         Notes { record, findings: Vec::new(), unusable: vec![Vec::new(); Channel::COUNT] }
     }
 
-    /// Writes a finding down; the text gets file, line and column in front.
+    /// Adds a finding; its text is prefixed by file, line and column.
     pub(super) fn add(&mut self, kind: &str, subject: Subject, fatal: bool, text: &str) {
         let line = subject.row.map(|row| self.record.line(row));
         let column = subject.channel.map(Channel::column);
@@ -39,7 +39,7 @@ impl<'a> Notes<'a> {
         self.findings.push(Finding { kind: kind.into(), column, line, fatal, text });
     }
 
-    /// The same of time.
+    /// The same for time.
     pub(super) fn add_time(&mut self, kind: &str, row: Option<usize>, fatal: bool, text: &str) {
         self.add(kind, Subject { channel: None, row }, fatal, text);
         if let Some(finding) = self.findings.last_mut() {
@@ -83,7 +83,7 @@ impl<'a> Notes<'a> {
         self.record.channels().filter(|channel| !fatal(&channel.column())).collect()
     }
 
-    /// Whether something makes the record useless.
+    /// Whether a finding is fatal.
     pub(super) fn is_fatal(&self) -> bool {
         self.findings.iter().any(|finding| finding.fatal)
     }

@@ -3,13 +3,13 @@
 //! Distinct values of a rounded channel lie whole steps apart, most neighbours exactly one. The step is taken from the small
 //! end of these distances, refined over all of them, and accepted only when nearly all are whole multiples.
 
-use super::smooth::quantile;
+use crate::stats::quantile;
 
 /// Share of the distances that must be whole multiples.
 const NEARLY_ALL: f64 = 0.97;
 /// How far a distance may be from a whole multiple, in steps.
 const TOLERANCE: f64 = 0.1;
-/// Distances of more steps than these say nothing: the step's own error would add up.
+/// Largest distance in steps: beyond, the error of the step accumulates.
 const FARTHEST: f64 = 30.0;
 
 /// Step of the values; `None` for values without one and for fewer than three distinct ones.

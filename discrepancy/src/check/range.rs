@@ -1,10 +1,10 @@
-//! Clipping: samples at the limit of a sensor's range, and runs of samples at a record's own extreme.
+//! Clipping: samples at the limit of a sensor's range, and runs at the extreme of a record.
 //!
 //! A sample at the limit is the limit or more, so it is left out with its neighbours, whose noise would all point inwards.
 //! Somebody else's limit is where a record's extreme value comes again and again: noise makes that a matter of a few samples in
 //! a row ([`super::stuck::by_chance`]).
 //!
-//! An axis that rests at the end of its stroke, its sensor at the limit, is parked: told, and not fatal.
+//! An axis at rest at the end of its stroke, its sensor at the limit, is parked, which is not fatal.
 
 use super::PARKED;
 use super::grid::Grid;

@@ -1,4 +1,4 @@
-//! Swapped pressures and wrong signs, by the balances that every rig keeps whatever it is missing.
+//! Swapped pressures and wrong signs, by balances that hold whatever effect is missing.
 //!
 //! ```text
 //!   flow balance     d(p V)/dt / p_N  against  q(u, p)                            valve  - pressures
@@ -6,30 +6,29 @@
 //!   force sensor     F_s  against  m_carriage a, linked against p_a A_a - p_b A_b
 //! ```
 //!
-//! Each balance is asked as a correlation, of which gains, offsets, lags and every effect of the catalogue leave the sign
-//! alone. One swap turns both of the first two, a sign of the valve turns the flows, a sign of the position turns the forces:
-//! each is tried, and told when the record obeys with it and not without it. A record without motion says nothing here, and no
-//! finding follows.
+//! Each balance is tested by the sign of a correlation, which gains, offsets, lags and the effects of the catalogue do not
+//! change. A swap inverts both of the first two, the sign of the valve the flows, the sign of the position the forces. A change
+//! is reported when the balances hold with it and not without it. A record without motion has no finding.
 //!
 //! Source: rig-model.md, One axis, and Masses and linkage; effects.md, Which pairs look alike, r_a and r_F.
 
 use super::grid::Grid;
 use super::notes::{Notes, Subject};
-use super::smooth::{means, slopes};
 use crate::records::{Channel, Signal};
+use crate::stats::{means, slopes};
 use plant::{Axis, RigParameters, StaticValve};
 
 /// Places to each side of a mean, and of a slope: 15 ms together keep noise down and edges in.
 const REACH: usize = 7;
-/// Speed beyond which friction has the sign of the motion, m/s.
+/// Speed above which friction has the sign of the motion, m/s.
 const MOVING_M_PER_S: f64 = 0.01;
-/// Samples that must tell.
+/// Fewest samples.
 const FEWEST: usize = 300;
-/// How clearly a changed reading must be the better one: sum of two correlations.
+/// Least gain in the sum of two correlations.
 const CLEARLY: f64 = 0.6;
 /// Correlation from which a balance holds.
 const HOLDS: f64 = 0.4;
-/// Spread of the force, in specified noise, from which its sign is told.
+/// Least spread of the force, in specified noise, for a test of its sign.
 const FORCE_SHOWS: f64 = 4.0;
 /// Units of force, N each.
 const FORCES: [(&str, f64); 4] = [("kN", 1e3), ("mN", 1e-3), ("kgf", 9.80665), ("lbf", 4.448_222)];
@@ -43,7 +42,7 @@ enum Reading {
     PositionSign,
 }
 
-/// Smooth series of an axis in its own extension.
+/// Smooth series of an axis, along its extension.
 struct Motion {
     opening: Vec<Option<f64>>,
     extension_m: Vec<Option<f64>>,

@@ -1,9 +1,9 @@
 //! Stuck channels: runs of one value that are longer than noise permits.
 //!
-//! Where a share f of neighbours are equal by chance, a run of n equal samples comes N f^(n-1) times in a record of N; a run
-//! that would come less than once in a hundred thousand records did not come by chance. A channel whose rounding is coarser
-//! than its noise stands still by itself and tells nothing here, nor does a rest that such a channel shows as one value; but one
-//! that never moves while its sensor should make noise is dead.
+//! Where a share f of neighbours are equal by chance, a run of n equal samples comes N f^(n-1) times in a record of N; a run that
+//! would come less than once in a hundred thousand records did not come by chance. A channel whose rounding is coarser than its
+//! noise repeats values anyway and is not tested, nor is its rest; but a channel that never moves although its sensor has noise
+//! is dead.
 
 use super::grid::Grid;
 use super::notes::{Notes, Subject};
@@ -14,15 +14,15 @@ use std::ops::Range;
 
 /// Chance of a run, in records.
 const CHANCE: f64 = 1e-5;
-/// Shortest run that is told, samples.
+/// Shortest reported run, samples.
 const SHORTEST: usize = 12;
-/// Share of equal neighbours beyond which a channel stands still by itself.
+/// Share of equal neighbours above which a channel is not tested.
 const MOSTLY_EQUAL: f64 = 0.6;
 /// Runs that are no chance whatever the noise: left out of the share of equal neighbours.
 const SURELY: usize = 60;
 /// Share of a channel beyond which too little is left of it.
 const MOST: f64 = 0.5;
-/// Runs that are told one by one.
+/// Runs that are listed one by one.
 const TOLD: usize = 5;
 
 pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
@@ -78,7 +78,7 @@ pub(super) fn is_rest(values: &[Option<f64>], run: &Run, step: Option<f64>) -> b
     let near = |other: Option<f64>| other.is_none_or(|other| (other - level).abs() < 1.5 * step);
     let before = values[..run.places.start].iter().rev().flatten().next();
     let after = values[run.places.end..].iter().flatten().next();
-    // A run that is all there is says nothing of a rest.
+    // A run over the whole record is no rest.
     (before.is_some() || after.is_some()) && near(before.copied()) && near(after.copied())
 }
 
@@ -120,7 +120,7 @@ pub(super) fn runs(values: &[Option<f64>]) -> Vec<Run> {
     runs
 }
 
-/// Longest run of equal values that noise makes by chance; `None` for a channel that stands still by itself.
+/// Longest run of equal values by chance; `None` for a channel that is not tested.
 pub(super) fn by_chance(values: &[Option<f64>]) -> Option<usize> {
     let (mut equal, mut pairs) = (0_usize, 0_usize);
     for run in runs(values).into_iter().filter(|run| run.samples < SURELY) {

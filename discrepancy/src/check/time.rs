@@ -1,13 +1,13 @@
 //! Time: an empty or short record, repeated and jumping time, the period, lost rows, holes, jitter.
 //!
-//! Rows are good in time that belong to the longest chain of growing times; a single stamp that leaps ahead is so told from
-//! a clock that was set back. Source of the chain: Fredman 1975, Discrete Math. 11(1), longest growing subsequence.
+//! Rows on the longest increasing subsequence of times are good, which separates a single wrong stamp from a clock that was set
+//! back. Source of the chain: Fredman 1975, Discrete Math. 11(1), longest growing subsequence.
 
 use super::grid::{SPARSEST, period_s};
 use super::notes::Notes;
-use super::smooth::quantile;
 use crate::gridded_record::{HELD_LONGEST, SHORTEST};
 use crate::records::{Channel, Signal};
+use crate::stats::quantile;
 use plant::{Axis, PERIOD_S};
 
 /// Shortest record of the rig, s.
@@ -16,7 +16,7 @@ const SHORTEST_S: f64 = SHORTEST as f64 * PERIOD_S;
 pub(crate) const FEWEST_ROWS: usize = 50;
 /// Rows missing in a row that are a hole and not lost samples; a command is held over the latter.
 const HOLE: usize = HELD_LONGEST + 1;
-/// Holes that are told one by one.
+/// Holes that are listed one by one.
 const HOLES_LISTED: usize = 20;
 /// Part of a period by which times must differ to be two.
 const SAME: f64 = 0.01;
@@ -26,7 +26,7 @@ const MOST_LOST: f64 = 0.5;
 const MOST_JUMPING: f64 = 0.01;
 /// Holes, in units of the rows that there are, that no record has: the stamp beyond is wrong.
 const FARTHEST: f64 = SPARSEST as f64 - 1.0;
-/// Spread of sampling instants around their grid, in periods, that is told, and that spoils speeds.
+/// Spread of sampling instants around their grid, in periods, that is reported, and that spoils speeds.
 const JITTER: [f64; 2] = [0.02, 0.25];
 
 pub(super) fn check(notes: &mut Notes) {
@@ -58,7 +58,7 @@ pub(super) fn check(notes: &mut Notes) {
         notes.add_time("too-short", Some(0), true, &text);
     }
     if !(0.9..=1.1).contains(&ratio) {
-        // Commands act over a whole period: a slower record does not say what acted in between.
+        // Commands act over a whole period; a slower record misses commands.
         let fatal = of_rig && !(0.45..=3.5).contains(&ratio);
         let text = format!(
             "the sampling period is {:.4} ms and not {:.4} ms: {}",
@@ -73,7 +73,7 @@ pub(super) fn check(notes: &mut Notes) {
     absent(notes);
 }
 
-/// Whether the period is off by the factor between two units of time, and told so.
+/// Reports a period that is off by the factor between two units of time.
 fn unit_of_time(notes: &mut Notes, ratio: f64) -> bool {
     let units = [(1e3, "ms"), (1e6, "us"), (1e9, "ns"), (1.0 / 60.0, "min")];
     let Some((factor, unit)) = units.into_iter().find(|(factor, _)| (0.9..=1.1).contains(&(ratio / factor)))
@@ -248,7 +248,7 @@ fn absent(notes: &mut Notes) {
     let record = notes.record;
     for channel in record.channels() {
         let absent = (0..record.len()).filter(|row| record.value(channel, *row).is_none()).count();
-        // The node's pressure is told every ten cycles, and nothing is simulated from it.
+        // The node's pressure is sent every ten cycles and not simulated.
         if absent == 0 || channel == Channel::SupplyPressure {
             continue;
         }

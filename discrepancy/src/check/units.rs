@@ -1,12 +1,12 @@
 //! Units that cannot be: pressures in bar, positions in mm, a valve in % or volts.
 //!
-//! What a channel may show follows from the rig file: a chamber's pressure lies between exhaust and supply, a position within
-//! the stroke, a command in [-1, 1]. A channel beyond that is told with the factor that brings it back, if one does. A force
-//! has no such bounds and is told from its signs and sizes elsewhere.
+//! Bounds follow from the rig file: a chamber's pressure lies between exhaust and supply, a position within the stroke, a command
+//! in [-1, 1]. A channel out of bounds is reported with the unit that explains it. A force has no such bounds; its sign and size
+//! are tested elsewhere.
 
 use super::notes::{Notes, Subject};
-use super::smooth::quantile;
 use crate::records::{Channel, Signal};
+use crate::stats::quantile;
 use plant::{Axis, RigParameters};
 
 /// How far beyond the supply a pressure may read: sensors and supplies are off by a tenth.

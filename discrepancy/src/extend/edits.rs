@@ -25,7 +25,7 @@ impl<'t> Edits<'t> {
         self.edits.push((span, by));
     }
 
-    /// A comment of its own above the line of a place, indented as that line.
+    /// A comment line above the line of a place, with its indentation.
     pub(super) fn comment_above(&mut self, place: usize, comment: &str) {
         let start = self.line_start(place);
         let indent: String =
@@ -35,7 +35,7 @@ impl<'t> Edits<'t> {
 
     /// The text with all edits done.
     pub(super) fn applied(mut self) -> String {
-        // Stable: what was put at one place first stays first.
+        // Stable: edits at one place keep their order.
         self.edits.sort_by_key(|(span, _)| (span.start, span.end));
         let mut result = String::with_capacity(self.text.len() + 1024);
         let mut copied = 0;
@@ -54,7 +54,7 @@ impl<'t> Edits<'t> {
         if start == 0 && self.text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { start }
     }
 
-    /// An effect with its numbers: changed where it is on already, else a table of its own.
+    /// An effect with its numbers: changed where it exists, else a new table.
     pub(super) fn switch_on(
         &mut self,
         document: &Document<&str>,

@@ -1,4 +1,4 @@
-//! `parameter:` names and the keys of the rig file that they scale; numbers of the file by their own keys.
+//! `parameter:` names and the keys of the rig file that they scale; numbers of the file by their keys.
 
 use super::edits::Edits;
 use super::{ExtendError, quantity_text, written};
@@ -14,7 +14,7 @@ pub(super) fn names() -> Vec<&'static str> {
     PARAMETERS.iter().map(|parameter| parameter.name).collect()
 }
 
-/// The keys of the rig file, as `mass.drive_kg`, that a parameter scales; the first one is the parameter's own number.
+/// The keys of the rig file, as `mass.drive_kg`, that a parameter scales; the first holds the parameter's value.
 ///
 /// Only the mass differs between the axes. The carriage, which the force sensor moves, is scaled with the drive's mass.
 #[must_use]
@@ -141,7 +141,7 @@ pub(super) fn change(
     Ok(edits.applied())
 }
 
-/// A piston at rest holds at least what holds it while it slides: a break-away force below the new sliding force follows it.
+/// The break-away force is at least the sliding force and follows it.
 fn hold_at_rest(
     text: &str,
     document: &Document<&str>,

@@ -5,6 +5,7 @@
 //! is kept, and the simulation decides by the residual.
 
 use super::{POSITION_REACH, Parabola};
+use crate::stats::mean;
 use plant::PERIOD_S;
 
 /// Periods to each side that must be slow at rest.
@@ -115,10 +116,6 @@ impl<'a> Still<'a> {
     fn least_m(&self, count: usize) -> f64 {
         CREEP_ERRORS * self.noise_m * (2.0 / count as f64).sqrt()
     }
-}
-
-fn mean(part: &[f64]) -> f64 {
-    part.iter().sum::<f64>() / part.len() as f64
 }
 
 #[cfg(test)]

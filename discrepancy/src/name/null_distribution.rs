@@ -7,6 +7,7 @@ use crate::fit::Products;
 use crate::parameters::COUNT;
 use crate::refit::{Around, Refit, parameter_ridges, rig_of};
 use crate::screen::Columns;
+use crate::stats::order_statistic;
 use crate::windows::dot;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -89,8 +90,8 @@ impl NullDistribution {
                     .fold(0.0, f64::max)
             })
             .collect();
-        most.sort_by(f64::total_cmp);
-        most[((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1)]
+        let rank = ((NULLS as f64 * NULL_SHARE) as usize).min(NULLS - 1);
+        order_statistic(&mut most, rank).expect("the rank is one of the draws")
     }
 
     /// Smallest amplitude coordinate of each candidate that reaches a gain.

@@ -12,6 +12,7 @@
 
 use crate::locate::maps::{BINS, bins, few_bins};
 use crate::locate::{UnknownSeries, VARIABLES};
+use crate::stats::mean_and_variance;
 
 /// Circular shifts.
 pub(crate) const SHIFTS: usize = 200;
@@ -104,8 +105,7 @@ impl Sample {
         let n = self.values.len();
         let shifted: Vec<f64> = (1..=SHIFTS).map(|at| most(at * n / (SHIFTS + 1))).collect();
         let reached = shifted.iter().filter(|other| **other >= r2).count();
-        let mean = shifted.iter().sum::<f64>() / SHIFTS as f64;
-        let variance = shifted.iter().map(|other| (other - mean).powi(2)).sum::<f64>() / (SHIFTS - 1) as f64;
+        let (mean, variance) = mean_and_variance(&shifted);
         let stands_out = if variance > 0.0 { (r2 - mean) / variance.sqrt() } else { 0.0 };
         (r2, (1 + reached) as f64 / (1 + SHIFTS) as f64, stands_out)
     }

@@ -1,4 +1,4 @@
-//! The ranking of candidates, what the records do not excite, and the smallest amplitude of each effect that would have shown.
+//! The ranking of candidates, effects that are not excited, and detection limits.
 
 use super::draw::{Bar, bars, figure};
 use super::markup::{Cell, charts, folded, heading, number, paragraph, table, words as said};
@@ -44,7 +44,7 @@ pub(super) fn candidates(report: &Report) -> String {
     charts(&[drawn]) + &folded(&format!("All {count} candidates, and what became of each"), &all)
 }
 
-/// The section of what can be seen at all.
+/// The section of detection limits.
 pub(super) fn limits(report: &Report) -> String {
     let mut text = String::new();
     if !report.not_excited.is_empty() {

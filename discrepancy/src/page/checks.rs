@@ -1,4 +1,4 @@
-//! The records: whether they can be used, what was noticed, and what their channels are made of.
+//! The records: usability, findings, noise and quantum of channels.
 
 use super::markup::{Cell, folded, heading, number, table, words as said};
 use super::words;

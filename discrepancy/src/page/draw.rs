@@ -8,7 +8,7 @@ use super::words;
 use bench::page_style::escaped;
 use std::fmt::Write as _;
 
-/// Width of all drawings, in their own pixels.
+/// Width of all drawings, in user units.
 pub(super) const WIDTH: f64 = 420.0;
 const LEFT: f64 = 54.0;
 const RIGHT: f64 = 12.0;
@@ -52,7 +52,7 @@ impl Scale {
     }
 }
 
-/// Smallest and largest of what is finite; `None` without any.
+/// Smallest and largest finite value; `None` without any.
 pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let start = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = values

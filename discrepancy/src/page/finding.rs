@@ -1,4 +1,4 @@
-//! What was found, in full: names with their numbers and rivals, parameters, what the catalogue does not have, what to run next.
+//! Findings in full: effects with numbers and alternatives, parameters, terms outside the catalogue, next experiment.
 
 use super::candidates;
 use super::draw::{Plot, Sample, figure, range};
@@ -98,7 +98,7 @@ fn numbers(named: &NamedEffect) -> String {
     quantities("Numbers of the effect", "number", &named.parameters, meaning)
 }
 
-/// Numbers with their errors, and what the rig file says where it says something of one of them.
+/// Numbers with their errors and the values of the rig file.
 fn quantities(label: &str, head: &str, all: &[Quantity], meaning: impl Fn(&str) -> String) -> String {
     let is_in_file = all.iter().any(|quantity| quantity.before.is_some());
     let row = |quantity: &Quantity| {
@@ -129,7 +129,7 @@ fn unknown(outside: &Outside) -> String {
         words::balance(&outside.balance)
     ));
     let rows = outside.variables.iter().map(|one| {
-        // The least that can be told: none of the shifted ones reached it.
+        // Smallest p value: no shifted series reached R2.
         let least = 1.0 / (SHIFTS + 1) as f64;
         let chance =
             if one.p_value <= least { format!("none of {SHIFTS}") } else { words::percent(one.p_value) };

@@ -1,4 +1,4 @@
-//! Tables, lists and sections as markup. A table stands in a box of its own that scrolls, by keyboard too, where it is too wide.
+//! Tables, lists and sections as markup. A table that is too wide scrolls in its box, by keyboard too.
 
 use bench::page_style::escaped;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ pub(super) enum Cell {
     Number(String),
     /// Words with something said below them in small letters.
     About(String, String),
-    /// Good or bad, told by sign, words and colour.
+    /// Good or bad, shown by sign, words and colour.
     Judged(bool, String),
     /// Words on a ground that is darker the larger the share, from 0 to 1.
     Shaded(f64, String),
@@ -106,7 +106,7 @@ pub(super) fn charts(figures: &[String]) -> String {
     }
 }
 
-/// Something that is opened by who wants to see it; nothing without content.
+/// A collapsed section; empty without content.
 pub(super) fn folded(summary: &str, markup: &str) -> String {
     if markup.is_empty() {
         return String::new();

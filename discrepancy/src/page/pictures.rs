@@ -1,7 +1,7 @@
 //! The disagreement as a picture, and the picture after: the second in which they differ most, and the difference over all of it.
 //!
 //! The difference is drawn in units of the sensor's noise, since a gap that nobody would see beside the whole stroke may be a
-//! hundred times what the sensor can tell apart. Before and after share their axes.
+//! hundred times the sensor noise. Before and after share their axes.
 
 use super::decimate::{COLUMNS, columns};
 use super::draw::{Plot, Sample, figure, range};
@@ -149,7 +149,7 @@ fn look(model: Model) -> (&'static str, &'static str) {
     }
 }
 
-/// What a difference is told in, and the factor: the sensor's noise, or the signal's unit where nobody knows that.
+/// Unit of a difference and its factor: the sensor's noise, or the signal's unit where the noise is unknown.
 fn difference(trace: &Trace) -> (String, f64) {
     if trace.noise > 0.0 {
         return ("times the noise".to_owned(), 1.0 / trace.noise);

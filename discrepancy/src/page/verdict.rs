@@ -1,4 +1,4 @@
-//! The box on top: verdict, names with their numbers, what became of the gap.
+//! The box on top: verdict, effects with numbers, closed gap.
 
 use super::words;
 use crate::report::{NamedEffect, Report, Verdict};
@@ -59,7 +59,7 @@ pub(super) fn head(report: &Report) -> String {
     )
 }
 
-/// A name and, as weighty as it, what explains the records as well.
+/// An effect and its alternatives, with equal weight.
 fn named(named: &NamedEffect) -> Vec<String> {
     let line = one(named, "");
     std::iter::once(line).chain(named.alternatives.iter().map(|other| one(other, "<i>or</i> "))).collect()

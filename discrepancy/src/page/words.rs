@@ -4,7 +4,7 @@ use crate::report::{Quantity, Where, decimals};
 use plant::effects::sheet;
 use plant::effects::sheet::PlaceKind;
 
-/// What stands where there is nothing.
+/// Placeholder of a missing value.
 pub(super) const NOTHING: &str = "\u{2013}";
 
 /// A number with three digits that count, plain from 0.001 to 99 999 and with a power of ten beyond.

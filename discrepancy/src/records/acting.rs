@@ -1,4 +1,4 @@
-//! Which valve command acts in each cycle, by the rig's own rules ([`protocol::commands`]), from the frames of a log.
+//! The valve command that acts in each cycle, by the rules of the rig ([`protocol::commands`]).
 //!
 //! ```text
 //!   t_k ── sensors k ──── command, echo k ──── t_k+1 ── sensors k+1 ────
@@ -22,7 +22,7 @@ pub(super) struct Acting {
     waiting: VecDeque<Logged>,
     /// Who holds the emergency stop: console, rig, drive, load.
     holders: [bool; 4],
-    /// A stop from before the log, of which only the rig's status tells.
+    /// A stop from before the log, known from the rig's status only.
     stopped_before: bool,
     first: u64,
     accepted: [bool; 2],
@@ -48,7 +48,7 @@ impl Acting {
         }
     }
 
-    /// Notes a frame, in the order of the log.
+    /// Processes a frame, in the order of the log.
     pub(super) fn note(&mut self, logged: Logged) {
         match logged.frame {
             Frame::RigEmergencyStop(stop) => self.holders[1] = !stop.release,
@@ -68,13 +68,13 @@ impl Acting {
         }
     }
 
-    /// The cycle was computed and not sent: what acted goes on acting.
+    /// A cycle computed and not sent: the command before continues to act.
     pub(super) fn skip(&mut self, cycle: u64) -> [Option<f64>; 2] {
         self.live.skipped(cycle, 1);
         self.opening
     }
 
-    /// The cycle began at `begin_ns`: what acts over it.
+    /// Commands that act over the cycle that began at `begin_ns`.
     pub(super) fn latch(&mut self, cycle: u64, begin_ns: u64) -> [Option<f64>; 2] {
         self.live.sent(cycle);
         self.fresh = [false; 2];

@@ -4,9 +4,9 @@
 //!   frames ──► cycles.rs: of which cycle ──► acting.rs: which command acts ──► rows
 //! ```
 //!
-//! Sensors that are not in the log are absent in their row; so are those of cycles that the rig skipped. The valve of such a row
-//! is known all the same where the contract says what acts. Nothing is made up. One thing a log cannot tell: a frame that the
-//! kernel stamped and held up for a while before the rig's socket had it, on a machine without room for its own work.
+//! Sensors missing in the log are absent in their row, as are those of skipped cycles. The valve of such a row is known where the
+//! contract defines the acting command. A log cannot show that the kernel stamped a frame and delivered it late to the rig's
+//! socket on an overloaded machine.
 //!
 //! Source: bus.md, Time and Frames.
 
@@ -83,11 +83,11 @@ fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, R
     Ok(log)
 }
 
-/// When cycles begin, by the log's clock.
+/// Start times of cycles, by the clock of the log.
 enum Begins {
-    /// The run's summary says when cycle 0 began.
+    /// From the run's summary: start of cycle 0.
     Reported { zero_ns: u64 },
-    /// From the sensors that left soonest, by blocks of cycles.
+    /// From the earliest sensor frames, by blocks of cycles.
     Estimated { blocks: BTreeMap<u64, u64> },
 }
 
@@ -123,7 +123,7 @@ impl Begins {
     }
 }
 
-/// When cycle 0 began, from `summary.json` beside a run's `bus.log`.
+/// Start of cycle 0, from `summary.json` beside a run's `bus.log`.
 fn reported_zero_ns(file: &Path) -> Option<u64> {
     let text = std::fs::read_to_string(file.parent()?.join("summary.json")).ok()?;
     let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
@@ -224,7 +224,7 @@ fn rows(
     Ok(())
 }
 
-/// What is known of one cycle.
+/// Data of one cycle.
 #[derive(Default)]
 struct Row {
     line: Option<u64>,
@@ -264,7 +264,7 @@ fn put_row(record: &mut Record, axis: Axis, valve: Option<f64>, sensors: Option<
     }
 }
 
-/// What the rig said of itself, as far as a reader must tell it.
+/// Status of the rig as far as a reader must report it.
 #[derive(Default)]
 struct Statuses {
     linked: Option<bool>,

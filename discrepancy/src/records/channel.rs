@@ -1,9 +1,9 @@
-//! What a record can hold beside its time: the channels, their names and units.
+//! Channels of a record, their names and units.
 
 use plant::Axis;
 use std::fmt;
 
-/// What an axis can have measured.
+/// Signals of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Signal {
     /// Valve command that acts over the row's period, -1 to 1.
@@ -52,7 +52,7 @@ impl Signal {
     }
 }
 
-/// What a channel measures, and so which units a mapping may give it.
+/// Quantity of a channel, which determines its units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// A share, without a unit.

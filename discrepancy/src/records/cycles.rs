@@ -27,13 +27,13 @@ pub(super) struct Logged {
     pub(super) frame: Frame,
 }
 
-/// What is known of a log's cycles.
+/// Cycles of a log.
 pub(super) struct Cycles {
     /// The cycle of each frame of sensors, in the order of the log; `None` for other frames.
     pub(super) of: Vec<Option<u64>>,
     /// Cycles that the rig says it computed without sending them.
     pub(super) skipped: BTreeSet<u64>,
-    /// Whether no tick told the full numbers.
+    /// Whether no tick gave the full numbers.
     pub(super) guessed: bool,
 }
 

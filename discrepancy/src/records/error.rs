@@ -1,4 +1,4 @@
-//! What keeps a record from being read: file, line, column, value, and what would be right.
+//! Errors of reading a record, with file, line, column, value and what is allowed.
 
 use super::mapping::MappingError;
 use std::path::PathBuf;

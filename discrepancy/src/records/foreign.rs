@@ -1,4 +1,4 @@
-//! Reads a CSV that somebody else wrote, by a mapping file.
+//! Reads a foreign CSV by a mapping file.
 
 use super::mapping::Time;
 use super::table::Table;
@@ -61,8 +61,8 @@ pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> 
     Ok(record)
 }
 
-/// Whether a row only has what the row before lacks, within half the period that was meant: recorders that stamp each channel
-/// on its own write such rows.
+/// Whether a row only adds channels that the row before lacks, within half the nominal period: recorders that stamp each channel
+/// write such rows.
 fn goes_on(record: &Record, time_s: f64, present: &[(Channel, f64)]) -> bool {
     let (Some(period_s), Some(before_s)) = (record.nominal_period_s(), record.time_s().last()) else {
         return false;

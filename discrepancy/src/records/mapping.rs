@@ -1,4 +1,4 @@
-//! The mapping file: what the columns of somebody else's CSV mean.
+//! The mapping file: meaning of the columns of a foreign CSV.
 //!
 //! ```text
 //! value in SI = sign * (cell * scale + offset) * unit          + atmospheric pressure, if the column is a gauge pressure
@@ -45,7 +45,7 @@ pub enum MappingError {
     },
 }
 
-/// What the columns of a foreign CSV mean; checked.
+/// A checked mapping.
 #[derive(Clone, Debug)]
 pub struct Mapping {
     pub(super) layout: Layout,
@@ -58,7 +58,7 @@ pub struct Mapping {
     pub(super) channels: Vec<MappedChannel>,
 }
 
-/// Where the time of a row comes from.
+/// Source of the time of a row.
 #[derive(Clone, Debug)]
 pub(super) enum Time {
     Column {

@@ -32,7 +32,7 @@ pub(super) fn read(file: &Path, unknown: Unknown) -> Result<Record, ReadError> {
     Ok(record)
 }
 
-/// The first comment tells how the rig was set up; others tell nothing, and a blind record has none.
+/// The first comment holds the set-up of the rig; others are ignored, and a blind record has none.
 fn read_comments(table: &Table, unknown: Unknown, record: &mut Record) -> Result<(), ReadError> {
     for (place, (line, text)) in table.comments.iter().enumerate() {
         let words = text.trim_start_matches('#').split_whitespace();

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub(super) separator: Separator,
-    /// What a comment line begins with.
+    /// Prefix of a comment line.
     pub(super) comment: Option<String>,
     /// Lines before the head that are no table.
     pub(super) skip_lines: u64,
@@ -32,7 +32,7 @@ impl Default for Layout {
     }
 }
 
-/// A table that was read, not yet understood.
+/// An unparsed table.
 pub(super) struct Table {
     pub(super) file: PathBuf,
     /// Names of the columns.

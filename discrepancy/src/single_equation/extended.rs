@@ -1,7 +1,7 @@
-//! The model file with what was found: the terms join the baseline, and are fitted with it when it runs again.
+//! Writes the extended model file: selected terms join the baseline and are refitted with it in the next run.
 //!
 //! Everything of the old file stays, comments too. A term's numbers stand in it for people, under `fitted`; a linear term has no
-//! use for them, since the next run fits it again on its own records.
+//! use for them, since the next run refits it on its records.
 
 use super::BalanceError;
 use super::model::TermEntry;
@@ -11,7 +11,7 @@ use crate::workflow::Reported;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 
-/// The model file with the terms that a report tells; paths in it are made absolute, so that it may lie anywhere.
+/// The model file with the terms of a report; paths become absolute.
 ///
 /// # Errors
 /// [`BalanceError`] when the model file cannot be read.

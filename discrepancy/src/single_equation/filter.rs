@@ -9,8 +9,8 @@
 //! Gain at 0 Hz is 1; that of a Chebyshev I of even order is its ripple, 1 / sqrt(1 + e^2), and twice that forth and back. Model
 //! and data go through the same filter, so that numbers do not change, but residuals are the smaller for it.
 //!
-//! Before a run the samples are continued at both ends by their own point reflections, 3 (n + 1) of them, and the sections begin
-//! in the steady state of the first. Poles come in pairs, each a section of second order: no polynomial of order n is ever made.
+//! Before a run the samples are extended at both ends by their point reflections, 3 (n + 1) of them, and the sections begin in
+//! the steady state of the first. Poles come in pairs, each a section of second order: no polynomial of order n is ever made.
 //!
 //! No crate: what is published designs Butterworth alone, or stands on an older nalgebra. Source: Oppenheim, Schafer,
 //! Discrete-Time Signal Processing, 3rd ed., 2010, 7.1; Gustafsson 1996, IEEE Trans. Signal Processing 44(4), on running forth

@@ -12,7 +12,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest pivot of a scaled Gram matrix, of 1, below which columns cannot be told apart.
+/// Smallest pivot of a scaled Gram matrix; below, columns are collinear.
 const LEAST_PIVOT: f64 = 1e-9;
 
 /// Columns of the same length.
@@ -73,7 +73,7 @@ fn normal(
 }
 
 impl Normal {
-    /// The inverse of the Gram matrix; `None` when columns cannot be told apart over these rows.
+    /// The inverse of the Gram matrix; `None` for collinear columns over these rows.
     fn inverse(&self, rows: usize) -> Option<DMatrix<f64>> {
         let cholesky = (self.gram.clone() / rows.max(1) as f64).cholesky()?;
         let least =
@@ -84,7 +84,7 @@ impl Normal {
 }
 
 impl Rows {
-    /// The fit of these columns; `None` when they cannot be told apart.
+    /// The fit of these columns; `None` when they are collinear.
     pub(super) fn fit(&self, columns: &Columns) -> Option<Fit> {
         let scales = scales(columns);
         let all = normal(columns, &scales, &self.target, 0..self.target.len());
@@ -94,8 +94,7 @@ impl Rows {
         Some(Fit { numbers, residual })
     }
 
-    /// Squares of what each fold has left when it is not fitted, judged rows alone; `None` where a fold's rest cannot tell
-    /// columns apart.
+    /// Squared residuals of each held-out fold, judged rows only; `None` where the other folds do not determine columns apart.
     pub(super) fn left_out(&self, columns: &Columns, cut: &Cut) -> Option<Vec<f64>> {
         let scales = scales(columns);
         let all = normal(columns, &scales, &self.target, 0..self.target.len());

@@ -27,7 +27,7 @@ pub(crate) struct Model {
     pub(crate) kind: Kind,
     /// What it is called in reports.
     pub(crate) name: String,
-    /// Where its records' columns are told; `None` for `measurement.csv`.
+    /// Mapping of its records; `None` for `measurement.csv`.
     pub(crate) mapping: Option<PathBuf>,
     /// Rig file that a chamber's numbers come from.
     pub(crate) rig: Option<PathBuf>,
@@ -35,7 +35,7 @@ pub(crate) struct Model {
     pub(super) channels: BTreeMap<String, Channel>,
     /// How records are processed.
     pub(crate) processing: Processing,
-    /// How selection is folded and what it asks.
+    /// Folds and thresholds of the selection.
     pub(crate) selection: Selection,
     /// Which of the baseline's columns are fitted.
     pub(crate) baseline: Baseline,
@@ -67,7 +67,7 @@ pub(crate) struct Processing {
     pub(crate) speed_above_mm_per_s: f64,
     /// Rows outside are left out, mm.
     pub(crate) position_mm: [f64; 2],
-    /// Rows within this of an end of a record are fitted, but nothing is selected by them, s: a zero-phase filter's ends.
+    /// Rows within this of an end of a record are fitted but not judged, s: the ends of a zero-phase filter.
     pub(crate) ends_s: f64,
 }
 
@@ -99,9 +99,9 @@ pub(crate) struct Selection {
     pub(crate) bands: usize,
     /// Least share of the residual's power that a term must take on folds in time; half of it on bands.
     pub(super) share_floor: f64,
-    /// Most terms; 0 searches for none, and tells the residuals of the model as it is.
+    /// Maximum number of terms; 0 reports the residuals of the model as it is.
     pub(crate) most: usize,
-    /// Pitches that the machine has, of a screw or of teeth, mm: candidates for ripples of their own, beside the scan.
+    /// Pitches that the machine has, of a screw or of teeth, mm: further candidates for ripples beside the scan.
     pub(crate) pitches_mm: Vec<f64>,
 }
 
@@ -129,7 +129,7 @@ impl Default for Baseline {
     }
 }
 
-/// A term that was added to the model; its numbers are told for people, and fitted again with the others.
+/// A term that was added to the model; its numbers are for information and refitted with the others.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TermEntry {
     /// Name in the catalogue.

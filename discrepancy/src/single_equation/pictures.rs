@@ -1,4 +1,4 @@
-//! Series for the page: what the balance was measured to give, and what both models say of it.
+//! Series for the page: the measured balance and both models.
 
 use super::model::Kind;
 use super::runs::Run;
@@ -30,7 +30,7 @@ impl Study {
         };
         let shown = |value: &dyn Fn(usize) -> f64| drawn(&|row| factor * value(row), &|_| f64::NAN);
         let time_s = |row: usize| run.time_s[run.kept[row - range.start]];
-        // At the ends filters swing in: the largest difference there says nothing of the model.
+        // Filters settle at the ends: differences there are no model error.
         let judged = |value: &dyn Fn(usize) -> f64| {
             shown(&|row| if fitted.rows.judged[row] { value(row) } else { f64::NAN })
         };

@@ -1,4 +1,4 @@
-//! Whether the records of a balance can be used: what the check says of its channels, and numbers that came out below zero.
+//! Whether the records of a balance can be used: findings of its channels, and fitted numbers below zero.
 
 use super::Study;
 use super::terms;

@@ -1,4 +1,4 @@
-//! The report of a balance: what was named and what was not, and the held-out record.
+//! The report of a balance: selected and rejected terms, and the held-out record.
 //!
 //! The noise of the sensors is not known for a foreign record, so that `gap.floor` is 0 and `closed` a lower bound. For the same
 //! reason `chi2` counts in the power that the extended model leaves on the training records, and its range is that of their
@@ -103,7 +103,7 @@ impl Study {
         if self.model.kind == Kind::Chamber { "drive.flow-a" } else { "drive.force" }
     }
 
-    /// The baseline's numbers beside what was taken, in words.
+    /// The baseline's numbers beside the selected terms, in words.
     fn baseline_numbers(&self) -> String {
         let columns = terms::baseline(&self.model);
         let each = columns.iter().zip(&self.extended_fit.numbers);
@@ -153,7 +153,7 @@ impl Study {
         all
     }
 
-    /// Clustered standard errors of a fit over these columns; one that is not known is NaN, and told as none.
+    /// Clustered standard errors of a fit over these columns; an unknown one is NaN, and reported as null.
     fn errors(&self, columns: &super::Columns, fit: &super::Fit) -> Vec<f64> {
         self.rows.covariance(columns, fit, &self.time).map_or_else(
             || vec![f64::NAN; columns.len()],
@@ -271,14 +271,14 @@ impl Study {
         candidates
     }
 
-    /// Families that no fit can tell from the baseline.
+    /// Families collinear with the baseline.
     fn not_excited(&self) -> Vec<EffectPlace> {
         let describe = self.found.first.iter().filter(|judged| !judged.is_excited);
         let effects = describe.map(|judged| self.families[judged.place].family.variants[0].effect.clone());
         effects.map(|effect| EffectPlace { place: place(&effect), effect }).collect()
     }
 
-    /// The number that would take the asked share of what is left now.
+    /// Detection limit: the number that would remove the required share of the remaining power.
     fn detection_limits(&self) -> Vec<DetectionLimit> {
         let power = self.rows.power(&self.extended_fit.residual);
         let mut limits = Vec::new();
@@ -430,7 +430,7 @@ fn finite(mut quantities: Vec<Quantity>) -> Vec<Quantity> {
     quantities
 }
 
-/// What is the same column by construction, and so told without a fit.
+/// Effects with an identical column, reported without a fit.
 fn alias(entry: &TermEntry, numbers: &[Quantity], study: &Study) -> Vec<NamedEffect> {
     let named = |effect: &str, parameters: Vec<Quantity>| NamedEffect {
         effect: effect.into(),

@@ -1,12 +1,12 @@
-//! A record as rows of a balance: what is measured, processed as the model file says, and which rows count.
+//! A record as rows of a balance: processed signals, and which rows count.
 //!
 //! ```text
 //!   record ─► even grid ─► position: low pass or moving average ─► v, a by central differences ─► columns of each term
 //!          ─► zero-phase Chebyshev I and every n-th sample, columns and target alike ─► rows that are fast and inside
 //! ```
 //!
-//! A chamber's target is what its flow balance lacks, `d(p (A x + V_0))/dt / p_N - q`, with q the baseline's: edge flow of the
-//! plant at the measured pressures, behind both lags.
+//! A chamber's target is the residual of its flow balance, `d(p (A x + V_0))/dt / p_N - q`, with q of the baseline: edge flow of
+//! the plant at the measured pressures, behind both lags.
 //!
 //! Source: Janot, Gautier, Brunot 2019 (processing of EMPS); effects.md, Real records; rig-model.md, One axis.
 
@@ -189,7 +189,7 @@ impl Grid {
         Ok(Self { time_s, as_is })
     }
 
-    /// A channel on the grid, straight between what is there.
+    /// A channel on the grid, interpolated linearly.
     fn values(&self, record: &Record, name: &str, channel: Channel) -> Result<Vec<f64>, BalanceError> {
         let missing = || BalanceError::Missing { file: name.into(), column: channel.column() };
         let values = record.channel(channel).ok_or_else(missing)?;

@@ -24,7 +24,7 @@ use super::terms::{Family, amplitude};
 /// Clustered standard errors that folds in time ask, and those in bands.
 const T_TIME: f64 = 3.0;
 const T_BANDS: f64 = 2.0;
-/// Clustered standard errors by which two effects are told apart.
+/// Significance of a difference between two effects, in clustered standard errors.
 const T_APART: f64 = 3.0;
 /// Twice the difference of log likelihoods that does the same: "very strong" is 10 [Kass, Raftery 1995, JASA 90(430)].
 const GAIN_APART: f64 = 10.0;
@@ -58,12 +58,12 @@ pub(super) struct Judged {
     pub(super) number: f64,
     /// Share of the power left out in time that it takes.
     pub(super) share: f64,
-    /// The least of what was there over what was asked: above 1 passes.
+    /// Smallest ratio of a statistic to its threshold; above 1 passes.
     pub(super) score: f64,
     /// The gate that decided.
     pub(super) gate: String,
     pub(super) passes: bool,
-    /// Whether the records tell it from the baseline at all.
+    /// Whether it is identifiable beside the baseline.
     pub(super) is_excited: bool,
     /// Squares left out of each fold in time.
     left: Vec<f64>,
@@ -87,7 +87,7 @@ pub(super) struct Found {
     pub(super) taken: Vec<Taken>,
     /// All families alone, in their order.
     pub(super) first: Vec<Judged>,
-    /// All families beside what was taken.
+    /// All families beside the selected terms.
     pub(super) last: Vec<Judged>,
     /// The decoy that did better than every effect, where that ended the search.
     pub(super) decoy: Option<Judged>,

@@ -2,6 +2,7 @@
 
 use super::Model;
 use super::power::{Power, kept, levels, pooled, sums};
+use crate::stats::mean_and_variance;
 use crate::windows::Windows;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
@@ -101,8 +102,6 @@ fn joint(power: &Power) -> f64 {
 
 /// Mean and standard deviation.
 fn spread(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let (mean, variance) = mean_and_variance(values);
     (mean, variance.sqrt())
 }

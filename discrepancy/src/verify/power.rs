@@ -2,6 +2,7 @@
 
 use super::LEVELS;
 use super::null_power::NullPower;
+use crate::stats::order_statistic;
 use crate::windows::WINDOW;
 
 /// Share of trimmed windows.
@@ -98,8 +99,8 @@ impl Power {
                 let squares = self.lane(lane);
                 let mut ratios: Vec<f64> =
                     squares.into_iter().filter(|window| window.expected > 0.0).map(Squares::over).collect();
-                ratios.sort_unstable_by(f64::total_cmp);
-                ratios.get((QUIET * ratios.len() as f64) as usize).copied().unwrap_or(1.0)
+                let rank = (QUIET * ratios.len() as f64) as usize;
+                order_statistic(&mut ratios, rank).unwrap_or(1.0)
             })
             .collect()
     }

@@ -2,6 +2,7 @@
 
 use super::{FORCE, WINDOW, Windows, dot};
 use crate::gridded_record::GriddedRecord;
+use crate::stats::median;
 use plant::PERIOD_S;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
@@ -82,8 +83,7 @@ impl Windows<'_> {
                 let to = (at + SPIKE_REACH + 1).min(series.len());
                 let near = &mut near[..to - from];
                 near.copy_from_slice(&series[from..to]);
-                near.sort_unstable_by(f64::total_cmp);
-                let median = near[near.len() / 2];
+                let Some(median) = median(near) else { continue };
                 if (series[at] - median).abs() > limit {
                     values[at * width + lane] = median;
                 }

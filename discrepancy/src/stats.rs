@@ -1,21 +1,37 @@
-//! Small statistics that the checks share: quantiles, and slopes over short stretches.
+//! Order statistics, means and slopes.
+//!
+//! statrs interpolates quantiles and updates means recursively; thresholds of reports need values of the list and plain sums, to
+//! the bit.
 
-/// The value below which a share of the values lies; `None` of none.
-pub(super) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let at = ((values.len() - 1) as f64 * share).round() as usize;
-    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
+/// The value at a rank from 0; `None` beyond the last.
+pub(crate) fn order_statistic(values: &mut [f64], rank: usize) -> Option<f64> {
+    (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
-/// The middle value.
-pub(super) fn median(values: &mut [f64]) -> Option<f64> {
-    quantile(values, 0.5)
+/// The value at the rank nearest to a share of the last rank; `None` for an empty list.
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    order_statistic(values, (values.len().saturating_sub(1) as f64 * share).round() as usize)
+}
+
+/// The median, the upper one of two; `None` for an empty list.
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+    order_statistic(values, values.len() / 2)
+}
+
+/// Arithmetic mean.
+pub(crate) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Mean and sample variance.
+pub(crate) fn mean_and_variance(values: &[f64]) -> (f64, f64) {
+    let mean = mean(values);
+    let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    (mean, squares / (values.len() as f64 - 1.0))
 }
 
 /// Mean over `reach` places to each side; `None` where fewer than half of them are there.
-pub(super) fn means(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
+pub(crate) fn means(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0_usize)];
     for value in values {
         let (sum, count) = sums[sums.len() - 1];
@@ -32,7 +48,7 @@ pub(super) fn means(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
 }
 
 /// Change per place, from `reach` places before to `reach` after.
-pub(super) fn slopes(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
+pub(crate) fn slopes(values: &[Option<f64>], reach: usize) -> Vec<Option<f64>> {
     (0..values.len())
         .map(|place| {
             let before = values[place.checked_sub(reach)?]?;
