@@ -45,8 +45,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let driven = drive(&STEP, quiet, quiet)?;
     let began = driven.began.ok_or("the baseline does not come to its step")?;
     let edge = edge(&driven, began).ok_or("no edge of the valve")?;
-    let own = changes(quiet, &driven, edge)?;
-    let last = own[COMPARED - 1];
+    let hidden = changes(quiet, &driven, edge)?;
+    let last = hidden[COMPARED - 1];
     println!(
         "Baseline after 50 ms: {:.0} mm/s, p_a {:+.0} kPa, p_b {:+.0} kPa.\n",
         last[0], last[1], last[2]
@@ -83,7 +83,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let cases: Vec<(String, RigParameters)> = effects.chain(parameters).collect::<Result<_, _>>()?;
     let mut rows: Vec<(f64, String)> = cases
         .par_iter()
-        .map(|(head, rig)| row(quiet, head, rig, (&driven, edge), &own, &noise))
+        .map(|(head, rig)| row(quiet, head, rig, (&driven, edge), &hidden, &noise))
         .collect::<Result<_, _>>()?;
     rows.sort_by(|left, right| right.0.total_cmp(&left.0));
     rows.iter().for_each(|(_, row)| println!("{row}"));
@@ -125,7 +125,7 @@ fn row(
     head: &str,
     rig: &RigParameters,
     (baseline, baseline_edge): (&ClosedLoopRun, usize),
-    own: &Changes,
+    hidden: &Changes,
     noise: &[f64; 3],
 ) -> Result<(f64, String), String> {
     let driven = drive(&STEP, quiet, rig).map_err(|error| error.to_string())?;
@@ -138,12 +138,13 @@ fn row(
             (driven.inputs[edge + at].valve[0] - baseline.inputs[baseline_edge + at].valve[0]).abs() < 1e-3
         })
         .count();
-    let told: Vec<(f64, f64, String)> = (0..3)
+    let extremes: Vec<(f64, f64, String)> = (0..3)
         .map(|what| {
-            let towards = own[COMPARED - 1][what].signum();
-            let differs = changed.iter().zip(own).map(|(changed, own)| towards * (changed[what] - own[what]));
-            let (most, least) =
-                differs.fold((0.0_f64, 0.0_f64), |(most, least), own| (most.max(own), least.min(own)));
+            let towards = hidden[COMPARED - 1][what].signum();
+            let differs =
+                changed.iter().zip(hidden).map(|(changed, hidden)| towards * (changed[what] - hidden[what]));
+            let (most, least) = differs
+                .fold((0.0_f64, 0.0_f64), |(most, least), change| (most.max(change), least.min(change)));
             let peak = if most >= -least { most } else { least };
             (most / noise[what], least / noise[what], format!("{peak:+.1} ({:+.0})", peak / noise[what]))
         })
@@ -156,12 +157,15 @@ fn row(
         (false, true) => "slower",
         (false, false) => "alike",
     };
-    let [v, a, b] = [0, 1, 2].map(|what| said(told[what].0, told[what].1));
+    let [v, a, b] = [0, 1, 2].map(|what| said(extremes[what].0, extremes[what].1));
     let pressures = if a == b { a.to_owned() } else { format!("a {a}, b {b}") };
     // Sorted by how much faster the slowest of the three is.
-    let order = told.iter().map(|(most, least, _)| if *most >= -*least { *most } else { *least });
+    let order = extremes.iter().map(|(most, least, _)| if *most >= -*least { *most } else { *least });
     Ok((
         order.fold(f64::INFINITY, f64::min),
-        format!("{head} {} | {} | {} | {alike} ms | {v} | {pressures} |", told[0].2, told[1].2, told[2].2),
+        format!(
+            "{head} {} | {} | {} | {alike} ms | {v} | {pressures} |",
+            extremes[0].2, extremes[1].2, extremes[2].2
+        ),
     ))
 }

@@ -135,9 +135,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .iter()
             .map(|name| of(name).map_or_else(|| "-".to_owned(), |judged| shown(judged.least())))
             .collect();
-        let told = proposal.next.experiment.or(proposal.next.otherwise).unwrap_or_default();
+        let proposed = proposal.next.experiment.or(proposal.next.otherwise).unwrap_or_default();
         let pair = format!("{}, {}", both[0].names[0], both[1].names[0]);
-        writeln!(out, "| {pair} | {} | {told} |", cells.join(" | "))?;
+        writeln!(out, "| {pair} | {} | {proposed} |", cells.join(" | "))?;
         out.flush()?;
     }
     Ok(())

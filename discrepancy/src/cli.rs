@@ -48,36 +48,32 @@ pub struct RecordArguments {
     /// the other steps write no files.
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// Mapping file of foreign CSV records.
-    #[arg(long)]
-    pub mapping: Option<PathBuf>,
-    /// Refuse records with columns that the measurement file does not know.
-    #[arg(long)]
-    pub(crate) strict: bool,
+    /// How they are read.
+    #[command(flatten)]
+    pub(crate) read: ReadArguments,
     /// Threads; the results do not depend on them. Default: all cores.
     #[arg(long)]
     pub threads: Option<usize>,
 }
 
-impl RecordArguments {
-    /// How the records are read.
-    #[must_use]
-    pub fn options(&self) -> ReadOptions {
-        options(self.strict, self.mapping.as_ref())
-    }
+/// How records are read.
+#[derive(Args, Clone, Debug)]
+pub struct ReadArguments {
+    /// Mapping file of foreign CSV records.
+    #[arg(long)]
+    pub(crate) mapping: Option<PathBuf>,
+    /// Refuse records with columns that the measurement file does not know.
+    #[arg(long)]
+    pub(crate) strict: bool,
 }
 
-impl VerifyArguments {
-    /// How the record is read.
+impl ReadArguments {
+    /// The same for the reader.
     #[must_use]
-    pub fn options(&self) -> ReadOptions {
-        options(self.strict, self.mapping.as_ref())
+    pub(crate) fn options(&self) -> ReadOptions {
+        let unknown = if self.strict { Unknown::Refused } else { Unknown::Ignored };
+        ReadOptions { unknown, mapping: self.mapping.clone(), ..ReadOptions::default() }
     }
-}
-
-fn options(strict: bool, mapping: Option<&PathBuf>) -> ReadOptions {
-    let unknown = if strict { Unknown::Refused } else { Unknown::Ignored };
-    ReadOptions { unknown, mapping: mapping.cloned(), ..ReadOptions::default() }
 }
 
 /// What naming is given.
@@ -128,12 +124,9 @@ pub struct VerifyArguments {
     /// The held-out record.
     #[arg(long)]
     pub test: PathBuf,
-    /// Mapping file of a foreign CSV record.
-    #[arg(long)]
-    pub mapping: Option<PathBuf>,
-    /// Refuse a record with columns that the measurement file does not know.
-    #[arg(long)]
-    pub(crate) strict: bool,
+    /// How it is read.
+    #[command(flatten)]
+    pub(crate) read: ReadArguments,
     /// Folder for verification.json, made if missing; without it nothing is written.
     #[arg(long)]
     pub out: Option<PathBuf>,

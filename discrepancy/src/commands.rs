@@ -126,7 +126,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         _ => PathBuf::from("rig.toml"),
     };
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
-    let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests).chain(&records.mapping);
+    let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests).chain(&records.read.mapping);
     let out = Folder::open(&out, inputs)?;
     // Reported before a minute of work.
     for name in [Path::new("report.json"), Path::new("report.html"), &model] {
@@ -141,7 +141,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
             rig: records.rig.clone(),
             train: records.train.clone(),
             test: one_test(tests)?,
-            options: records.options(),
+            options: records.read.options(),
             without: without.clone(),
         };
         close(&task, &mut progress)?
@@ -184,8 +184,8 @@ fn one_balance_outcome(
 /// A model of one balance says itself how its records are read, and which terms it has.
 fn refuse_whole_rig_options(arguments: &NameArguments) -> Result<(), CommandError> {
     let given = [
-        ("--mapping", arguments.records.mapping.is_some(), "mapping = \"…\" in the model file"),
-        ("--strict", arguments.records.strict, "it reads the columns under [channels] alone"),
+        ("--mapping", arguments.records.read.mapping.is_some(), "mapping = \"…\" in the model file"),
+        ("--strict", arguments.records.read.strict, "it reads the columns under [channels] alone"),
         ("--without", !arguments.without.is_empty(), "[[terms]] and [selection] of the model file"),
     ];
     let Some((option, _, instead)) = given.iter().find(|(_, given, _)| *given) else { return Ok(()) };
@@ -240,7 +240,7 @@ fn check_command(arguments: &RecordArguments) -> Result<Exit, CommandError> {
     let mut all = Vec::new();
     let mut text = String::new();
     for path in &arguments.train {
-        let report = open(path, &arguments.options(), &rig)?.checked.report;
+        let report = open(path, &arguments.read.options(), &rig)?.checked.report;
         let fit = if report.usable { "can be used" } else { "cannot be used" };
         let _ = writeln!(text, "{}: {} rows, {:.3} s: {fit}", report.file, report.rows, report.length_s);
         for finding in &report.findings {
@@ -280,7 +280,7 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
         let _ = match (quantity.standard_error, quantity.before) {
             (Some(_), Some(before)) => writeln!(text, "{} (rig file: {before})", quantity_in_words(quantity)),
             (Some(_), None) => writeln!(text, "{}", quantity_in_words(quantity)),
-            (None, _) => writeln!(text, "{}: these records cannot tell", quantity.name),
+            (None, _) => writeln!(text, "{}: not determined by these records", quantity.name),
         };
     }
     print(&text)?;
@@ -333,7 +333,7 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
     let inputs = [&arguments.rig, &arguments.extended, &arguments.test];
     let out = arguments.out.as_ref().map(|out| Folder::open(out, inputs)).transpose()?;
     let [before, after] = [RigFile::read(&arguments.rig)?.rig, RigFile::read(&arguments.extended)?.rig];
-    let opened = open(&arguments.test, &arguments.options(), &before)?;
+    let opened = open(&arguments.test, &arguments.read.options(), &before)?;
     let Some(gridded) = opened.gridded else { return Err(CommandError::BadData(opened.checked.why_not())) };
     let verified = verify::verify(&before, &after, &gridded, &mut progress());
     let mut text = String::new();
@@ -396,7 +396,7 @@ fn gridded_records(arguments: &RecordArguments) -> Result<(RigFile, Vec<GriddedR
     let rig_file = RigFile::read(&arguments.rig)?;
     let mut all = Vec::new();
     for path in &arguments.train {
-        let opened = open(path, &arguments.options(), &rig_file.rig)?;
+        let opened = open(path, &arguments.read.options(), &rig_file.rig)?;
         let Some(gridded) = opened.gridded else {
             return Err(CommandError::BadData(opened.checked.why_not()));
         };
@@ -413,7 +413,7 @@ fn read_report(path: &Path) -> Result<Reported, CommandError> {
 
 /// The output folder, opened before the work.
 fn folder(arguments: &RecordArguments) -> Result<Option<Folder>, CommandError> {
-    let inputs = || [&arguments.rig].into_iter().chain(&arguments.train).chain(&arguments.mapping);
+    let inputs = || [&arguments.rig].into_iter().chain(&arguments.train).chain(&arguments.read.mapping);
     Ok(arguments.out.as_ref().map(|out| Folder::open(out, inputs())).transpose()?)
 }
 

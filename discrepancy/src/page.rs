@@ -77,7 +77,7 @@ pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
         ("next", "What to measure next", finding::next(report)),
         ("after", "After: with what was found", pictures::after(report, pictures)),
         ("gap", "The gap, before and after", held_out::gap(report)),
-        ("verification", "On a record that nothing was fitted on", held_out::verification(report)),
+        ("verification", "On a held-out record", held_out::verification(report)),
         ("location", "Where they disagree", location::location(report)),
         ("candidates", "Candidates, the best first", candidates::candidates(report)),
         ("limits", "What these records can show", candidates::limits(report)),

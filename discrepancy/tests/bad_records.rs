@@ -86,7 +86,7 @@ impl Sheet {
     }
 
     fn place(&self, column: &str) -> usize {
-        self.columns.iter().position(|own| own == column).unwrap()
+        self.columns.iter().position(|known| known == column).unwrap()
     }
 
     fn changed(mut self, column: &str, change: impl Fn(usize, f64) -> f64) -> Sheet {
@@ -176,17 +176,17 @@ fn good_records_have_no_findings_and_their_noise_and_steps_are_told() {
         let checked = sheet.checked();
         assert!(checked.report.usable && checked.report.findings.is_empty(), "{}", texts(&checked));
         assert_eq!((checked.report.rows, checked.report.length_s), (CYCLES as usize, 7.999));
-        for (column, own) in &checked.report.channels {
-            assert!((own.unusable - 0.0).abs() < 1e-12);
+        for (column, found) in &checked.report.channels {
+            assert!((found.unusable - 0.0).abs() < 1e-12);
             if column.contains("valve") {
-                assert_eq!(own.noise, None);
+                assert_eq!(found.noise, None);
                 continue;
             }
-            let ratio = own.noise.unwrap() / specified(column, 1.0);
+            let ratio = found.noise.unwrap() / specified(column, 1.0);
             assert!((0.9..1.1).contains(&ratio), "{column}: {ratio}");
             // The step and nothing else: noise^2 = specified^2 - step^2 / 12 would not tell it.
             let step = specified(column, 0.0) * 12.0_f64.sqrt();
-            assert!((own.quantum.unwrap() / step - 1.0).abs() < 1e-3, "{column}: {own:?}");
+            assert!((found.quantum.unwrap() / step - 1.0).abs() < 1e-3, "{column}: {found:?}");
         }
     }
 }
@@ -201,8 +201,9 @@ fn noise_is_told_at_half_twice_and_four_times_the_specified() {
             .unwrap();
         let checked = simulated(&rig, false, 3).of_the_drive().checked();
         assert!(checked.report.findings.is_empty(), "{}", texts(&checked));
-        for (column, own) in checked.report.channels.iter().filter(|(column, _)| !column.contains("valve")) {
-            let ratio = own.noise.unwrap() / specified(column, factor);
+        for (column, found) in checked.report.channels.iter().filter(|(column, _)| !column.contains("valve"))
+        {
+            let ratio = found.noise.unwrap() / specified(column, factor);
             assert!((0.9..1.1).contains(&ratio), "{factor}, {column}: {ratio}");
         }
     }
@@ -344,8 +345,8 @@ fn one_stamp_that_cannot_be_is_left_out_wherever_it_is() {
         assert!(checked.report.usable, "row {wrong}: {}", texts(&checked));
         assert!(kinds(&checked).contains(&"jumping-time"), "row {wrong}: {}", texts(&checked));
         assert!(!checked.is_usable(FORCE, wrong) && unusable(&checked, FORCE) == 1, "row {wrong}");
-        let course = GriddedRecord::of(&sheet, &checked, &rig).unwrap();
-        assert!((7999..=8000).contains(&course.len()), "row {wrong}: {}", course.len());
+        let gridded = GriddedRecord::of(&sheet, &checked, &rig).unwrap();
+        assert!((7999..=8000).contains(&gridded.len()), "row {wrong}: {}", gridded.len());
     }
 }
 

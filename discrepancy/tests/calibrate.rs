@@ -1,6 +1,6 @@
 //! A record tells the numbers of a rig that nothing is missing from: its volumes and the points of its valve's tables too.
 
-use crate::course::course;
+use crate::gridded::gridded;
 use discrepancy::calibrate::finer::{Finer, finer};
 use discrepancy::calibrate::{calibrate, quantity};
 use discrepancy::engine::Engine;
@@ -20,18 +20,18 @@ fn found(engine: &Engine<'_>) -> Finer {
 #[test]
 fn what_is_told_of_a_parameter_is_what_was_simulated_and_a_rig_file() {
     let rig = RigParameters::baseline();
-    let courses = [course(&rig, &rig)];
-    let engine = Engine::new(&courses, &rig);
+    let records = [gridded(&rig, &rig)];
+    let engine = Engine::new(&records, &rig);
     let ones = [1.0; COUNT];
     let around = Around { columns: engine.parameter_columns(&rig, &ones), factors: ones };
     let mut fit = calibrate(&engine, &around).fit;
     // A fit on lines may have rest below what slides.
     let [sliding, rest] = ["parameter:sliding-friction", "parameter:break-away-force"]
-        .map(|name| PARAMETERS.iter().position(|own| own.name == name).expect("one of them"));
+        .map(|name| PARAMETERS.iter().position(|parameter| parameter.name == name).expect("one of them"));
     (fit.factors[sliding], fit.factors[rest]) = (1.1, 0.8);
-    let told = [sliding, rest].map(|at| quantity(&engine, at, &fit));
-    assert_eq!(told[0].value, told[1].value, "{told:?}");
-    extend(RigParameters::BASELINE_TOML, "rig.toml", &[], &told, Axis::Drive, &[]).expect("a rig file");
+    let quantities = [sliding, rest].map(|at| quantity(&engine, at, &fit));
+    assert_eq!(quantities[0].value, quantities[1].value, "{quantities:?}");
+    extend(RigParameters::BASELINE_TOML, "rig.toml", &[], &quantities, Axis::Drive, &[]).expect("a rig file");
 }
 
 #[test]
@@ -41,13 +41,16 @@ fn a_rig_file_with_equal_points_and_a_volume_at_the_end_of_its_range_is_calibrat
         .and_then(|rig| rig.with("valve.kv_supply_m3_per_h", &[0.0, 0.0, 0.115, 0.36, 0.66, 0.66]))
         .expect("numbers of a rig");
     let hidden = rig.with("friction.viscous_n_per_mm_per_s", &[1.3]).expect("a rig");
-    let courses = [course(&hidden, &rig)];
-    let found = found(&Engine::new(&courses, &rig));
-    let viscous =
-        found.quantities.iter().find(|own| own.name == "parameter:viscous-friction").expect("told of");
+    let records = [gridded(&hidden, &rig)];
+    let found = found(&Engine::new(&records, &rig));
+    let viscous = found
+        .quantities
+        .iter()
+        .find(|quantity| quantity.name == "parameter:viscous-friction")
+        .expect("told of");
     let error = viscous.standard_error.expect("these strokes tell it");
     assert!((viscous.value - 1.3).abs() < 4.0 * error, "{viscous:?}");
-    let names: Vec<&str> = found.quantities.iter().map(|own| own.name.as_str()).collect();
+    let names: Vec<&str> = found.quantities.iter().map(|quantity| quantity.name.as_str()).collect();
     assert!(
         names.contains(&"valve.kv_supply_m3_per_h[3]") && names.contains(&"valve.kv_exhaust_m3_per_h[5]")
     );
@@ -64,11 +67,12 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
         .and_then(|rig| rig.with("friction.viscous_n_per_mm_per_s", &[1.25]))
         .expect("numbers of a rig");
     let rig = RigParameters::baseline();
-    let courses = [course(&hidden, &rig)];
-    let engine = Engine::new(&courses, &rig);
+    let records = [gridded(&hidden, &rig)];
+    let engine = Engine::new(&records, &rig);
     let found = found(&engine);
 
-    let of = |name: &str| found.quantities.iter().find(|own| own.name == name).expect("it is told of");
+    let of =
+        |name: &str| found.quantities.iter().find(|quantity| quantity.name == name).expect("it is told of");
     for (name, truth) in [
         ("cylinder.dead_volume_cm3", 26.0),
         ("valve.kv_supply_m3_per_h[2]", 0.123),
@@ -77,9 +81,12 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
         ("parameter:viscous-friction", 1.25),
         ("parameter:mass", 5.0),
     ] {
-        let own = of(name);
-        let error = own.standard_error.expect("these strokes tell it");
-        assert!((own.value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{own:?}, in truth {truth}");
+        let quantity = of(name);
+        let error = quantity.standard_error.expect("these strokes tell it");
+        assert!(
+            (quantity.value - truth).abs() < 4.0 * error && error < 0.05 * truth,
+            "{quantity:?}, in truth {truth}"
+        );
     }
     // As a file it is the rig that left the record, as far as the record tells.
     let text = extend(RigParameters::BASELINE_TOML, "rig.toml", &[], &found.changed, Axis::Drive, &[])
@@ -87,7 +94,7 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
     let after = RigParameters::from_toml(&text, "rig.toml").expect("it was read once");
     let chi2 = |rig: &RigParameters| {
         let left = engine.residual(&engine.simulate(rig));
-        left.iter().map(|own| own * own).sum::<f64>() / engine.freedom().iter().sum::<f64>()
+        left.iter().map(|value| value * value).sum::<f64>() / engine.freedom().iter().sum::<f64>()
     };
     assert!(chi2(&after) < 1.1 && chi2(&rig) > 10.0, "{} {}", chi2(&rig), chi2(&after));
 }

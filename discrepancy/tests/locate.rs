@@ -1,6 +1,6 @@
 //! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
 
-use crate::course::course;
+use crate::gridded::gridded;
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
 use discrepancy::report::Outside;
@@ -14,8 +14,8 @@ fn located(effect: Option<Hidden<'_>>) -> (Located, Option<Outside>) {
     let hidden = effect.map_or(rig.clone(), |(name, place, numbers)| {
         rig.with_effect(name, place, numbers).expect("numbers of the sheet")
     });
-    let courses = [course(&hidden, &rig)];
-    let located = locate(&rig, &courses, &mut |_| ());
+    let records = [gridded(&hidden, &rig)];
+    let located = locate(&rig, &records, &mut |_| ());
     let outside = outside(&located.unknowns, &mut |_| ());
     (located, outside)
 }

@@ -1,7 +1,7 @@
 //! The integration tests of `discrepancy`, one executable.
 
-#[path = "common/course.rs"]
-mod course;
+#[path = "common/gridded.rs"]
+mod gridded;
 mod real;
 #[path = "common/record.rs"]
 mod record;

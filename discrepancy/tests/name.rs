@@ -1,6 +1,6 @@
 //! Claims about naming, on records that the plant makes here with something hidden in it.
 
-use crate::course::course;
+use crate::gridded::gridded;
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{Found, name};
@@ -12,8 +12,8 @@ fn found(hidden: &RigParameters, without: &[&str]) -> Found {
 }
 
 fn found_beside(rig: &RigParameters, hidden: &RigParameters, without: &[&str]) -> Found {
-    let courses = [course(hidden, &RigParameters::baseline())];
-    let engine = Engine::new(&courses, rig);
+    let records = [gridded(hidden, &RigParameters::baseline())];
+    let engine = Engine::new(&records, rig);
     let without: Vec<String> = without.iter().map(|name| (*name).to_owned()).collect();
     name(&engine, Candidate::all(rig, [true, false], false, &without), &mut |_| ())
 }
@@ -39,8 +39,8 @@ fn factors(found: &Found) -> Vec<(f64, f64)> {
 
 #[test]
 fn rigs_side_by_side_show_what_each_shows_alone() {
-    let courses = [course(&RigParameters::baseline(), &RigParameters::baseline())];
-    let engine = Engine::new(&courses, &RigParameters::baseline());
+    let records = [gridded(&RigParameters::baseline(), &RigParameters::baseline())];
+    let engine = Engine::new(&records, &RigParameters::baseline());
     let off = |at: usize| {
         let mut factors = [1.0; COUNT];
         factors[at] = 1.01;
@@ -51,9 +51,9 @@ fn rigs_side_by_side_show_what_each_shows_alone() {
     rigs[3] = with(&[("inclination", "drive", &[("force_n", 20.0)])]);
     let windows = &engine.windows()[0];
     let together = windows.simulate_side_by_side(&rigs);
-    for (rig, own) in rigs.iter().zip(&together) {
+    for (rig, batched) in rigs.iter().zip(&together) {
         let alone = windows.simulate_coarsely(rig);
-        assert!(alone.iter().map(|value| value.to_bits()).eq(own.iter().map(|value| value.to_bits())));
+        assert!(alone.iter().map(|value| value.to_bits()).eq(batched.iter().map(|value| value.to_bits())));
     }
     assert!((1..rigs.len()).all(|at| together[at] != together[0]), "each moves something");
 }
@@ -81,7 +81,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
 
 /// Amplitude from which on a candidate would have been named.
 fn limit(found: &Found, name: &str) -> f64 {
-    let at = found.columns.candidates.iter().position(|own| own.name() == name).expect("a candidate");
+    let at = found.columns.candidates.iter().position(|known| known.name() == name).expect("a candidate");
     let candidate = &found.columns.candidates[at];
     let mut coordinates = candidate.origin();
     coordinates[0] = found.limits[at].expect("it is excited");
@@ -120,8 +120,8 @@ fn an_effect_that_the_rig_file_has_is_named_where_it_is_off_and_only_there() {
         let found = found_beside(&rig, &leaking(truth), &[]);
         assert_eq!(names(&found), ["piston-leakage drive"], "{truth}");
         let placed = &found.reported.placed[0];
-        let told = placed.candidate.numbers(&placed.coordinates)[0];
-        assert!((told - truth).abs() < 0.3, "{told}, in truth {truth}");
+        let reported = placed.candidate.numbers(&placed.coordinates)[0];
+        assert!((reported - truth).abs() < 0.3, "{reported}, in truth {truth}");
         assert_eq!(placed.candidate.baseline(0), Some(3.0));
     }
 }
@@ -135,9 +135,9 @@ fn a_wrong_mass_is_a_parameter_and_no_effect() {
     let (mass, error) = factors(&found)[0];
     assert!((mass - 1.1).abs() < 4.0 * error + 0.005, "{mass} +- {error}");
     // What is told is a fit of its own: the mass is as right without the parameters that went back to what the file says.
-    let told = found.reported.factors;
-    assert!((told[0] - 1.1).abs() < 4.0 * error + 0.005, "{told:?}");
-    assert!(told.iter().filter(|factor| **factor == 1.0).count() >= COUNT / 2, "{told:?}");
+    let reported = found.reported.factors;
+    assert!((reported[0] - 1.1).abs() < 4.0 * error + 0.005, "{reported:?}");
+    assert!(reported.iter().filter(|factor| **factor == 1.0).count() >= COUNT / 2, "{reported:?}");
     assert!(found.reported.loss < found.model.loss + 20.0 * COUNT as f64);
 }
 

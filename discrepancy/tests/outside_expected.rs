@@ -20,12 +20,17 @@ fn the_expected_table_has_every_effect_and_the_page_says_the_same() {
     assert_eq!(table.keys().map(String::as_str).collect::<Vec<_>>(), names);
     for (effect, expected) in &table {
         let (balances, variables) = (&expected["balances"], &expected["variables"]);
-        assert!(balances.iter().all(|own| BALANCES.contains(&own.as_str())), "{effect}: {balances:?}");
-        let is_variable = |own: &String| own == "constant" || VARIABLES.iter().any(|known| known.name == own);
+        assert!(
+            balances.iter().all(|balance| BALANCES.contains(&balance.as_str())),
+            "{effect}: {balances:?}"
+        );
+        let is_variable = |variable: &String| {
+            variable == "constant" || VARIABLES.iter().any(|known| known.name == variable)
+        };
         assert!(!variables.is_empty() && variables.iter().all(is_variable), "{effect}: {variables:?}");
-        let told: Vec<String> =
-            variables.iter().map(|own| format!("`{}`", own.replace('|', "\\|"))).collect();
-        let row = format!("| {effect} | {} | {} |", balances.join(", "), told.join(", "));
+        let listed: Vec<String> =
+            variables.iter().map(|variable| format!("`{}`", variable.replace('|', "\\|"))).collect();
+        let row = format!("| {effect} | {} | {} |", balances.join(", "), listed.join(", "));
         assert!(page.contains(&row), "the page lacks: {row}");
     }
 }

@@ -1,6 +1,6 @@
 //! A neighbour of a rig is simulated only where it differs, and shows the same as if it were simulated everywhere.
 
-use crate::course::course;
+use crate::gridded::gridded;
 use discrepancy::windows::Windows;
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};
@@ -25,8 +25,8 @@ fn rig(point: usize, more_n: f64) -> RigParameters {
 #[test]
 fn a_point_of_a_table_changes_nothing_in_windows_that_do_not_reach_it() {
     let baseline = RigParameters::baseline();
-    let course = course(&baseline, &baseline);
-    let windows = Windows::new(&course, &baseline);
+    let gridded = gridded(&baseline, &baseline);
+    let windows = Windows::new(&gridded, &baseline);
     let passage = windows.pass(&rig(0, 0.0));
     assert_eq!(passage.simulated(), windows.simulate_coarsely(&rig(0, 0.0)));
 
@@ -54,8 +54,8 @@ fn a_point_of_a_table_changes_nothing_in_windows_that_do_not_reach_it() {
 #[test]
 fn what_remembers_is_simulated_everywhere() {
     let baseline = RigParameters::baseline();
-    let course = course(&baseline, &baseline);
-    let windows = Windows::new(&course, &baseline);
+    let gridded = gridded(&baseline, &baseline);
+    let windows = Windows::new(&gridded, &baseline);
     let plays = |point: usize, more_n: f64| {
         rig(point, more_n)
             .with_effect("valve-hysteresis", "drive", &[("half_width_percent", 1.0)])

@@ -39,9 +39,9 @@ fn changed(name: &str, change: impl Fn(String) -> String) -> tempfile::NamedTemp
 }
 
 /// Within 3 %, the figures of effects.md.
-fn near(own: [f64; 2], figures: [f64; 2]) {
-    for (own, figure) in own.into_iter().zip(figures) {
-        assert!((own / figure - 1.0).abs() < 0.03, "{own} is not {figure}");
+fn near(computed: [f64; 2], figures: [f64; 2]) {
+    for (computed, figure) in computed.into_iter().zip(figures) {
+        assert!((computed / figure - 1.0).abs() < 0.03, "{computed} is not {figure}");
     }
 }
 
@@ -64,16 +64,16 @@ fn the_emps_figures_are_those_of_the_literature() {
     let Some(folder) = data("the_emps_figures_are_those_of_the_literature") else { return };
     let (train, test) = emps(&folder);
     near(residuals(changed("emps.toml", |text| text).path(), &train, &test), [2.33, 2.76]);
-    let own = |terms: &'static str| {
+    let residuals_with = |terms: &'static str| {
         let file = changed("emps.toml", with_term(terms));
         residuals(file.path(), &train, &test)
     };
-    near(own(ASYMMETRY), [1.91, 2.37]);
+    near(residuals_with(ASYMMETRY), [1.91, 2.37]);
     let stribeck = "effect = \"stribeck-friction\"\nshape = { velocity_mm_per_s = 10.0, exponent = 1.0 }";
-    near(own(stribeck), [2.32, 2.76]);
+    near(residuals_with(stribeck), [2.32, 2.76]);
     let ripple = "effect = \"friction-asymmetry\"\nform = \"viscous\"\n[[terms]]\neffect = \"position-dependent-force\"\n\
                   form = \"ripple\"\nshape = { pitch_mm = 2.5 }";
-    near(own(ripple), [1.88, 2.41]);
+    near(residuals_with(ripple), [1.88, 2.41]);
 }
 
 #[test]
@@ -101,8 +101,8 @@ fn emps_has_viscous_friction_that_differs_with_the_direction() {
     }
     let ripple = alone.candidates.iter().filter(|candidate| candidate.fate.contains("pitch_mm 2.5000"));
     assert!(ripple.clone().count() >= 2, "as a force, and as friction");
-    let told = |report: &Report| serde_json::to_string(&report.candidates).unwrap();
-    assert_eq!(told(&alone), told(&report));
+    let candidates = |report: &Report| serde_json::to_string(&report.candidates).unwrap();
+    assert_eq!(candidates(&alone), candidates(&report));
     // The extended model lacks nothing.
     let extended = extended_model_text(&model("emps.toml"), &Reported::from(&report)).unwrap();
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
@@ -133,12 +133,12 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
         (friction.effect.as_str(), "slope_n_per_bar")
     );
     assert!(report.next.as_ref().unwrap().otherwise.as_ref().unwrap().contains("three levels"));
-    let own = |form: &'static str| {
+    let residuals_with = |form: &'static str| {
         let file = changed("cylinder-friction.toml", with_term(form));
         residuals(file.path(), &train, &test)
     };
-    near(own("effect = \"pressure-dependent-friction\"\nform = \"root\""), [0.49, 0.78]);
-    near(own("effect = \"pressure-dependent-friction\"\nform = \"linear\""), [0.49, 0.90]);
+    near(residuals_with("effect = \"pressure-dependent-friction\"\nform = \"root\""), [0.49, 0.78]);
+    near(residuals_with("effect = \"pressure-dependent-friction\"\nform = \"linear\""), [0.49, 0.90]);
 }
 
 #[test]

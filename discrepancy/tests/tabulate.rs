@@ -49,8 +49,8 @@ fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
     assert_eq!(rig.tabulated()[0].value, outside.tables[0].value);
     assert!(text.contains("# Found from ") && text.contains("train.csv"));
     let written = serde_json::to_string(report).expect("a report is JSON");
-    let told: Reported = serde_json::from_str(&written).expect("what other steps read");
-    assert_eq!(extended(&rig_file, &told).expect("the same"), text);
+    let reported: Reported = serde_json::from_str(&written).expect("what other steps read");
+    assert_eq!(extended(&rig_file, &reported).expect("the same"), text);
 }
 
 #[test]

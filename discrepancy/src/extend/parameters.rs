@@ -119,9 +119,9 @@ pub(super) fn change(
             }
             done.push(path);
             let Some(spots) = spots(&document, path) else { continue };
-            let is_own = at == 0 && !quantity.unit.is_empty();
-            let unit = if is_own { quantity.unit.as_str() } else { "" };
-            let new = if is_own {
+            let is_value = at == 0 && !quantity.unit.is_empty();
+            let unit = if is_value { quantity.unit.as_str() } else { "" };
+            let new = if is_value {
                 quantity_text(quantity.value, quantity.standard_error, unit)
             } else {
                 let error =
@@ -132,7 +132,7 @@ pub(super) fn change(
             edits.comment_above(spots.key.start, &comment);
             for span in &spots.values {
                 let Some(old) = number(text, span) else { continue };
-                let new = if is_own { quantity.value } else { old * factor.unwrap_or(1.0) };
+                let new = if is_value { quantity.value } else { old * factor.unwrap_or(1.0) };
                 edits.replace(span.clone(), written(new));
             }
         }

@@ -126,17 +126,22 @@ fn signatures(
     left
 }
 
+/// Specified noise of each channel, its rounding included.
+pub(crate) fn noise_with_rounding(rig: &RigParameters) -> [f64; CHANNELS] {
+    let sensors = rig.sensors();
+    let with_rounding = |noise: f64, step: f64| (noise * noise + step * step / 12.0).sqrt();
+    let pressure = with_rounding(sensors.pressure_noise_pa, sensors.pressure_step_pa());
+    [
+        with_rounding(sensors.position_noise_m, sensors.position_step_m()),
+        with_rounding(sensors.force_noise_n, sensors.force_step_n()),
+        pressure,
+        pressure,
+    ]
+}
+
 impl<'a> Observer<'a> {
     fn new(driven: &'a ClosedLoopRun, rig: &RigParameters, measured: [bool; 2]) -> Self {
-        let sensors = rig.sensors();
-        let with_rounding = |noise: f64, step: f64| (noise * noise + step * step / 12.0).sqrt();
-        let pressure = with_rounding(sensors.pressure_noise_pa, sensors.pressure_step_pa());
-        let noise = [
-            with_rounding(sensors.position_noise_m, sensors.position_step_m()),
-            with_rounding(sensors.force_noise_n, sensors.force_step_n()),
-            pressure,
-            pressure,
-        ];
+        let noise = noise_with_rounding(rig);
         Observer { driven, measured: (0..2).filter(|axis| measured[*axis]).collect(), noise }
     }
 

@@ -49,9 +49,7 @@ pub(super) fn limits(report: &Report) -> String {
     let mut text = String::new();
     if !report.not_excited.is_empty() {
         text += &heading("Not excited");
-        text += &paragraph(
-            "Whether these are there, the training records do not tell: they do nothing in what was run.",
-        );
+        text += &paragraph("The training records do not excite these effects; they may be present.");
         let rows = report
             .not_excited
             .iter()

@@ -68,7 +68,7 @@ fn effect(named: &NamedEffect) -> String {
     }
     text += &numbers(named);
     if !named.alternatives.is_empty() {
-        text += &paragraph("These records cannot tell it from:");
+        text += &paragraph("These records do not distinguish it from:");
         let row = |other: &NamedEffect| {
             let values: Vec<String> = other
                 .parameters

@@ -12,7 +12,7 @@ pub(super) fn gap(report: &Report) -> String {
         let size = |value: f64| number(words::with_unit(&words::short(value * factor), &unit));
         let closed = match gap.closed {
             Some(closed) => Cell::Judged(closed >= 0.95, words::percent(closed)),
-            None => said("too little to tell"),
+            None => said("not significant"),
         };
         vec![said(words::signal(signal)), size(gap.before), size(gap.after), size(gap.floor), closed]
     };
@@ -48,15 +48,12 @@ pub(super) fn verification(report: &Report) -> String {
             said("the same, after"),
             Cell::Judged(
                 within,
-                format!(
-                    "{}; with nothing missing it is {low} to {high} in 95 of 100 records",
-                    words::short(seen.chi2_after)
-                ),
+                format!("{}; the 95 % null range is {low} to {high}", words::short(seen.chi2_after)),
             ),
         ],
     ];
     let sound = if seen.physical.is_empty() {
-        Cell::Judged(true, "nothing that a rig cannot do".to_owned())
+        Cell::Judged(true, "no unphysical state".to_owned())
     } else {
         Cell::Judged(false, seen.physical.join("; "))
     };

@@ -51,7 +51,7 @@ fn balances(location: &Location) -> String {
         .collect();
     figure(
         "Which balance",
-        "Unknown input over its noise, logarithmic; 1 is nothing. In brackets its rms.",
+        "Unknown input over its noise, logarithmic; 1 for a closed balance. In brackets its rms.",
         &[],
         &bars("balances", "Unknown input of each balance over its noise", &rows),
     )

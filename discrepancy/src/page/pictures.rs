@@ -58,7 +58,7 @@ fn all(report: &Report, pictures: &Pictures, model: Model, lead: &str) -> String
     });
     let Some((first, others)) = traces.split_first() else { return String::new() };
     let record = if pictures.held_out {
-        format!("{}, on which nothing was fitted.", pictures.record)
+        format!("{}, a held-out record.", pictures.record)
     } else {
         format!("{}, on which the models were fitted.", pictures.record)
     };
@@ -132,13 +132,13 @@ fn close(report: &Report, trace: &Trace, model: Model) -> String {
     };
     let id = identifier(trace, model, "close");
     let title = format!("{}: measured and {name}", words::signal(&trace.signal));
-    let scaled =
+    let range =
         format!("From {} to {} s.", words::fixed(time_s[0], 2), words::fixed(time_s[time_s.len() - 1], 2));
     figure(
         &format!("{}, where they differ most", words::signal(&trace.signal)),
-        &scaled,
+        &range,
         &[(Sample::Line("line s0"), "measured"), (Sample::Line(class), name)],
-        &plot.drawn(&id, &title, &scaled),
+        &plot.drawn(&id, &title, &range),
     )
 }
 

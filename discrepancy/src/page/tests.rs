@@ -62,7 +62,7 @@ fn the_verdict_stands_first_with_names_numbers_and_errors() {
     let order = [
         "\u{2713} Air leaks past",
         "piston-leakage at the drive axis: leakage 2.513 \u{b1} 0.041 Nl/min; it explains 97 % of the disagreement",
-        "On test.csv, which nothing was fitted on, 92 % to 99.6 % of the gap to the noise is closed",
+        "On test.csv, a held-out record, 92 % to 99.6 % of the gap to the noise is closed",
         "where they differ most",
         "What is missing",
         "After: with",

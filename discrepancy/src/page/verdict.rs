@@ -95,5 +95,5 @@ fn gap(report: &Report) -> Option<String> {
     } else {
         format!("{} to {}", words::percent(*least), words::percent(*most))
     };
-    Some(format!("On {record}, which nothing was fitted on, {range} of the gap to the noise is closed"))
+    Some(format!("On {record}, a held-out record, {range} of the gap to the noise is closed"))
 }

@@ -10,6 +10,7 @@
 //!
 //! Source: Liang, Zeger 1986, Biometrika 73(1) (clusters); Geyer 1992, Statistical Science 7(4) (the sum's end).
 
+use crate::stats::mean;
 use nalgebra::{DMatrix, DVector};
 
 /// Smallest pivot of a scaled Gram matrix; below, columns are collinear.
@@ -197,7 +198,7 @@ pub(super) fn rms(values: &[f64]) -> f64 {
 /// Mean over its standard error, of differences that are one for each fold.
 pub(super) fn clustered_t(differences: &[f64]) -> f64 {
     let count = differences.len() as f64;
-    let mean = differences.iter().sum::<f64>() / count;
+    let mean = mean(differences);
     let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
     mean / (variance / count).sqrt().max(f64::MIN_POSITIVE)
 }

@@ -27,9 +27,9 @@ impl Study {
         let columns: Vec<String> = self.model.channels.values().map(|channel| channel.column()).collect();
         let rig = self.rig.clone().unwrap_or_else(RigParameters::baseline);
         let mut check = crate::check::check(record, &rig).report;
-        let is_own =
+        let is_of_study =
             |finding: &Finding| finding.column.as_ref().is_none_or(|column| columns.contains(column));
-        check.findings.retain(|finding| is_own(finding) && KINDS.contains(&finding.kind.as_str()));
+        check.findings.retain(|finding| is_of_study(finding) && KINDS.contains(&finding.kind.as_str()));
         check.channels.retain(|column, _| columns.contains(column));
         let times = record.time_s();
         let hole = times.windows(2).enumerate().map(|(row, pair)| (row, pair[1] - pair[0]));

@@ -2,21 +2,13 @@
 
 use super::*;
 use crate::gridded_record::Point;
+use crate::next::divergence::noise_with_rounding;
 use crate::windows::first_state;
 use plant::{Inputs, Plant, Sensors};
 
 /// A record of 3 s made by a rig: the drive, out and back by half-open valves, with its sensors' noise.
 fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRecord {
     const PERIODS: usize = 3000;
-    let sensors = baseline.sensors();
-    let with_rounding = |noise: f64, step: f64| noise.hypot(step / 12.0_f64.sqrt());
-    let pressure = with_rounding(sensors.pressure_noise_pa, sensors.pressure_step_pa());
-    let noise = [
-        with_rounding(sensors.position_noise_m, sensors.position_step_m()),
-        with_rounding(sensors.force_noise_n, sensors.force_step_n()),
-        pressure,
-        pressure,
-    ];
     let mut record = GriddedRecord {
         name: "made".to_owned(),
         linked: false,
@@ -25,7 +17,7 @@ fn record(rig: &RigParameters, baseline: &RigParameters, seed: u64) -> GriddedRe
         inputs: vec![Inputs::default(); PERIODS],
         samples: Vec::new(),
         points: vec![[Point { extension_m: 0.1, ..Point::default() }; 2]],
-        noise: [noise, [0.0; CHANNELS]],
+        noise: [noise_with_rounding(baseline), [0.0; CHANNELS]],
         memory: [[0.0; CHANNELS]; 2],
         jitter_s: 0.0,
         gaps: vec![false; PERIODS],

@@ -6,7 +6,7 @@ use discrepancy::workflow::{Task, open};
 use plant::RigParameters;
 
 /// Strokes of a rig, read beside the rig file that is thought to be its.
-pub(crate) fn course(hidden: &RigParameters, rig: &RigParameters) -> GriddedRecord {
+pub(crate) fn gridded(hidden: &RigParameters, rig: &RigParameters) -> GriddedRecord {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("train.csv");
     std::fs::write(&path, measurement(hidden, 11, STROKES_RAD_PER_S)).expect("the folder is ours");

@@ -3,7 +3,7 @@
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use std::fmt::Write;
 
-/// Strokes of the records that are taken as courses, rad/s.
+/// Strokes of the records that are gridded, rad/s.
 pub(crate) const STROKES_RAD_PER_S: f64 = 1.3;
 
 /// Twelve seconds of the drive as a record: a second of rest, then strokes over most of its way and rests between.
