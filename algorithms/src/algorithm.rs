@@ -9,7 +9,7 @@
 //! An algorithm holds its state and nothing else: parameters come with each step, since they may change while running.
 //! It neither allocates nor blocks; that its result is a number is checked behind it.
 
-use crate::parameters::Parameter;
+use crate::parameters::{Declared, Parameter};
 use plant::RigParameters;
 
 /// What the pre-controller has made ready. The C interface has the same layout: numbers of 8 bytes, in this order.
@@ -47,13 +47,42 @@ pub struct Ready {
     pub applied_velocity_m_per_s: f64,
 }
 
-/// A control algorithm of one axis.
+/// A control algorithm of one axis, with the values of its parameters in the order of its table.
 pub trait Algorithm: Send {
-    /// Begins anew from what is: no integral, no memory. The axis has been without control before.
+    /// Resets integral and memory. The axis has been without control before.
+    ///
+    /// # Panics
+    /// When `parameters` are not as many as its table has.
     fn reset(&mut self, ready: &Ready, parameters: &[f64]);
 
-    /// The velocity that the own rod shall have, m/s.
+    /// The velocity that the rod shall have, m/s.
+    ///
+    /// # Panics
+    /// When `parameters` are not as many as its table has.
     fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64;
+}
+
+/// A control algorithm whose parameters are declared by [`crate::parameters!`]: it reads them as fields, and is an [`Algorithm`]
+/// by that.
+pub trait ControlLaw: Send {
+    /// Its parameters.
+    type Parameters: Declared;
+
+    /// Resets integral and memory. The axis has been without control before.
+    fn reset(&mut self, ready: &Ready, parameters: &Self::Parameters);
+
+    /// The velocity that the rod shall have, m/s.
+    fn step(&mut self, ready: &Ready, parameters: &Self::Parameters) -> f64;
+}
+
+impl<L: ControlLaw> Algorithm for L {
+    fn reset(&mut self, ready: &Ready, parameters: &[f64]) {
+        ControlLaw::reset(self, ready, &L::Parameters::of(parameters));
+    }
+
+    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
+        ControlLaw::step(self, ready, &L::Parameters::of(parameters))
+    }
 }
 
 /// What an algorithm controls.

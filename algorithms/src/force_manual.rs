@@ -17,58 +17,43 @@
 //!
 //! Source: [Neugebauer 2011, section 4], manual mode.
 
-use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
-use crate::parameters::Parameter;
+use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::parameters::declare;
 
 /// In the list of algorithms.
-pub const KIND: Kind = Kind {
+pub(crate) const KIND: Kind = Kind {
     name: "force-manual",
     about: "force: for moving by hand and relieving stress, with the paper's distinction of standstill and motion",
     controls: Quantity::Force,
-    parameters: &PARAMETERS,
+    parameters: Parameters::TABLE,
     make: |_| Box::new(ForceManual),
 };
 
-const GAIN: usize = 0;
-const FEED_FORWARD: usize = 1;
-const DEAD_ZONE: usize = 2;
-const MOVING: usize = 3;
-const LIMIT: usize = 4;
-static PARAMETERS: [Parameter; 5] = [
-    Parameter::new(("gain_m_per_n_s", "m/(N s)"), [0.0, 0.05], 0.015, "velocity for each error"),
-    Parameter::new(
-        ("velocity_feed_forward", ""),
-        [0.0, 1.0],
-        0.5,
-        "share of the own rod's velocity that is fed forward while it moves",
-    ),
-    Parameter::new(("dead_zone_n", "N"), [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
-    Parameter::new(
-        ("moving", ""),
-        [0.0, 1.0],
-        0.0,
-        "from 0.5 on the rod counts as moving; in [giving-way] the force chain decides it",
-    ),
-    Parameter::new(
-        ("limit_m_per_s", "m/s"),
-        [0.0, 5.0],
-        1.0,
-        "largest velocity either way; in [giving-way] the force chain may lower it",
-    ),
-];
+crate::parameters! {
+    /// Parameters of `force-manual`.
+    struct Parameters {
+        gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.015, "velocity for each error"),
+        velocity_feed_forward: declare("", [0.0, 1.0], 0.5, "share of the own rod's velocity that is fed forward while it moves"),
+        dead_zone_n: declare("N", [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
+        moving: declare("", [0.0, 1.0], 0.0, "from 0.5 on the rod counts as moving; in [giving-way] the force chain decides it"),
+        limit_m_per_s: declare("m/s", [0.0, 5.0], 1.0, "largest velocity either way; in [giving-way] the force chain may lower it"),
+    }
+}
 
-/// The algorithm.
 #[derive(Debug)]
-pub struct ForceManual;
+struct ForceManual;
 
-impl Algorithm for ForceManual {
-    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {}
+impl ControlLaw for ForceManual {
+    type Parameters = Parameters;
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
+    fn reset(&mut self, _ready: &Ready, _: &Parameters) {}
+
+    fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
         let error_n = ready.set_force_n - ready.force_n;
-        let (gain, dead_n, limit) = (parameters[GAIN], parameters[DEAD_ZONE], parameters[LIMIT]);
-        let wanted = if parameters[MOVING] >= 0.5 {
-            gain * error_n + parameters[FEED_FORWARD] * ready.velocity_m_per_s
+        let (gain, dead_n, limit) =
+            (parameters.gain_m_per_n_s, parameters.dead_zone_n, parameters.limit_m_per_s);
+        let wanted = if parameters.moving >= 0.5 {
+            gain * error_n + parameters.velocity_feed_forward * ready.velocity_m_per_s
         } else {
             gain * (error_n - error_n.clamp(-dead_n, dead_n))
         };
@@ -81,8 +66,14 @@ mod tests {
     use super::*;
     use crate::laws;
 
-    const STANDING: [f64; 5] = [0.01, 0.5, 5.0, 0.0, 1.0];
-    const MOVES: [f64; 5] = [0.01, 0.5, 5.0, 1.0, 1.0];
+    const STANDING: Parameters = Parameters {
+        gain_m_per_n_s: 0.01,
+        velocity_feed_forward: 0.5,
+        dead_zone_n: 5.0,
+        moving: 0.0,
+        limit_m_per_s: 1.0,
+    };
+    const MOVES: Parameters = Parameters { moving: 1.0, ..STANDING };
 
     fn at(force_n: f64, velocity_m_per_s: f64) -> Ready {
         Ready { force_n, velocity_m_per_s, ..Ready::default() }
@@ -104,8 +95,7 @@ mod tests {
     fn the_limit_holds_in_both_cases_and_both_directions() {
         for (parameters, force_n) in [(STANDING, 300.0), (MOVES, 300.0), (STANDING, -300.0), (MOVES, -300.0)]
         {
-            let mut limited = parameters;
-            limited[LIMIT] = 0.05;
+            let limited = Parameters { limit_m_per_s: 0.05, ..parameters };
             assert_eq!(ForceManual.step(&at(force_n, 0.0), &limited), -0.05 * force_n.signum());
         }
     }

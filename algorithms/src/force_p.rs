@@ -10,40 +10,37 @@
 //!
 //! Source: [Neugebauer 2011, section 4].
 
-use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
-use crate::parameters::Parameter;
+use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::parameters::declare;
 
 /// In the list of algorithms.
-pub const KIND: Kind = Kind {
+pub(crate) const KIND: Kind = Kind {
     name: "force-p",
     about: "force: proportional with the rod's velocity fed forward, the paper's",
     controls: Quantity::Force,
-    parameters: &PARAMETERS,
+    parameters: Parameters::TABLE,
     make: |_| Box::new(ForceP),
 };
 
-const GAIN: usize = 0;
-const FEED_FORWARD: usize = 1;
-static PARAMETERS: [Parameter; 2] = [
-    Parameter::new(("gain_m_per_n_s", "m/(N s)"), [0.0, 0.05], 0.012, "velocity for each error"),
-    Parameter::new(
-        ("velocity_feed_forward", ""),
-        [0.0, 2.0],
-        0.8,
-        "share of the own rod's velocity that is fed forward",
-    ),
-];
+crate::parameters! {
+    /// Parameters of `force-p`.
+    struct Parameters {
+        gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.012, "velocity for each error"),
+        velocity_feed_forward: declare("", [0.0, 2.0], 0.8, "share of the own rod's velocity that is fed forward"),
+    }
+}
 
-/// The algorithm.
 #[derive(Debug)]
-pub struct ForceP;
+struct ForceP;
 
-impl Algorithm for ForceP {
-    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {}
+impl ControlLaw for ForceP {
+    type Parameters = Parameters;
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        let velocity = parameters[GAIN] * (ready.set_force_n - ready.force_n)
-            + parameters[FEED_FORWARD] * ready.velocity_m_per_s;
+    fn reset(&mut self, _ready: &Ready, _: &Parameters) {}
+
+    fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
+        let velocity = parameters.gain_m_per_n_s * (ready.set_force_n - ready.force_n)
+            + parameters.velocity_feed_forward * ready.velocity_m_per_s;
         velocity.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S)
     }
 }
@@ -59,7 +56,10 @@ mod tests {
     #[test]
     fn the_error_and_the_velocity_add_up() {
         let ready = Ready { set_force_n: 300.0, force_n: 280.0, velocity_m_per_s: -0.2, ..Ready::default() };
-        assert_eq!(ForceP.step(&ready, &[0.01, 0.5]), 0.01 * 20.0 - 0.1);
+        assert_eq!(
+            ForceP.step(&ready, &Parameters { gain_m_per_n_s: 0.01, velocity_feed_forward: 0.5 }),
+            0.01 * 20.0 - 0.1
+        );
     }
 
     #[test]

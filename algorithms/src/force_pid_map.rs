@@ -26,105 +26,44 @@
 //! Source: PID in the ideal form and integrator clamping [Åström, Hägglund 1995]; the map is the outlook of
 //! [Neugebauer 2011, section 5]; c from its eqs. 1 to 4.
 
-use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
+use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
 use crate::linearisation::Air;
-use crate::parameters::Parameter;
+use crate::parameters::declare;
 use plant::RigParameters;
 use std::f64::consts::TAU;
 
 /// In the list of algorithms.
-pub const KIND: Kind = Kind {
+pub(crate) const KIND: Kind = Kind {
     name: "force-pid-map",
     about: "force: PID through a map of the air's stiffness, with friction and velocity fed forward",
     controls: Quantity::Force,
-    parameters: &PARAMETERS,
+    parameters: Parameters::TABLE,
     make: |rig| Box::new(ForcePidMap::new(rig)),
 };
 
-const GAIN: usize = 0;
-const INTEGRAL_TIME: usize = 1;
-const INTEGRAL_LIMIT: usize = 2;
-const DERIVATIVE_TIME: usize = 3;
-const DERIVATIVE_HZ: usize = 4;
-const REFERENCE_TIME: usize = 5;
-const REFERENCE_SPEED: usize = 6;
-const VALVE_TIME: usize = 7;
-const RATE_SHARE: usize = 8;
-const VELOCITY_SHARE: usize = 9;
-const FRICTION_SHARE: usize = 10;
-const DEAD_ZONE: usize = 11;
-const STANDSTILL: usize = 12;
-static PARAMETERS: [Parameter; 13] = [
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 400.0], 150.0, "rate of force for each error"),
-    Parameter::new(
-        ("integral_time_s", "s"),
-        [0.0, 100.0],
-        0.2,
-        "time in which the integral part doubles a standing error; 0 for none",
-    ),
-    Parameter::new(
-        ("integral_limit_n", "N"),
-        [0.0, 500.0],
-        100.0,
-        "largest integral part, as the error that it stands for",
-    ),
-    Parameter::new(
-        ("derivative_time_s", "s"),
-        [0.0, 0.05],
-        0.0,
-        "time over which the error is extrapolated by its rate",
-    ),
-    Parameter::new(
-        ("derivative_filter_hz", "Hz"),
-        [1.0, 400.0],
-        100.0,
-        "cut-off of the measured force's rate",
-    ),
-    Parameter::new(
-        ("reference_time_s", "s"),
-        [0.001, 1.0],
-        0.032,
-        "time constant with which a step is followed",
-    ),
-    Parameter::new(
-        ("reference_speed_m_per_s", "m/s"),
-        [0.01, 10.0],
-        2.0,
-        "fastest rate of the reference, as the velocity that it stands for",
-    ),
-    Parameter::new(("valve_time_s", "s"), [0.0, 0.1], 0.012, "how much later the force comes than asked for"),
-    Parameter::new(
-        ("rate_feed_forward", ""),
-        [0.0, 2.0],
-        1.0,
-        "share of the reference's rate that is fed forward",
-    ),
-    Parameter::new(
-        ("velocity_feed_forward", ""),
-        [0.0, 2.0],
-        1.0,
-        "share of the own rod's velocity that is fed forward while it moves",
-    ),
-    Parameter::new(
-        ("friction_feed_forward", ""),
-        [0.0, 1.0],
-        0.8,
-        "share of the nominal viscous friction's rate that is fed forward while it moves",
-    ),
-    Parameter::new(("dead_zone_n", "N"), [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
-    Parameter::new(
-        ("standstill_m_per_s", "m/s"),
-        [0.001, 0.2],
-        0.04,
-        "velocity from which on the rod moves; up to half of it, it stands",
-    ),
-];
+crate::parameters! {
+    /// Parameters of `force-pid-map`.
+    struct Parameters {
+        gain_per_s: declare("1/s", [0.0, 400.0], 150.0, "rate of force for each error"),
+        integral_time_s: declare("s", [0.0, 100.0], 0.2, "time in which the integral part doubles a standing error; 0 for none"),
+        integral_limit_n: declare("N", [0.0, 500.0], 100.0, "largest integral part, as the error that it stands for"),
+        derivative_time_s: declare("s", [0.0, 0.05], 0.0, "time over which the error is extrapolated by its rate"),
+        derivative_filter_hz: declare("Hz", [1.0, 400.0], 100.0, "cut-off of the measured force's rate"),
+        reference_time_s: declare("s", [0.001, 1.0], 0.032, "time constant with which a step is followed"),
+        reference_speed_m_per_s: declare("m/s", [0.01, 10.0], 2.0, "fastest rate of the reference, as the velocity that it stands for"),
+        valve_time_s: declare("s", [0.0, 0.1], 0.012, "how much later the force comes than asked for"),
+        rate_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the reference's rate that is fed forward"),
+        velocity_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the own rod's velocity that is fed forward while it moves"),
+        friction_feed_forward: declare("", [0.0, 1.0], 0.8, "share of the nominal viscous friction's rate that is fed forward while it moves"),
+        dead_zone_n: declare("N", [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
+        standstill_m_per_s: declare("m/s", [0.001, 0.2], 0.04, "velocity from which on the rod moves; up to half of it, it stands"),
+    }
+}
 /// Time in which the integral part fades while the rod stands, s.
 const FADING_S: f64 = 0.05;
 
-/// The algorithm.
 #[derive(Debug)]
-pub struct ForcePidMap {
+struct ForcePidMap {
     air: Air,
     viscous_n_s_per_m: f64,
     memory: Memory,
@@ -143,8 +82,7 @@ struct Memory {
 
 impl ForcePidMap {
     /// For a rig of these nominal numbers.
-    #[must_use]
-    pub fn new(rig: &RigParameters) -> Self {
+    fn new(rig: &RigParameters) -> Self {
         Self {
             air: Air::new(rig),
             viscous_n_s_per_m: rig.friction().viscous_n_s_per_m,
@@ -153,50 +91,52 @@ impl ForcePidMap {
     }
 }
 
-impl Algorithm for ForcePidMap {
-    fn reset(&mut self, ready: &Ready, _parameters: &[f64]) {
+impl ControlLaw for ForcePidMap {
+    type Parameters = Parameters;
+
+    fn reset(&mut self, ready: &Ready, _: &Parameters) {
         let force_n = ready.force_n;
         self.memory = Memory { reference_n: force_n, expected_n: force_n, force_n, ..Memory::default() };
     }
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        let p = |place: usize| parameters[place];
+    fn step(&mut self, ready: &Ready, p: &Parameters) -> f64 {
         let memory = &mut self.memory;
         let period_s = ready.period_s;
         let stiffness_n_per_m = self.air.at(ready).stiffness_n_per_m();
-        let moves = (2.0 * ready.velocity_m_per_s.abs() / p(STANDSTILL) - 1.0).clamp(0.0, 1.0);
+        let moves = (2.0 * ready.velocity_m_per_s.abs() / p.standstill_m_per_s - 1.0).clamp(0.0, 1.0);
 
-        let fastest = p(REFERENCE_SPEED) * stiffness_n_per_m;
-        let catching_up = (ready.set_force_n - memory.reference_n) / p(REFERENCE_TIME).max(period_s);
+        let fastest = p.reference_speed_m_per_s * stiffness_n_per_m;
+        let catching_up = (ready.set_force_n - memory.reference_n) / p.reference_time_s.max(period_s);
         let reference_rate = (ready.set_force_rate_n_per_s + catching_up).clamp(-fastest, fastest);
         memory.reference_n += period_s * reference_rate;
         let behind_n = memory.reference_n - memory.expected_n;
-        let expected_rate = behind_n / p(VALVE_TIME).max(period_s);
+        let expected_rate = behind_n / p.valve_time_s.max(period_s);
         memory.expected_n += period_s * expected_rate;
 
         let slope = (ready.force_n - memory.force_n) / period_s;
         memory.force_n = ready.force_n;
         memory.force_rate_n_per_s +=
-            (1.0 - libm::exp(-TAU * p(DERIVATIVE_HZ) * period_s)) * (slope - memory.force_rate_n_per_s);
+            (1.0 - libm::exp(-TAU * p.derivative_filter_hz * period_s)) * (slope - memory.force_rate_n_per_s);
 
         let error_n = memory.expected_n - ready.force_n;
-        let dead_n = (1.0 - moves) * p(DEAD_ZONE);
+        let dead_n = (1.0 - moves) * p.dead_zone_n;
         let error_n = error_n - error_n.clamp(-dead_n, dead_n);
         let held_back = memory.result_m_per_s - ready.applied_velocity_m_per_s;
-        if p(INTEGRAL_TIME) == 0.0 {
+        if p.integral_time_s == 0.0 {
             memory.integral_n = 0.0;
         } else if held_back * error_n <= 1e-9 {
-            memory.integral_n += moves * error_n * period_s / p(INTEGRAL_TIME);
+            memory.integral_n += moves * error_n * period_s / p.integral_time_s;
         }
         memory.integral_n *= 1.0 - (1.0 - moves) * (period_s / FADING_S).min(1.0);
-        memory.integral_n = memory.integral_n.clamp(-p(INTEGRAL_LIMIT), p(INTEGRAL_LIMIT));
+        memory.integral_n = memory.integral_n.clamp(-p.integral_limit_n, p.integral_limit_n);
 
-        let lead_n = p(DERIVATIVE_TIME) * (expected_rate - memory.force_rate_n_per_s);
+        let lead_n = p.derivative_time_s * (expected_rate - memory.force_rate_n_per_s);
         let friction_rate = moves * self.viscous_n_s_per_m * ready.acceleration_m_per_s2;
-        let force_rate = p(RATE_SHARE) * reference_rate
-            + p(GAIN) * (error_n + memory.integral_n + lead_n)
-            + p(FRICTION_SHARE) * friction_rate;
-        let result = force_rate / stiffness_n_per_m + p(VELOCITY_SHARE) * moves * ready.velocity_m_per_s;
+        let force_rate = p.rate_feed_forward * reference_rate
+            + p.gain_per_s * (error_n + memory.integral_n + lead_n)
+            + p.friction_feed_forward * friction_rate;
+        let result =
+            force_rate / stiffness_n_per_m + p.velocity_feed_forward * moves * ready.velocity_m_per_s;
         memory.result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         memory.result_m_per_s
     }
@@ -212,10 +152,6 @@ mod tests {
 
     const CYCLE_S: f64 = 1e-3;
 
-    fn defaults() -> Vec<f64> {
-        PARAMETERS.iter().map(|parameter| parameter.default).collect()
-    }
-
     fn moving_at(velocity_m_per_s: f64) -> Ready {
         Ready {
             period_s: CYCLE_S,
@@ -229,8 +165,8 @@ mod tests {
     }
 
     /// A step of 200 N on a rod that moves along while the air, c v, is an integrator behind a lag of the valve's time.
-    fn step_response(change: impl Fn(&mut [f64])) -> Vec<f64> {
-        let mut parameters = defaults();
+    fn step_response(change: impl Fn(&mut Parameters)) -> Vec<f64> {
+        let mut parameters = Parameters::default();
         change(&mut parameters);
         let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
         let mut ready = moving_at(-0.1);
@@ -243,7 +179,7 @@ mod tests {
                 let result = algorithm.step(&ready, &parameters);
                 ready.applied_velocity_m_per_s = result.clamp(-0.6, 0.6);
                 let wanted = stiffness * (ready.applied_velocity_m_per_s - ready.velocity_m_per_s);
-                rate += (wanted - rate) * CYCLE_S / parameters[VALVE_TIME];
+                rate += (wanted - rate) * CYCLE_S / parameters.valve_time_s;
                 ready.force_n += CYCLE_S * rate;
                 ready.force_n
             })
@@ -262,11 +198,11 @@ mod tests {
 
     #[test]
     fn a_motion_that_is_fed_forward_too_little_leaves_no_lasting_error() {
-        let end = *step_response(|parameters| parameters[VELOCITY_SHARE] = 0.8).last().unwrap();
+        let end = *step_response(|parameters| parameters.velocity_feed_forward = 0.8).last().unwrap();
         assert!((end - 200.0).abs() < 0.1, "{end}");
         let without = *step_response(|parameters| {
-            parameters[VELOCITY_SHARE] = 0.8;
-            parameters[INTEGRAL_TIME] = 0.0;
+            parameters.velocity_feed_forward = 0.8;
+            parameters.integral_time_s = 0.0;
         })
         .last()
         .unwrap();
@@ -277,7 +213,7 @@ mod tests {
     #[test]
     fn a_valve_that_cannot_follow_does_not_wind_it_up() {
         // 1500 N over 100 s: 150 N in 10 s, of a limit of 500 N.
-        let changed = &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 500.0)];
+        let changed = &[("integral_time_s", 100.0), ("integral_limit_n", 500.0)];
         let held = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
         let back = Ready { set_force_n: -15.0, ..moving_at(0.1) };
         laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
@@ -285,7 +221,7 @@ mod tests {
 
     #[test]
     fn after_a_step_that_the_valve_cannot_follow_it_turns_in_time() {
-        let parameters = defaults();
+        let parameters = Parameters::default();
         for shut in [false, true] {
             let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
             let mut ready = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
@@ -307,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_standing_rod_lets_small_errors_be_and_the_integral_fades() {
-        let parameters = defaults();
+        let parameters = Parameters::default();
         let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
         let mut ready = Ready { force_n: 100.0, set_force_n: 104.0, ..moving_at(0.1) };
         algorithm.reset(&ready, &parameters);

@@ -62,8 +62,8 @@ pub(super) fn check(kind: &Kind) {
     TestRunner::default().run(&inputs, claim).unwrap_or_else(|error| panic!("{}: {error}", kind.name));
 }
 
-/// Place of a parameter and its value.
-pub(super) type Changed = (usize, f64);
+/// Name of a parameter and its value.
+pub(super) type Changed = (&'static str, f64);
 
 /// An error that the valve cannot work off, and what comes after it.
 pub(super) struct Stuck<'a> {
@@ -81,7 +81,10 @@ pub(super) struct Stuck<'a> {
 /// were claimed.
 pub(super) fn does_not_wind_up(kind: &Kind, stuck: &Stuck<'_>) {
     let mut parameters: Vec<_> = kind.parameters.iter().map(|parameter| parameter.default).collect();
-    stuck.changed.iter().for_each(|(place, value)| parameters[*place] = *value);
+    for (name, value) in stuck.changed {
+        let place = kind.parameters.iter().position(|parameter| parameter.name == *name);
+        parameters[place.unwrap_or_else(|| panic!("{}: no {name}", kind.name))] = *value;
+    }
     let after = |held_s: f64, valve: &dyn Fn(f64) -> f64| -> Vec<f64> {
         let mut algorithm = (kind.make)(&RigParameters::baseline());
         let mut ready = stuck.held;

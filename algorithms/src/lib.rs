@@ -10,15 +10,15 @@
 //! | the others | one algorithm each |
 
 pub mod algorithm;
-pub mod force_manual;
-pub mod force_p;
-pub mod force_pid_map;
+mod force_manual;
+mod force_p;
+mod force_pid_map;
 pub mod guard;
 pub mod linearisation;
 pub mod parameters;
-pub mod position_cascade;
-pub mod position_p;
-pub mod position_pid;
+mod position_cascade;
+mod position_p;
+mod position_pid;
 pub mod rest_zone;
 
 #[cfg(test)]

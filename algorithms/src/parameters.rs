@@ -1,7 +1,9 @@
 //! Parameters of a controller: each a variable with name, unit, range, default and meaning, in tables.
 //!
-//! A part of the axis program has a table and reads its values from a slice in the table's order; the slice may change between
-//! two cycles, so no part keeps a copy. What enters a slice was checked against its table before.
+//! A part of the axis program declares its parameters once, by [`crate::parameters!`]: that makes the table, which files, listings,
+//! checks and XCP read, and a struct with a field for each. Values stand in a slice in the table's order, which may change between
+//! two cycles, so no part keeps a copy; the struct is read from it in each step. What enters a slice was checked against its
+//! table before.
 
 use std::borrow::Cow;
 
@@ -35,7 +37,13 @@ impl Parameter {
         default: f64,
         meaning: &'static str,
     ) -> Self {
-        let [least, most] = range;
+        Self::declared(name, declare(unit, range, default, meaning))
+    }
+
+    /// The parameter called `name` that is declared so.
+    #[must_use]
+    pub const fn declared(name: &'static str, declaration: Declaration) -> Self {
+        let Declaration { unit, range: [least, most], default, meaning, whole, at_start_only } = declaration;
         Self {
             name: Cow::Borrowed(name),
             unit: Cow::Borrowed(unit),
@@ -43,8 +51,8 @@ impl Parameter {
             most,
             default,
             meaning: Cow::Borrowed(meaning),
-            whole: false,
-            at_start_only: false,
+            whole,
+            at_start_only,
         }
     }
 
@@ -52,13 +60,6 @@ impl Parameter {
     #[must_use]
     pub const fn whole(mut self) -> Self {
         self.whole = true;
-        self
-    }
-
-    /// The same, read once, at the start.
-    #[must_use]
-    pub const fn at_start_only(mut self) -> Self {
-        self.at_start_only = true;
         self
     }
 
@@ -96,6 +97,146 @@ impl Parameter {
     }
 }
 
+/// A parameter without its name, which is that of the field it is declared for.
+#[derive(Clone, Copy, Debug)]
+pub struct Declaration {
+    unit: &'static str,
+    range: [f64; 2],
+    /// Value when nothing is said.
+    pub default: f64,
+    meaning: &'static str,
+    whole: bool,
+    at_start_only: bool,
+}
+
+/// Declares a parameter.
+#[must_use]
+pub const fn declare(
+    unit: &'static str,
+    range: [f64; 2],
+    default: f64,
+    meaning: &'static str,
+) -> Declaration {
+    Declaration { unit, range, default, meaning, whole: false, at_start_only: false }
+}
+
+impl Declaration {
+    /// The same, of whole numbers.
+    #[must_use]
+    pub const fn whole(mut self) -> Self {
+        self.whole = true;
+        self
+    }
+
+    /// The same, read once, at the start.
+    #[must_use]
+    pub const fn at_start_only(mut self) -> Self {
+        self.at_start_only = true;
+        self
+    }
+}
+
+/// Parameters that [`crate::parameters!`] declared.
+pub trait Declared: Sized {
+    /// Their table.
+    const TABLE: &'static [Parameter];
+
+    /// Their values from a slice in the order of the table.
+    ///
+    /// # Panics
+    /// When it is not as long as the table.
+    fn of(values: &[f64]) -> Self;
+}
+
+/// Declares parameters: a struct with a field for each, its table and its defaults.
+///
+/// ```
+/// use algorithms::parameters::declare;
+///
+/// algorithms::parameters! {
+///     /// Parameters of a position control.
+///     pub struct Position {
+///         gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"),
+///         integral_time_s: declare("s", [0.0, 100.0], 1.0, "time in which the integral part doubles a standing error"),
+///     }
+/// }
+///
+/// let p = Position::of(&[30.0, 2.0]);
+/// assert_eq!((p.gain_per_s, p.integral_time_s), (30.0, 2.0));
+/// assert_eq!(Position::TABLE[1].name, "integral_time_s");
+/// assert_eq!(Position::default().gain_per_s, 20.0);
+/// ```
+///
+/// The parameter of another algorithm does not compile, as a field or as a whole:
+///
+/// ```compile_fail,E0609
+/// # use algorithms::parameters::declare;
+/// # algorithms::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
+/// # algorithms::parameters! { struct Force { gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.01, "velocity for each error"), } }
+/// let velocity_m_per_s = 0.01 * Position::default().gain_m_per_n_s;
+/// ```
+///
+/// ```compile_fail,E0308
+/// # use algorithms::parameters::declare;
+/// # algorithms::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
+/// # algorithms::parameters! { struct Force { gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.01, "velocity for each error"), } }
+/// fn position_control(error_m: f64, parameters: &Position) -> f64 {
+///     parameters.gain_per_s * error_m
+/// }
+/// let velocity_m_per_s = position_control(0.01, &Force::default());
+/// ```
+///
+/// Nor does a place in place of a name:
+///
+/// ```compile_fail,E0608
+/// # use algorithms::parameters::declare;
+/// # algorithms::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
+/// let velocity_m_per_s = 0.01 * Position::default()[0];
+/// ```
+#[macro_export]
+macro_rules! parameters {
+    ($(#[$about:meta])* $visibility:vis struct $name:ident { $($field:ident: $declaration:expr,)+ }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[allow(missing_docs)] // what a field means stands in the table
+        $visibility struct $name { $($visibility $field: f64,)+ }
+
+        impl $name {
+            /// Name, unit, range, default and meaning of each.
+            $visibility const TABLE: &'static [$crate::parameters::Parameter] =
+                &[$($crate::parameters::Parameter::declared(stringify!($field), $declaration)),+];
+
+            /// The values of a slice in the order of the table.
+            ///
+            /// # Panics
+            /// When it is not as long as the table.
+            #[must_use]
+            #[inline]
+            $visibility fn of(values: &[f64]) -> Self {
+                let &[$($field),+] = values else {
+                    panic!("{} values for {} parameters", values.len(), Self::TABLE.len())
+                };
+                Self { $($field),+ }
+            }
+        }
+
+        impl $crate::parameters::Declared for $name {
+            const TABLE: &'static [$crate::parameters::Parameter] = Self::TABLE;
+
+            #[inline]
+            fn of(values: &[f64]) -> Self {
+                Self::of(values)
+            }
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: const { $declaration }.default),+ }
+            }
+        }
+    };
+}
+
 /// A value that its parameter does not allow.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
@@ -131,7 +272,8 @@ mod tests {
 
     #[test]
     fn what_is_read_once_may_be_set_but_not_changed() {
-        let timeout = Parameter::new(("timeout_s", "s"), [0.1, 600.0], 15.0, "how long").at_start_only();
+        let declaration = declare("s", [0.1, 600.0], 15.0, "how long").at_start_only();
+        let timeout = Parameter::declared("timeout_s", declaration);
         assert_eq!(timeout.check(20.0), Ok(20.0));
         let message = timeout.check_change(20.0).unwrap_err().to_string();
         assert!(message.starts_with("timeout_s = 20") && message.contains("at the start only"), "{message}");

@@ -30,96 +30,45 @@
 //! rig-model.md.
 
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
-use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
+use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
 use crate::linearisation::Air;
-use crate::parameters::Parameter;
+use crate::parameters::declare;
 use crate::rest_zone::{self, RestZone};
 use plant::RigParameters;
 
 /// In the list of algorithms.
-pub const KIND: Kind = Kind {
+pub(crate) const KIND: Kind = Kind {
     name: "position-cascade",
     about: "position: cascaded loops for position, velocity and pneumatic force, with integral part",
     controls: Quantity::Position,
-    parameters: &PARAMETERS,
+    parameters: Parameters::TABLE,
     make: |rig| Box::new(PositionCascade::new(rig)),
 };
 
-const GAIN: usize = 0;
-const FEED_FORWARD: usize = 1;
-const VELOCITY_GAIN: usize = 2;
-const INTEGRAL_GAIN: usize = 3;
-const INTEGRAL_LIMIT: usize = 4;
-const INTEGRAL_ZONE: usize = 5;
-const FORCE_GAIN: usize = 6;
-const ACCELERATION_FEED_FORWARD: usize = 7;
-const MASS: usize = 8;
-const FRICTION: usize = 9;
-const FRICTION_SPEED: usize = 10;
-const LOAD: usize = 11;
-const REST_ZONE: usize = 12;
-static PARAMETERS: [Parameter; 13] = [
-    gain(15.0),
-    VELOCITY_FEED_FORWARD,
-    Parameter::new(
-        ("velocity_gain_n_s_per_m", "N/(m/s)"),
-        [0.0, 20_000.0],
-        700.0,
-        "force for each error of the velocity",
-    ),
-    Parameter::new(
-        ("integral_gain_n_per_m_s", "N/(m s)"),
-        [0.0, 1e6],
-        100_000.0,
-        "rate of the force for each error of the position",
-    ),
-    Parameter::new(("integral_limit_n", "N"), [0.0, 1000.0], 60.0, "largest force of the integral part"),
-    Parameter::new(
-        ("integral_zone_m", "m"),
-        [0.0, 0.5],
-        0.005,
-        "larger errors leave the integral part as it is",
-    ),
-    Parameter::new(("force_gain_per_s", "1/s"), [0.0, 200.0], 25.0, "force rate for each error of the force"),
-    Parameter::new(
-        ("acceleration_feed_forward", ""),
-        [0.0, 2.0],
-        1.0,
-        "share of the set-point's acceleration that is fed forward as a force rate",
-    ),
-    Parameter::new(
-        ("moved_mass_kg", "kg"),
-        [0.0, 100.0],
-        5.0,
-        "mass that the set-point's acceleration is told of",
-    ),
-    Parameter::new(
-        ("friction_compensation", ""),
-        [0.0, 1.0],
-        1.0,
-        "share of the nominal sliding friction that is compensated",
-    ),
-    Parameter::new(
-        ("friction_speed_m_per_s", "m/s"),
-        [1e-4, 1.0],
-        0.004,
-        "wanted speed from which on it is compensated in full",
-    ),
-    Parameter::new(
-        ("load_compensation", ""),
-        [0.0, 1.0],
-        1.0,
-        "share of the measured force between rod and carriage that is compensated",
-    ),
-    rest_zone::parameter(2e-4),
-];
+crate::parameters! {
+    /// Parameters of `position-cascade`.
+    struct Parameters {
+        gain_per_s: gain(15.0),
+        velocity_feed_forward: VELOCITY_FEED_FORWARD,
+        velocity_gain_n_s_per_m: declare("N/(m/s)", [0.0, 20_000.0], 700.0, "force for each error of the velocity"),
+        integral_gain_n_per_m_s: declare("N/(m s)", [0.0, 1e6], 100_000.0, "rate of the force for each error of the position"),
+        integral_limit_n: declare("N", [0.0, 1000.0], 60.0, "largest force of the integral part"),
+        integral_zone_m: declare("m", [0.0, 0.5], 0.005, "larger errors leave the integral part as it is"),
+        force_gain_per_s: declare("1/s", [0.0, 200.0], 25.0, "force rate for each error of the force"),
+        acceleration_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the set-point's acceleration that is fed forward as a force rate"),
+        moved_mass_kg: declare("kg", [0.0, 100.0], 5.0, "mass that the set-point's acceleration is told of"),
+        friction_compensation: declare("", [0.0, 1.0], 1.0, "share of the nominal sliding friction that is compensated"),
+        friction_speed_m_per_s: declare("m/s", [1e-4, 1.0], 0.004, "wanted speed from which on it is compensated in full"),
+        load_compensation: declare("", [0.0, 1.0], 1.0, "share of the measured force between rod and carriage that is compensated"),
+        rest_zone_m: rest_zone::declaration(2e-4),
+    }
+}
 
 /// Largest result, m/s: several times what any valve of this rig gives.
 const LARGEST_M_PER_S: f64 = 5.0;
 
-/// The algorithm.
 #[derive(Debug)]
-pub struct PositionCascade {
+struct PositionCascade {
     air: Air,
     viscous_n_s_per_m: f64,
     sliding_force_n: f64,
@@ -130,8 +79,7 @@ pub struct PositionCascade {
 
 impl PositionCascade {
     /// For a rig of these nominal numbers.
-    #[must_use]
-    pub fn new(rig: &RigParameters) -> Self {
+    fn new(rig: &RigParameters) -> Self {
         Self {
             air: Air::new(rig),
             viscous_n_s_per_m: rig.friction().viscous_n_s_per_m,
@@ -143,40 +91,41 @@ impl PositionCascade {
     }
 }
 
-impl Algorithm for PositionCascade {
-    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {
+impl ControlLaw for PositionCascade {
+    type Parameters = Parameters;
+
+    fn reset(&mut self, _ready: &Ready, _: &Parameters) {
         self.integral_n = 0.0;
         self.last_result_m_per_s = 0.0;
         self.rest = RestZone::default();
     }
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        let p = |place: usize| parameters[place];
+    fn step(&mut self, ready: &Ready, p: &Parameters) -> f64 {
         let error_m = ready.set_position_m - ready.position_m;
-        if self.rest.rests(ready, p(REST_ZONE)) {
+        if self.rest.rests(ready, p.rest_zone_m) {
             self.last_result_m_per_s = 0.0;
             return 0.0;
         }
         let set_acceleration = ready.set_acceleration_m_per_s2;
-        let velocity = p(GAIN) * error_m + p(FEED_FORWARD) * ready.set_velocity_m_per_s;
+        let velocity = p.gain_per_s * error_m + p.velocity_feed_forward * ready.set_velocity_m_per_s;
 
         // The valve gives less than was asked for: only an error that takes the integral back counts.
         let held_back = self.last_result_m_per_s - ready.applied_velocity_m_per_s;
-        if error_m.abs() <= p(INTEGRAL_ZONE) && held_back * error_m <= 0.0 {
-            self.integral_n += p(INTEGRAL_GAIN) * error_m * ready.period_s;
+        if error_m.abs() <= p.integral_zone_m && held_back * error_m <= 0.0 {
+            self.integral_n += p.integral_gain_n_per_m_s * error_m * ready.period_s;
         }
-        self.integral_n = self.integral_n.clamp(-p(INTEGRAL_LIMIT), p(INTEGRAL_LIMIT));
+        self.integral_n = self.integral_n.clamp(-p.integral_limit_n, p.integral_limit_n);
 
-        let sliding_n = (velocity / p(FRICTION_SPEED)).clamp(-1.0, 1.0) * self.sliding_force_n;
-        let force_n = p(FEED_FORWARD) * p(MASS) * set_acceleration
+        let sliding_n = (velocity / p.friction_speed_m_per_s).clamp(-1.0, 1.0) * self.sliding_force_n;
+        let force_n = p.velocity_feed_forward * p.moved_mass_kg * set_acceleration
             + self.viscous_n_s_per_m * velocity
-            + p(VELOCITY_GAIN) * (velocity - ready.velocity_m_per_s)
-            + p(FRICTION) * sliding_n
-            + p(LOAD) * ready.force_n
+            + p.velocity_gain_n_s_per_m * (velocity - ready.velocity_m_per_s)
+            + p.friction_compensation * sliding_n
+            + p.load_compensation * ready.force_n
             + self.integral_n;
         let air = self.air.at(ready);
-        let rate_n_per_s = p(FORCE_GAIN) * (force_n - air.force_n())
-            + p(ACCELERATION_FEED_FORWARD) * self.viscous_n_s_per_m * set_acceleration;
+        let rate_n_per_s = p.force_gain_per_s * (force_n - air.force_n())
+            + p.acceleration_feed_forward * self.viscous_n_s_per_m * set_acceleration;
         self.last_result_m_per_s =
             (velocity + rate_n_per_s / air.stiffness_n_per_m()).clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         self.last_result_m_per_s
@@ -190,10 +139,6 @@ mod tests {
 
     fn cascade() -> PositionCascade {
         PositionCascade::new(&RigParameters::baseline())
-    }
-
-    fn defaults() -> Vec<f64> {
-        PARAMETERS.iter().map(|parameter| parameter.default).collect()
     }
 
     /// Air in balance at rest, as the rig starts.
@@ -214,10 +159,12 @@ mod tests {
 
     #[test]
     fn each_loop_adds_its_part() {
-        let mut parameters = defaults();
-        for place in [INTEGRAL_GAIN, FRICTION, LOAD] {
-            parameters[place] = 0.0;
-        }
+        let parameters = Parameters {
+            integral_gain_n_per_m_s: 0.0,
+            friction_compensation: 0.0,
+            load_compensation: 0.0,
+            ..Parameters::default()
+        };
         let ready = Ready { set_position_m: 0.21, set_velocity_m_per_s: 0.1, ..balanced() };
         let velocity = 15.0 * 0.01 + 0.1;
         let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
@@ -233,7 +180,8 @@ mod tests {
         let ready = Ready { set_velocity_m_per_s: 0.1, ..balanced() };
         let loaded = Ready { force_n: 100.0, ..ready };
         let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
-        let more = cascade().step(&loaded, &defaults()) - cascade().step(&ready, &defaults());
+        let more =
+            cascade().step(&loaded, &Parameters::default()) - cascade().step(&ready, &Parameters::default());
         assert!((more - 25.0 * 100.0 / stiffness).abs() < 1e-9, "{more}");
     }
 
@@ -245,8 +193,12 @@ mod tests {
     #[test]
     fn it_does_not_wind_up() {
         // 0.2 m at 300 N/(m s): 600 N in 10 s, of a limit of 1000 N.
-        let changed =
-            &[(INTEGRAL_GAIN, 300.0), (INTEGRAL_LIMIT, 1000.0), (INTEGRAL_ZONE, 0.5), (REST_ZONE, 0.0)];
+        let changed = &[
+            ("integral_gain_n_per_m_s", 300.0),
+            ("integral_limit_n", 1000.0),
+            ("integral_zone_m", 0.5),
+            ("rest_zone_m", 0.0),
+        ];
         let held = Ready { set_position_m: 0.4, ..balanced() };
         let back = Ready { set_position_m: 0.19, ..balanced() };
         laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });

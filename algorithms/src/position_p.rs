@@ -9,54 +9,55 @@
 //!
 //! Source: [Neugebauer 2011, section 4].
 
-use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
-use crate::parameters::Parameter;
+use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::parameters::{Declaration, declare};
 use crate::rest_zone::{self, RestZone};
 
 /// In the list of algorithms.
-pub const KIND: Kind = Kind {
+pub(crate) const KIND: Kind = Kind {
     name: "position-p",
     about: "position: proportional with velocity feed-forward, the paper's",
     controls: Quantity::Position,
-    parameters: &PARAMETERS,
+    parameters: Parameters::TABLE,
     make: |_| Box::new(PositionP::default()),
 };
 
 /// The gain that every position algorithm has, with its default, 1/s.
-pub(super) const fn gain(default_per_s: f64) -> Parameter {
-    Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], default_per_s, "velocity for each error")
+pub(super) const fn gain(default_per_s: f64) -> Declaration {
+    declare("1/s", [0.0, 200.0], default_per_s, "velocity for each error")
 }
 
 /// The feed-forward that every position algorithm has.
-pub(super) const VELOCITY_FEED_FORWARD: Parameter = Parameter::new(
-    ("velocity_feed_forward", ""),
-    [0.0, 2.0],
-    1.0,
-    "share of the set-point's rate that is fed forward",
-);
+pub(super) const VELOCITY_FEED_FORWARD: Declaration =
+    declare("", [0.0, 2.0], 1.0, "share of the set-point's rate that is fed forward");
 
-const GAIN: usize = 0;
-const FEED_FORWARD: usize = 1;
-const REST_ZONE: usize = 2;
-static PARAMETERS: [Parameter; 3] = [gain(20.0), VELOCITY_FEED_FORWARD, rest_zone::parameter(5e-4)];
+crate::parameters! {
+    /// Parameters of `position-p`.
+    struct Parameters {
+        gain_per_s: gain(20.0),
+        velocity_feed_forward: VELOCITY_FEED_FORWARD,
+        rest_zone_m: rest_zone::declaration(5e-4),
+    }
+}
 
-/// The algorithm.
 #[derive(Debug, Default)]
-pub struct PositionP {
+struct PositionP {
     rest: RestZone,
 }
 
-impl Algorithm for PositionP {
-    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {
+impl ControlLaw for PositionP {
+    type Parameters = Parameters;
+
+    fn reset(&mut self, _ready: &Ready, _: &Parameters) {
         *self = Self::default();
     }
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        if self.rest.rests(ready, parameters[REST_ZONE]) {
+    fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
+        if self.rest.rests(ready, parameters.rest_zone_m) {
             return 0.0;
         }
-        parameters[GAIN] * (ready.set_position_m - ready.position_m)
-            + parameters[FEED_FORWARD] * ready.set_velocity_m_per_s
+        parameters.gain_per_s * (ready.set_position_m - ready.position_m)
+            + parameters.velocity_feed_forward * ready.set_velocity_m_per_s
     }
 }
 
@@ -68,8 +69,13 @@ mod tests {
     fn the_error_and_the_rate_add_up() {
         let ready =
             Ready { set_position_m: 0.2, set_velocity_m_per_s: 0.1, position_m: 0.19, ..Ready::default() };
-        assert_eq!(PositionP::default().step(&ready, &[40.0, 0.5, 0.0]), 40.0 * (0.2 - 0.19) + 0.05);
+        assert_eq!(
+            PositionP::default()
+                .step(&ready, &Parameters { gain_per_s: 40.0, velocity_feed_forward: 0.5, rest_zone_m: 0.0 }),
+            40.0 * (0.2 - 0.19) + 0.05
+        );
     }
+
     #[test]
     fn what_every_algorithm_must_keep() {
         crate::laws::check(&KIND);

@@ -16,89 +16,65 @@
 //! Source: [Åström, Hägglund 1995], PID in the ideal form; the derivative filter is the pre-controller's.
 
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
-use crate::algorithm::{Algorithm, Kind, Quantity, Ready};
-use crate::parameters::Parameter;
+use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::parameters::declare;
 use crate::rest_zone::{self, RestZone};
 
 /// In the list of algorithms.
-pub const KIND: Kind = Kind {
+pub(crate) const KIND: Kind = Kind {
     name: "position-pid",
     about: "position: PID with velocity feed-forward",
     controls: Quantity::Position,
-    parameters: &PARAMETERS,
+    parameters: Parameters::TABLE,
     make: |_| Box::new(PositionPid::default()),
 };
 
-const GAIN: usize = 0;
-const FEED_FORWARD: usize = 1;
-const INTEGRAL_TIME: usize = 2;
-const INTEGRAL_LIMIT: usize = 3;
-const INTEGRAL_ZONE: usize = 4;
-const DERIVATIVE_TIME: usize = 5;
-const REST_ZONE: usize = 6;
-static PARAMETERS: [Parameter; 7] = [
-    gain(30.0),
-    VELOCITY_FEED_FORWARD,
-    Parameter::new(
-        ("integral_time_s", "s"),
-        [0.0, 100.0],
-        1.0,
-        "time in which the integral part doubles a standing error; 0 for none",
-    ),
-    Parameter::new(
-        ("integral_limit_m", "m"),
-        [0.0, 0.1],
-        0.003,
-        "largest integral part, as the error that it stands for",
-    ),
-    Parameter::new(
-        ("integral_zone_m", "m"),
-        [0.0, 0.5],
-        0.003,
-        "larger errors leave the integral part as it is",
-    ),
-    Parameter::new(
-        ("derivative_time_s", "s"),
-        [0.0, 1.0],
-        0.12,
-        "time over which the error is extrapolated by its rate",
-    ),
-    rest_zone::parameter(3e-4),
-];
+crate::parameters! {
+    /// Parameters of `position-pid`.
+    struct Parameters {
+        gain_per_s: gain(30.0),
+        velocity_feed_forward: VELOCITY_FEED_FORWARD,
+        integral_time_s: declare("s", [0.0, 100.0], 1.0, "time in which the integral part doubles a standing error; 0 for none"),
+        integral_limit_m: declare("m", [0.0, 0.1], 0.003, "largest integral part, as the error that it stands for"),
+        integral_zone_m: declare("m", [0.0, 0.5], 0.003, "larger errors leave the integral part as it is"),
+        derivative_time_s: declare("s", [0.0, 1.0], 0.12, "time over which the error is extrapolated by its rate"),
+        rest_zone_m: rest_zone::declaration(3e-4),
+    }
+}
 
 /// Largest result, m/s: several times what any valve of this rig gives.
 const LARGEST_M_PER_S: f64 = 5.0;
 
-/// The algorithm.
 #[derive(Debug, Default)]
-pub struct PositionPid {
+struct PositionPid {
     integral_m: f64,
     last_result_m_per_s: f64,
     rest: RestZone,
 }
 
-impl Algorithm for PositionPid {
-    fn reset(&mut self, _ready: &Ready, _parameters: &[f64]) {
+impl ControlLaw for PositionPid {
+    type Parameters = Parameters;
+
+    fn reset(&mut self, _ready: &Ready, _: &Parameters) {
         *self = Self::default();
     }
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        let p = |place: usize| parameters[place];
+    fn step(&mut self, ready: &Ready, p: &Parameters) -> f64 {
         let error_m = ready.set_position_m - ready.position_m;
-        if self.rest.rests(ready, p(REST_ZONE)) {
+        if self.rest.rests(ready, p.rest_zone_m) {
             self.last_result_m_per_s = 0.0;
             return 0.0;
         }
         let held_back = self.last_result_m_per_s - ready.applied_velocity_m_per_s;
-        if p(INTEGRAL_TIME) == 0.0 {
+        if p.integral_time_s == 0.0 {
             self.integral_m = 0.0;
-        } else if error_m.abs() <= p(INTEGRAL_ZONE) && held_back * error_m <= 0.0 {
-            self.integral_m += error_m * ready.period_s / p(INTEGRAL_TIME);
+        } else if error_m.abs() <= p.integral_zone_m && held_back * error_m <= 0.0 {
+            self.integral_m += error_m * ready.period_s / p.integral_time_s;
         }
-        self.integral_m = self.integral_m.clamp(-p(INTEGRAL_LIMIT), p(INTEGRAL_LIMIT));
+        self.integral_m = self.integral_m.clamp(-p.integral_limit_m, p.integral_limit_m);
         let rate_m_per_s = ready.set_velocity_m_per_s - ready.velocity_m_per_s;
-        let result = p(GAIN) * (error_m + p(DERIVATIVE_TIME) * rate_m_per_s + self.integral_m)
-            + p(FEED_FORWARD) * ready.set_velocity_m_per_s;
+        let result = p.gain_per_s * (error_m + p.derivative_time_s * rate_m_per_s + self.integral_m)
+            + p.velocity_feed_forward * ready.set_velocity_m_per_s;
         self.last_result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         self.last_result_m_per_s
     }
@@ -129,7 +105,16 @@ mod tests {
     #[test]
     fn its_parts_add_up() {
         let ready = Ready { position_m: 0.199, velocity_m_per_s: 0.04, set_velocity_m_per_s: 0.1, ..AT_REST };
-        let result = PositionPid::default().step(&ready, &[20.0, 1.0, 0.5, 0.003, 0.003, 0.12, 0.0]);
+        let parameters = Parameters {
+            gain_per_s: 20.0,
+            velocity_feed_forward: 1.0,
+            integral_time_s: 0.5,
+            integral_limit_m: 0.003,
+            integral_zone_m: 0.003,
+            derivative_time_s: 0.12,
+            rest_zone_m: 0.0,
+        };
+        let result = PositionPid::default().step(&ready, &parameters);
         let expected = 20.0 * (0.001 + 0.12 * 0.06 + 0.001 * 1e-3 / 0.5) + 0.1;
         assert!((result - expected).abs() < 1e-12, "{result}, not {expected}");
     }
@@ -142,8 +127,12 @@ mod tests {
     #[test]
     fn it_does_not_wind_up() {
         // 0.3 m over 100 s: 30 mm in 10 s, of a limit of 100 mm.
-        let changed =
-            &[(INTEGRAL_TIME, 100.0), (INTEGRAL_LIMIT, 0.1), (INTEGRAL_ZONE, 0.5), (REST_ZONE, 0.0)];
+        let changed = &[
+            ("integral_time_s", 100.0),
+            ("integral_limit_m", 0.1),
+            ("integral_zone_m", 0.5),
+            ("rest_zone_m", 0.0),
+        ];
         let held = Ready { set_position_m: 0.5, ..AT_REST };
         let back = Ready { set_position_m: 0.19, ..AT_REST };
         laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });

@@ -13,7 +13,7 @@
 //! mm/s in the middle of the stroke. e: error, m; b, c: viscous friction and stiffness of the air.
 
 use crate::algorithm::Ready;
-use crate::parameters::Parameter;
+use crate::parameters::{Declaration, declare};
 
 /// A rod that leaves no band of this half-width, m, over [`STANDING_S`] stands: slower than 2 mm/s. Five times the
 /// sensor's noise.
@@ -24,13 +24,8 @@ const LEAVING: f64 = 2.0;
 
 /// The zone as a parameter of an algorithm, with its default, m.
 #[must_use]
-pub const fn parameter(default_m: f64) -> Parameter {
-    Parameter::new(
-        ("rest_zone_m", "m"),
-        [0.0, 0.01],
-        default_m,
-        "error within which a standing rod is left alone",
-    )
+pub const fn declaration(default_m: f64) -> Declaration {
+    declare("m", [0.0, 0.01], default_m, "error within which a standing rod is left alone")
 }
 
 /// Whether the rod rests.

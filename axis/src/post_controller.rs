@@ -9,30 +9,19 @@
 
 use algorithms::algorithm::Ready;
 use algorithms::linearisation::Linearisation;
-use algorithms::parameters::Parameter;
+use algorithms::parameters::declare;
 
-const OPENING_LIMIT: usize = 1;
-const DEAD_ZONE: usize = 2;
-const MANUAL: usize = 3;
-const MANUAL_OPENING: usize = 4;
-/// Parameters of the post-controller; the first is the multiple of its task.
-pub static PARAMETERS: [Parameter; 5] = [
-    crate::program::EVERY_CYCLES,
-    Parameter::new(("opening_limit", ""), [0.0, 1.0], 1.0, "largest opening in either direction"),
-    Parameter::new(
-        ("dead_zone_m_per_s", "m/s"),
-        [0.0, 0.1],
-        0.0,
-        "wanted velocities below it shut the valve",
-    ),
-    Parameter::new(
-        ("manual", ""),
-        [0.0, 1.0],
-        0.0,
-        "from 0.5 on, manual mode: manual_opening instead of the algorithm",
-    ),
-    Parameter::new(("manual_opening", ""), [-1.0, 1.0], 0.0, "opening in manual mode"),
-];
+algorithms::parameters! {
+    /// Parameters of the post-controller.
+    pub struct Parameters {
+        every_cycles: crate::program::EVERY_CYCLES,
+        opening_limit: declare("", [0.0, 1.0], 1.0, "largest opening in either direction"),
+        dead_zone_m_per_s: declare("m/s", [0.0, 0.1], 0.0, "wanted velocities below it shut the valve"),
+        manual: declare("", [0.0, 1.0], 0.0, "from 0.5 on, manual mode: manual_opening instead of the algorithm"),
+        manual_opening: declare("", [-1.0, 1.0], 0.0, "opening in manual mode"),
+    }
+}
+
 /// Share of the dead zone by which the wanted velocity must exceed it to open the valve again.
 const HYSTERESIS: f64 = 0.5;
 
@@ -65,16 +54,16 @@ impl PostController {
     }
 
     /// Turns a finite wanted velocity into an opening.
-    pub fn step(&mut self, wanted_m_per_s: f64, ready: &Ready, parameters: &[f64]) -> Output {
-        if parameters[MANUAL] >= 0.5 {
-            return self.output(parameters[MANUAL_OPENING], ready);
+    pub fn step(&mut self, wanted_m_per_s: f64, ready: &Ready, parameters: &Parameters) -> Output {
+        if parameters.manual >= 0.5 {
+            return self.output(parameters.manual_opening, ready);
         }
-        let dead_zone = parameters[DEAD_ZONE] * if self.shut { 1.0 + HYSTERESIS } else { 1.0 };
+        let dead_zone = parameters.dead_zone_m_per_s * if self.shut { 1.0 + HYSTERESIS } else { 1.0 };
         self.shut = wanted_m_per_s.abs() < dead_zone;
         if self.shut {
             return Output::default();
         }
-        let limit = parameters[OPENING_LIMIT];
+        let limit = parameters.opening_limit;
         let opening = self.linearisation.opening(wanted_m_per_s, ready);
         if opening.abs() <= limit {
             let most = self.linearisation.velocity(opening, ready).abs();
@@ -102,7 +91,7 @@ mod tests {
     #[test]
     fn the_dead_zone_shuts_and_opens_with_hysteresis() {
         let mut post = post();
-        let parameters = [1.0, 1.0, 0.01, 0.0, 0.0];
+        let parameters = Parameters { dead_zone_m_per_s: 0.01, ..Parameters::default() };
         for (wanted, open) in
             [(0.009, false), (0.014, false), (0.016, true), (0.011, true), (0.009, false), (0.011, false)]
         {
@@ -112,7 +101,8 @@ mod tests {
 
     #[test]
     fn manual_mode_overrides() {
-        let output = post().step(-3.0, &Ready::default(), &[1.0, 1.0, 0.0, 1.0, 0.25]);
+        let parameters = Parameters { manual: 1.0, manual_opening: 0.25, ..Parameters::default() };
+        let output = post().step(-3.0, &Ready::default(), &parameters);
         assert!(output.opening == 0.25 && output.applied_velocity_m_per_s > 0.0);
     }
 
@@ -121,7 +111,9 @@ mod tests {
         fn the_opening_keeps_its_limit_and_what_is_applied_never_exceeds_what_was_wanted(
             wanted in -20.0..20.0_f64, limit in 0.0..1.0_f64, dead_zone in 0.0..0.1_f64,
         ) {
-            let output = post().step(wanted, &Ready::default(), &[1.0, limit, dead_zone, 0.0, 0.0]);
+            let parameters =
+                Parameters { opening_limit: limit, dead_zone_m_per_s: dead_zone, ..Parameters::default() };
+            let output = post().step(wanted, &Ready::default(), &parameters);
             prop_assert!(output.opening.abs() <= limit);
             prop_assert!(output.applied_velocity_m_per_s.abs() <= wanted.abs() + 1e-12);
             prop_assert!(output.opening * wanted >= 0.0);

@@ -11,33 +11,21 @@
 //! T is the time between the two samples that there are: cycles that the rig skipped pass for the filters too.
 
 use algorithms::algorithm::Ready;
-use algorithms::parameters::Parameter;
+use algorithms::parameters::declare;
 use plant::Axis;
 use protocol::frames::Sensors;
 use std::f64::consts::TAU;
 
-const VELOCITY_HZ: usize = 1;
-const ACCELERATION_HZ: usize = 2;
-const FORCE_HZ: usize = 3;
-const PRESSURE_HZ: usize = 4;
-/// Parameters of the pre-controller; the first is the multiple of its task.
-pub static PARAMETERS: [Parameter; 5] = [
-    crate::program::EVERY_CYCLES,
-    Parameter::new(
-        ("velocity_filter_hz", "Hz"),
-        [1.0, 400.0],
-        60.0,
-        "cut-off of each of the two low-passes of the velocity",
-    ),
-    Parameter::new(
-        ("acceleration_filter_hz", "Hz"),
-        [1.0, 400.0],
-        30.0,
-        "cut-off of each of the two low-passes of the acceleration",
-    ),
-    Parameter::new(("force_filter_hz", "Hz"), [1.0, 400.0], 200.0, "cut-off of the force's low-pass"),
-    Parameter::new(("pressure_filter_hz", "Hz"), [1.0, 400.0], 200.0, "cut-off of the pressures' low-passes"),
-];
+algorithms::parameters! {
+    /// Parameters of the pre-controller.
+    pub struct Parameters {
+        every_cycles: crate::program::EVERY_CYCLES,
+        velocity_filter_hz: declare("Hz", [1.0, 400.0], 60.0, "cut-off of each of the two low-passes of the velocity"),
+        acceleration_filter_hz: declare("Hz", [1.0, 400.0], 30.0, "cut-off of each of the two low-passes of the acceleration"),
+        force_filter_hz: declare("Hz", [1.0, 400.0], 200.0, "cut-off of the force's low-pass"),
+        pressure_filter_hz: declare("Hz", [1.0, 400.0], 200.0, "cut-off of the pressures' low-passes"),
+    }
+}
 
 /// Where an axis lies in the rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,7 +147,7 @@ impl PreController {
     }
 
     /// Takes the sensors that came `period_s` after the last ones, and fills in what was measured of `ready`.
-    pub fn step(&mut self, sensors: &Sensors, period_s: f64, parameters: &[f64], ready: &mut Ready) {
+    pub fn step(&mut self, sensors: &Sensors, period_s: f64, parameters: &Parameters, ready: &mut Ready) {
         let extension_m = self.geometry.extension_m(sensors.position_m - self.geometry.offset_m);
         let memory = self.memory.get_or_insert_with(|| Memory {
             extension_m,
@@ -170,14 +158,14 @@ impl PreController {
         });
         let last_velocity = memory.velocity[1].value;
         let slope = (extension_m - std::mem::replace(&mut memory.extension_m, extension_m)) / period_s;
-        let velocity = twice(&mut memory.velocity, slope, parameters[VELOCITY_HZ], period_s);
+        let velocity = twice(&mut memory.velocity, slope, parameters.velocity_filter_hz, period_s);
         let slope = (velocity - last_velocity) / period_s;
         ready.position_m = extension_m;
         ready.velocity_m_per_s = velocity;
         ready.acceleration_m_per_s2 =
-            twice(&mut memory.acceleration, slope, parameters[ACCELERATION_HZ], period_s);
-        ready.force_n = memory.force.step(sensors.force_n, parameters[FORCE_HZ], period_s);
-        let pressure_hz = parameters[PRESSURE_HZ];
+            twice(&mut memory.acceleration, slope, parameters.acceleration_filter_hz, period_s);
+        ready.force_n = memory.force.step(sensors.force_n, parameters.force_filter_hz, period_s);
+        let pressure_hz = parameters.pressure_filter_hz;
         let [a, b] = &mut memory.pressures;
         ready.pressure_a_pa = a.step(sensors.pressure_a_pa, pressure_hz, period_s);
         ready.pressure_b_pa = b.step(sensors.pressure_b_pa, pressure_hz, period_s);
@@ -193,8 +181,6 @@ fn twice(filters: &mut [LowPass; 2], input: f64, cut_off_hz: f64, period_s: f64)
 mod tests {
     use super::*;
 
-    const DEFAULTS: [f64; 5] = [1.0, 60.0, 30.0, 200.0, 200.0];
-
     fn at(position_m: f64) -> Sensors {
         Sensors { position_m, ..Sensors::default() }
     }
@@ -205,7 +191,7 @@ mod tests {
             let mut pre = PreController::new(Geometry::new(axis, 0.5));
             let mut ready = Ready::default();
             (0..1000).for_each(|ms| {
-                pre.step(&at(0.1 + 0.2 * f64::from(ms) * 1e-3), 1e-3, &DEFAULTS, &mut ready);
+                pre.step(&at(0.1 + 0.2 * f64::from(ms) * 1e-3), 1e-3, &Parameters::default(), &mut ready);
             });
             // 1 s is 190 time constants of the slowest filter.
             assert!((ready.velocity_m_per_s - direction * 0.2).abs() < 1e-9, "{axis:?}");
@@ -218,7 +204,7 @@ mod tests {
         let mut pre = PreController::new(Geometry::new(Axis::Drive, 0.5));
         let mut ready = Ready::default();
         let sensors = Sensors { position_m: 0.3, force_n: 50.0, pressure_a_pa: 4e5, ..Sensors::default() };
-        pre.step(&sensors, 1e-3, &DEFAULTS, &mut ready);
+        pre.step(&sensors, 1e-3, &Parameters::default(), &mut ready);
         assert_eq!((ready.position_m, ready.velocity_m_per_s), (0.3, 0.0));
         assert_eq!((ready.force_n, ready.pressure_a_pa), (50.0, 4e5));
     }
@@ -227,9 +213,9 @@ mod tests {
     fn another_offset_makes_no_velocity() {
         let mut pre = PreController::new(Geometry::new(Axis::Load, 0.5));
         let mut ready = Ready::default();
-        pre.step(&at(0.3), 1e-3, &DEFAULTS, &mut ready);
+        pre.step(&at(0.3), 1e-3, &Parameters::default(), &mut ready);
         pre.set_offset(0.8e-3);
-        pre.step(&at(0.3), 1e-3, &DEFAULTS, &mut ready);
+        pre.step(&at(0.3), 1e-3, &Parameters::default(), &mut ready);
         assert!(ready.velocity_m_per_s.abs() < 1e-12 && (ready.position_m - 0.2008).abs() < 1e-12);
     }
 }

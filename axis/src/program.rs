@@ -15,19 +15,18 @@
 pub mod file;
 
 use crate::chains::force::ForceOutput;
-use crate::post_controller::{Output, PostController};
-use crate::pre_controller::{Geometry, PreController};
+use crate::post_controller::{self, Output, PostController};
+use crate::pre_controller::{self, Geometry, PreController};
 use crate::set_point::{Actual, ForceSetPoint, SetPoint};
 use algorithms::algorithm::{Quantity, Ready};
 use algorithms::guard::{AlgorithmFault, Guarded};
-use algorithms::parameters::{OutOfRange, Parameter};
+use algorithms::parameters::{Declaration, OutOfRange, Parameter, declare};
 use protocol::frames::Sensors;
 use std::ops::Range;
 
 /// Multiple of the basic cycle of a task; the first parameter of each.
-pub const EVERY_CYCLES: Parameter =
-    Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms")
-        .whole();
+pub const EVERY_CYCLES: Declaration =
+    declare("cycles", [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms").whole();
 /// Seconds of one cycle.
 const CYCLE_S: f64 = 1e-3;
 /// A task that is so many cycles late begins anew: a stall is no reason for a jump.
@@ -116,18 +115,18 @@ pub struct Program {
 impl Program {
     /// Takes the sensors of `cycle`: the pre-controller's task.
     pub fn observe(&mut self, cycle: u64, sensors: &Sensors, supply_pressure_pa: f64) {
-        let parameters = &self.values[self.tasks[Task::PreController as usize].clone()];
-        let passed = match due(self.observed, cycle, parameters) {
+        let parameters = pre_controller::Parameters::of(self.task(Task::PreController));
+        let passed = match due(self.observed, cycle, parameters.every_cycles) {
             Due::NotYet => return,
             Due::After(passed) => passed,
             Due::Anew => {
                 self.pre.reset();
-                parameters[0]
+                parameters.every_cycles
             }
         };
         self.observed = Some(cycle);
         self.ready.supply_pressure_pa = supply_pressure_pa;
-        self.pre.step(sensors, passed * CYCLE_S, parameters, &mut self.ready);
+        self.pre.step(sensors, passed * CYCLE_S, &parameters, &mut self.ready);
     }
 
     /// The opening for `demand`, from the algorithm that has the axis.
@@ -155,10 +154,11 @@ impl Program {
                 self.user.step(cycle, ready, &self.values[self.user.values.clone()])?
             }
         };
-        let parameters = &self.values[self.tasks[Task::PostController as usize].clone()];
-        if due(self.post_stepped, cycle, parameters) != Due::NotYet {
+        let parameters =
+            post_controller::Parameters::of(&self.values[self.tasks[Task::PostController as usize].clone()]);
+        if due(self.post_stepped, cycle, parameters.every_cycles) != Due::NotYet {
             self.post_stepped = Some(cycle);
-            self.output = self.post.step(wanted, ready, parameters);
+            self.output = self.post.step(wanted, ready, &parameters);
             self.ready.applied_velocity_m_per_s = self.output.applied_velocity_m_per_s;
         }
         Ok(self.output)
@@ -298,7 +298,7 @@ impl Slot {
     /// The wanted velocity, with the `values` of this slot.
     fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<f64, AlgorithmFault> {
         let (every, parameters) = values.split_at(1);
-        match due(self.stepped, cycle, every) {
+        match due(self.stepped, cycle, every[0]) {
             Due::NotYet => return Ok(self.wanted_m_per_s),
             Due::After(passed) => ready.period_s = passed * CYCLE_S,
             Due::Anew => {
@@ -336,9 +336,9 @@ enum Due {
     Anew,
 }
 
-/// Whether a task is due at `cycle`; its multiple is its first parameter.
-fn due(last: Option<u64>, cycle: u64, parameters: &[f64]) -> Due {
-    let every = parameters[0] as u64;
+/// Whether a task is due at `cycle`.
+fn due(last: Option<u64>, cycle: u64, every_cycles: f64) -> Due {
+    let every = every_cycles as u64;
     let Some(last) = last else { return Due::Anew };
     match cycle.saturating_sub(last) {
         passed if passed < every => Due::NotYet,

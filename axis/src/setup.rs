@@ -342,10 +342,8 @@ fn sections(experiment: &Experiment) -> impl Iterator<Item = (Axis, &AxisExperim
 /// How long the states before the experiment may take.
 fn lengths(section: &AxisExperiment, program: &Program) -> Lengths {
     let step_s = |step: &Prepare| match step {
-        Prepare::Relieve => timeout_s(force::PARAMETERS, program.task(Task::ForceChain), "relieve_timeout_s"),
-        Prepare::Match => {
-            timeout_s(matching::PARAMETERS, program.task(Task::MatchingChain), "match_timeout_s")
-        }
+        Prepare::Relieve => force::Parameters::of(program.task(Task::ForceChain)).relieve_timeout_s,
+        Prepare::Match => matching::Parameters::of(program.task(Task::MatchingChain)).match_timeout_s,
     };
     let ramps = section.initial_force_n() > 0.0;
     Lengths {
@@ -353,10 +351,6 @@ fn lengths(section: &AxisExperiment, program: &Program) -> Lengths {
         initial_force_s: if ramps { section.initial_ramp_s } else { 0.0 },
         experiment_s: section.set_points.duration_s(),
     }
-}
-
-fn timeout_s(table: &[algorithms::parameters::Parameter], values: &[f64], name: &str) -> f64 {
-    table.iter().position(|parameter| parameter.name == name).map_or(0.0, |place| values[place])
 }
 
 fn plan(section: &AxisExperiment) -> Plan {

@@ -71,11 +71,11 @@ fn write(out: &mut impl Write) -> io::Result<()> {
         table(out, kind.parameters)?;
     }
     let tasks: [(&str, &[Parameter]); 5] = [
-        ("pre-controller", &pre_controller::PARAMETERS),
-        ("post-controller", &post_controller::PARAMETERS),
-        (force::TABLE, force::PARAMETERS),
-        (matching::TABLE, matching::PARAMETERS),
-        (settled::TABLE, settled::PARAMETERS),
+        ("pre-controller", pre_controller::Parameters::TABLE),
+        ("post-controller", post_controller::Parameters::TABLE),
+        (force::TABLE, force::Parameters::TABLE),
+        (matching::TABLE, matching::Parameters::TABLE),
+        (settled::TABLE, settled::Bounds::TABLE),
     ];
     for (name, parameters) in tasks {
         writeln!(out, "[{name}]")?;

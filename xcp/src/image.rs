@@ -330,7 +330,7 @@ fn width(region: Region) -> u32 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use algorithms::parameters::Parameter;
+    use algorithms::parameters::{Parameter, declare};
 
     /// Whoever is told, and remembers.
     #[derive(Default)]
@@ -360,7 +360,8 @@ pub(super) mod tests {
         let variable = |name: &'static str, parameter: Parameter| Variable { name: name.into(), parameter };
         let gain = Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 25.0, "gain");
         let every = Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "multiple").whole();
-        let timeout = Parameter::new(("timeout_s", "s"), [0.1, 60.0], 15.0, "how long").at_start_only();
+        let timeout =
+            Parameter::declared("timeout_s", declare("s", [0.1, 60.0], 15.0, "how long").at_start_only());
         let variables = vec![
             variable("a.gain_per_s", gain),
             variable("a.every_cycles", every),

@@ -27,25 +27,26 @@
 //! ends with its mean: a rod that bounces within the gap of the linkage is fast at times and goes nowhere.
 
 use super::{CYCLE_S, Entered, Fault, cycles, elapsed_s};
-use algorithms::parameters::Parameter;
+use algorithms::parameters::declare;
 use protocol::frames::ForceChainState;
 
-/// Name of the table of [`PARAMETERS`].
+/// Name of the table of [`Parameters`].
 pub const TABLE: &str = "force-chain";
 
-/// Parameters, in the order of the slices.
-pub const PARAMETERS: &[Parameter] = &[
-    Parameter::new(("high_force_n", "N"), [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),
-    Parameter::new(("limited_m_per_s", "m/s"), [1e-3, 1.0], 0.02, "largest rod velocity while it is limited"),
-    Parameter::new(("low_force_for_s", "s"), [0.0, 10.0], 0.05, "how long the force must be low to end that"),
-    Parameter::new(("moving_m_per_s", "m/s"), [1e-4, 1.0], 0.01, "significant movement; half of it ends it"),
-    Parameter::new(("moving_for_s", "s"), [0.0, 1.0], 0.02, "how long the axis must move significantly"),
-    Parameter::new(("still_for_s", "s"), [0.0, 1.0], 0.1, "how long it must not, to be at standstill again"),
-    Parameter::new(("relieved_n", "N"), [0.1, 2000.0], 20.0, "mean force of a relieved system"),
-    Parameter::new(("relieved_for_s", "s"), [0.0, 60.0], 0.3, "how long it must be lower, at standstill"),
-    Parameter::new(("relieve_timeout_s", "s"), [0.1, 600.0], 15.0, "how long relieving may take")
-        .at_start_only(),
-];
+algorithms::parameters! {
+    /// Parameters of the force chain.
+    pub struct Parameters {
+        high_force_n: declare("N", [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),
+        limited_m_per_s: declare("m/s", [1e-3, 1.0], 0.02, "largest rod velocity while it is limited"),
+        low_force_for_s: declare("s", [0.0, 10.0], 0.05, "how long the force must be low to end that"),
+        moving_m_per_s: declare("m/s", [1e-4, 1.0], 0.01, "significant movement; half of it ends it"),
+        moving_for_s: declare("s", [0.0, 1.0], 0.02, "how long the axis must move significantly"),
+        still_for_s: declare("s", [0.0, 1.0], 0.1, "how long it must not, to be at standstill again"),
+        relieved_n: declare("N", [0.1, 2000.0], 20.0, "mean force of a relieved system"),
+        relieved_for_s: declare("s", [0.0, 60.0], 0.3, "how long it must be lower, at standstill"),
+        relieve_timeout_s: declare("s", [0.1, 600.0], 15.0, "how long relieving may take").at_start_only(),
+    }
+}
 
 /// Time constant of the mean force, s.
 const MEAN_S: f64 = 0.05;
@@ -53,50 +54,6 @@ const MEAN_S: f64 = 0.05;
 const MEAN_VELOCITY_S: f64 = 0.15;
 /// Share of the significant velocity below which, in the mean, movement ends.
 const STILL_SHARE: f64 = 0.5;
-
-/// [`PARAMETERS`] by name.
-#[derive(Clone, Copy, Debug)]
-struct Numbers {
-    high_force_n: f64,
-    limited_m_per_s: f64,
-    low_force_for_s: f64,
-    moving_m_per_s: f64,
-    moving_for_s: f64,
-    still_for_s: f64,
-    relieved_n: f64,
-    relieved_for_s: f64,
-    relieve_timeout_s: f64,
-}
-
-impl Numbers {
-    fn of(values: &[f64]) -> Self {
-        let &[
-            high_force_n,
-            limited_m_per_s,
-            low_force_for_s,
-            moving_m_per_s,
-            moving_for_s,
-            still_for_s,
-            relieved_n,
-            relieved_for_s,
-            relieve_timeout_s,
-        ] = values
-        else {
-            panic!("{} values for the {} parameters of {TABLE}", values.len(), PARAMETERS.len())
-        };
-        Self {
-            high_force_n,
-            limited_m_per_s,
-            low_force_for_s,
-            moving_m_per_s,
-            moving_for_s,
-            still_for_s,
-            relieved_n,
-            relieved_for_s,
-            relieve_timeout_s,
-        }
-    }
-}
 
 /// What the load axis is asked to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -222,12 +179,12 @@ impl Default for ForceChain {
 }
 
 impl ForceChain {
-    /// Moves on by one edge at most, with `values` in the order of [`PARAMETERS`].
+    /// Moves on by one edge at most, with `values` in the order of [`Parameters`].
     ///
     /// # Panics
     /// When `values` is not as long as the table.
     pub fn advance(&mut self, inputs: &ForceInputs, values: &[f64]) -> ForceOutput {
-        let numbers = Numbers::of(values);
+        let numbers = Parameters::of(values);
         self.note(inputs, &numbers);
         if let Some((state, cause)) = self.decide(inputs, &numbers) {
             self.enter(state, cause, inputs.cycle);
@@ -249,7 +206,7 @@ impl ForceChain {
     }
 
     /// Keeps what the inputs tell, without a change of state.
-    fn note(&mut self, inputs: &ForceInputs, numbers: &Numbers) {
+    fn note(&mut self, inputs: &ForceInputs, numbers: &Parameters) {
         let ForceInputs { cycle, force_n, velocity_m_per_s, .. } = *inputs;
         let now = Mean { cycle, force_n, velocity_m_per_s };
         let mut mean = self.mean.map_or(now, |last| last.to(&now));
@@ -278,7 +235,7 @@ impl ForceChain {
     }
 
     /// The edge to go, if any.
-    fn decide(&self, inputs: &ForceInputs, numbers: &Numbers) -> Option<Edge> {
+    fn decide(&self, inputs: &ForceInputs, numbers: &Parameters) -> Option<Edge> {
         use ForceChainState as S;
         let asked = inputs.asked;
         if self.state == State::Fault {
@@ -320,7 +277,7 @@ impl ForceChain {
         }
     }
 
-    fn output(&self, numbers: &Numbers) -> ForceOutput {
+    fn output(&self, numbers: &Parameters) -> ForceOutput {
         let relieved = self.state == State::Done && self.asked == ForceAsked::Relieve;
         let yields = relieved
             || matches!(self.asked, ForceAsked::Relieve | ForceAsked::Manual) && self.state != State::Fault;

@@ -18,46 +18,28 @@
 //! A matched offset holds until the next one, or until the rig restarts.
 
 use super::{Entered, Fault, Partner, cycles};
-use algorithms::parameters::Parameter;
+use algorithms::parameters::declare;
 use protocol::frames::MatchingChainState;
 
-/// Name of the table of [`PARAMETERS`].
+/// Name of the table of [`Parameters`].
 pub const TABLE: &str = "matching-chain";
 
-/// Parameters, in the order of the slices.
-pub const PARAMETERS: &[Parameter] = &[
-    Parameter::new(("average_s", "s"), [0.01, 60.0], 0.5, "time over which both positions are averaged"),
-    Parameter::new(("rest_s", "s"), [0.0, 60.0], 0.2, "how long the partner must have been at rest before"),
-    Parameter::new(("moved_m", "m"), [1e-5, 0.1], 0.3e-3, "range of a position that counts as movement"),
-    Parameter::new(("offset_most_m", "m"), [1e-4, 0.5], 5e-3, "largest plausible offset"),
-    Parameter::new(("match_timeout_s", "s"), [0.1, 600.0], 10.0, "how long matching may take")
-        .at_start_only(),
-];
+algorithms::parameters! {
+    /// Parameters of the matching chain.
+    pub struct Parameters {
+        average_s: declare("s", [0.01, 60.0], 0.5, "time over which both positions are averaged"),
+        rest_s: declare("s", [0.0, 60.0], 0.2, "how long the partner must have been at rest before"),
+        moved_m: declare("m", [1e-5, 0.1], 0.3e-3, "range of a position that counts as movement"),
+        offset_most_m: declare("m", [1e-4, 0.5], 5e-3, "largest plausible offset"),
+        match_timeout_s: declare("s", [0.1, 600.0], 10.0, "how long matching may take").at_start_only(),
+    }
+}
 
 /// What the linkage's gap leaves open in a matched offset, to each side, m.
 pub const UNCERTAINTY_M: f64 = 0.1e-3;
 
 /// The partner's averaged position is taken each so many cycles, its period.
 const SAMPLE_CYCLES: u64 = 10;
-
-/// [`PARAMETERS`] by name.
-#[derive(Clone, Copy, Debug)]
-struct Numbers {
-    average_s: f64,
-    rest_s: f64,
-    moved_m: f64,
-    offset_most_m: f64,
-    match_timeout_s: f64,
-}
-
-impl Numbers {
-    fn of(values: &[f64]) -> Self {
-        let &[average_s, rest_s, moved_m, offset_most_m, match_timeout_s] = values else {
-            panic!("{} values for the {} parameters of {TABLE}", values.len(), PARAMETERS.len())
-        };
-        Self { average_s, rest_s, moved_m, offset_most_m, match_timeout_s }
-    }
-}
 
 /// What the chain is told each cycle.
 #[derive(Clone, Copy, Debug, Default)]
@@ -186,12 +168,12 @@ impl Default for MatchingChain {
 }
 
 impl MatchingChain {
-    /// Moves on by one edge at most, with `values` in the order of [`PARAMETERS`].
+    /// Moves on by one edge at most, with `values` in the order of [`Parameters`].
     ///
     /// # Panics
     /// When `values` is not as long as the table.
     pub fn advance(&mut self, inputs: &MatchingInputs, values: &[f64]) -> MatchingOutput {
-        let numbers = Numbers::of(values);
+        let numbers = Parameters::of(values);
         self.note(inputs, &numbers);
         if let Some((state, cause)) = self.decide(inputs, &numbers) {
             self.enter(state, cause, inputs.cycle);
@@ -213,7 +195,7 @@ impl MatchingChain {
     }
 
     /// Keeps what the inputs tell, without a change of state.
-    fn note(&mut self, inputs: &MatchingInputs, numbers: &Numbers) {
+    fn note(&mut self, inputs: &MatchingInputs, numbers: &Parameters) {
         let cycle = inputs.cycle;
         let partner_m = partner_position_m(inputs);
         match &mut self.state {
@@ -238,7 +220,7 @@ impl MatchingChain {
     }
 
     /// The edge to go, if any.
-    fn decide(&self, inputs: &MatchingInputs, numbers: &Numbers) -> Option<Edge> {
+    fn decide(&self, inputs: &MatchingInputs, numbers: &Parameters) -> Option<Edge> {
         use MatchingChainState as S;
         let passed = |since: u64| inputs.cycle.saturating_sub(since);
         let too_long = |began: u64| {
@@ -272,7 +254,7 @@ impl MatchingChain {
         }
     }
 
-    fn judge(offset_m: f64, numbers: &Numbers) -> Edge {
+    fn judge(offset_m: f64, numbers: &Parameters) -> Edge {
         if offset_m.abs() <= numbers.offset_most_m {
             return (MatchingChainState::Matched, MatchingCause::Averaged);
         }

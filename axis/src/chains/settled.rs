@@ -11,27 +11,20 @@
 //! after more than 20 cycles without a sample, for which a valve command is stale too, the window begins anew.
 
 use super::{cycles, elapsed_s};
-use algorithms::parameters::Parameter;
+use algorithms::parameters::declare;
 
-/// Name of the table of [`PARAMETERS`].
+/// Name of the table of [`Bounds`].
 pub const TABLE: &str = "settled";
 
-/// Bounds, in the order of the slices.
-pub const PARAMETERS: &[Parameter] = &[
-    Parameter::new(("still_m", "m"), [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest")
-        .at_start_only(),
-    Parameter::new(("position_error_m", "m"), [1e-5, 0.5], 2e-3, "largest position error of a settled axis")
-        .at_start_only(),
-    Parameter::new(("force_error_n", "N"), [0.1, 2000.0], 20.0, "largest mean force error of a settled axis")
-        .at_start_only(),
-    Parameter::new(
-        ("force_error_n_per_n", "N/N"),
-        [0.0, 1.0],
-        0.1,
-        "the same as a share of the force set-point",
-    )
-    .at_start_only(),
-];
+algorithms::parameters! {
+    /// Bounds of a settled axis.
+    pub struct Bounds {
+        still_m: declare("m", [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest").at_start_only(),
+        position_error_m: declare("m", [1e-5, 0.5], 2e-3, "largest position error of a settled axis").at_start_only(),
+        force_error_n: declare("N", [0.1, 2000.0], 20.0, "largest mean force error of a settled axis").at_start_only(),
+        force_error_n_per_n: declare("N/N", [0.0, 1.0], 0.1, "the same as a share of the force set-point").at_start_only(),
+    }
+}
 
 /// Cycles of one bucket, and the longest gap between samples.
 const BUCKET_CYCLES: u64 = 20;
@@ -39,41 +32,6 @@ const BUCKET_CYCLES: u64 = 20;
 const BUCKETS: usize = 10;
 /// Cycles of the window.
 pub const WINDOW_CYCLES: u64 = BUCKET_CYCLES * BUCKETS as u64;
-
-/// [`PARAMETERS`] by name.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Peak to peak of the position of an axis at rest, m.
-    pub still_m: f64,
-    /// Largest position error, m.
-    pub position_error_m: f64,
-    /// Largest mean force error, N.
-    pub force_error_n: f64,
-    /// The same as a share of the set-point.
-    pub force_error_n_per_n: f64,
-}
-
-impl Bounds {
-    /// The values of a slice in the table's order.
-    ///
-    /// # Panics
-    /// When it is not as long as the table.
-    #[must_use]
-    pub fn of(values: &[f64]) -> Self {
-        let &[still_m, position_error_m, force_error_n, force_error_n_per_n] = values else {
-            panic!("{} values for the {} parameters of {TABLE}", values.len(), PARAMETERS.len())
-        };
-        Self { still_m, position_error_m, force_error_n, force_error_n_per_n }
-    }
-}
-
-impl Default for Bounds {
-    fn default() -> Self {
-        let [still_m, position_error_m, force_error_n, force_error_n_per_n] =
-            std::array::from_fn(|index| PARAMETERS[index].default);
-        Self { still_m, position_error_m, force_error_n, force_error_n_per_n }
-    }
-}
 
 /// What keeps an axis from its set-point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -314,7 +272,7 @@ mod tests {
 
     #[test]
     fn the_defaults_are_those_of_the_table() {
-        let values: Vec<f64> = PARAMETERS.iter().map(|parameter| parameter.default).collect();
+        let values: Vec<f64> = Bounds::TABLE.iter().map(|parameter| parameter.default).collect();
         assert_eq!(Bounds::of(&values), Bounds::default());
     }
 }

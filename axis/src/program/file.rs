@@ -133,15 +133,16 @@ impl Source {
     pub fn program(&self, axis: Axis, rig: &RigParameters, real_time: bool) -> Result<Program, ProgramError> {
         let file = self.parse()?;
         let mut reader = Reader { source: self, rig, real_time, variables: Vec::new(), values: Vec::new() };
-        let pre = reader.section("pre-controller", file.pre_controller, &pre_controller::PARAMETERS)?;
+        let pre = reader.section("pre-controller", file.pre_controller, pre_controller::Parameters::TABLE)?;
         let user = reader.slot("algorithm", file.algorithm)?;
         let mut section = file.post_controller;
         let linearisation = reader.linearisation(section.remove("linearisation"))?;
-        let post = reader.section("post-controller", section, &post_controller::PARAMETERS)?;
+        let post = reader.section("post-controller", section, post_controller::Parameters::TABLE)?;
         let giving_way = file.giving_way.map(|section| reader.giving_way(section)).transpose()?;
-        let force_chain = reader.section(force::TABLE, file.force_chain, force::PARAMETERS)?;
-        let matching_chain = reader.section(matching::TABLE, file.matching_chain, matching::PARAMETERS)?;
-        let settled = reader.section(settled::TABLE, file.settled, settled::PARAMETERS)?;
+        let force_chain = reader.section(force::TABLE, file.force_chain, force::Parameters::TABLE)?;
+        let matching_chain =
+            reader.section(matching::TABLE, file.matching_chain, matching::Parameters::TABLE)?;
+        let settled = reader.section(settled::TABLE, file.settled, settled::Bounds::TABLE)?;
         let Reader { variables, values, .. } = reader;
         Ok(Program {
             pre: PreController::new(Geometry::new(axis, rig.cylinder().stroke_m)),
@@ -234,7 +235,8 @@ impl Reader<'_> {
                 return Err(self.error(place, &problem));
             }
         };
-        let table: Vec<_> = std::iter::once(EVERY_CYCLES).chain(parameters).collect();
+        let table: Vec<_> =
+            std::iter::once(Parameter::declared("every_cycles", EVERY_CYCLES)).chain(parameters).collect();
         let values = self.section(name, section, &table)?;
         let clock = self.real_time.then(|| Box::new(MonotonicClock) as _);
         let algorithm = Guarded::new(algorithm, clock);

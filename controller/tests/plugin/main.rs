@@ -4,7 +4,6 @@
 mod build;
 mod example;
 mod latched;
-#[allow(unreachable_pub)] // public beside the shipped algorithms
 mod position_pi;
 mod refused;
 

@@ -5,12 +5,12 @@ use ForceChainState as S;
 use proptest::prelude::*;
 
 fn defaults() -> Vec<f64> {
-    PARAMETERS.iter().map(|parameter| parameter.default).collect()
+    Parameters::TABLE.iter().map(|parameter| parameter.default).collect()
 }
 
 /// The default of a time, in cycles.
 fn cycles_of(name: &str) -> u64 {
-    let parameter = PARAMETERS.iter().find(|parameter| parameter.name == name).unwrap();
+    let parameter = Parameters::TABLE.iter().find(|parameter| parameter.name == name).unwrap();
     cycles(parameter.default)
 }
 
@@ -233,7 +233,7 @@ fn a_new_rig_makes_idle() {
 
 #[test]
 fn the_defaults_lie_in_their_ranges() {
-    for parameter in PARAMETERS {
+    for parameter in Parameters::TABLE {
         assert_eq!(parameter.check(parameter.default), Ok(parameter.default), "{}", parameter.name);
     }
 }

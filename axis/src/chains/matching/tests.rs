@@ -26,7 +26,7 @@ impl Play {
             partner: Partner { status: Some(ChainStatus::default()), ..Partner::default() },
             ..MatchingInputs::default()
         };
-        let values = PARAMETERS.iter().map(|parameter| parameter.default).collect();
+        let values = Parameters::TABLE.iter().map(|parameter| parameter.default).collect();
         Self { chain: MatchingChain::default(), inputs, values, drive_m: 0.1, heard: true }
     }
 
@@ -205,7 +205,7 @@ fn a_new_rig_has_no_offset() {
 
 #[test]
 fn the_defaults_lie_in_their_ranges() {
-    for parameter in PARAMETERS {
+    for parameter in Parameters::TABLE {
         assert_eq!(parameter.check(parameter.default), Ok(parameter.default), "{}", parameter.name);
     }
 }
