@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   faults.toml ── script.rs ──┐                              ┌─► plant::faults      valve, hose, friction, supply, sensors
-//!   console ────── parse ──────┴─► course.rs, once a cycle ───┼─► protocol wire      by orders to the bus's host
+//!   console ────── parse ──────┴─► schedule.rs, once a cycle ───┼─► protocol wire      by orders to the bus's host
 //!                                        │                    └─► hands              a push towards an end of the stroke
 //!                                        └─► marks: events, faults.csv, truth.csv, a frame of the bench
 //! ```
@@ -11,15 +11,15 @@
 //! |---|---|
 //! | [`table`] | every fault: name, places, numbers with unit and range, description; nothing about them stands elsewhere |
 //! | [`script`] | a file of faults with their times and conditions, checked |
-//! | [`course`] | faults in the course of a run |
+//! | [`schedule`] | what begins and ends when in a run |
 //! | [`overlay`] | what those that are active do to plant, sensors and hands |
 //! | [`mark`] | that a fault began or ended, for every log |
 //! | [`listing`] | `emulator faults`: the table for a person, a program, a page |
 
-pub mod course;
 pub mod listing;
 pub mod mark;
 pub mod overlay;
+pub mod schedule;
 pub mod script;
 pub mod table;
 

@@ -5,10 +5,10 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`station`] | one cycle: sensors out, commands in, records, step |
+//! | [`node`], `rig` | the node of the bus with console and records; plant, people and faults behind it |
 //! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
 //! | [`exchange`] | when sensors went out and the commands that answer them came |
-//! | [`telegrams`], [`wire_limits`] | the frames that the rig sends, and whether its numbers fit them |
+//! | [`wire_limits`] | whether the numbers of a rig fit the frames |
 //! | [`recording`] | the queues out of the 1 ms path, the files, and the evidence of real time |
 //! | `finish` | histograms, summary, exit code |
 //! | [`faults`] | what is broken on purpose, when, and how it is told |
@@ -27,12 +27,12 @@ pub mod faults;
 mod finish;
 pub mod host_thread;
 pub mod inputs;
+pub mod node;
 pub mod pace;
 pub mod recording;
+mod rig;
 pub mod run;
 pub mod seal;
-pub mod station;
 pub mod summary;
-pub mod telegrams;
 pub mod telemetry;
 pub mod wire_limits;

@@ -3,7 +3,7 @@
 pub mod lockstep;
 pub mod real;
 
-use crate::station::Station;
+use crate::node::EmulatorNode;
 use protocol::bus::Bus;
 use realtime::{Continued, Freeze, Interrupt, LoopStatistics, Overrun};
 use std::fmt;
@@ -104,9 +104,9 @@ pub struct Limits {
 }
 
 /// A rig on its bus, and what may end its run.
-pub struct Ride<'a> {
+pub struct RunContext<'a> {
     /// The rig.
-    pub station: &'a mut Station,
+    pub node: &'a mut EmulatorNode,
     /// Its peer on the bus.
     pub bus: &'a mut dyn Bus,
     /// When the run ends by itself.
@@ -116,7 +116,7 @@ pub struct Ride<'a> {
 }
 
 /// What a pace leaves behind.
-pub struct Paced {
+pub struct RunOutcome {
     /// Why it ended.
     pub end: End,
     /// Cycles begun, skipped ones included.
@@ -129,25 +129,25 @@ pub struct Paced {
     pub allocations: Option<u64>,
 }
 
-impl Ride<'_> {
+impl RunContext<'_> {
     /// Tells the progress after `cycles`, and why the run should end, if it should.
     fn after_cycle(&mut self, cycles: u64) -> Option<End> {
-        let Self { station, limits, shared, .. } = self;
+        let Self { node, limits, shared, .. } = self;
         shared.cycle.store(cycles, Ordering::Relaxed);
-        shared.skipped.store(station.skipped(), Ordering::Relaxed);
-        shared.controller_heard.store(station.controller_heard(), Ordering::Relaxed);
-        if !station.is_finite(cycles - 1) {
+        shared.skipped.store(node.skipped(), Ordering::Relaxed);
+        shared.controller_heard.store(node.controller_heard(), Ordering::Relaxed);
+        if !node.is_finite(cycles - 1) {
             Some(End::NotFinite)
         } else if shared.interrupt.came() {
             Some(End::Interrupted)
         } else if shared.output_failed.load(Ordering::Relaxed) {
             Some(End::OutputFailed)
-        } else if station.quit_asked() {
+        } else if node.quit_asked() {
             Some(End::Quit)
         } else if limits.cycles.is_some_and(|limit| cycles >= limit) {
             Some(End::TimeUp)
         } else {
-            station.controllers_done().then_some(End::ControllersDone)
+            node.controllers_done().then_some(End::ControllersDone)
         }
     }
 }

@@ -10,15 +10,15 @@
 
 use crate::cli::RunArguments;
 use crate::console::{self, Command, Console};
-use crate::faults::course::FaultCourse;
+use crate::faults::schedule::FaultSchedule;
 use crate::finish::finish;
 use crate::host_thread::HostThread;
 use crate::inputs::{Inputs, Script};
-use crate::pace::{self, Limits, Pace, Paced, Ride, Shared};
+use crate::node::{EmulatorNode, NodeFigures, NodeParts};
+use crate::pace::{self, Limits, Pace, RunContext, RunOutcome, Shared};
 use crate::recording::evidence::{EvidenceSetup, PROCESS};
 use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
-use crate::station::{Station, StationFigures, StationParts};
 use crate::summary::RunDescription;
 use crate::telemetry::{Described, Telemetry};
 use crossbeam_channel::Receiver;
@@ -122,7 +122,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         console.listen();
     }
     let by_script = script.as_ref().map(|script| &script.script);
-    let faults = FaultCourse::new(by_script, arguments.console, orders);
+    let faults = FaultSchedule::new(by_script, arguments.console, orders);
 
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
@@ -193,8 +193,8 @@ impl RunStart {
 
 /// What the rig loop hands back.
 pub(crate) struct LoopOutcome {
-    pub(crate) paced: Paced,
-    pub(crate) figures: StationFigures,
+    pub(crate) paced: RunOutcome,
+    pub(crate) figures: NodeFigures,
     pub(crate) bus: BusCounters,
     pub(crate) host: Option<HostReport>,
 }
@@ -208,7 +208,7 @@ struct RigWork<'a> {
     periodic: PeriodicConfig,
     console: Option<Receiver<Command>>,
     script: Option<&'a Script>,
-    faults: FaultCourse,
+    faults: FaultSchedule,
 }
 
 impl RigWork<'_> {
@@ -216,7 +216,7 @@ impl RigWork<'_> {
         let Self { arguments, inputs, started, simulated_ns, periodic, console, script, faults } = self;
         let grants = acquire_realtime(arguments);
         describe(arguments, inputs, script, started, &grants)?;
-        let mut station = Station::new(StationParts {
+        let mut node = EmulatorNode::new(NodeParts {
             plant: inputs.plant.clone(),
             people: People::new(&inputs.scene),
             faults,
@@ -231,14 +231,14 @@ impl RigWork<'_> {
             bus_grace: Duration::from_secs_f64(arguments.bus_grace),
             join: Duration::from_secs_f64(arguments.join_timeout),
         };
-        let ride = Ride { station: &mut station, bus, limits: &limits, shared };
+        let context = RunContext { node: &mut node, bus, limits: &limits, shared };
         let paced = match arguments.pace {
-            Pace::Real => pace::real::run(ride, MonotonicClock, periodic),
-            Pace::Lockstep => pace::lockstep::run(ride, simulated_ns)?,
+            Pace::Real => pace::real::run(context, MonotonicClock, periodic),
+            Pace::Lockstep => pace::lockstep::run(context, simulated_ns)?,
         };
-        // Taking the figures drops the station and with it the queues' sending ends, which lets the writer finish.
+        // Taking the figures drops the node and with it the queues' sending ends, which lets the writer finish.
         let host = bus.host_report();
-        Ok(LoopOutcome { paced, figures: station.into_figures(), bus: *bus.counters(), host })
+        Ok(LoopOutcome { paced, figures: node.into_figures(), bus: *bus.counters(), host })
     }
 }
 

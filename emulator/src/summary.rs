@@ -4,8 +4,8 @@
 //! the controllers' own files are joined to it.
 
 use crate::event::Event;
+use crate::node::FrameCounters;
 use crate::recording::evidence::{CommandAges, FlightFigures};
-use crate::station::FrameCounters;
 use plant::Scene;
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;

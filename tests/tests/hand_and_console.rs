@@ -83,10 +83,7 @@ fn the_rig_says_the_same_in_lockstep_and_in_a_rehearsal() {
     const CYCLES: usize = 1000;
     let scene = with_people(STOP_AND_RELEASE);
     lockstep(&scene, CYCLES, |_| None);
-    // A status tells of the commands too, and here nobody sends any.
-    let is_status = |frame: &CanFrame| matches!(Frame::decode(frame), Ok(Frame::RigStatus(_)));
-    let mut logged = bus_log(&scene.path("emulator/bus.log"));
-    logged.retain(|frame| !is_status(frame));
+    let logged = bus_log(&scene.path("emulator/bus.log"));
 
     let rig = RigParameters::baseline();
     let people = plant::Scene::from_toml(STOP_AND_RELEASE, "people", &rig).expect("a scene");
@@ -96,7 +93,7 @@ fn the_rig_says_the_same_in_lockstep_and_in_a_rehearsal() {
     let (listener, frames) = crossbeam_channel::bounded(4 * CYCLES);
     rehearsal.listen(listener);
     (0..CYCLES).for_each(|_| _ = rehearsal.step(|_, _| {}));
-    let rehearsed: Vec<CanFrame> = frames.try_iter().filter(|frame| !is_status(frame)).collect();
+    let rehearsed: Vec<CanFrame> = frames.try_iter().collect();
 
     let release = |frames: &[CanFrame]| {
         let is_release = |frame: &&CanFrame| {

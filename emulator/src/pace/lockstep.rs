@@ -1,6 +1,6 @@
 //! The rig as the barrier's rig: as fast as all members allow, in simulated time.
 
-use super::{End, Paced, Ride};
+use super::{End, RunContext, RunOutcome};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::host::BARRIER_TIMEOUT;
 use protocol::bus::{BusError, Received};
@@ -19,38 +19,38 @@ const CYCLE_NS: u64 = 1_000_000;
 ///
 /// # Errors
 /// [`BusError::NoBarrier`] on a bus without one.
-pub fn run(mut ride: Ride<'_>, simulated_ns: &AtomicU64) -> Result<Paced, BusError> {
-    ride.bus.join_lockstep(Role::Rig, "rig")?;
+pub fn run(mut context: RunContext<'_>, simulated_ns: &AtomicU64) -> Result<RunOutcome, BusError> {
+    context.bus.join_lockstep(Role::Rig, "rig")?;
     let mut posted = Vec::new();
     let mut cycles = 0;
     let mut members_seen = false;
     let end = loop {
         let cycle = cycles;
-        let patience = if cycle == 0 { ride.limits.join } else { BARRIER_TIMEOUT * 2 };
-        let members = match wait_for_go(&mut ride, &mut posted, cycle, patience) {
+        let patience = if cycle == 0 { context.limits.join } else { BARRIER_TIMEOUT * 2 };
+        let members = match wait_for_go(&mut context, &mut posted, cycle, patience) {
             Ok(members) => members,
             Err(end) => break end,
         };
         members_seen |= members > 0;
         simulated_ns.store(cycle * CYCLE_NS, Ordering::Relaxed);
-        let Ride { station, bus, .. } = &mut ride;
+        let RunContext { node, bus, .. } = &mut context;
         // As in real time: sensors first, then what arrived before the cycle.
-        station.publish(cycle, false, *bus);
-        take(&mut posted, |frame, stamp_ns| station.take(frame, stamp_ns, cycle));
-        station.act(cycle);
+        node.publish(cycle, false, *bus);
+        take(&mut posted, |frame, stamp_ns| node.take(frame, stamp_ns, cycle));
+        node.act(cycle);
         cycles += 1;
         let left = (members_seen && members == 0).then_some(End::MembersLeft);
-        if let Some(end) = ride.after_cycle(cycles).or(left) {
-            ride.station.publish_end(cycles, ride.bus);
-            ride.bus.done(cycle as u32);
+        if let Some(end) = context.after_cycle(cycles).or(left) {
+            context.node.publish_end(cycles, context.bus);
+            context.bus.done(cycle as u32);
             // The members' last words belong into the log; a member that is gone says none.
-            let _ = wait_for_go(&mut ride, &mut posted, cycles, FAREWELL);
-            take(&mut posted, |frame, stamp_ns| ride.station.take(frame, stamp_ns, cycles));
+            let _ = wait_for_go(&mut context, &mut posted, cycles, FAREWELL);
+            take(&mut posted, |frame, stamp_ns| context.node.take(frame, stamp_ns, cycles));
             break end;
         }
-        ride.bus.done(cycle as u32);
+        context.bus.done(cycle as u32);
     };
-    Ok(Paced { end, cycles, cycle_zero_ns: 0, statistics: None, allocations: None })
+    Ok(RunOutcome { end, cycles, cycle_zero_ns: 0, statistics: None, allocations: None })
 }
 
 fn take(posted: &mut Vec<(CanFrame, u64)>, mut take: impl FnMut(&CanFrame, u64)) {
@@ -59,14 +59,14 @@ fn take(posted: &mut Vec<(CanFrame, u64)>, mut take: impl FnMut(&CanFrame, u64))
 
 /// Collects what was posted until the barrier says Go for `cycle`; tells how many members it has.
 fn wait_for_go(
-    ride: &mut Ride<'_>,
+    context: &mut RunContext<'_>,
     posted: &mut Vec<(CanFrame, u64)>,
     cycle: u64,
     patience: Duration,
 ) -> Result<u8, End> {
     let mut since: Option<Instant> = None;
     loop {
-        match ride.bus.receive() {
+        match context.bus.receive() {
             // Stamped in the cycle in which it was posted: the clock still shows it.
             Received::Frame(frame, stamp_ns) => posted.push((frame, stamp_ns)),
             Received::Barrier(control) => match control.kind {
@@ -77,13 +77,13 @@ fn wait_for_go(
             Received::Nothing => {
                 let waited = since.get_or_insert_with(Instant::now).elapsed();
                 // In the middle of a cycle the members finish their turn, so that they hear the farewell after it.
-                if ride.shared.interrupt.came() && (cycle == 0 || waited >= LAST_TURN) {
+                if context.shared.interrupt.came() && (cycle == 0 || waited >= LAST_TURN) {
                     return Err(End::Interrupted);
                 }
                 if waited >= patience {
                     return Err(if cycle == 0 { End::NobodyJoined } else { End::BusGone });
                 }
-                ride.bus.wait_readable((patience - waited).min(Duration::from_millis(100)));
+                context.bus.wait_readable((patience - waited).min(Duration::from_millis(100)));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The rig on the machine's clock: one cycle each millisecond.
 
-use super::{CYCLE, End, Paced, Ride};
+use super::{CYCLE, End, RunContext, RunOutcome};
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
 use protocol::commands::STALE_AFTER_CYCLES;
@@ -20,20 +20,20 @@ const WARM_UP_CYCLES: u64 = 1000;
 const NEWCOMER_CYCLES: u64 = 10 * STALE_AFTER_CYCLES;
 
 /// Runs the rig on `clock`.
-pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Paced {
+pub fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: PeriodicConfig) -> RunOutcome {
     let start = clock.now() + CYCLE;
     let mut periodic = PeriodicLoop::new(&clock, config, start);
-    let mut vitals = VitalsReader::new(ride.shared.continued.clone());
+    let mut vitals = VitalsReader::new(context.shared.continued.clone());
     let mut inbox = Inbox::new();
     let mut bus_lost_at: Option<u64> = None;
     let mut cycles = 0;
     let mut watch = None;
-    let grace_cycles = ride.limits.bus_grace.as_millis() as u64;
+    let grace_cycles = context.limits.bus_grace.as_millis() as u64;
     let end = loop {
         let cycle = match periodic.next_cycle() {
             Ok(cycle) => cycle,
             Err(overrun) => {
-                ride.station.tell_overrun(&overrun, clock.now().as_nanos());
+                context.node.tell_overrun(&overrun, clock.now().as_nanos());
                 break End::Overrun(overrun);
             }
         };
@@ -41,30 +41,30 @@ pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Pa
         if watch.is_none() && index >= WARM_UP_CYCLES {
             watch = Some(realtime::allocations::watch());
         }
-        let Ride { station, bus, .. } = &mut ride;
-        station.miss(index - cycle.skipped, cycle.skipped);
+        let RunContext { node, bus, .. } = &mut context;
+        node.miss(index - cycle.skipped, cycle.skipped);
         let caught_up = clock.now();
-        station.publish(index, cycle.skipped > 0, *bus);
+        node.publish(index, cycle.skipped > 0, *bus);
         let sent = clock.now();
         inbox.take_before(cycle.scheduled.as_nanos(), *bus, |frame, stamp_ns| {
-            station.take(frame, stamp_ns, index);
+            node.take(frame, stamp_ns, index);
         });
         let taken = clock.now();
-        station.act(index);
+        node.act(index);
         let stepped = clock.now();
         cycles = index + 1;
         bus_lost_at = if bus.is_up() { None } else { bus_lost_at.or(Some(index)) };
         let end = if bus_lost_at.is_some_and(|lost| index - lost > grace_cycles) {
             Some(End::BusGone)
-        } else if index < NEWCOMER_CYCLES && station.frame_counters().second_rig > 0 {
+        } else if index < NEWCOMER_CYCLES && node.frame_counters().second_rig > 0 {
             Some(End::SecondRig)
         } else {
-            ride.after_cycle(cycles)
+            context.after_cycle(cycles)
         };
         // Measuring is part of the cycle's work, save for handing over what was measured.
         let vitals = row_vitals(vitals.read());
         let done = periodic.end_of_work().unwrap_or(stepped);
-        ride.station.tell_timing(CycleTiming {
+        context.node.tell_timing(CycleTiming {
             cycle: index,
             skipped: cycle.skipped,
             due_ns: cycle.scheduled.as_nanos(),
@@ -86,10 +86,10 @@ pub fn run<C: Clock>(mut ride: Ride<'_>, clock: C, config: PeriodicConfig) -> Pa
     });
     // A rig with a fault is silent; one that came second leaves the first one's controllers alone.
     if !matches!(end, End::NotFinite | End::SecondRig) {
-        say_farewell(&mut ride, &mut inbox, cycles);
+        say_farewell(&mut context, &mut inbox, cycles);
     }
     let cycle_zero_ns = start.as_nanos();
-    Paced { end, cycles, cycle_zero_ns, statistics: Some(periodic.into_statistics()), allocations }
+    RunOutcome { end, cycles, cycle_zero_ns, statistics: Some(periodic.into_statistics()), allocations }
 }
 
 fn length_ns(from: realtime::Instant, to: realtime::Instant) -> u64 {
@@ -109,18 +109,18 @@ fn row_vitals(counts: VitalCounts) -> Vitals {
     }
 }
 
-fn say_farewell(ride: &mut Ride<'_>, inbox: &mut Inbox, cycles: u64) {
-    let Ride { station, bus, .. } = ride;
+fn say_farewell(context: &mut RunContext<'_>, inbox: &mut Inbox, cycles: u64) {
+    let RunContext { node, bus, .. } = context;
     for _ in 0..FAREWELLS {
-        station.publish_end(cycles, *bus);
+        node.publish_end(cycles, *bus);
         let until = Instant::now() + FAREWELL / FAREWELLS;
         while let Some(left) = until.checked_duration_since(Instant::now()) {
-            inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| station.take(frame, stamp_ns, cycles));
+            inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| node.take(frame, stamp_ns, cycles));
             bus.wait_readable(left);
         }
     }
     bus.leave();
-    inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| station.take(frame, stamp_ns, cycles));
+    inbox.take_before(u64::MAX, *bus, |frame, stamp_ns| node.take(frame, stamp_ns, cycles));
 }
 
 /// Sorts frames by cycle: what arrived after a cycle's start waits for the next one, however late the loop reads.

@@ -11,7 +11,8 @@ use axis_control::setup::FileArguments;
 use axis_control::setup::{Inputs, Mode};
 use plant::scene::{Holder, Outcome, RigCall};
 use plant::{Axis, AxisReadings, RigParameters, Scene};
-use rehearsal::{Rehearsal, SimulatedRig, Standing};
+use rehearsal::Rehearsal;
+use rig_node::{SimulatedRig, Standing};
 use std::path::{Path, PathBuf};
 
 /// Rms and largest error of a sampling instant, s.
@@ -123,7 +124,8 @@ pub(super) fn replay_with(
     let mut record = record(recipe, &scene, valves.len());
     for (cycle, valve) in valves.iter().enumerate() {
         let valve = [0, 1].map(|i| if made.rig.active[i] { valve[i] } else { 0.0 });
-        made.sample(cycle as u64, valve, &mut |_| {});
+        made.expect_valves(valve);
+        made.sample(cycle as u64, &mut |_| {});
         let row = made.step(cycle as u64, valve);
         check(&row)?;
         record.rows.push(row);
@@ -148,7 +150,8 @@ pub(super) fn replay_windows(
         if cycle % window == 0 {
             made.rig.set(&mut made.state, &row.axes);
         }
-        made.sample(cycle as u64, row.valve, &mut |_| {});
+        made.expect_valves(row.valve);
+        made.sample(cycle as u64, &mut |_| {});
         rows.push(made.step(cycle as u64, row.valve));
     }
     Ok(rows)
@@ -235,6 +238,8 @@ pub(super) struct Made {
     foreign: bool,
     jitter: Option<Stream>,
     linked: bool,
+    /// Valve openings over the cycle that is sampled.
+    expected: [f64; 2],
     row: Option<Row>,
     stopped: bool,
 }
@@ -280,6 +285,7 @@ impl Made {
             foreign: recipe.foreign_form,
             jitter: recipe.jitter.then(|| Stream::new(recipe.seed, JITTER_STREAM)),
             linked: scene.linked,
+            expected: [0.0; 2],
             row: None,
             stopped: false,
         })
@@ -315,8 +321,14 @@ fn truth(rig: &Rig, state: &State, evaluated: &Evaluated) -> [TrueAxis; 2] {
 
 impl SimulatedRig for Made {
     type Cycle = Row;
+    type Event = Outcome;
 
-    fn sample(&mut self, cycle: u64, acting: [f64; 2], _tell: &mut dyn FnMut(Outcome)) -> [AxisReadings; 2] {
+    fn expect_valves(&mut self, valve: [f64; 2]) {
+        self.expected = valve;
+    }
+
+    fn sample(&mut self, cycle: u64, _tell: &mut dyn FnMut(Outcome)) -> [AxisReadings; 2] {
+        let acting = self.expected;
         let at = cycle as usize * self.rig.steps_per_ms;
         let time_s = cycle as f64 / 1000.0;
         let (rig, sensing) = (&self.rig, &mut self.sensing);
@@ -362,7 +374,7 @@ impl SimulatedRig for Made {
 
     fn step(&mut self, _cycle: u64, valve: [f64; 2]) -> Row {
         let row = self.row.take().expect("sampled before");
-        assert_eq!(row.valve, valve, "commands act as the rehearsal said before the cycle was sampled");
+        assert_eq!(row.valve, valve, "commands act as was expected when the cycle was sampled");
         row
     }
 }

@@ -24,11 +24,12 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 15] = [
+const ROOMS: [&str; 16] = [
     "protocol",
     "realtime",
     "runlog",
     "plant",
+    "rig-node",
     "emulator",
     "algorithms",
     "plugin",
@@ -48,12 +49,13 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("runlog", &["protocol", "realtime"]),
     ("plant", &[]),
     ("fmu", &["plant"]),
-    ("emulator", &["protocol", "realtime", "runlog", "plant"]),
+    ("rig_node", &["protocol", "plant"]),
+    ("emulator", &["protocol", "realtime", "runlog", "plant", "rig-node"]),
     ("algorithms", &["realtime", "plant"]),
     ("plugin", &["protocol", "plant", "algorithms"]),
     ("axis", &["protocol", "realtime", "runlog", "plant", "algorithms", "plugin"]),
     ("xcp", &["protocol", "runlog", "plant", "algorithms", "axis-control"]),
-    ("rehearsal", &["protocol", "runlog", "plant", "axis-control"]),
+    ("rehearsal", &["protocol", "runlog", "plant", "rig-node", "axis-control"]),
     (
         "controller",
         &[

@@ -38,7 +38,7 @@ struct Entry {
 }
 
 /// All faults of a run.
-pub struct FaultCourse {
+pub struct FaultSchedule {
     entries: Vec<Entry>,
     room: usize,
     /// Whether something waits or is active.
@@ -62,7 +62,7 @@ pub struct Broken<'a> {
     pub inputs: &'a Inputs,
 }
 
-impl FaultCourse {
+impl FaultSchedule {
     /// The faults of a script, and room for those of people when `by_hand`. `orders` is the way to the bus's host, where there
     /// is one.
     #[must_use]

@@ -5,6 +5,7 @@ use crate::recording::{self, Records};
 use plant::{RigParameters, Scene};
 use protocol::bus::control::Role;
 use protocol::bus::{BusCounters, BusError, Received, SendError};
+use protocol::frames::ValveCommand;
 use std::time::Instant;
 
 /// A bus without anybody on it.
@@ -37,41 +38,41 @@ impl Bus for Nobody {
     fn done(&mut self, _cycle: u32) {}
 }
 
-fn station(scene: &str) -> (Station, Records) {
+fn node(scene: &str) -> (EmulatorNode, Records) {
     let rig = RigParameters::baseline();
     let scene = Scene::from_toml(scene, "test", &rig).unwrap();
     let (recorder, records) = recording::queues(false);
-    let parts = StationParts {
+    let parts = NodeParts {
         plant: Plant::new(&rig, &scene.setup()).unwrap(),
         sensors: Sensors::new(&rig, 1),
         people: People::new(&scene),
-        faults: FaultCourse::none(),
+        faults: FaultSchedule::none(),
         console: None,
         recorder,
         bench_frames: true,
         lockstep: false,
     };
-    (Station::new(parts), records)
+    (EmulatorNode::new(parts), records)
 }
 
 /// Sends the sensors of `cycle`, which are answered with this opening of the drive's valve from the second cycle on.
-fn live(station: &mut Station, cycle: u64, opening: f64) {
-    station.publish(cycle, false, &mut Nobody::default());
+fn live(node: &mut EmulatorNode, cycle: u64, opening: f64) {
+    node.publish(cycle, false, &mut Nobody::default());
     if let Some(echo) = cycle.checked_sub(1) {
         let alive = (cycle % 16) as u8;
         let command = ValveCommand { opening, alive, echo: echo as u16, enable: true };
         let frame = Frame::DriveValveCommand(command).encode().unwrap();
-        station.take(&frame, 0, cycle);
+        node.take(&frame, 0, cycle);
     }
-    station.act(cycle);
+    node.act(cycle);
 }
 
 #[test]
 fn a_stop_within_missed_cycles_shuts_the_valve_from_its_cycle_to_its_release() {
     let scene = "[[rig.event]]\nat_s = 0.004\ndo = \"emergency-stop\"\n[[rig.event]]\nat_s = 0.007\ndo = \"release\"\n";
-    let (mut station, records) = station(scene);
-    (0..3).for_each(|cycle| live(&mut station, cycle, 0.5));
-    station.miss(3, 7);
+    let (mut node, records) = node(scene);
+    (0..3).for_each(|cycle| live(&mut node, cycle, 0.5));
+    node.miss(3, 7);
     let openings: Vec<_> = records.cycles.try_iter().map(|record| record.valve[0]).collect();
     let open = plant::quantise_valve(0.5);
     let expected = [0.0, open, open, open, 0.0, 0.0, 0.0, open, open, open];
@@ -80,32 +81,32 @@ fn a_stop_within_missed_cycles_shuts_the_valve_from_its_cycle_to_its_release() {
 
 #[test]
 fn a_writer_that_does_not_write_is_waited_for_once_in_a_stall_and_one_that_is_gone_not_at_all() {
-    let (mut station, records) = station("");
+    let (mut node, records) = node("");
     let mut cycle = 0;
-    while !station.recorder.is_full() {
-        station.advance(cycle);
+    while !node.recorder.is_full() {
+        node.advance(cycle);
         cycle += 1;
     }
     let began = Instant::now();
-    station.miss(cycle, 3);
+    node.miss(cycle, 3);
     let took = began.elapsed().as_secs_f64();
     // One wait is 2 s of sleeps of a millisecond, each of which may be late; three would be 6 s.
     assert!((2.0..5.0).contains(&took), "{took} s");
     drop(records);
     let began = Instant::now();
-    station.miss(cycle + 3, 3);
+    node.miss(cycle + 3, 3);
     assert!(began.elapsed().as_secs_f64() < 1.0);
 }
 
 /// A rig that stood still while its interface went down and came back never saw it down, and told nobody.
 #[test]
 fn a_bus_that_went_and_came_back_between_two_looks_is_told_of() {
-    let (mut station, records) = station("");
+    let (mut node, records) = node("");
     let mut bus = Nobody::default();
-    station.publish(0, false, &mut bus);
+    node.publish(0, false, &mut bus);
     (bus.0.disconnects, bus.0.reconnects) = (1, 1);
-    station.publish(1, false, &mut bus);
-    station.publish(2, false, &mut bus);
+    node.publish(1, false, &mut bus);
+    node.publish(2, false, &mut bus);
     let told: Vec<_> = records.events.try_iter().map(|event| (event.cycle, event.kind)).collect();
     assert_eq!(told, [(1, EventKind::BusLost), (1, EventKind::BusBack)]);
 }

@@ -1,13 +1,13 @@
 //! What the rig says on the bus: sensors every cycle, tick and status every ten ([`protocol::periods`]).
 
+use crate::rig::Standing;
+use plant::AxisReadings;
 use plant::scene::RigCall;
-use plant::{AxisReadings, Plant};
-use protocol::can::CanFrame;
-use protocol::frames::{ALIVE_RANGE, EmergencyStop, FaultMark, Frame, RIG_STATUS, RigStatus, Sensors, Tick};
+use protocol::commands::CommandIntake;
+use protocol::frames::{ALIVE_RANGE, EmergencyStop, Frame, RIG_STATUS, RigStatus, Sensors, Tick};
 
 /// Sensors of one axis in `cycle`.
-#[must_use]
-pub fn sensors(readings: &AxisReadings, cycle: u64) -> Sensors {
+pub(crate) fn sensors(readings: &AxisReadings, cycle: u64) -> Sensors {
     Sensors {
         position_m: readings.position.value,
         force_n: readings.force.value,
@@ -29,37 +29,20 @@ pub enum TickCause {
 }
 
 /// The tick of `cycle`, with `skipped` cycles in all so far.
-#[must_use]
-pub fn tick(cause: TickCause, cycle: u64, skipped: u64, lockstep: bool) -> Frame {
+pub(crate) fn tick(cause: TickCause, cycle: u64, skipped: u64, lockstep: bool) -> Frame {
     let (catch_up, ending) = (cause == TickCause::Miss, cause == TickCause::Farewell);
     // Both counters wrap as their fields in rig.dbc do.
     Frame::Tick(Tick { cycle: cycle as u32, skipped: skipped as u16, catch_up, lockstep, ending })
 }
 
 /// The rig's own emergency stop: somebody pressed its button, or released it.
-#[must_use]
-pub fn emergency_stop(call: RigCall) -> Frame {
+pub(crate) fn emergency_stop(call: RigCall) -> Frame {
     Frame::RigEmergencyStop(EmergencyStop::of_operator(call == RigCall::Release))
-}
-
-/// The bench's mark that a fault of this number begins or ends.
-#[must_use]
-pub fn fault_mark(number: u16, begins: bool) -> Frame {
-    Frame::FaultMark(FaultMark { fault: number, active: begins })
-}
-
-/// What the rig's status needs besides plant and sensors.
-#[derive(Clone, Copy, Debug)]
-pub struct CommandState {
-    /// Valve shut for want of a fresh command, drive and load.
-    pub stale: [bool; 2],
-    /// Valve shut because two senders dispute it, drive and load.
-    pub two_sources: [bool; 2],
 }
 
 /// Sensors of an axis that saturated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SaturatedSensors {
+pub(crate) struct SaturatedSensors {
     position: bool,
     force: bool,
     pressure_a: bool,
@@ -68,7 +51,7 @@ pub struct SaturatedSensors {
 
 impl SaturatedSensors {
     /// Takes note of a sample.
-    pub fn note(&mut self, readings: &AxisReadings) {
+    pub(crate) fn note(&mut self, readings: &AxisReadings) {
         self.position |= readings.position.saturated;
         self.force |= readings.force.saturated;
         self.pressure_a |= readings.pressure_a.saturated;
@@ -77,14 +60,17 @@ impl SaturatedSensors {
 }
 
 /// The rig's status, with the sensors that saturated since the last one.
-#[must_use]
-pub fn status(plant: &Plant, [drive, load]: &[SaturatedSensors; 2], commands: CommandState) -> Frame {
+pub(crate) fn status(
+    standing: &Standing,
+    [drive, load]: &[SaturatedSensors; 2],
+    commands: &[CommandIntake; 2],
+) -> Frame {
     Frame::RigStatus(RigStatus {
         // A node that chambers feed back into may rise above the set pressure, and its sensor ends where the wire does.
-        supply_pressure_pa: plant.supply_pressure_pa().min(RIG_STATUS.signals[0].max),
-        linked: plant.linked(),
-        emergency_stop: plant.emergency_stop(),
-        check_valves_shut: plant.check_valves_shut(),
+        supply_pressure_pa: standing.supply_pressure_pa.min(RIG_STATUS.signals[0].max),
+        linked: standing.linked,
+        emergency_stop: standing.emergency_stop,
+        check_valves_shut: standing.check_valves_shut,
         drive_position_saturated: drive.position,
         drive_force_saturated: drive.force,
         drive_pressure_a_saturated: drive.pressure_a,
@@ -93,26 +79,18 @@ pub fn status(plant: &Plant, [drive, load]: &[SaturatedSensors; 2], commands: Co
         load_force_saturated: load.force,
         load_pressure_a_saturated: load.pressure_a,
         load_pressure_b_saturated: load.pressure_b,
-        drive_stale: commands.stale[0],
-        load_stale: commands.stale[1],
-        drive_two_sources: commands.two_sources[0],
-        load_two_sources: commands.two_sources[1],
+        drive_stale: commands[0].stale(),
+        load_stale: commands[1].stale(),
+        drive_two_sources: commands[0].disputed(),
+        load_two_sources: commands[1].disputed(),
     })
-}
-
-/// Encodes a frame that the rig made itself.
-///
-/// # Panics
-/// If a value is beyond its range in `rig.dbc`: sensors saturate within it, which a test holds against the rig's ranges.
-#[must_use]
-pub fn encode(frame: &Frame) -> CanFrame {
-    frame.encode().unwrap_or_else(|error| panic!("the rig made a frame that rig.dbc does not allow: {error}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use plant::{RigParameters, Setup};
+    use crate::{PeopledPlant, SimulatedRig};
+    use plant::{People, Plant, RigParameters, Scene, Setup};
     use protocol::frames::{SignalSpec, WEIGHTS};
 
     fn signal(message: &protocol::frames::MessageSpec, name: &str) -> &'static SignalSpec {
@@ -134,10 +112,11 @@ mod tests {
         assert_eq!(RIG_STATUS.signals[0].name, "supply_pressure");
         let rig = RigParameters::baseline().with("supply.pressure_bar", &[11.0]).unwrap();
         let plant = Plant::new(&rig, &Setup::default()).unwrap();
-        let quiet = CommandState { stale: [false; 2], two_sources: [false; 2] };
-        let Frame::RigStatus(sent) = status(&plant, &Default::default(), quiet) else { panic!("a status") };
+        let rig = PeopledPlant::new(plant, plant::Sensors::new(&rig, 1), People::new(&Scene::default()));
+        let frame = status(&rig.standing(), &Default::default(), &Default::default());
+        let Frame::RigStatus(sent) = frame else { panic!("a status") };
         assert_eq!(sent.supply_pressure_pa, RIG_STATUS.signals[0].max);
-        assert_eq!(encode(&Frame::RigStatus(sent)).data().len(), 4);
+        assert_eq!(Frame::RigStatus(sent).encode().unwrap().data().len(), 4);
     }
 
     #[test]
@@ -152,7 +131,7 @@ mod tests {
         let plant = Plant::new(&rig, &Setup::default()).unwrap();
         let readings = plant::Sensors::new(&rig, 1).sample(&plant, &plant::Inputs::default());
         assert!(readings[1].position.saturated);
-        let frame = encode(&Frame::LoadSensors(sensors(&readings[1], 7)));
+        let frame = Frame::LoadSensors(sensors(&readings[1], 7)).encode().unwrap();
         assert_eq!(frame.data()[..2], [0xFF, 0xFF]);
     }
 }

@@ -4,7 +4,7 @@ use super::*;
 use plant::{RigParameters, Setup};
 
 struct Bench {
-    course: FaultCourse,
+    schedule: FaultSchedule,
     plant: Plant,
     sensors: Sensors,
     inputs: Inputs,
@@ -16,7 +16,7 @@ impl Bench {
         let script = FaultScript::from_toml(script, "test").unwrap();
         let setup = Setup { carriage_position_m: 0.25, linked: true, ..Setup::default() };
         Self {
-            course: FaultCourse::new(Some(&script), by_hand, None),
+            schedule: FaultSchedule::new(Some(&script), by_hand, None),
             plant: Plant::new(&rig, &setup).unwrap(),
             sensors: Sensors::new(&rig, 1),
             inputs: Inputs { valve: [0.5, 0.0], ..Inputs::default() },
@@ -27,19 +27,22 @@ impl Bench {
     fn run(&mut self, from: u64, end: u64) -> Vec<(u64, u16, &'static str)> {
         let mut told = Vec::new();
         for cycle in from..end {
-            let Self { course, plant, sensors, inputs } = self;
+            let Self { schedule, plant, sensors, inputs } = self;
             let broken = Broken { plant, sensors, inputs };
-            course.begin_cycle(cycle, broken, |mark| told.push((cycle, mark.number, mark.what.name())));
-            course.hands().put_into(&mut self.inputs);
+            schedule.begin_cycle(cycle, broken, |mark| told.push((cycle, mark.number, mark.what.name())));
+            schedule.hands().put_into(&mut self.inputs);
             self.plant.step(&self.inputs);
         }
         told
     }
 
-    fn by_hand(&mut self, act: impl FnOnce(&mut FaultCourse, Broken<'_>, &mut dyn FnMut(Mark))) -> Vec<What> {
+    fn by_hand(
+        &mut self,
+        act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
+    ) -> Vec<What> {
         let mut told = Vec::new();
-        let Self { course, plant, sensors, inputs } = self;
-        act(course, Broken { plant, sensors, inputs }, &mut |mark| told.push(mark.what));
+        let Self { schedule, plant, sensors, inputs } = self;
+        act(schedule, Broken { plant, sensors, inputs }, &mut |mark| told.push(mark.what));
         told
     }
 }
@@ -51,12 +54,12 @@ fn faults_begin_and_end_by_time_and_the_plant_is_whole_again() {
          [[fault]]\nname = \"valve-offset\"\nat = \"load\"\noffset = 0.1\nfrom_s = 0.02\nfor_s = 0.02\n",
         false,
     );
-    assert!(bench.course.possible());
+    assert!(bench.schedule.possible());
     let told = bench.run(0, 50);
     assert_eq!(told, [(10, 1, "begins"), (20, 2, "begins"), (30, 1, "ends"), (40, 2, "ends")]);
-    assert_eq!(bench.course.overlay, Overlay::default());
-    assert!(!bench.course.busy && bench.course.active() == 0);
-    let sent: Vec<_> = std::iter::from_fn(|| bench.course.next_to_tell()).collect();
+    assert_eq!(bench.schedule.overlay, Overlay::default());
+    assert!(!bench.schedule.busy && bench.schedule.active() == 0);
+    let sent: Vec<_> = std::iter::from_fn(|| bench.schedule.next_to_tell()).collect();
     assert_eq!(sent, [(1, true), (2, true), (1, false), (2, false)]);
 }
 
@@ -88,7 +91,7 @@ fn an_end_stop_is_hit_and_rods_part_once() {
     let [(10, 1, "begins"), (20, 2, "begins"), (hit, 2, "ends")] = told[..] else { panic!("{told:?}") };
     assert!(!bench.plant.linked());
     assert!(hit < 1000, "{hit}");
-    assert_eq!(bench.course.hands(), HandForces::default(), "let go");
+    assert_eq!(bench.schedule.hands(), HandForces::default(), "let go");
 }
 
 #[test]
@@ -97,23 +100,26 @@ fn people_break_and_mend_and_are_told_when_they_cannot() {
     let stuck = Fault::new("valve-stuck", Some("drive"), &[]).unwrap();
     let lost = Fault::new("bus-loss", None, &[]).unwrap();
     assert_eq!(
-        bench.by_hand(|course, broken, tell| course.break_by_hand(lost, broken, tell)),
+        bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(lost, broken, tell)),
         [What::Refused]
     );
     assert_eq!(
-        bench.by_hand(|course, broken, tell| course.break_by_hand(stuck, broken, tell)),
+        bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell)),
         [What::Begins]
     );
-    assert_eq!(bench.course.active(), 1);
-    assert_eq!(bench.by_hand(|course, broken, tell| course.mend(Some(&lost), broken, tell)), []);
-    assert_eq!(bench.by_hand(|course, broken, tell| course.mend(Some(&stuck), broken, tell)), [What::Ends]);
+    assert_eq!(bench.schedule.active(), 1);
+    assert_eq!(bench.by_hand(|schedule, broken, tell| schedule.mend(Some(&lost), broken, tell)), []);
+    assert_eq!(
+        bench.by_hand(|schedule, broken, tell| schedule.mend(Some(&stuck), broken, tell)),
+        [What::Ends]
+    );
     for _ in 0..MOST_BY_HAND {
-        bench.by_hand(|course, broken, tell| course.break_by_hand(stuck, broken, tell));
+        bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell));
     }
     assert_eq!(
-        bench.by_hand(|course, broken, tell| course.break_by_hand(stuck, broken, tell)),
+        bench.by_hand(|schedule, broken, tell| schedule.break_by_hand(stuck, broken, tell)),
         [What::Refused]
     );
-    assert_eq!(bench.by_hand(|course, broken, tell| course.mend(None, broken, tell)).len(), MOST_BY_HAND);
-    assert_eq!(bench.course.overlay, Overlay::default());
+    assert_eq!(bench.by_hand(|schedule, broken, tell| schedule.mend(None, broken, tell)).len(), MOST_BY_HAND);
+    assert_eq!(bench.schedule.overlay, Overlay::default());
 }

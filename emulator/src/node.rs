@@ -1,0 +1,396 @@
+//! The emulator's node: the rig on its bus with its console and its records, whatever paces the cycles.
+//!
+//! ```text
+//!   t_k  missed cycles ──► publish(k) ─────────► take(frame)* ────────────► act(k) ──► t_k+1
+//!        computed, not     people, sensors,      what arrived before t_k    latch, record,
+//!        sent              send frames           (in lockstep: before Go)   step the plant
+//! ```
+//!
+//! The cycle itself is that of [`rig_node`]. Missed cycles are computed with the command latched before, so a stall changes which
+//! inputs there are and never the physics. Nothing here allocates, locks, prints or blocks.
+
+use crate::console::Command;
+use crate::event::{Event, EventKind};
+use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
+use crate::faults::mark::Mark;
+use crate::faults::schedule::{Broken, FaultSchedule};
+use crate::recording::Recorder;
+use crate::rig::BreakableRig;
+use crossbeam_channel::Receiver;
+use plant::scene::{Action, HandForces};
+use plant::{Axis, AxisReadings, People, Plant, Sensors};
+use protocol::bus::Bus;
+use protocol::can::CanFrame;
+use protocol::commands::{Change, CommandCounters};
+use protocol::frames::{ChainStatus, DecodeError, FaultMark, Frame, LinkRequest, MainChainState};
+use realtime::Overrun;
+use rig_node::{Hand, Latched, RigNode, Taken, TickCause};
+use runlog::candump::FrameRecord;
+use runlog::timing::CycleTiming;
+use std::time::Duration;
+
+/// Longest wait for room in the recorder's queue after a stall, in ms; a writer that is slower than this has failed.
+const LONGEST_WAIT_MS: u32 = 2000;
+
+/// What the node is made of.
+pub struct NodeParts {
+    /// The plant in its initial state.
+    pub plant: Plant,
+    /// Its sensors.
+    pub sensors: Sensors,
+    /// Who does what to it by hand.
+    pub people: People,
+    /// What breaks.
+    pub faults: FaultSchedule,
+    /// What is typed at the console, if it is open.
+    pub console: Option<Receiver<Command>>,
+    /// Where cycles, frames and events go.
+    pub recorder: Recorder,
+    /// Whether frames of the bench (hand force, link, weights) are obeyed.
+    pub bench_frames: bool,
+    /// Whether simulated time is the bus's time.
+    pub lockstep: bool,
+}
+
+/// Frames that arrived, by what became of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct FrameCounters {
+    /// Not as `rig.dbc` says: length, checksum, reserved bits, a raw value out of range.
+    pub malformed: u64,
+    /// Identifiers that `rig.dbc` does not know, extended and remote frames.
+    pub unknown: u64,
+    /// Frames that only the rig sends.
+    pub second_rig: u64,
+}
+
+/// What the node counted.
+pub struct NodeFigures {
+    /// Frames by what became of them.
+    pub frames: FrameCounters,
+    /// Commands of drive and load by what became of them.
+    pub commands: [CommandCounters; 2],
+    /// Cycles computed without being sent.
+    pub skipped: u64,
+    /// Records lost to full queues.
+    pub records_dropped: u64,
+}
+
+/// The rig on its bus, with console and records.
+pub struct EmulatorNode {
+    node: RigNode<BreakableRig>,
+    console: Option<Receiver<Command>>,
+    quit_asked: bool,
+    recorder: Recorder,
+    bench_frames: bool,
+    lockstep: bool,
+    bus_was_up: bool,
+    bus_disconnects: u64,
+    frames: FrameCounters,
+    exchange: [ExchangeWatch; 2],
+    chains_done: [Option<bool>; 2],
+}
+
+impl EmulatorNode {
+    /// Puts the rig on its bus, before cycle 0.
+    #[must_use]
+    pub fn new(parts: NodeParts) -> Self {
+        let NodeParts { plant, sensors, people, faults, console, recorder, bench_frames, lockstep } = parts;
+        Self {
+            node: RigNode::new(BreakableRig::new(plant, sensors, people, faults), lockstep),
+            console,
+            quit_asked: false,
+            recorder,
+            bench_frames,
+            lockstep,
+            bus_was_up: true,
+            bus_disconnects: 0,
+            frames: FrameCounters::default(),
+            exchange: Default::default(),
+            chains_done: [None; 2],
+        }
+    }
+
+    /// Computes `count` cycles from `first` on that the loop missed, with the commands latched before.
+    pub fn miss(&mut self, first: u64, count: u64) {
+        if count == 0 {
+            return;
+        }
+        self.node.skip(first, count);
+        self.tell(first + count, EventKind::Skipped { cycles: count });
+        let mut left_ms = LONGEST_WAIT_MS;
+        for cycle in first..first + count {
+            self.wait_for_writer(&mut left_ms);
+            self.begin(cycle);
+            self.advance(cycle);
+        }
+    }
+
+    /// After a stall longer than the queue, waiting for the writer costs nothing that is not lost already.
+    fn wait_for_writer(&self, left_ms: &mut u32) {
+        while *left_ms > 0 && self.recorder.is_full() {
+            *left_ms -= 1;
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Samples the sensors of `cycle` and sends what is due. `after_miss` sends the tick first, so that receivers know
+    /// which cycle the sensors are of.
+    pub fn publish(&mut self, cycle: u64, after_miss: bool, bus: &mut dyn Bus) {
+        self.take_typed(cycle);
+        let readings = self.begin(cycle);
+        let Self { node, recorder, exchange, .. } = self;
+        node.publish(cycle, after_miss, &readings, |frame| {
+            let stamp_ns = send(frame, bus, recorder);
+            match frame {
+                Frame::DriveSensors(_) => exchange[0].begin(cycle, stamp_ns),
+                Frame::LoadSensors(_) => exchange[1].begin(cycle, stamp_ns),
+                _ => {}
+            }
+        });
+        self.send_fault_marks(bus);
+        self.look_at_the_bus(cycle, bus);
+    }
+
+    /// Tells when the bus goes and comes, also when it did both since the last look, as after a stall.
+    fn look_at_the_bus(&mut self, cycle: u64, bus: &dyn Bus) {
+        let disconnects = bus.counters().disconnects;
+        let went = disconnects != std::mem::replace(&mut self.bus_disconnects, disconnects);
+        if went && self.bus_was_up {
+            self.bus_was_up = false;
+            self.tell(cycle, EventKind::BusLost);
+        }
+        if bus.is_up() != self.bus_was_up {
+            self.bus_was_up = bus.is_up();
+            self.tell(cycle, if self.bus_was_up { EventKind::BusBack } else { EventKind::BusLost });
+        }
+    }
+
+    /// Says farewell: a tick that tells the controllers that no more sensors come after `cycle`.
+    pub fn publish_end(&mut self, cycle: u64, bus: &mut dyn Bus) {
+        send(&self.node.tick(TickCause::Farewell, cycle), bus, &mut self.recorder);
+    }
+
+    /// Takes a frame that arrived before `cycle`.
+    pub fn take(&mut self, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
+        self.recorder.frame(FrameRecord { stamp_ns, frame: *frame });
+        match Frame::decode(frame) {
+            Ok(known) => self.take_known(known, frame, stamp_ns, cycle),
+            Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
+                self.frames.unknown += 1;
+            }
+            Err(_) => {
+                self.frames.malformed += 1;
+                if self.frames.malformed == 1 {
+                    self.tell(cycle, EventKind::Malformed { raw_id: frame.raw_id() });
+                }
+            }
+        }
+    }
+
+    fn take_known(&mut self, known: Frame, frame: &CanFrame, stamp_ns: u64, cycle: u64) {
+        let Self { node, recorder, .. } = self;
+        let other = match node.take(known, &mut |kind| recorder.event(Event { cycle, kind })) {
+            Taken::Command { axis, echo } => return self.time_command(axis.index(), echo, stamp_ns, cycle),
+            Taken::Done => return,
+            Taken::Other(other) => other,
+        };
+        match other {
+            Frame::DriveChainStatus(status) => self.note_chain(0, status),
+            Frame::LoadChainStatus(status) => self.note_chain(1, status),
+            Frame::HandForce(hand) if self.bench_frames => {
+                *self.node.rig_mut().hand(Hand::Bus) =
+                    HandForces { carriage_n: hand.carriage_n, load_eye_n: hand.load_eye_n };
+            }
+            Frame::Link(link) if self.bench_frames => match link.request {
+                LinkRequest::Link => self.act_by_hand(Action::Link { until_s: None }, cycle),
+                LinkRequest::Unlink => self.act_by_hand(Action::Unlink, cycle),
+            },
+            Frame::Weights(weights) if self.bench_frames => {
+                self.act_by_hand(Action::Weights { added_mass_kg: weights.added_mass_kg }, cycle);
+            }
+            Frame::DriveSensors(_)
+            | Frame::LoadSensors(_)
+            | Frame::Tick(_)
+            | Frame::RigStatus(_)
+            | Frame::RigEmergencyStop(_) => {
+                self.frames.second_rig += 1;
+                if self.frames.second_rig == 1 {
+                    let id = frame.standard_id().unwrap_or_default();
+                    self.tell(cycle, EventKind::SecondRig { id });
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Latches the commands for `cycle`, records it, and steps the plant to the start of the next.
+    pub fn act(&mut self, cycle: u64) {
+        for axis in Axis::ALL {
+            let Latched { change, age_cycles } = self.node.latch(axis);
+            self.exchange[axis as usize].latched(age_cycles);
+            if let Some(change) = change {
+                self.tell(cycle, change_event(change, axis));
+            }
+        }
+        self.advance(cycle);
+    }
+
+    /// Hands over when everything of this cycle happened: `row` without the exchange, which the node knows.
+    pub fn tell_timing(&mut self, row: CycleTiming) {
+        let axes = self.exchange.each_ref().map(ExchangeWatch::cycle);
+        let [AxisCycle { exchange: drive, .. }, AxisCycle { exchange: load, .. }] = axes;
+        self.recorder.timing(TimingRecord::Cycle { row: CycleTiming { drive, load, ..row }, axes });
+    }
+
+    /// Hands over the overrun that ends the run.
+    pub fn tell_overrun(&mut self, overrun: &Overrun, woke_ns: u64) {
+        let Overrun { index: first, skipped, late_by } = *overrun;
+        let late_ns = late_by.as_nanos() as u64;
+        self.recorder.timing(TimingRecord::Stopped { first, skipped, late_ns, woke_ns });
+    }
+
+    /// Records `cycle` with what acts over it, and steps the plant: for cycles that were sent and for those that were missed.
+    fn advance(&mut self, cycle: u64) {
+        self.recorder.cycle(self.node.step(cycle));
+    }
+
+    fn time_command(&mut self, axis: usize, echo: u16, stamp_ns: u64, cycle: u64) {
+        let round_trip_ns = self.exchange[axis].taken(echo, stamp_ns, cycle);
+        if let Some(ns) = round_trip_ns.filter(|_| !self.lockstep) {
+            self.recorder.round_trip(RoundTrip { axis, cycle, ns });
+        }
+    }
+
+    fn note_chain(&mut self, axis: usize, status: ChainStatus) {
+        self.chains_done[axis] = Some(status.main_chain == MainChainState::Done);
+    }
+
+    /// Lets people and faults do what is due in `cycle`, then samples.
+    fn begin(&mut self, cycle: u64) -> [AxisReadings; 2] {
+        let Self { node, recorder, .. } = self;
+        node.begin(cycle, &mut |kind| recorder.event(Event { cycle, kind }))
+    }
+
+    /// Tells the bench which faults began and ended, where it listens.
+    fn send_fault_marks(&mut self, bus: &mut dyn Bus) {
+        while let Some((fault, active)) = self.node.rig_mut().next_fault_mark() {
+            if self.bench_frames {
+                send(&Frame::FaultMark(FaultMark { fault, active }), bus, &mut self.recorder);
+            }
+        }
+    }
+
+    fn act_by_hand(&mut self, action: Action, cycle: u64) {
+        let Self { node, recorder, .. } = self;
+        node.rig_mut().act(action, |kind| recorder.event(Event { cycle, kind }));
+    }
+
+    /// Takes one command of the console, if one waits: a flood of them is spread over cycles.
+    fn take_typed(&mut self, cycle: u64) {
+        let Some(Ok(command)) = self.console.as_ref().map(Receiver::try_recv) else { return };
+        match command {
+            Command::Act(action) => self.act_by_hand(action, cycle),
+            Command::Hand { on, force_n } => {
+                let hand = self.node.rig_mut().hand(Hand::Console);
+                *hand.on(on) = force_n;
+                let kind = (*hand).into();
+                self.tell(cycle, kind);
+            }
+            Command::Break(fault) => self.break_or_mend(cycle, |faults, broken, tell| {
+                faults.break_by_hand(fault, broken, tell);
+            }),
+            Command::Mend(like) => self.break_or_mend(cycle, |faults, broken, tell| {
+                faults.mend(like.as_ref(), broken, tell);
+            }),
+            Command::Quit => self.quit_asked = true,
+        }
+    }
+
+    fn break_or_mend(
+        &mut self,
+        cycle: u64,
+        act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
+    ) {
+        let Self { node, recorder, .. } = self;
+        node.rig_mut().break_or_mend(act, |kind| recorder.event(Event { cycle, kind }));
+    }
+
+    fn tell(&mut self, cycle: u64, kind: EventKind) {
+        self.recorder.event(Event { cycle, kind });
+    }
+
+    /// Whether every controller that was heard says that its chain is done.
+    #[must_use]
+    pub fn controllers_done(&self) -> bool {
+        self.chains_done.iter().flatten().count() > 0 && self.chains_done.iter().flatten().all(|done| *done)
+    }
+
+    /// Whether the plant's state is finite; when not, which is told, the run must end with silence on the bus.
+    pub fn is_finite(&mut self, cycle: u64) -> bool {
+        let finite = self.node.rig().plant().state().is_finite();
+        if !finite {
+            self.tell(cycle, EventKind::NotFinite);
+        }
+        finite
+    }
+
+    /// Frames by what became of them.
+    #[must_use]
+    pub fn frame_counters(&self) -> FrameCounters {
+        self.frames
+    }
+
+    /// Whether somebody typed quit.
+    #[must_use]
+    pub fn quit_asked(&self) -> bool {
+        self.quit_asked
+    }
+
+    /// Whether any valve command was accepted.
+    #[must_use]
+    pub fn controller_heard(&self) -> bool {
+        self.node.commands().iter().any(|intake| intake.counters().accepted > 0)
+    }
+
+    /// Cycles computed without being sent.
+    #[must_use]
+    pub fn skipped(&self) -> u64 {
+        self.node.skipped()
+    }
+
+    /// The figures of the run; the node goes, and with it the recorder's sending ends.
+    #[must_use]
+    pub fn into_figures(self) -> NodeFigures {
+        NodeFigures {
+            frames: self.frames,
+            commands: self.node.commands().each_ref().map(|intake| *intake.counters()),
+            skipped: self.node.skipped(),
+            records_dropped: self.recorder.dropped(),
+        }
+    }
+}
+
+/// Sends and records a frame; gives its stamp. What the bus did not take is counted there.
+///
+/// # Panics
+/// If a value is beyond its range in `rig.dbc`: sensors saturate within it, which a test holds against the rig's ranges.
+fn send(frame: &Frame, bus: &mut dyn Bus, recorder: &mut Recorder) -> Option<u64> {
+    let frame = frame
+        .encode()
+        .unwrap_or_else(|error| panic!("the rig made a frame that rig.dbc does not allow: {error}"));
+    let stamp_ns = bus.send(&frame).ok()?;
+    recorder.frame(FrameRecord { stamp_ns, frame });
+    Some(stamp_ns)
+}
+
+fn change_event(change: Change, axis: Axis) -> EventKind {
+    match change {
+        Change::Expired => EventKind::CommandStale(axis),
+        Change::Fresh => EventKind::CommandFresh(axis),
+        Change::TwoSources => EventKind::TwoSources(axis),
+        Change::OneSource => EventKind::OneSource(axis),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,88 @@
+//! The rig of the emulator: the plant with people around it, and what breaks on purpose.
+
+use crate::event::EventKind;
+use crate::faults::mark::Mark;
+use crate::faults::schedule::{Broken, FaultSchedule};
+use plant::scene::{Action, HandForces, Holder, Outcome, RigCall};
+use plant::tables::CycleRecord;
+use plant::{AxisReadings, People, Plant, Sensors};
+use rig_node::{Hand, PeopledPlant, SimulatedRig, Standing};
+
+/// The plant with people and faults.
+pub(crate) struct BreakableRig {
+    peopled: PeopledPlant,
+    faults: FaultSchedule,
+}
+
+impl BreakableRig {
+    pub(crate) fn new(mut plant: Plant, mut sensors: Sensors, people: People, faults: FaultSchedule) -> Self {
+        if faults.possible() {
+            plant.expect_faults();
+            sensors.seed_faults(faults.seed());
+        }
+        Self { peopled: PeopledPlant::new(plant, sensors, people), faults }
+    }
+
+    pub(crate) fn plant(&self) -> &Plant {
+        self.peopled.plant()
+    }
+
+    /// Hands that push from now on.
+    pub(crate) fn hand(&mut self, whose: Hand) -> &mut HandForces {
+        self.peopled.hand(whose)
+    }
+
+    pub(crate) fn act(&mut self, action: Action, mut tell: impl FnMut(EventKind)) {
+        self.peopled.act(action, |outcome| tell(outcome.into()));
+    }
+
+    /// Lets a person do something to what is broken.
+    pub(crate) fn break_or_mend(
+        &mut self,
+        act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
+        mut tell: impl FnMut(EventKind),
+    ) {
+        let (plant, sensors, inputs) = self.peopled.parts();
+        let broken = Broken { plant, sensors, inputs };
+        act(&mut self.faults, broken, &mut |mark| tell(EventKind::Fault(mark)));
+    }
+
+    /// The next mark for the bench's frame: number of the fault, and whether it begins.
+    pub(crate) fn next_fault_mark(&mut self) -> Option<(u16, bool)> {
+        self.faults.next_to_tell()
+    }
+}
+
+impl SimulatedRig for BreakableRig {
+    type Cycle = CycleRecord;
+    type Event = EventKind;
+
+    fn sample(&mut self, cycle: u64, tell: &mut dyn FnMut(EventKind)) -> [AxisReadings; 2] {
+        self.peopled.let_people_act(cycle, |outcome| tell(outcome.into()));
+        let (plant, sensors, inputs) = self.peopled.parts();
+        let broken = Broken { plant, sensors, inputs };
+        self.faults.begin_cycle(cycle, broken, |mark| tell(EventKind::Fault(mark)));
+        *self.peopled.hand(Hand::Faults) = self.faults.hands();
+        self.peopled.sample_sensors()
+    }
+
+    fn rig_call(&mut self, cycle: u64) -> Option<RigCall> {
+        self.peopled.rig_call(cycle)
+    }
+
+    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Outcome> {
+        self.peopled.emergency_stop(holder, release)
+    }
+
+    fn standing(&self) -> Standing {
+        self.peopled.standing()
+    }
+
+    fn step(&mut self, cycle: u64, valve: [f64; 2]) -> CycleRecord {
+        let mut record = self.peopled.step(cycle, valve);
+        if self.faults.possible() {
+            record.terms.push(self.faults.active() as f64);
+        }
+        record
+    }
+}
