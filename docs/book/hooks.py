@@ -19,6 +19,9 @@ UNLIKE = {
     "a fence inside a list": re.compile(r"^ +```", re.MULTILINE),
     "a list without an empty line before it": re.compile(r"^(?![-*#>|\s]|\d+\. ).+\n(?:[-*]|1\.) ", re.MULTILINE),
 }
+SOURCE = re.compile(r"`([\w./-]+\.(?:rs|toml|sh|yml|c|h|py|js|css))`")
+# A file that the reader writes, and one inside an FMU.
+NOT_HERE = ("position_pi.rs", "resources/rig.toml")
 log = logging.getLogger("mkdocs.hooks")
 
 
@@ -41,6 +44,12 @@ def anchor(title, separator):
     return re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", separator)
 
 
+def ends(path):
+    """A path and its ends: pages name files from the root or from a folder above them."""
+    parts = path.split("/")
+    return {"/".join(parts[start:]) for start in range(len(parts))}
+
+
 def on_config(config):
     config.mdx_configs.setdefault("toc", {})["slugify"] = anchor
     return config
@@ -49,7 +58,9 @@ def on_config(config):
 def on_files(files, config):
     for file in [file for file in files if file.src_dir == config.docs_dir]:
         files.remove(file)
-    for path in filter(in_book, tracked()):
+    names = tracked()
+    config.extra["known"] = set().union(*map(ends, names))
+    for path in filter(in_book, names):
         files.append(File.generated(config, path, abs_src_path=str(ROOT / path)))
     return files
 
@@ -70,4 +81,8 @@ def on_page_markdown(markdown, page, config, files):
     for what, pattern in UNLIKE.items():
         if any(pattern.search(part) for part in parts if not part.startswith("```")):
             log.warning("Doc file '%s' contains %s, which MkDocs does not render as the forge does.", page.file.src_uri, what)
+    for name in SOURCE.findall("".join(part for part in parts if not part.startswith("```"))):
+        absent = name not in config.extra["known"] and "NAME" not in name and not name.endswith(NOT_HERE)
+        if absent and ("/" in name or name.endswith(".rs")) and page.file.src_uri != "CHANGELOG.md":
+            log.warning("Doc file '%s' names '%s', which is not in the repository.", page.file.src_uri, name)
     return "".join(part if part.startswith("```") else LINK.sub(to_forge, part) for part in parts)
