@@ -1,6 +1,6 @@
 //! The plant's smooth effects against an independent solver: motions, who is on in them, and the differences.
 //!
-//! [`equations`] is the rig with its effects as one system of ordinary differential equations, [`solution`] lets diffsol
+//! [`equations`] is the rig with its effects as one system of ordinary differential equations, [`solution`] lets ode_solvers
 //! solve it, and here both follow the same commands from the same state. Smooth is what such a system can have: 35 of the 38
 //! effects. Left out are `spool-rate-limit` (a corner of its own), `line-delay` (an equation with a delay) and
 //! `rest-time-dependent-break-away` (acts on what rests).

@@ -1,7 +1,7 @@
-//! The equations under a window's commands, solved by diffsol: Tsitouras' explicit pair of orders 5 and 4 with its own control of
-//! the step, from edge to edge of the commands, across which nothing is smooth.
+//! The equations under a window's commands, solved by ode_solvers: Dormand and Prince's explicit pair of orders 5 and 4 with its
+//! own control of the step, from edge to edge of the commands, across which nothing is smooth.
 
-use diffsol::{MatrixCommon, NalgebraMat, OdeBuilder, OdeSolverMethod};
+use ode_solvers::{DVector, Dopri5, OutputType};
 
 use super::equations::{
     AXIS, BRISTLE, GAS_MASS, P, P_NODE, P_SILENCER, Q, SHOWN, SPOOL, STATES, System, V, X,
@@ -85,22 +85,52 @@ pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<
     (1..=inputs.len()).map(|k| [0, 1].map(|axis| seen(&system, axis, k as f64 * 1e-3, at))).collect()
 }
 
+/// The equations in units of the absolute tolerances, since the solver takes one tolerance for all states.
+struct Scaled<'s> {
+    system: &'s System<'s>,
+    units: Y,
+}
+
+impl ode_solvers::System<f64, DVector<f64>> for Scaled<'_> {
+    fn system(&self, _: f64, scaled: &DVector<f64>, rate: &mut DVector<f64>) {
+        let y: Y = std::array::from_fn(|i| scaled[i] * self.units[i]);
+        let mut rates = [0.0; STATES];
+        self.system.rates(&y, &mut rates);
+        (0..STATES).for_each(|i| rate[i] = rates[i] / self.units[i]);
+    }
+}
+
 /// The states at these times, of which the last ends the leg.
 fn through(system: &System<'_>, from: &Y, begin: f64, times: &[f64]) -> Vec<Y> {
-    let absolute = (0..STATES).map(|i| if i == P_NODE { 1e-3 } else { ABSOLUTE[i % AXIS] });
-    let problem = OdeBuilder::<NalgebraMat<f64>>::new()
-        .t0(begin)
-        .h0(1e-6)
-        .rtol(RELATIVE)
-        .atol(absolute.collect::<Vec<f64>>())
-        .rhs(|y: &[f64], _: &[f64], _: f64, rate: &mut [f64]| system.rates(y, rate))
-        .init(|_: &[f64], _: f64, y: &mut [f64]| y.copy_from_slice(from), STATES)
-        .build()
-        .expect("a plain system of equations");
-    let mut solver = problem.tsit45().expect("an explicit rule needs no more");
-    let (states, _) = solver.solve_dense(times).expect("the window is smooth");
-    let column = |j: usize| std::array::from_fn(|i| states.inner()[(i, j)]);
-    (0..times.len()).map(column).collect()
+    let units: Y = std::array::from_fn(|i| if i == P_NODE { 1e-3 } else { ABSOLUTE[i % AXIS] });
+    let (mut t, mut y) = (begin, *from);
+    let step_to = |&end: &f64| {
+        let scaled = DVector::from_iterator(STATES, (0..STATES).map(|i| y[i] / units[i]));
+        // Safety factor, beta, smallest and largest change of the step, and limits of steps are the solver's defaults; h = 0 is chosen.
+        let mut solver = Dopri5::from_param(
+            Scaled { system, units },
+            t,
+            end,
+            end - t,
+            scaled,
+            RELATIVE,
+            1.0,
+            0.9,
+            0.04,
+            0.2,
+            10.0,
+            end - t,
+            0.0,
+            100_000,
+            1000,
+            OutputType::Sparse,
+        );
+        solver.integrate().expect("the window is smooth");
+        let last = solver.y_out().last().expect("a step was made");
+        (t, y) = (end, std::array::from_fn(|i| last[i] * units[i]));
+        y
+    };
+    times.iter().map(step_to).collect()
 }
 
 /// The start of a window, with all that effects remember at rest, as the plant has it.
