@@ -157,8 +157,11 @@ fn add_figures(summary: &mut Map<String, Value>, record: &Record, figures: &Figu
             summary.insert(key.into(), json!(compute(record)));
         }
     }
-    let figures: Map<_, _> = figures.iter().map(|(name, value)| (name.to_owned(), json!(value))).collect();
-    summary.insert("figures".into(), Value::Object(figures));
+    let values: Map<_, _> = figures.iter().map(|(name, value)| (name.to_owned(), json!(value))).collect();
+    summary.insert("figures".into(), Value::Object(values));
+    let each: Map<_, _> =
+        figures.by_repetition().map(|(name, values)| (name.to_owned(), json!(values))).collect();
+    summary.insert("figures_by_repetition".into(), Value::Object(each));
 }
 
 /// What stands against the run, in a few words each; empty when it has passed.

@@ -7,7 +7,7 @@
 use crate::SummaryError;
 use crate::reports;
 use crate::series::{Series, Span};
-use crate::tables_read::{self, Table};
+use crate::tables_read::{self, StateSpan, Table};
 use std::path::Path;
 
 /// Numbers of a controller's table.
@@ -102,6 +102,38 @@ impl Record {
     #[must_use]
     pub fn experiments(&self) -> Vec<Span> {
         self.leader().in_state("main_chain", &["experiment"])
+    }
+
+    /// The run cut into its repetitions, the way to each included. One that the end of the run cut short is left out unless
+    /// there is no other; a run that tells no states is one repetition.
+    #[must_use]
+    pub fn repetitions(&self) -> Vec<Span> {
+        let states = self.leader().states("main_chain");
+        let is_last = |entry: &StateSpan| entry.state == "final-settling";
+        let begins_anew = |pair: &&[StateSpan]| is_last(&pair[0]) && pair[1].state == "initial-positioning";
+        let mut repetitions: Vec<Span> = Vec::new();
+        let mut from_s = f64::NEG_INFINITY;
+        for to_s in states.windows(2).filter(begins_anew).map(|pair| pair[1].span.from_s) {
+            repetitions.push(Span { from_s, to_s });
+            from_s = to_s;
+        }
+        if repetitions.is_empty() || states.iter().any(|entry| is_last(entry) && entry.span.from_s >= from_s)
+        {
+            repetitions.push(Span { from_s, to_s: f64::INFINITY });
+        }
+        repetitions
+    }
+
+    /// The part of the record inside `span`.
+    #[must_use]
+    pub fn within(&self, span: &Span) -> Self {
+        Self {
+            drive: self.drive.within(span),
+            load: self.load.within(span),
+            measured: self.measured.within(span),
+            truth: self.truth.within(span),
+            experiment: self.experiment.clone(),
+        }
     }
 
     /// The experiment with the waiting before and after it.
@@ -209,7 +241,6 @@ pub fn largest_step(set_point: &Series, spans: &[Span], least_value: f64) -> Opt
 #[cfg(test)]
 pub(crate) mod made {
     use super::*;
-    use crate::tables_read::StateSpan;
 
     /// A quantity each millisecond.
     pub(crate) fn each_ms(from_s: f64, to_s: f64, law: impl Fn(f64) -> f64) -> Series {
@@ -272,6 +303,34 @@ mod tests {
         };
         assert_eq!(rounded(record.moves()), [(1000.0, 2000.0)]);
         assert_eq!(rounded(record.rests()), [(500.0, 1000.0), (2000.0, 3000.0), (3000.0, 3500.0)]);
+    }
+
+    #[test]
+    fn a_run_is_cut_where_another_repetition_follows_and_one_cut_short_does_not_count() {
+        let repetition =
+            [("initial-positioning", 0.0), ("settling", 0.1), ("experiment", 0.2), ("final-settling", 0.8)];
+        let states = |times: f64, end_s: f64| {
+            let mut states: Vec<_> = (0..times as u32)
+                .flat_map(|number| repetition.map(|(state, at_s)| (state, at_s + f64::from(number))))
+                .take_while(|(_, at_s)| *at_s < end_s)
+                .collect();
+            states.push(("", end_s));
+            let mut drive = table(&[("position_m", &each_ms(0.0, end_s, |time| time))]);
+            drive.set_states("main_chain", chain(&states));
+            Record { drive, ..Record::default() }
+        };
+        let first_ms = |record: &Record| -> Vec<_> {
+            let firsts = record.repetitions().into_iter().map(|span| record.within(&span));
+            firsts.map(|part| (part.drive.numbers("position_m").values()[0] * 1e3).round()).collect()
+        };
+        assert_eq!(first_ms(&states(1.0, 1.0)), [0.0]);
+        assert_eq!(first_ms(&states(3.0, 3.0)), [0.0, 1000.0, 2000.0]);
+        assert_eq!(first_ms(&states(3.0, 2.5)), [0.0, 1000.0], "the third was cut short");
+        assert_eq!(first_ms(&states(1.0, 0.5)), [0.0], "but there is no other");
+        let record = states(3.0, 2.5);
+        let spans: Vec<_> =
+            record.repetitions().iter().flat_map(|span| record.within(span).experiments()).collect();
+        assert_eq!(spans, record.experiments()[..2]);
     }
 
     #[test]

@@ -19,6 +19,10 @@ pub fn table(joined: &Joined) -> String {
             row(&without_unit(name), in_use(value, unit));
         }
     }
+    let repetitions = joined.record.repetitions().len();
+    if repetitions > 1 {
+        row("repetitions", format!("{repetitions} (the figures are the worst)"));
+    }
     row("cycles", format!("{} ({} skipped)", count(figure("cycles")), count(figure("skipped"))));
     if joined.is_rehearsal() {
         row("frames and latencies", "none: rehearsal, no bus".into());

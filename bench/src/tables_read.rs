@@ -47,6 +47,21 @@ impl Table {
         spans
     }
 
+    /// The part of the table inside `span`.
+    #[must_use]
+    pub fn within(&self, span: &Span) -> Self {
+        let numbers = self.numbers.iter().map(|(name, column)| (*name, column.within(span)));
+        // The last state of a table may have a single row, and so no length.
+        let inside = |entry: &StateSpan| {
+            let lone = || span.holds(entry.span.from_s).then_some(entry.span);
+            let common = entry.span.common(span).or_else(lone)?;
+            Some(StateSpan { state: entry.state.clone(), span: common })
+        };
+        let states =
+            self.states.iter().map(|(name, column)| (*name, column.iter().filter_map(inside).collect()));
+        Self { numbers: numbers.collect(), states: states.collect() }
+    }
+
     /// Puts a column of numbers in.
     pub fn set_numbers(&mut self, name: &'static str, column: Series) {
         self.numbers.insert(name, column);

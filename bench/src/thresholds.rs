@@ -9,7 +9,8 @@
 //! ```
 //!
 //! A key is looked up at the top of the summary, then under `figures`. A figure that was not measured does not keep its bounds:
-//! absence is no proof.
+//! absence is no proof. Of a figure that each repetition has (`figures_by_repetition`) every value must keep them; the one that
+//! keeps them least is judged.
 
 use crate::{SummaryError, figures};
 use serde_json::{Map, Value, json};
@@ -73,6 +74,12 @@ impl Bounds {
         Ok(bounds)
     }
 
+    /// How far inside a value is; negative outside.
+    fn slack(&self, value: f64) -> f64 {
+        let below = self.most.map_or(f64::INFINITY, |most| most - value);
+        below.min(self.least.map_or(f64::INFINITY, |least| value - least))
+    }
+
     fn hold(&self, value: f64) -> bool {
         self.least.is_none_or(|least| value >= least) && self.most.is_none_or(|most| value <= most)
     }
@@ -94,6 +101,11 @@ pub fn judge(passed: &toml::Table, summary: &Map<String, Value>) -> Result<Map<S
                 Some(value.as_f64().ok_or_else(|| refused("that key of summary.json is no number"))?)
             }
         };
+        let value = value.map(|worst| {
+            let each = summary.get("figures_by_repetition").and_then(|each| each.get(key)?.as_array());
+            let values = each.into_iter().flatten().filter_map(Value::as_f64);
+            values.fold(worst, |one, other| if bounds.slack(other) < bounds.slack(one) { other } else { one })
+        });
         let kept = value.is_some_and(|value| bounds.hold(value));
         let Bounds { least, most } = bounds;
         Ok((key.clone(), json!({ "least": least, "most": most, "value": value, "kept": kept })))
@@ -189,6 +201,25 @@ mod tests {
             ("force_settling_s = { least = 0.07, most = 0.09 }", false),
         ] {
             assert_eq!(judged(passed).unwrap().values().all(is_kept), kept, "{passed}");
+        }
+    }
+
+    #[test]
+    fn every_repetition_must_keep_a_bound_and_the_one_that_keeps_it_least_is_told() {
+        let summary = json!({
+            "figures": { "force_settling_s": 0.12 },
+            "figures_by_repetition": { "force_settling_s": [0.12, 0.08, null] },
+        });
+        let Value::Object(summary) = summary else { unreachable!("the literal above is an object") };
+        for (bound, kept, value) in [
+            ("{ least = 0.07, most = 0.13 }", true, 0.12),
+            ("{ least = 0.075, most = 0.13 }", true, 0.08),
+            ("{ least = 0.09, most = 0.13 }", false, 0.08),
+            ("0.11", false, 0.12),
+        ] {
+            let judged = judge(&format!("force_settling_s = {bound}").parse().unwrap(), &summary).unwrap();
+            let entry = &judged["force_settling_s"];
+            assert_eq!((is_kept(entry), entry["value"].as_f64()), (kept, Some(value)), "{bound}");
         }
     }
 

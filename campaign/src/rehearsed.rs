@@ -78,17 +78,24 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
         drive.and_then(|figures| figures.dynamic_m()).or_else(|| position::error_dynamic_m(record)),
         drive.and_then(|figures| figures.static_m()).or_else(|| position::error_static_m(record)),
     ];
-    let figures = figures::of(record);
+    let computed = figures::of(record);
     let known = TOP.into_iter().zip(top).filter_map(|(name, value)| Some((name, value?)));
     let figures: BTreeMap<_, _> =
-        known.chain(figures.iter()).map(|(name, value)| (name.to_owned(), Value::Number(value))).collect();
-    let passed = passed(inputs, &figures, ended)?;
+        known.chain(computed.iter()).map(|(name, value)| (name.to_owned(), Value::Number(value))).collect();
+    let each: Map<_, _> =
+        computed.by_repetition().map(|(name, values)| (name.to_owned(), json!(values))).collect();
+    let passed = passed(inputs, &figures, each, ended)?;
     let simulated_s = rehearsal.cycles() as f64 * 1e-3;
     Ok(Outcome { ended, because, simulated_s, passed, figures })
 }
 
 /// Whether the experiment's bounds are kept; a rehearsal loses no frames, is never late, and has no latency to bound.
-fn passed(inputs: &Inputs, figures: &BTreeMap<String, Value>, ended: Ended) -> Result<Option<bool>, String> {
+fn passed(
+    inputs: &Inputs,
+    figures: &BTreeMap<String, Value>,
+    by_repetition: Map<String, serde_json::Value>,
+    ended: Ended,
+) -> Result<Option<bool>, String> {
     let bounds = &inputs.experiment.passed;
     if bounds.is_empty() {
         return Ok(None);
@@ -100,6 +107,7 @@ fn passed(inputs: &Inputs, figures: &BTreeMap<String, Value>, ended: Ended) -> R
         summary.insert(name.to_owned(), json!(0));
     }
     summary.insert("figures".to_owned(), json!({}));
+    summary.insert("figures_by_repetition".to_owned(), by_repetition.into());
     for (name, value) in figures {
         let at_top = TOP.contains(&name.as_str());
         let table = if at_top { Some(&mut summary) } else { summary["figures"].as_object_mut() };

@@ -1,6 +1,6 @@
 /* The drive controller.
  *
- *                sensors, tick        there            2 s            3 s, 1 s, 3 s, 1 s
+ *                sensors, tick        there            2 s            twice 3, 1, 3, 1 s
  *     WAITING ─────────────► APPROACH ─────► SETTLING ─────► EXPERIMENT ─────► FINAL ─────► DONE
  *        ▲                       └───────────────┴───────┬───────┴────────────────┘ 0.5 s
  *        │ RunControl start, no stop any more            │ emergency stop, abort; own sensors silent for 50 ms
@@ -22,6 +22,8 @@
 #define APPROACH_MS 1000U
 #define MOVE_MS 3000U
 #define REST_MS 1000U
+#define REPETITION_MS (2U * (MOVE_MS + REST_MS))
+#define REPETITIONS 2U
 #define SETTLING_MS 2000U
 #define FINAL_MS 500U
 #define STATUS_EVERY_CYCLES 10U
@@ -187,16 +189,20 @@ static void advance(void)
             enter(EXPERIMENT);
         }
         break;
-    case EXPERIMENT:
-        if (now < MOVE_MS + REST_MS) {
-            fw.set_point = motion_bestehorn(START_M, FAR_M, now, MOVE_MS);
+    case EXPERIMENT: {
+        const uint32_t within = now % REPETITION_MS;
+        if (now >= REPETITIONS * REPETITION_MS) {
+            fw.set_point = (struct motion_point){.position_m = START_M};
+        } else if (within < MOVE_MS + REST_MS) {
+            fw.set_point = motion_bestehorn(START_M, FAR_M, within, MOVE_MS);
         } else {
-            fw.set_point = motion_bestehorn(FAR_M, START_M, now - MOVE_MS - REST_MS, MOVE_MS);
+            fw.set_point = motion_bestehorn(FAR_M, START_M, within - MOVE_MS - REST_MS, MOVE_MS);
         }
-        if (now >= 2U * (MOVE_MS + REST_MS)) {
+        if (now >= REPETITIONS * REPETITION_MS) {
             enter(FINAL);
         }
         break;
+    }
     case FINAL:
         if (now >= FINAL_MS) {
             enter(DONE);

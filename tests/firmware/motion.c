@@ -1,6 +1,6 @@
 /* The set-point and the control law.
  *
- *     v = GAIN (w - x) + w'               proportional, with velocity feed-forward
+ *     v = GAIN (w - x) + FEED_FORWARD w'  proportional, with velocity feed-forward
  *     K_V = v A_out 3600 / (12.95 p_N)    choked exhaust of the outgoing chamber, p_N in bar
  *     opening = K_V,exhaust^-1(K_V)
  *
@@ -12,7 +12,8 @@
 #include <math.h>
 
 #define TWO_PI 6.28318531F
-#define GAIN_PER_S 20.0F
+#define GAIN_PER_S 24.0F /* gain and feed-forward of controller/programs/position-p.toml */
+#define FEED_FORWARD 1.15F
 #define REST_ZONE_M 5e-4F
 #define STANDING_M 1e-4F /* a band that a standing rod does not leave */
 #define STANDING_MS 50U
@@ -73,7 +74,8 @@ float motion_step(struct motion_control *control, struct motion_point set_point,
     if (rests(control, set_point, position_m)) {
         return 0.0F;
     }
-    const float velocity = GAIN_PER_S * (set_point.position_m - position_m) + set_point.velocity_m_per_s;
+    const float velocity =
+        GAIN_PER_S * (set_point.position_m - position_m) + FEED_FORWARD * set_point.velocity_m_per_s;
     if (velocity > 0.0F) {
         return opening_for(velocity * ANNULUS_AREA_M2 * KV_PER_M2_M_PER_S);
     }

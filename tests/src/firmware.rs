@@ -12,14 +12,17 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Largest dynamic and static error that it may have, m: the bounds of controller/experiments/point-to-point.toml.
-pub const DYNAMIC_M: f64 = 0.005;
+pub const DYNAMIC_M: f64 = 0.004;
 /// The same at rest.
-pub const STATIC_M: f64 = 0.0005;
+pub const STATIC_M: f64 = 0.0004;
 
 /// The places between which it moves, m, and its times, in cycles.
 const PLACES_M: [f64; 2] = [0.1, 0.4];
 const MOVE_CYCLES: u64 = 3000;
 const REST_CYCLES: u64 = 1000;
+/// How often it moves out and back; the first time with the chamber pressures of the start.
+const REPETITIONS: u64 = 2;
+const EXPERIMENT_CYCLES: u64 = REPETITIONS * 2 * (MOVE_CYCLES + REST_CYCLES);
 /// The last part of a rest, over which the static error is averaged (bus.md, A run's folder).
 const STATIC_CYCLES: u64 = 200;
 /// Cycles without an answer, in real time, by which a machine that stands still holds the loop up; and how many cycles after it
@@ -72,7 +75,7 @@ pub fn positioned(frames: &[CanFrame]) -> Positioned {
     let began = counted.began.expect("it told that its experiment began");
     let mut done = Positioned::default();
     let mut rests: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-    for (cycle, position_m) in counted.positions_m.range(began..began + 2 * (MOVE_CYCLES + REST_CYCLES)) {
+    for (cycle, position_m) in counted.positions_m.range(began..began + EXPERIMENT_CYCLES) {
         let (set_point_m, part, within) = set_point(cycle - began);
         let error_m = (set_point_m - position_m).abs();
         let held_up = counted.held_up.range(cycle.saturating_sub(RECOVERY_CYCLES)..=*cycle);
@@ -87,20 +90,20 @@ pub fn positioned(frames: &[CanFrame]) -> Positioned {
             rests.entry(part).or_default().push(error_m);
         }
     }
-    assert_eq!(rests.len(), 2, "both rests are there");
+    assert_eq!(rests.len() as u64, 2 * REPETITIONS, "all rests are there");
     let means = rests.values().map(|errors_m| errors_m.iter().sum::<f64>() / errors_m.len() as f64);
     done.position_error_static_m = means.fold(0.0, f64::max);
-    for (cycle, told_m) in counted.set_points_m.range(began + 1..began + 2 * (MOVE_CYCLES + REST_CYCLES)) {
+    for (cycle, told_m) in counted.set_points_m.range(began + 1..began + EXPERIMENT_CYCLES) {
         done.set_point_error_m = done.set_point_error_m.max((set_point(cycle - began).0 - told_m).abs());
         done.set_points += 1;
     }
     done
 }
 
-/// The Bestehorn sinoid out, a rest, and back, a rest: set-point in m, which of both, and the cycle within it.
+/// The Bestehorn sinoid out, a rest, and back, a rest: set-point in m, which of all moves, and the cycle within it.
 fn set_point(cycle: u64) -> (f64, u64, u64) {
     let (part, within) = (cycle / (MOVE_CYCLES + REST_CYCLES), cycle % (MOVE_CYCLES + REST_CYCLES));
-    let (from_m, to_m) = if part == 0 { (PLACES_M[0], PLACES_M[1]) } else { (PLACES_M[1], PLACES_M[0]) };
+    let (from_m, to_m) = if part % 2 == 0 { (PLACES_M[0], PLACES_M[1]) } else { (PLACES_M[1], PLACES_M[0]) };
     let z = within.min(MOVE_CYCLES) as f64 / MOVE_CYCLES as f64;
     (from_m + (to_m - from_m) * (z - libm::sin(TAU * z) / TAU), part, within)
 }

@@ -54,8 +54,8 @@ fn it_positions_within_the_figures_and_in_lockstep_always_alike() {
     }
     let done = positioned(&bus_log(&folder.join("bus.log")));
     eprintln!("{done:?}");
-    assert_eq!((done.cycles, done.left_out), (8000, 0));
-    assert!(done.set_points > 790 && done.set_point_error_m < 2e-5, "{done:?}");
+    assert_eq!((done.cycles, done.left_out), (16_000, 0));
+    assert!(done.set_points > 1590 && done.set_point_error_m < 2e-5, "{done:?}");
     assert!(done.position_error_dynamic_m < DYNAMIC_M, "{done:?}");
     assert!(done.position_error_static_m < STATIC_M, "{done:?}");
     // It does position: the errors are those of a real loop, and not of a carriage that was not there.

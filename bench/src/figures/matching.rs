@@ -1,6 +1,6 @@
 //! The matching chain: the offset that it found between both measured positions, and what is left of it.
 
-use super::{Definition, Family, Figures};
+use super::{Definition, Family, Figures, Worst};
 use crate::record::Record;
 use crate::series::Span;
 
@@ -14,11 +14,13 @@ pub(super) const FAMILY: Family = Family {
         Definition {
             name: "matching_offset_m",
             unit: "m",
+            worst: Worst::Farthest,
             meaning: "offset taken off the load's position sensor, as last matched",
         },
         Definition {
             name: "matching_residual_m",
             unit: "m",
+            worst: Worst::Farthest,
             meaning: "mean of load position (offset taken off) less drive position in the 0.5 s after matching",
         },
     ],

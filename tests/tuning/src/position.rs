@@ -43,8 +43,11 @@ const fn to(to_m: f64, duration_s: f64, rest_s: f64) -> Move {
 
 /// Where all moves start, m.
 const START_M: f64 = 0.1;
-/// The paper's positioning: Fig. 8.
-pub const POINT_TO_POINT: &[Move] = &[to(0.4, 3.0, 1.0), to(0.1, 3.0, 1.0)];
+/// The paper's positioning, Fig. 8, twice: the first repetition has the chamber pressures of the start, the others do not.
+pub const POINT_TO_POINT: &[Move] =
+    &[to(0.4, 3.0, 1.0), to(0.1, 3.0, 1.0), to(0.4, 3.0, 1.0), to(0.1, 3.0, 1.0)];
+/// Weights with which the positioning keeps its bounds, kg.
+pub const WEIGHTS_KG: [f64; 3] = [0.0, 2.5, 5.0];
 /// A step and back: Fig. 7.
 pub const STEP: &[Move] = &[to(0.3, 0.0, 2.0), to(0.1, 0.0, 2.0)];
 /// What wakes up an oscillation: both ends, the soft middle, a step.
@@ -81,6 +84,22 @@ impl Figures {
 /// [`TrialError`] when the conditions are none of the rig's, or the algorithm's result is no number.
 pub fn attempt(program: Program, moves: &[Move], trial: &Trial) -> Result<Figures, TrialError> {
     attempt_late(program, moves, trial, 0)
+}
+
+/// The positioning with each of [`WEIGHTS_KG`]: the worst of all.
+///
+/// # Errors
+/// As [`attempt`].
+pub fn positioning(program: impl Fn() -> Program) -> Result<Figures, TrialError> {
+    let mut worst = Figures::default();
+    for added_mass_kg in WEIGHTS_KG {
+        let trial = Trial { added_mass_kg, ..Trial::default() };
+        let figures = attempt(program(), POINT_TO_POINT, &trial)?;
+        worst.dynamic_m = worst.dynamic_m.max(figures.dynamic_m);
+        worst.static_m = worst.static_m.max(figures.static_m);
+        worst.rest_peak_to_peak_m = worst.rest_peak_to_peak_m.max(figures.rest_peak_to_peak_m);
+    }
+    Ok(worst)
 }
 
 /// The same with each command so many cycles late.

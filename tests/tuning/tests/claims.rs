@@ -50,7 +50,7 @@ fn broken_of_fig_9(figure: impl Fn(&str) -> f64) -> Vec<&'static str> {
 fn fig_8_with_the_papers_program() {
     let figure = positioning("position-p");
     let (dynamic_m, static_m) = (figure("position_error_dynamic_m"), figure("position_error_static_m"));
-    assert!(dynamic_m <= 5e-3 && static_m <= 5e-4, "{dynamic_m} m, {static_m} m");
+    assert!(dynamic_m <= 4e-3 && static_m <= 4e-4, "{dynamic_m} m, {static_m} m");
     assert_eq!(figure("position_error_maxima"), 2.0);
     assert!(figure("position_rest_peak_to_peak_smoothed_m") <= 2e-4);
 }

@@ -6,12 +6,16 @@ use axis_control::program::file::{ProgramError, Source};
 use plant::{Axis, RigParameters};
 use std::error::Error;
 use std::path::Path;
-use tuning::position::{POINT_TO_POINT, STEP, attempt, delay_margin, gain_margin};
+use tuning::position::{POINT_TO_POINT, STEP, attempt, delay_margin, gain_margin, positioning};
 use tuning::{Trial, TrialError, in_parallel};
 
 const GAIN: &str = "algorithm.gain_per_s";
+const FEED_FORWARD: &str = "algorithm.velocity_feed_forward";
+/// Numbers of the paper's program that are tried together.
+const GAINS: [f64; 6] = [20.0, 22.0, 24.0, 26.0, 28.0, 30.0];
+const SHARES: [f64; 5] = [1.0, 1.05, 1.1, 1.15, 1.2];
 const PROGRAMS: [(&str, &[f64]); 3] = [
-    ("position-p", &[5.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0]),
+    ("position-p", &[5.0, 8.0, 10.0, 12.0, 15.0, 20.0, 24.0, 26.0, 28.0, 30.0, 40.0]),
     ("position-pid", &[10.0, 15.0, 20.0, 25.0, 30.0, 40.0]),
     ("position-cascade", &[5.0, 10.0, 15.0, 20.0, 25.0, 30.0]),
 ];
@@ -25,6 +29,9 @@ pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
         println!("\n### {name}\n");
         shipped.by_gain(gains)?;
         shipped.by_corner()?;
+        if name == "position-p" {
+            shipped.by_feed_forward()?;
+        }
     }
     Ok(())
 }
@@ -53,7 +60,7 @@ impl Shipped {
         let own = own.place(GAIN).map(|place| own.values()[place]);
         for &gain in gains {
             let make = || self.program(Some(gain)).expect("made before");
-            let moved = attempt(make(), POINT_TO_POINT, &Trial::default())?;
+            let moved = positioning(make)?;
             let tried = in_parallel(&Trial::corners(), |trial| {
                 Ok((gain_margin(make, trial)?, attempt(make(), STEP, trial)?.overshoot_m))
             });
@@ -72,6 +79,29 @@ impl Shipped {
                 worst.1 * 1e3,
                 worst.0
             );
+        }
+        Ok(())
+    }
+
+    /// Gain and feed-forward together: dynamic and static error, and the margin at 0 kg and 7 bar.
+    fn by_feed_forward(&self) -> Result<(), Box<dyn Error>> {
+        println!("\n| gain, 1/s | {} |", SHARES.map(|share| format!("feed-forward {share}")).join(" | "));
+        println!("|---{}|", "|---".repeat(SHARES.len()));
+        for gain in GAINS {
+            let cells = in_parallel(&SHARES, |&share| {
+                let make = || {
+                    let mut program = self.program(Some(gain)).expect("made before");
+                    let place = program.place(FEED_FORWARD).expect("the paper's program feeds forward");
+                    program.set(place, share).expect("the shares are within the range");
+                    program
+                };
+                let figures = positioning(make)?;
+                let margin = gain_margin(make, &Trial::default())?;
+                let (dynamic_mm, static_mm) = (figures.dynamic_m * 1e3, figures.static_m * 1e3);
+                Ok(format!("{dynamic_mm:.2} mm / {static_mm:.2} mm / {margin}"))
+            });
+            let cells = cells.into_iter().collect::<Result<Vec<_>, TrialError>>()?;
+            println!("| {gain} | {} |", cells.join(" | "));
         }
         Ok(())
     }
