@@ -10,7 +10,6 @@ use axis_control::rig_view::PerAxis;
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::{Bus, BusError, Received};
 use realtime::{Clock, Continued, Interrupt, VitalsReader};
-use runlog::timing::Vitals;
 use std::time::{Duration, Instant as WallInstant};
 
 /// Longest wait for a frame before looking at the world again.
@@ -86,7 +85,7 @@ pub fn run_real(
         }
         stopwatch.took_all();
         let answered = node.answer(&mut stopwatch.bus(bus));
-        stopwatch.answered(answered, || counted(&mut vitals));
+        stopwatch.answered(answered, || vitals.read());
         if interrupt.came() {
             break End::Interrupted;
         }
@@ -121,20 +120,6 @@ pub fn run_real(
         realtime::allocations::counted()
     });
     RunOutcome { end, allocations, stopwatch: stopwatch.finish() }
-}
-
-/// What the kernel counted since it was asked last, in the words of the timing table.
-fn counted(vitals: &mut VitalsReader) -> Vitals {
-    let counts = vitals.read();
-    Vitals {
-        minor_faults: counts.minor_faults,
-        major_faults: counts.major_faults,
-        voluntary_switches: counts.voluntary_switches,
-        involuntary_switches: counts.involuntary_switches,
-        run_delay_ns: counts.run_delay_ns,
-        continued: counts.continued,
-        cpu: counts.cpu,
-    }
 }
 
 /// Whether the rig is heard of.

@@ -3,7 +3,7 @@
 //! A thread of its own polls the queues, so that the 1 ms path wakes nobody.
 
 use crate::reload::Reloader;
-use crate::timing::ledger::{Ledger, TimingFigures};
+use crate::timing::queues::TimingQueues;
 use algorithms::guard::Stuck;
 use axis_control::axis::AxisRecord;
 use axis_control::node::News;
@@ -11,6 +11,7 @@ use crossbeam_channel::{Receiver, TryRecvError};
 use plant::Axis;
 use protocol::frames::MainChainState;
 use runlog::run_folder::LineFile;
+use runlog::timing_recorder::TimingFigures;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -102,8 +103,8 @@ pub struct Writer {
     pub reloader: Option<Reloader>,
     /// Who does what XCP asks for, if it may.
     pub clerk: Option<Clerk>,
-    /// Who records what the stopwatch stamped, where time is real.
-    pub ledger: Option<Ledger>,
+    /// Stamps of the stopwatch and their recorder, where time is real.
+    pub timing: Option<TimingQueues>,
 }
 
 /// What is left when the queues' senders are gone.
@@ -120,7 +121,7 @@ impl Writer {
     /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
     /// which does not return, when an algorithm never does, with everything written.
     pub fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
-        let Self { mut tables, records, news, mut reloader, mut clerk, mut ledger } = self;
+        let Self { mut tables, records, news, mut reloader, mut clerk, mut timing } = self;
         let mut told = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
@@ -145,33 +146,33 @@ impl Writer {
             }
             for item in news.try_iter() {
                 eprintln!("controller: {}", sentence(item));
-                if let (News::State { state: MainChainState::Fault, cycle, .. }, Some(ledger)) =
-                    (item, &mut ledger)
+                if let (News::State { state: MainChainState::Fault, cycle, .. }, Some(timing)) =
+                    (item, &mut timing)
                 {
-                    ledger.fault(cycle);
+                    timing.fault(cycle);
                 }
                 told.push(item);
             }
-            if let Some(ledger) = &mut ledger {
-                note(&mut failure, if finished { ledger.finish() } else { ledger.look() });
+            if let Some(timing) = &mut timing {
+                note(&mut failure, if finished { timing.finish() } else { timing.poll() });
             }
             if watch.look() {
                 // The process ends here; a failure of the last write has nobody left to be told to.
                 let _ = tables.write_out();
-                let _ = ledger.as_mut().map(Ledger::finish);
+                let _ = timing.as_mut().map(TimingQueues::finish);
                 stuck();
             }
             if finished || last_flush.elapsed() > FLUSH_PERIOD {
                 last_flush = Instant::now();
                 note(&mut failure, tables.write_out());
-                note(&mut failure, ledger.as_mut().map_or(Ok(()), Ledger::write_out));
+                note(&mut failure, timing.as_mut().map_or(Ok(()), TimingQueues::write_out));
             }
             if let Some(failure) = &failure {
                 eprintln!("controller: cannot write {failure}; free space or choose another --out");
                 failed();
             }
             if finished || failure.is_some() {
-                return Written { told, failure, timing: ledger.map(|ledger| ledger.figures()) };
+                return Written { told, failure, timing: timing.map(|timing| timing.figures()) };
             }
             std::thread::sleep(POLL_PERIOD);
         }

@@ -1,13 +1,13 @@
 //! `controller.json`, or `controller-drive.json` and `controller-load.json`: what a process's controllers were run with and what
 //! they counted.
 
-use crate::timing::ledger::TimingFigures;
 use axis_control::axis::AxisController;
 use axis_control::node::{CalibrationPort, ControllerNode, IgnoredFrames, News};
 use axis_control::setup::Inputs;
 use plant::Axis;
 use protocol::bus::BusCounters;
 use protocol::frames::MainChainState;
+use runlog::timing_recorder::TimingFigures;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use xcp::port::PortCounters;

@@ -8,7 +8,6 @@ use crate::recording::{Tables, Writer, Written};
 use crate::reload::Reloader;
 use crate::report::{self, AxisReport, Report};
 use crate::timing::Stopwatch;
-use crate::timing::ledger::TimingFigures;
 use crate::timing::setup::{self, RunStart};
 use algorithms::guard::STUCK;
 use axis_control::axis::AxisController;
@@ -22,6 +21,7 @@ use protocol::exit::Exit;
 use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, Request};
 use runlog::flight_dump;
 use runlog::run_folder::{SCHEMA_VERSION, clear, controller_results, write_json};
+use runlog::timing_recorder::TimingFigures;
 use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
@@ -122,12 +122,12 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let reloader = arguments.watch.then(|| Reloader::new(&inputs, axes, change_sender));
     let started = RunStart::now();
     let timing = real_time.then(|| setup::begin(arguments, &started, signals.freeze)).transpose()?;
-    let (stopwatch, ledger) = timing.unzip();
+    let (stopwatch, timing) = timing.unzip();
     std::thread::scope(|scope| {
         // The writer owns the receiving ends: when it fails, nobody waits for room in its queues.
         let asking = &signals.interrupt;
         let writer = scope.spawn(move || {
-            let writer = Writer { tables, records, news, reloader, clerk, ledger };
+            let writer = Writer { tables, records, news, reloader, clerk, timing };
             writer.run(|| asking.ask(), || end_stuck(out, axes))
         });
         let bus = bus.as_mut();

@@ -17,10 +17,10 @@
 //! What arrived before the loop began to wait was not late: a cycle is due then at the earliest, and sensors from before are
 //! counted apart.
 //!
-//! This side stamps and hands over; the recorder's thread ([`ledger`]) does the rest. Nothing here allocates, locks, prints or
+//! This side stamps and hands over; the recorder's thread ([`queues`]) does the rest. Nothing here allocates, locks, prints or
 //! blocks.
 
-pub mod ledger;
+pub mod queues;
 pub mod setup;
 mod timed_bus;
 
@@ -28,8 +28,8 @@ use crossbeam_channel::Sender;
 use plant::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
-use realtime::Clock;
-use runlog::timing::{CycleTiming, Exchange, Vitals};
+use realtime::{Clock, VitalCounts};
+use runlog::timing::{CycleTiming, Exchange};
 pub use timed_bus::TimedBus;
 
 /// Cycles that an answer may be older than the newest one and still belong to the same rig; below, the rig began anew.
@@ -167,7 +167,7 @@ impl<C: Clock + Send> Stopwatch<C> {
 
     /// The axes answered these cycles. When that made a row whole, `vitals` is asked what the kernel counted since it was asked
     /// last.
-    pub fn answered(&mut self, cycles: [Option<u64>; 2], vitals: impl FnOnce() -> Vitals) {
+    pub fn answered(&mut self, cycles: [Option<u64>; 2], vitals: impl FnOnce() -> VitalCounts) {
         if cycles == [None; 2] {
             return;
         }

@@ -6,7 +6,7 @@ use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
 use crate::summary::Summary;
 use protocol::exit::Exit;
-use realtime::{Percentiles, Recorder as Histogram, StageFigures};
+use realtime::{Percentiles, Recorder as Histogram};
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use std::path::Path;
 
@@ -66,13 +66,10 @@ fn summarise(
     let percentiles = |recorder: Option<&Histogram>| {
         recorder.map_or_else(|| Histogram::new().percentiles(), Histogram::percentiles)
     };
-    let WriterReport { evidence, events, event_count, .. } = written;
-    let nothing = || Histogram::new().percentiles();
-    let of_stage =
-        |pick: fn(&StageFigures) -> Percentiles| evidence.stages.as_ref().map_or_else(nothing, pick);
-    let of_axes = |figures: Option<[Percentiles; 2]>| figures.unwrap_or_else(|| [nothing(), nothing()]);
-    let [round_trip_ns, load_round_trip_ns] = of_axes(evidence.round_trip_ns);
-    let [drive_command_age_ns, load_command_age_ns] = of_axes(evidence.command_age_ns);
+    let WriterReport { timing: rig_timing, events, event_count, .. } = written;
+    let timing = rig_timing.timing;
+    let [round_trip_ns, load_round_trip_ns] = rig_timing.round_trip_ns;
+    let [drive_command_age_ns, load_command_age_ns] = rig_timing.command_age_ns;
     let of_loop =
         |pick: fn(&realtime::LoopStatistics) -> &Histogram| -> Percentiles { percentiles(loops.map(pick)) };
     Summary {
@@ -95,19 +92,19 @@ fn summarise(
         wakeup_ns: of_loop(|statistics| &statistics.wakeup_ns),
         execution_ns: of_loop(|statistics| &statistics.execution_ns),
         period_error_ns: of_loop(|statistics| &statistics.period_error_ns),
-        receive_ns: of_stage(|stages| stages.receive_ns),
-        step_ns: of_stage(|stages| stages.step_ns),
-        send_ns: of_stage(|stages| stages.send_ns),
-        completion_ns: of_stage(|stages| stages.completion_ns),
+        receive_ns: timing.stages.receive_ns,
+        step_ns: timing.stages.step_ns,
+        send_ns: timing.stages.send_ns,
+        completion_ns: timing.stages.completion_ns,
         round_trip_ns,
         load_round_trip_ns,
         drive_command_age_ns,
         load_command_age_ns,
-        command_age_cycles: evidence.command_age_cycles,
-        arrivals: evidence.arrivals,
-        flight: evidence.flight,
-        wall_clock_steps: evidence.wall_clock_steps,
-        vitals: evidence.vitals,
+        command_age_cycles: rig_timing.command_age_cycles,
+        arrivals: timing.arrivals,
+        flight: timing.flight,
+        wall_clock_steps: rig_timing.wall_clock_steps,
+        vitals: timing.vitals,
         allocations_in_cycle: paced.allocations.filter(|_| cfg!(feature = "count-allocations")),
         records_dropped: figures.records_dropped,
         ended_because,

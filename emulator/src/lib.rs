@@ -9,7 +9,7 @@
 //! | [`pace`] | what moves it from cycle to cycle: the clock, or the barrier |
 //! | [`exchange`] | when sensors went out and the commands that answer them came |
 //! | [`wire_limits`] | whether the numbers of a rig fit the frames |
-//! | [`recording`] | the queues out of the 1 ms path, the files, and the evidence of real time |
+//! | [`recording`] | the queues out of the 1 ms path, the files, and the timing of the rig |
 //! | `finish` | histograms, summary, exit code |
 //! | [`faults`] | what is broken on purpose, when, and how it is told |
 //! | [`console`] | what a person types |

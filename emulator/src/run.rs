@@ -16,7 +16,7 @@ use crate::host_thread::HostThread;
 use crate::inputs::{Inputs, Script};
 use crate::node::{EmulatorNode, NodeFigures, NodeParts};
 use crate::pace::{self, Limits, Pace, RunContext, RunOutcome, Shared};
-use crate::recording::evidence::{EvidenceSetup, PROCESS};
+use crate::recording::rig_timing::PROCESS;
 use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
 use crate::summary::RunDescription;
@@ -30,8 +30,9 @@ use protocol::exit::Exit;
 use realtime::{
     Clock, Continued, Freeze, Grants, Interrupt, Machine, MonotonicClock, PeriodicConfig, Request,
 };
-use runlog::flight_dump;
+use runlog::flight_dump::{self, Log};
 use runlog::run_folder::{SCHEMA_VERSION, clear_results, write_json};
+use runlog::timing_recorder::{Due, TimingSetup};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -330,12 +331,16 @@ fn open_folder(
         added_mass_kg: inputs.scene.added_mass_kg,
         terms,
         faults: can_break(arguments),
-        evidence: started.unix_s.map(|started_unix_s| EvidenceSetup {
+        timing: started.unix_s.map(|started_unix_s| TimingSetup {
+            folder: folder.into(),
+            process: PROCESS.into(),
+            due: Due::EveryPeriod,
             full_timing: arguments.full_timing,
             flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
+            log: Log { interface: interface.into(), epoch_offset_ns: started.epoch_offset_ns },
             started_unix_s,
-            base: started.monotonic,
-            told: telemetry.is_some(),
+            started: started.monotonic,
+            copies_lines: telemetry.is_some(),
         }),
         telemetry,
     })

@@ -5,12 +5,13 @@
 
 use crate::event::Event;
 use crate::node::FrameCounters;
-use crate::recording::evidence::{CommandAges, FlightFigures};
+use crate::recording::rig_timing::CommandAges;
 use plant::Scene;
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
 use protocol::commands::CommandCounters;
 use realtime::{ArrivalFigures, Machine, Percentiles, VitalTotals, WallClockStep};
+use runlog::timing_recorder::FlightFigures;
 use serde::Serialize;
 
 /// `run.json`: what a run was made with.

@@ -24,14 +24,14 @@ use serde::Serialize;
 
 use crate::signals::Continued;
 
-/// Counts of the calling thread since the last reading.
+/// Counts of a thread since the last reading, of a loop's thread during one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VitalCounts {
     /// Page faults served without the disk.
     pub minor_faults: u64,
     /// Page faults that had to read from it.
     pub major_faults: u64,
-    /// Times the thread gave the CPU away to wait.
+    /// Times the thread gave the CPU away to wait; one a cycle is usual.
     pub voluntary_switches: u64,
     /// Times another thread took the CPU from it.
     pub involuntary_switches: u64,

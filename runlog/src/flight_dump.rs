@@ -10,7 +10,6 @@
 use crate::candump::{self, FrameRecord};
 use crate::run_folder::{SCHEMA_VERSION, named, write_json};
 use crate::timing::{CycleTiming, write_head, write_row};
-use protocol::can::CanFrame;
 use serde::Serialize;
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -73,7 +72,7 @@ pub fn write<'a>(
     run: &Path,
     event: &Event,
     rows: impl IntoIterator<Item = &'a CycleTiming>,
-    frames: impl IntoIterator<Item = (u64, &'a CanFrame)>,
+    frames: impl IntoIterator<Item = &'a FrameRecord>,
     log: &Log,
 ) -> io::Result<()> {
     let folder = run.join(FOLDER).join(event.name());
@@ -83,10 +82,9 @@ pub fn write<'a>(
         rows.into_iter().try_for_each(|row| write_row(out, row))
     })?;
     write_file(&folder.join("bus.log"), |out| {
-        frames.into_iter().try_for_each(|(stamp_ns, frame)| {
-            let record = FrameRecord { stamp_ns, frame: *frame };
-            candump::write_line(out, &log.interface, log.epoch_offset_ns, &record)
-        })
+        frames
+            .into_iter()
+            .try_for_each(|record| candump::write_line(out, &log.interface, log.epoch_offset_ns, record))
     })?;
     write_json(&folder.join("event.json"), event)
 }
@@ -158,6 +156,7 @@ impl Default for Event {
 mod tests {
     use super::*;
     use crate::timing;
+    use protocol::can::CanFrame;
 
     fn event(process: &str, cycle: u64) -> Event {
         Event { process: process.into(), trigger: "late".into(), cycle, ..Event::default() }
@@ -167,9 +166,9 @@ mod tests {
     fn a_dump_holds_cycles_frames_and_what_happened() {
         let run = tempfile::tempdir().unwrap();
         let rows = [CycleTiming { cycle: 41, ..CycleTiming::default() }, CycleTiming::default()];
-        let frame = CanFrame::new(0x120, &[0xAB, 0, 1]);
+        let frame = FrameRecord { stamp_ns: 1_234_567_890, frame: CanFrame::new(0x120, &[0xAB, 0, 1]) };
         let log = Log { interface: "vcan0".into(), epoch_offset_ns: 1_700_000_000_000_000_000 };
-        write(run.path(), &event("controller", 42), &rows, [(1_234_567_890, &frame)], &log).unwrap();
+        write(run.path(), &event("controller", 42), &rows, [&frame], &log).unwrap();
         let read = |name: &str| {
             fs::read_to_string(run.path().join("flight/controller-0000000042-late").join(name)).unwrap()
         };

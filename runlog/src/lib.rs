@@ -5,3 +5,4 @@ pub mod flight_dump;
 pub mod run_folder;
 pub mod telemetry;
 pub mod timing;
+pub mod timing_recorder;

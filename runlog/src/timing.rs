@@ -12,6 +12,7 @@
 //!
 //! Stamps are ns of that clock, 0 where there is none; stages are lengths in ns. Counts are those of the cycle alone.
 
+use realtime::{CycleStages, VitalCounts};
 use std::io::{self, Write};
 use std::num::ParseIntError;
 
@@ -25,25 +26,6 @@ pub struct Exchange {
     pub command_ns: u64,
     /// Cycle whose sensors that command answers; meaningless when `command_ns` is 0.
     pub answers: u64,
-}
-
-/// What the kernel counted of the thread during a cycle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Vitals {
-    /// Page faults served without the disk.
-    pub minor_faults: u64,
-    /// Page faults that had to read from it.
-    pub major_faults: u64,
-    /// Times the thread gave the CPU away to wait; one a cycle is usual.
-    pub voluntary_switches: u64,
-    /// Times another thread took the CPU from it.
-    pub involuntary_switches: u64,
-    /// Time that the thread was ready to run and another one had the CPU, ns; 0 where the kernel does not tell.
-    pub run_delay_ns: u64,
-    /// Times the process was continued after a stop (SIGCONT).
-    pub continued: u64,
-    /// CPU on which the cycle ended.
-    pub cpu: u64,
 }
 
 /// One cycle of one process.
@@ -69,8 +51,8 @@ pub struct CycleTiming {
     pub drive: Exchange,
     /// Exchange of the load axis.
     pub load: Exchange,
-    /// What the kernel counted.
-    pub vitals: Vitals,
+    /// The kernel's counters over the cycle.
+    pub vitals: VitalCounts,
 }
 
 /// Columns in their order, as the head line names them. The only place where they stand.
@@ -128,6 +110,13 @@ impl CycleTiming {
         ]
     }
 
+    /// The stages of the cycle.
+    #[must_use]
+    pub fn stages(&self) -> CycleStages {
+        let Self { cycle, skipped, due_ns, woke_ns, receive_ns, step_ns, send_ns, done_ns, .. } = *self;
+        CycleStages { cycle, skipped, due_ns, woke_ns, receive_ns, step_ns, send_ns, done_ns }
+    }
+
     /// The row with these values.
     #[must_use]
     pub fn from_values(values: &[u64; COLUMNS.len()]) -> Self {
@@ -145,7 +134,7 @@ impl CycleTiming {
             done_ns,
             drive: Exchange { sensors_ns: d_sensors, command_ns: d_command, answers: d_answers },
             load: Exchange { sensors_ns: l_sensors, command_ns: l_command, answers: l_answers },
-            vitals: Vitals {
+            vitals: VitalCounts {
                 minor_faults: minor,
                 major_faults: major,
                 voluntary_switches: voluntary,

@@ -3,7 +3,8 @@
 use super::files::RunFiles;
 use super::joined::PERIOD_NS;
 use super::samples::Samples;
-use runlog::timing::{CycleTiming, Exchange, Vitals};
+use realtime::VitalCounts;
+use runlog::timing::{CycleTiming, Exchange};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -55,7 +56,7 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
 
 fn both(cycle: u64) -> (CycleTiming, CycleTiming) {
     let due_ns = START_NS + cycle * PERIOD_NS;
-    let quiet = |cpu| Vitals { voluntary_switches: 1, run_delay_ns: 800, cpu, ..Vitals::default() };
+    let quiet = |cpu| VitalCounts { voluntary_switches: 1, run_delay_ns: 800, cpu, ..VitalCounts::default() };
     // Some spread, so that percentiles differ.
     let woke_ns = due_ns + 10_000 + cycle * 37 % 5_000;
     let sent_ns = woke_ns + 4_000;

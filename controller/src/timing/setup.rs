@@ -1,6 +1,6 @@
 //! Both sides of the timing of a run, made before its threads start.
 
-use super::ledger::{Ledger, LedgerSetup};
+use super::queues::TimingQueues;
 use super::{Outlets, Stopwatch};
 use crate::cli::RunArguments;
 use crate::report;
@@ -9,6 +9,7 @@ use crossbeam_channel::bounded;
 use protocol::bus::BusUrl;
 use realtime::{Clock, Freeze, Instant, MonotonicClock};
 use runlog::flight_dump::Log;
+use runlog::timing_recorder::{Due, TimingRecorder, TimingSetup};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Rows and waits that fit the queue: 16 s of cycles, and as many sensors that were overtaken.
@@ -48,7 +49,7 @@ pub fn begin(
     arguments: &RunArguments,
     started: &RunStart,
     freeze: Freeze,
-) -> Result<(Stopwatch<MonotonicClock>, Ledger), RunError> {
+) -> Result<(Stopwatch<MonotonicClock>, TimingQueues), RunError> {
     let (measured_sender, measured) = bounded(MEASURED_QUEUE);
     let (frame_sender, frames) = bounded(FRAME_QUEUE);
     let outlets = Outlets { measured: measured_sender, frames: frame_sender };
@@ -56,18 +57,18 @@ pub fn begin(
         BusUrl::Can { interface } => interface.as_str(),
         BusUrl::Unix { .. } => EMBEDDED_INTERFACE,
     };
-    let ledger = Ledger::create(LedgerSetup {
+    let recorder = TimingRecorder::create(TimingSetup {
         folder: arguments.files.out.clone(),
         process: report::name(arguments.axis.list()),
+        due: Due::OnArrival,
         full_timing: arguments.full_timing,
         flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
         log: Log { interface: interface.into(), epoch_offset_ns: started.epoch_offset_ns },
         started_unix_s: started.unix_s,
         started: started.at,
-        freeze,
-        measured,
-        frames,
+        copies_lines: false,
     });
-    let ledger = ledger.map_err(RunError::output)?;
-    Ok((Stopwatch::new(MonotonicClock, arguments.axis.list(), outlets), ledger))
+    let recorder = recorder.map_err(RunError::output)?;
+    let queues = TimingQueues { measured, frames, freeze, recorder };
+    Ok((Stopwatch::new(MonotonicClock, arguments.axis.list(), outlets), queues))
 }

@@ -103,7 +103,7 @@ impl Bench {
                 let _ = self.stopwatch.bus(&mut self.wire).send(&command(axis));
             }
         }
-        self.stopwatch.answered(cycles, || Vitals { cpu: 1, ..Vitals::default() });
+        self.stopwatch.answered(cycles, || VitalCounts { cpu: 1, ..VitalCounts::default() });
     }
 
     fn now(&self) -> u64 {
@@ -153,7 +153,7 @@ fn both_axes_in_one_wake_up_are_one_row_whose_stages_leave_no_gap() {
         done_ns: woke + 18,
         drive: Exchange { sensors_ns: woke - 40, command_ns: sent, answers: 7 },
         load: Exchange { sensors_ns: woke - 30, command_ns: sent + 3, answers: 7 },
-        vitals: Vitals { cpu: 1, ..Vitals::default() },
+        vitals: VitalCounts { cpu: 1, ..VitalCounts::default() },
         ..CycleTiming::default()
     };
     assert_eq!(bench.rows(), [expected]);
@@ -387,7 +387,7 @@ fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
         }
         bench.stopwatch.took_all();
         let cycles = node.answer(&mut bench.stopwatch.bus(&mut bench.wire));
-        bench.stopwatch.answered(cycles, Vitals::default);
+        bench.stopwatch.answered(cycles, VitalCounts::default);
     }
     let rows = bench.rows();
     for row in &rows {

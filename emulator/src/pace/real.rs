@@ -4,8 +4,8 @@ use super::{CYCLE, End, RunContext, RunOutcome};
 use protocol::bus::{Bus, Received};
 use protocol::can::CanFrame;
 use protocol::commands::STALE_AFTER_CYCLES;
-use realtime::{Clock, PeriodicConfig, PeriodicLoop, VitalCounts, VitalsReader};
-use runlog::timing::{CycleTiming, Vitals};
+use realtime::{Clock, PeriodicConfig, PeriodicLoop, VitalsReader};
+use runlog::timing::CycleTiming;
 use std::time::{Duration, Instant};
 
 /// How long after the farewell the answers to the last cycles may still come in.
@@ -62,7 +62,7 @@ pub fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: PeriodicConf
             context.after_cycle(cycles)
         };
         // Measuring is part of the cycle's work, save for handing over what was measured.
-        let vitals = row_vitals(vitals.read());
+        let vitals = vitals.read();
         let done = periodic.end_of_work().unwrap_or(stepped);
         context.node.tell_timing(CycleTiming {
             cycle: index,
@@ -94,19 +94,6 @@ pub fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: PeriodicConf
 
 fn length_ns(from: realtime::Instant, to: realtime::Instant) -> u64 {
     to.saturating_duration_since(from).as_nanos() as u64
-}
-
-/// The counts under the names of the timing table.
-fn row_vitals(counts: VitalCounts) -> Vitals {
-    Vitals {
-        minor_faults: counts.minor_faults,
-        major_faults: counts.major_faults,
-        voluntary_switches: counts.voluntary_switches,
-        involuntary_switches: counts.involuntary_switches,
-        run_delay_ns: counts.run_delay_ns,
-        continued: counts.continued,
-        cpu: counts.cpu,
-    }
 }
 
 fn say_farewell(context: &mut RunContext<'_>, inbox: &mut Inbox, cycles: u64) {

@@ -4,7 +4,7 @@
 //! process that is killed leaves files that read to their last line. When a write fails (a full disk, a folder that
 //! went away), the run is asked to end, and what was written stays.
 
-use super::evidence::{Evidence, EvidenceReport, EvidenceSetup};
+use super::rig_timing::{RigTiming, RigTimingReport};
 use super::{Records, a_turn};
 use crate::event::{Event, EventKind};
 use crate::faults::mark;
@@ -13,8 +13,8 @@ use crate::telemetry::{Telemetry, Untold};
 use plant::tables;
 use realtime::{Clock, MonotonicClock};
 use runlog::candump::{self, FrameRecord};
-use runlog::flight_dump::Log;
 use runlog::run_folder::{FAULTS_CSV, LineFile};
+use runlog::timing_recorder::TimingSetup;
 use std::collections::HashMap;
 use std::io::{self, Write};
 use std::mem::{Discriminant, discriminant};
@@ -50,8 +50,8 @@ pub struct WriterSetup {
     pub terms: Vec<String>,
     /// Whether there can be faults, which have a table of their own then.
     pub faults: bool,
-    /// What to keep of time; `None` in lockstep.
-    pub evidence: Option<EvidenceSetup>,
+    /// How to record the timing; `None` in lockstep.
+    pub timing: Option<TimingSetup>,
     /// Who looks on.
     pub telemetry: Option<Telemetry>,
 }
@@ -67,8 +67,8 @@ pub struct WriterReport {
     pub events: Vec<Event>,
     /// Events in all.
     pub event_count: u64,
-    /// What was measured of time.
-    pub evidence: EvidenceReport,
+    /// The timing.
+    pub timing: RigTimingReport,
     /// Why writing stopped, if it did.
     pub failure: Option<String>,
 }
@@ -81,7 +81,7 @@ pub struct Writer {
     measurement: LineFile,
     truth: LineFile,
     faults: Option<LineFile>,
-    evidence: Option<Evidence>,
+    timing: Option<RigTiming>,
     pending: Vec<FrameRecord>,
     told: HashMap<Discriminant<EventKind>, usize>,
     untold: Untold,
@@ -99,14 +99,11 @@ impl Writer {
             (open("bus.log")?, open("measurement.csv")?, open("truth.csv")?);
         tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
         tables::write_truth_head(truth.lines(), &setup.terms)?;
-        let log = Log { interface: setup.interface.clone(), epoch_offset_ns: setup.epoch_offset_ns };
         let mut faults = setup.faults.then(|| open(FAULTS_CSV)).transpose()?;
         if let Some(faults) = &mut faults {
             writeln!(faults.lines(), "{}", mark::COLUMNS)?;
         }
-        let evidence = setup.evidence.as_ref();
-        let evidence =
-            evidence.map(|evidence| Evidence::create(setup.folder.clone(), log, evidence)).transpose()?;
+        let timing = setup.timing.take().map(RigTiming::create).transpose()?;
         let pending = Vec::new();
         let report = WriterReport::default();
         let telemetry = setup.telemetry.take();
@@ -117,7 +114,7 @@ impl Writer {
             measurement,
             truth,
             faults,
-            evidence,
+            timing,
             pending,
             told: HashMap::new(),
             untold: Untold::default(),
@@ -145,7 +142,7 @@ impl Writer {
             };
             let mut written = drained.and(flushed);
             if finished || written.is_err() {
-                written = written.and(self.finish_evidence());
+                written = written.and(self.finish_timing());
             }
             self.serve();
             if let Err(error) = written {
@@ -173,8 +170,8 @@ impl Writer {
             self.truth.write_when_full()?;
         }
         for record in a_turn(&records.frames) {
-            if let Some(evidence) = &mut self.evidence {
-                evidence.frame(&record);
+            if let Some(timing) = &mut self.timing {
+                timing.frame(&record);
             }
             self.pending.push(record);
         }
@@ -188,29 +185,29 @@ impl Writer {
     /// Takes what the loop measured, and does what follows from it.
     fn judge(&mut self, records: &Records, shared: &Shared) -> io::Result<()> {
         let asked = shared.freeze.take();
-        let Some(evidence) = &mut self.evidence else { return Ok(()) };
+        let Some(timing) = &mut self.timing else { return Ok(()) };
         for record in a_turn(&records.timings) {
             // Those of a cycle were handed over before its row.
-            a_turn(&records.round_trips).for_each(|round_trip| evidence.round_trip(round_trip));
-            evidence.timing(&record)?;
+            a_turn(&records.round_trips).for_each(|round_trip| timing.round_trip(round_trip));
+            timing.timing(&record)?;
         }
-        a_turn(&records.round_trips).for_each(|round_trip| evidence.round_trip(round_trip));
-        evidence.poll(MonotonicClock.now(), asked)
+        a_turn(&records.round_trips).for_each(|round_trip| timing.round_trip(round_trip));
+        timing.poll(MonotonicClock.now(), asked)
     }
 
     /// Lets viewers have what there is for them.
     fn serve(&mut self) {
         let Some(telemetry) = &mut self.telemetry else { return };
-        if let Some(evidence) = &mut self.evidence {
-            telemetry.histograms(&evidence.new_lines());
+        if let Some(timing) = &mut self.timing {
+            telemetry.histograms(&timing.new_lines());
         }
         telemetry.serve(&self.report.events, self.untold);
     }
 
-    fn finish_evidence(&mut self) -> io::Result<()> {
-        let Some(evidence) = self.evidence.take() else { return Ok(()) };
-        let (report, written) = evidence.finish(MonotonicClock.now());
-        self.report.evidence = report;
+    fn finish_timing(&mut self) -> io::Result<()> {
+        let Some(timing) = self.timing.take() else { return Ok(()) };
+        let (report, written) = timing.finish(MonotonicClock.now());
+        self.report.timing = report;
         written
     }
 
@@ -241,8 +238,8 @@ impl Writer {
         if let (Some(faults), EventKind::Fault(mark)) = (&mut self.faults, &event.kind) {
             mark.write(faults.lines(), event.cycle)?;
         }
-        if let Some(evidence) = &mut self.evidence {
-            evidence.event(&event);
+        if let Some(timing) = &mut self.timing {
+            timing.event(&event);
         }
         let late = matches!(event.kind, EventKind::Skipped { .. });
         let most_told = if late { SKIPS_TOLD } else { EVENTS_TOLD };
@@ -267,7 +264,7 @@ impl Writer {
         self.measurement.write_out()?;
         self.truth.write_out()?;
         self.faults.as_mut().map_or(Ok(()), LineFile::write_out)?;
-        self.evidence.as_mut().map_or(Ok(()), Evidence::flush)
+        self.timing.as_mut().map_or(Ok(()), RigTiming::flush)
     }
 
     fn fail(&mut self, error: &io::Error, shared: &Shared) {
@@ -304,7 +301,7 @@ mod tests {
             added_mass_kg: 0.0,
             terms: Vec::new(),
             faults: false,
-            evidence: None,
+            timing: None,
             telemetry: None,
         };
         Writer::create(setup).unwrap()

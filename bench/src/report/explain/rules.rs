@@ -20,7 +20,7 @@
 
 use crate::report::model::Cause;
 use crate::report::probe::Watched;
-use runlog::timing::Vitals;
+use realtime::VitalCounts;
 
 /// Faults in a cycle from which on they are a cause by themselves: a locked process has none.
 const MANY_FAULTS: u64 = 20;
@@ -51,7 +51,7 @@ pub struct Seen {
     /// Lengths of the stages receive, step, send, ns.
     pub stages_ns: [u64; 3],
     /// What the kernel counted.
-    pub vitals: Vitals,
+    pub vitals: VitalCounts,
     /// SIGCONTs in the event's cycles and right after.
     pub continued: u64,
     /// Whether the kernel tells for how long threads wait for a CPU.

@@ -1,11 +1,15 @@
-//! What a ledger writes of rows, waits and frames that a test hands over.
+//! What is recorded of rows, waits and frames that a test hands over.
 
 use super::*;
 use crossbeam_channel::{Sender, bounded};
 use protocol::can::CanFrame;
-use protocol::frames::{Sensors, Tick};
-use runlog::timing::{self, Vitals};
+use protocol::frames::{Frame, Sensors, Tick};
+use realtime::{Instant, VitalCounts};
+use runlog::flight_dump::{self, Log};
+use runlog::timing::{self, CycleTiming};
+use runlog::timing_recorder::{Due, FlightFigures, TimingSetup};
 use std::fs;
+use std::time::Duration;
 use tempfile::TempDir;
 
 const MS: u64 = 1_000_000;
@@ -15,7 +19,7 @@ struct Bench {
     measured: Sender<Measured>,
     frames: Sender<Passed>,
     started: Instant,
-    ledger: Ledger,
+    queues: TimingQueues,
 }
 
 impl Bench {
@@ -24,19 +28,20 @@ impl Bench {
         let (measured_sender, measured) = bounded(4096);
         let (frame_sender, frames) = bounded(4096);
         let started = MonotonicClock.now();
-        let ledger = Ledger::create(LedgerSetup {
+        let recorder = TimingRecorder::create(TimingSetup {
             folder: run.path().into(),
             process: "controller".into(),
+            due: Due::OnArrival,
             full_timing,
             flight_late: Some(Duration::from_micros(500)),
             log: Log { interface: "bus0".into(), epoch_offset_ns: 0 },
             started_unix_s: 1.7e9,
             started,
-            freeze: Freeze::default(),
-            measured,
-            frames,
+            copies_lines: false,
         });
-        Self { run, measured: measured_sender, frames: frame_sender, started, ledger: ledger.unwrap() }
+        let recorder = recorder.unwrap();
+        let queues = TimingQueues { measured, frames, freeze: Freeze::default(), recorder };
+        Self { run, measured: measured_sender, frames: frame_sender, started, queues }
     }
 
     /// A row that woke `late_ns` after it was due and worked for `work_ns`, one fifth of it receiving.
@@ -69,8 +74,8 @@ fn each_row_and_each_wait_is_a_sample() {
     rows.iter().for_each(|row| bench.tell(*row));
     // Nobody answers after these.
     bench.measured.send(Measured::Waited { arrived_ns: 1000, woke_ns: 91_000 }).unwrap();
-    bench.ledger.finish().unwrap();
-    let TimingFigures { stages, flight, .. } = bench.ledger.figures();
+    bench.queues.finish().unwrap();
+    let TimingFigures { stages, flight, .. } = bench.queues.figures();
     assert_eq!((stages.wakeup_ns.count, stages.execution_ns.count, stages.completion_ns.count), (3, 2, 3));
     let about = |value: Option<u64>, exact: u64| value.is_some_and(|ns| ns.abs_diff(exact) <= exact / 500);
     assert!(about(stages.wakeup_ns.max, 90_000), "{stages:?}");
@@ -97,8 +102,8 @@ fn sensors_that_were_overtaken_are_answered_when_the_row_after_them_is_done() {
         bench.measured.send(Measured::Waited { arrived_ns, woke_ns: row.woke_ns }).unwrap();
     }
     bench.tell(row);
-    bench.ledger.finish().unwrap();
-    let TimingFigures { stages, .. } = bench.ledger.figures();
+    bench.queues.finish().unwrap();
+    let TimingFigures { stages, .. } = bench.queues.figures();
     assert_eq!((stages.wakeup_ns.count, stages.completion_ns.count), (50, 50));
     assert!(stages.completion_ns.max >= stages.wakeup_ns.max, "{stages:?}");
     let completion_ns = 50 * MS + 60_000;
@@ -109,7 +114,7 @@ fn sensors_that_were_overtaken_are_answered_when_the_row_after_them_is_done() {
 fn without_full_timing_there_is_no_table() {
     let mut bench = Bench::new(false);
     bench.tell(bench.row(7, 20_000, 50_000));
-    bench.ledger.finish().unwrap();
+    bench.queues.finish().unwrap();
     assert!(!bench.run.path().join("controller-timing.csv").exists());
 }
 
@@ -119,7 +124,7 @@ fn late_slow_overtaken_and_faulty_freeze_the_recorder_and_the_rest_does_not() {
         let mut bench = Bench::new(false);
         bench.tell(bench.row(6, 20_000, 50_000));
         of(&mut bench);
-        bench.ledger.finish().unwrap();
+        bench.queues.finish().unwrap();
         bench.dumps()
     };
     assert_eq!(told(&|bench| bench.tell(bench.row(7, 500_000, 500_000))), [""; 0]);
@@ -130,7 +135,7 @@ fn late_slow_overtaken_and_faulty_freeze_the_recorder_and_the_rest_does_not() {
         bench.tell(CycleTiming { skipped: 2, ..bench.row(9, 0, 0) });
     };
     assert_eq!(told(&overrun), ["controller-0000000009-overrun"]);
-    assert_eq!(told(&|bench| bench.ledger.fault(7)), ["controller-0000000007-fault"]);
+    assert_eq!(told(&|bench| bench.queues.fault(7)), ["controller-0000000007-fault"]);
 }
 
 #[test]
@@ -147,7 +152,7 @@ fn a_dump_holds_the_rows_and_the_frames_both_ways_and_how_long_the_oldest_sensor
     bench.tell(bench.row(6, 0, 0));
     bench.measured.send(Measured::Waited { arrived_ns: MS, woke_ns: 4 * MS }).unwrap();
     bench.tell(CycleTiming { skipped: 2, ..bench.row(9, 1000, 2000) });
-    bench.ledger.finish().unwrap();
+    bench.queues.finish().unwrap();
     let dump = bench.run.path().join("flight/controller-0000000009-overrun");
     let read = |name: &str| fs::read_to_string(dump.join(name)).unwrap();
     assert_eq!(timing::read(&read("timing.csv")).unwrap().len(), 2);
@@ -164,10 +169,9 @@ fn a_dump_that_fails_is_told_though_the_next_one_is_good() {
     fs::create_dir_all(in_its_place.parent().unwrap()).unwrap();
     fs::write(&in_its_place, "a file").unwrap();
     for (cycle, s) in [(7, 1), (8, 5)] {
-        let trigger = Trigger::other(Severity::Fault, cycle, Instant::from_nanos(s * 1000 * MS));
-        bench.ledger.flight.as_mut().unwrap().ring.trigger(trigger);
+        bench.queues.recorder.fault(cycle, Instant::from_nanos(s * 1000 * MS));
     }
-    let told = bench.ledger.finish().unwrap_err().to_string();
+    let told = bench.queues.finish().unwrap_err().to_string();
     assert!(told.contains("controller-0000000007-fault"), "{told}");
     assert_eq!(bench.dumps()[1], "controller-0000000008-fault");
 }
@@ -188,8 +192,8 @@ fn cyclic_frames_that_came_have_an_account_and_sent_and_broken_ones_have_none() 
     ] {
         bench.frames.send(Passed { stamp_ns: ms * MS, frame, sent }).unwrap();
     }
-    bench.ledger.look().unwrap();
-    let arrivals = bench.ledger.figures().arrivals;
+    bench.queues.poll().unwrap();
+    let arrivals = bench.queues.figures().arrivals;
     let of = |name: &str| arrivals.iter().find(|arrivals| arrivals.frame == name).unwrap();
     assert_eq!((of("DriveSensors").count, of("DriveSensors").gaps), (3, 1));
     assert_eq!(
@@ -203,12 +207,12 @@ fn cyclic_frames_that_came_have_an_account_and_sent_and_broken_ones_have_none() 
 #[test]
 fn vitals_count_after_the_first_second() {
     let mut bench = Bench::new(false);
-    let vitals = Vitals { minor_faults: 1, continued: 2, ..Vitals::default() };
+    let vitals = VitalCounts { minor_faults: 1, continued: 2, ..VitalCounts::default() };
     for cycle in [1, 500, 1001, 1002, 2000] {
         bench.tell(CycleTiming { vitals, ..bench.row(cycle, 0, 0) });
     }
-    bench.ledger.look().unwrap();
-    let counted = bench.ledger.figures().vitals;
+    bench.queues.poll().unwrap();
+    let counted = bench.queues.figures().vitals;
     assert_eq!((counted.minor_faults, counted.continued), (2, 4));
 }
 
@@ -216,7 +220,7 @@ fn vitals_count_after_the_first_second() {
 fn a_new_run_begins_with_none_of_the_old_ones_dumps() {
     let mut bench = Bench::new(false);
     bench.tell(bench.row(7, 600_000, 0));
-    bench.ledger.finish().unwrap();
+    bench.queues.finish().unwrap();
     assert_eq!(bench.dumps().len(), 1);
     flight_dump::clear(bench.run.path(), "controller").unwrap();
     assert!(bench.dumps().is_empty());

@@ -4,22 +4,29 @@ use super::*;
 use crate::event::EventKind;
 use plant::Axis;
 use protocol::can::CanFrame;
+use protocol::frames::Frame;
 use protocol::frames::ValveCommand;
-use runlog::timing::Exchange;
+use runlog::flight_dump::{self, Log};
+use runlog::timing::{Exchange, read as read_rows};
+use runlog::timing_recorder::{Due, FlightFigures};
 use std::path::Path;
+use std::time::Duration;
 
 const MS: u64 = 1_000_000;
 
-fn evidence(folder: &Path, full_timing: bool) -> Evidence {
-    let log = Log { interface: "bus0".into(), epoch_offset_ns: 0 };
-    let setup = EvidenceSetup {
-        told: false,
+fn rig_timing(folder: &Path, full_timing: bool) -> RigTiming {
+    let setup = TimingSetup {
+        folder: folder.into(),
+        process: PROCESS.into(),
+        due: Due::EveryPeriod,
         full_timing,
         flight_late: Some(Duration::from_micros(500)),
+        log: Log { interface: "bus0".into(), epoch_offset_ns: 0 },
         started_unix_s: 0.0,
-        base: realtime::Instant::from_nanos(0),
+        started: realtime::Instant::from_nanos(0),
+        copies_lines: false,
     };
-    Evidence::create(folder.into(), log, &setup).unwrap()
+    RigTiming::create(setup).unwrap()
 }
 
 /// A cycle that woke after `late_ns`, acting on a command that answers the one before.
@@ -46,33 +53,33 @@ fn dumped(folder: &Path) -> Vec<String> {
 #[test]
 fn ages_and_round_trips_are_counted_by_axis() {
     let folder = tempfile::tempdir().unwrap();
-    let mut evidence = evidence(folder.path(), true);
-    (1..=10).for_each(|cycle| evidence.timing(&record(cycle, 1000)).unwrap());
-    evidence.round_trip(RoundTrip { axis: 1, cycle: 10, ns: 70_000 });
-    let (report, written) = evidence.finish(at(11));
+    let mut timing = rig_timing(folder.path(), true);
+    (1..=10).for_each(|cycle| timing.timing(&record(cycle, 1000)).unwrap());
+    timing.round_trip(RoundTrip { axis: 1, cycle: 10, ns: 70_000 });
+    let (report, written) = timing.finish(at(11));
     written.unwrap();
     assert_eq!(report.command_age_cycles.drive, BTreeMap::from([(1, 10)]));
     assert_eq!(report.command_age_cycles.load, BTreeMap::from([(2, 10)]));
-    let [drive_age, load_age] = report.command_age_ns.unwrap();
+    let [drive_age, load_age] = report.command_age_ns;
     assert_eq!((drive_age.count, drive_age.max.map(|ns| ns / 10_000), load_age.count), (10, Some(99), 0));
-    assert_eq!(report.round_trip_ns.unwrap().map(|figures| figures.count), [0, 1]);
+    assert_eq!(report.round_trip_ns.map(|figures| figures.count), [0, 1]);
     let table = std::fs::read_to_string(folder.path().join("emulator-timing.csv")).unwrap();
-    assert_eq!(timing::read(&table).unwrap().len(), 10);
-    assert_eq!((report.flight, dumped(folder.path())), (FlightFigures::default(), Vec::new()));
+    assert_eq!(read_rows(&table).unwrap().len(), 10);
+    assert_eq!((report.timing.flight, dumped(folder.path())), (FlightFigures::default(), Vec::new()));
 }
 
 #[test]
 fn round_trips_that_are_taken_late_belong_to_the_second_of_their_cycle() {
     let folder = tempfile::tempdir().unwrap();
-    let mut evidence = evidence(folder.path(), false);
+    let mut timing = rig_timing(folder.path(), false);
     // The writer stood still for 2.5 s and finds all of it.
     for cycle in 1..=2500 {
-        evidence.round_trip(RoundTrip { axis: 0, cycle, ns: 100_000 * (1 + cycle / 1000) });
+        timing.round_trip(RoundTrip { axis: 0, cycle, ns: 100_000 * (1 + cycle / 1000) });
     }
-    (1..=2500).for_each(|cycle| evidence.timing(&record(cycle, 1000)).unwrap());
-    let (report, written) = evidence.finish(at(2501));
+    (1..=2500).for_each(|cycle| timing.timing(&record(cycle, 1000)).unwrap());
+    let (report, written) = timing.finish(at(2501));
     written.unwrap();
-    assert_eq!(report.round_trip_ns.unwrap()[0].count, 2500);
+    assert_eq!(report.round_trip_ns[0].count, 2500);
     let log = std::fs::read_to_string(folder.path().join("emulator.hlog")).unwrap();
     let lines = log.lines().filter(|line| line.starts_with("Tag=drive-round-trip,"));
     let maxima_ns: Vec<f64> = lines.map(|line| line.split(',').nth(3).unwrap().parse().unwrap()).collect();
@@ -84,43 +91,43 @@ fn round_trips_that_are_taken_late_belong_to_the_second_of_their_cycle() {
 #[test]
 fn a_late_cycle_a_fault_and_a_signal_leave_a_dump_each() {
     let folder = tempfile::tempdir().unwrap();
-    let mut evidence = evidence(folder.path(), false);
+    let mut timing = rig_timing(folder.path(), false);
     let mut cycle = 0;
-    let mut run_until = |evidence: &mut Evidence, end, late| {
+    let mut run_until = |timing: &mut RigTiming, end, late| {
         while cycle < end {
             cycle += 1;
-            evidence.timing(&record(cycle, if cycle == late { 600_000 } else { 1000 })).unwrap();
-            evidence.poll(at(cycle), false).unwrap();
+            timing.timing(&record(cycle, if cycle == late { 600_000 } else { 1000 })).unwrap();
+            timing.poll(at(cycle), false).unwrap();
         }
     };
-    run_until(&mut evidence, 2000, 1500);
-    evidence.event(&Event { cycle: 2000, kind: EventKind::Linked });
-    evidence.event(&Event { cycle: 2000, kind: EventKind::TwoSources(Axis::Drive) });
-    run_until(&mut evidence, 3000, 0);
-    evidence.poll(at(3000), true).unwrap();
+    run_until(&mut timing, 2000, 1500);
+    timing.event(&Event { cycle: 2000, kind: EventKind::Linked });
+    timing.event(&Event { cycle: 2000, kind: EventKind::TwoSources(Axis::Drive) });
+    run_until(&mut timing, 3000, 0);
+    timing.poll(at(3000), true).unwrap();
     // The last window is not over: the end of the run hands it out.
-    let (report, written) = evidence.finish(at(3001));
+    let (report, written) = timing.finish(at(3001));
     written.unwrap();
     let expected = ["emulator-0000001500-late", "emulator-0000002000-fault", "emulator-0000003000-signal"];
     assert_eq!(dumped(folder.path()), expected);
-    assert_eq!(report.flight, FlightFigures { dumps: 3, dropped: 0 });
+    assert_eq!(report.timing.flight, FlightFigures { dumps: 3, dropped: 0 });
     let rows =
         std::fs::read_to_string(folder.path().join("flight").join(expected[0]).join("timing.csv")).unwrap();
     // From 1 s before it was due to 0.3 s after it woke.
-    let rows = timing::read(&rows).unwrap();
+    let rows = read_rows(&rows).unwrap();
     assert_eq!((rows[0].cycle, rows[rows.len() - 1].cycle), (500, 1800));
 }
 
 #[test]
 fn an_overrun_that_ends_the_run_is_counted_and_dumped() {
     let folder = tempfile::tempdir().unwrap();
-    let mut evidence = evidence(folder.path(), false);
-    evidence.timing(&record(1, 0)).unwrap();
+    let mut timing = rig_timing(folder.path(), false);
+    timing.timing(&record(1, 0)).unwrap();
     let stopped =
         TimingRecord::Stopped { first: 2, skipped: 5, late_ns: 5 * MS + 7000, woke_ns: 7 * MS + 7000 };
-    evidence.timing(&stopped).unwrap();
-    let (report, _) = evidence.finish(at(8));
-    let stages = report.stages.unwrap();
+    timing.timing(&stopped).unwrap();
+    let (report, _) = timing.finish(at(8));
+    let stages = report.timing.stages;
     assert_eq!((stages.wakeup_ns.count, stages.completion_ns.count), (6, 6));
     assert!(stages.completion_ns.max >= stages.wakeup_ns.max, "{stages:?}");
     assert_eq!(dumped(folder.path()), ["emulator-0000000002-overrun"]);
@@ -129,29 +136,19 @@ fn an_overrun_that_ends_the_run_is_counted_and_dumped() {
 #[test]
 fn only_good_cyclic_frames_of_others_are_looked_at() {
     let folder = tempfile::tempdir().unwrap();
-    let mut evidence = evidence(folder.path(), false);
+    let mut timing = rig_timing(folder.path(), false);
     let command = ValveCommand { opening: 0.0, alive: 0, echo: 0, enable: true };
     let good = Frame::DriveValveCommand(command).encode().unwrap();
     let frames =
         [good, CanFrame::new(0x110, &[1, 2, 3]), CanFrame::new(0x120, &[0; 8]), CanFrame::new(0x7FF, &[])];
     for ms in 1..=10 {
-        frames.iter().for_each(|frame| evidence.frame(&FrameRecord { stamp_ns: ms * MS, frame: *frame }));
+        frames.iter().for_each(|frame| timing.frame(&FrameRecord { stamp_ns: ms * MS, frame: *frame }));
     }
-    let (report, _) = evidence.finish(at(11));
-    let [arrivals] = &report.arrivals[..] else { panic!("{:?}", report.arrivals) };
+    let (report, _) = timing.finish(at(11));
+    let [arrivals] = &report.timing.arrivals[..] else { panic!("{:?}", report.timing.arrivals) };
     assert_eq!(arrivals.bursts, Some(0));
     assert_eq!(
         (arrivals.frame, arrivals.period_ms, arrivals.count, arrivals.gaps),
         ("DriveValveCommand", 1, 10, 0)
     );
-}
-
-#[test]
-fn a_frame_that_is_sent_on_change_too_has_no_account_of_bursts() {
-    let message = |name: &str| MESSAGES.iter().find(|message| message.name == name).unwrap();
-    let bursts = |name: &str| arrivals_of(message(name)).figures().bursts;
-    let on_change = MESSAGES.iter().filter(|message| message.send_type == "CyclicAndOnChange");
-    assert!(on_change.clone().count() > 0);
-    on_change.for_each(|message| assert_eq!(bursts(message.name), None, "{}", message.name));
-    assert_eq!(bursts("DriveValveCommand"), Some(0));
 }

@@ -1,0 +1,192 @@
+//! The rig's timing: what every process records, round trips, the age of the commands that act, steps of the wall clock.
+//!
+//! In real time only: simulated time is never late.
+
+use crate::event::Event;
+use crate::exchange::{AxisCycle, RoundTrip, TimingRecord};
+use protocol::frames::{MessageSpec, RIG_STATUS};
+use realtime::stages::Further;
+use realtime::{Percentiles, WallClockStep, WallClockWatch};
+use runlog::candump::FrameRecord;
+use runlog::timing::CycleTiming;
+use runlog::timing_recorder::{TimingFigures, TimingRecorder, TimingSetup};
+use serde::Serialize;
+use std::collections::{BTreeMap, VecDeque};
+use std::io;
+
+/// Name of this process in tags and folders.
+pub const PROCESS: &str = "emulator";
+/// Names of the axes in tags.
+const AXES: [&str; 2] = ["drive", "load"];
+/// Steps of the wall clock that are kept.
+const MOST_STEPS: usize = 100;
+
+/// The timing of a run, for `summary.json`.
+#[derive(Clone, Debug)]
+pub struct RigTimingReport {
+    /// Stages, arrivals, the kernel's counters, the flight recorder.
+    pub timing: TimingFigures,
+    /// Sensors handed over to command received, drive and load.
+    pub round_trip_ns: [Percentiles; 2],
+    /// Age of commands when they begin to act, drive and load.
+    pub command_age_ns: [Percentiles; 2],
+    /// Cycles sent, by the age in cycles of the command that acted.
+    pub command_age_cycles: CommandAges,
+    /// Steps of the wall clock.
+    pub wall_clock_steps: Vec<WallClockStep>,
+}
+
+/// Of a run in simulated time.
+impl Default for RigTimingReport {
+    fn default() -> Self {
+        let none = [realtime::Recorder::new().percentiles(); 2];
+        Self {
+            timing: TimingFigures::none(),
+            round_trip_ns: none,
+            command_age_ns: none,
+            command_age_cycles: CommandAges::default(),
+            wall_clock_steps: Vec::new(),
+        }
+    }
+}
+
+/// Cycles sent, by the age in cycles of the command that acted over them; a cycle without a command is in none.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct CommandAges {
+    /// Drive axis.
+    pub drive: BTreeMap<u64, u64>,
+    /// Load axis.
+    pub load: BTreeMap<u64, u64>,
+}
+
+/// Records the rig's timing.
+pub struct RigTiming {
+    recorder: TimingRecorder,
+    round_trip: [Further; 2],
+    /// Those of cycles whose rows are to come.
+    trips: VecDeque<RoundTrip>,
+    command_age: [Further; 2],
+    ages: CommandAges,
+    wall_clock: WallClockWatch,
+    steps: Vec<WallClockStep>,
+}
+
+impl RigTiming {
+    /// Opens the files.
+    ///
+    /// # Errors
+    /// Names the file that cannot be made.
+    pub fn create(setup: TimingSetup) -> io::Result<Self> {
+        let mut recorder = TimingRecorder::create(setup)?;
+        let round_trip = AXES.map(|axis| recorder.add(&format!("{axis}-round-trip")));
+        let command_age = AXES.map(|axis| recorder.add(&format!("{axis}-command-age")));
+        Ok(Self {
+            recorder,
+            round_trip,
+            trips: VecDeque::new(),
+            command_age,
+            ages: CommandAges::default(),
+            wall_clock: WallClockWatch::new(),
+            steps: Vec::new(),
+        })
+    }
+
+    /// Records what the loop measured.
+    ///
+    /// # Errors
+    /// What the system says when a file cannot be written.
+    pub fn timing(&mut self, record: &TimingRecord) -> io::Result<()> {
+        match record {
+            TimingRecord::Cycle { row, axes } => self.cycle(row, axes),
+            TimingRecord::Stopped { first, skipped, late_ns, woke_ns } => {
+                self.recorder.missed(*first, *skipped, *late_ns, *woke_ns);
+                Ok(())
+            }
+        }
+    }
+
+    fn cycle(&mut self, row: &CycleTiming, axes: &[AxisCycle; 2]) -> io::Result<()> {
+        // First the row: it ends the second of the cycles before it.
+        let written = self.recorder.row(row);
+        self.record_trips(row.cycle);
+        for (axis, cycle) in axes.iter().enumerate() {
+            if let Some(ns) = cycle.age_ns(row.due_ns) {
+                self.recorder.record_further(self.command_age[axis], ns);
+            }
+            if cycle.age_cycles > 0 {
+                let ages = if axis == 0 { &mut self.ages.drive } else { &mut self.ages.load };
+                *ages.entry(cycle.age_cycles).or_default() += 1;
+            }
+        }
+        written
+    }
+
+    /// Takes a round trip. It waits for the row of its cycle, and so belongs to the second of that, however late both are taken.
+    pub fn round_trip(&mut self, trip: RoundTrip) {
+        self.trips.push_back(trip);
+    }
+
+    /// Records the round trips up to this cycle.
+    fn record_trips(&mut self, cycle: u64) {
+        while let Some(RoundTrip { axis, ns, .. }) = self.trips.pop_front_if(|trip| trip.cycle <= cycle) {
+            self.recorder.record_further(self.round_trip[axis], ns);
+        }
+    }
+
+    /// Records a frame that was sent or received.
+    pub fn frame(&mut self, record: &FrameRecord) {
+        let spec = record.frame.standard_id().and_then(MessageSpec::by_id);
+        self.recorder.frame(*record, spec.is_some_and(|spec| spec.sender != RIG_STATUS.sender));
+    }
+
+    /// Takes an event: a fault freezes the recorder.
+    pub fn event(&mut self, event: &Event) {
+        if event.kind.is_fault() {
+            self.recorder.fault(event.cycle, self.recorder.newest_done());
+        }
+    }
+
+    /// What is due at `now`, after everything was taken; `asked` when a signal asked for a dump.
+    ///
+    /// # Errors
+    /// What the system says when a file cannot be written.
+    pub fn poll(&mut self, now: realtime::Instant, asked: bool) -> io::Result<()> {
+        if asked {
+            self.recorder.signal(now);
+        }
+        let step = self.wall_clock.look();
+        self.steps.extend(step.filter(|_| self.steps.len() < MOST_STEPS));
+        self.recorder.advance(now)
+    }
+
+    /// New lines of the `.hlog`.
+    pub fn new_lines(&mut self) -> Vec<u8> {
+        self.recorder.new_lines()
+    }
+
+    /// Writes the table out.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.recorder.write_out()
+    }
+
+    /// Writes what is left, and returns the figures, those of a failed file too.
+    pub fn finish(mut self, now: realtime::Instant) -> (RigTimingReport, io::Result<()>) {
+        self.record_trips(u64::MAX);
+        let written = self.recorder.finish(now);
+        let of = |further: [Further; 2]| further.map(|further| self.recorder.further(further));
+        let report = RigTimingReport {
+            timing: self.recorder.figures(),
+            round_trip_ns: of(self.round_trip),
+            command_age_ns: of(self.command_age),
+            command_age_cycles: self.ages,
+            wall_clock_steps: self.steps,
+        };
+        (report, written)
+    }
+}
+
+#[cfg(test)]
+mod tests;
