@@ -20,6 +20,7 @@ use protocol::can::CanFrame;
 use protocol::frames::{
     ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand,
 };
+use runlog::controller_report::IgnoredFrames;
 use std::collections::VecDeque;
 
 /// Ticks of the rig, one every ten cycles, without sensors of an axis in between, after which they count as lost: 50 ms. Sooner
@@ -65,15 +66,6 @@ fn state_name<S: serde::Serializer>(state: &MainChainState, serializer: S) -> Re
 
 fn in_words<S: serde::Serializer>(cause: &MainCause, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(cause)
-}
-
-/// Frames that were counted and ignored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct IgnoredFrames {
-    /// Not as `rig.dbc` says.
-    pub malformed: u64,
-    /// Identifiers that `rig.dbc` does not know, extended and remote frames.
-    pub unknown: u64,
 }
 
 /// A parameter that shall change, already checked against its table.

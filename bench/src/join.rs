@@ -248,6 +248,16 @@ mod tests {
     }
 
     #[test]
+    fn no_key_of_a_joined_summary_is_lost() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["summary.json", "run.json", "controller.json"] {
+            std::fs::write(folder.path().join(name), runlog::golden::text(name)).unwrap();
+        }
+        let joined = join(folder.path()).unwrap();
+        runlog::golden::check("summary.keys", &runlog::golden::keys(&Value::Object(joined.summary)));
+    }
+
+    #[test]
     fn all_parts_become_one_and_joining_again_changes_nothing() {
         let folder = folder(&[("controller.json", both(&json!({})))]);
         let joined = join(folder.path()).unwrap();

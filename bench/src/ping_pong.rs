@@ -25,10 +25,9 @@ use protocol::bus::{self, BusError, BusUrl, StampClock};
 use protocol::exit::Exit;
 use rally::{Rally, Rhythm};
 use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request, write_hlog};
+use runlog::ping_pong::{PingPongFigures, PingPongFile};
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
-use serde::Serialize;
-use serde_json::{Map, Value, json};
 use std::io::{self, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::path::Path;
@@ -84,27 +83,6 @@ impl PingPongError {
     }
 }
 
-/// What stands in the JSON file under the name of a ping-pong; percentiles first, in ns.
-#[derive(Debug, Serialize)]
-struct Figures {
-    #[serde(flatten)]
-    round_trip_ns: Percentiles,
-    /// Null on a bare pair of sockets.
-    to_arrival_ns: Option<Percentiles>,
-    sent: u64,
-    answered: u64,
-    lost: u64,
-    /// Pings left out since the one before was not back in time.
-    skipped: u64,
-    interval_us: u64,
-    priority: u8,
-    cpu: Option<usize>,
-    peer_cpu: Option<usize>,
-    bus: Option<String>,
-    granted: Vec<String>,
-    refused: Vec<String>,
-}
-
 /// Plays as asked, prints the figures, and writes them where asked.
 ///
 /// # Errors
@@ -123,7 +101,7 @@ pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
     let figures = figures(arguments, &rally, &grants);
     tell(&name(arguments), &figures);
     if let Some(path) = &arguments.json {
-        add(path, &name(arguments), &figures)?;
+        add(path, &name(arguments), figures)?;
     }
     if let Some(path) = &arguments.out {
         let tag = format!("{PING_PONG}{}", name(arguments));
@@ -228,8 +206,8 @@ fn name(arguments: &PingPongArguments) -> String {
     arguments.name.clone().unwrap_or_else(|| usual.to_owned())
 }
 
-fn figures(arguments: &PingPongArguments, rally: &Rally, grants: &Grants) -> Figures {
-    Figures {
+fn figures(arguments: &PingPongArguments, rally: &Rally, grants: &Grants) -> PingPongFigures {
+    PingPongFigures {
         round_trip_ns: rally.round_trip_ns.percentiles(),
         to_arrival_ns: arguments.bus.as_ref().map(|_| rally.to_arrival_ns.percentiles()),
         sent: rally.sent,
@@ -246,7 +224,7 @@ fn figures(arguments: &PingPongArguments, rally: &Rally, grants: &Grants) -> Fig
     }
 }
 
-fn tell(name: &str, figures: &Figures) {
+fn tell(name: &str, figures: &PingPongFigures) {
     let us = |ns: Option<u64>| ns.map_or_else(|| "-".to_owned(), |ns| format!("{:.1}", ns as f64 / 1e3));
     let line = |what: &str, of: &Percentiles| {
         format!(
@@ -271,20 +249,18 @@ fn tell(name: &str, figures: &Figures) {
 }
 
 /// Adds the figures to a file that other ping-pongs may have begun.
-fn add(path: &Path, name: &str, figures: &Figures) -> Result<(), PingPongError> {
+fn add(path: &Path, name: &str, figures: PingPongFigures) -> Result<(), PingPongError> {
     let refused = |reason: String| PingPongError::write(path, reason);
-    let mut file: Map<String, Value> = match std::fs::read_to_string(path) {
+    let mut file: PingPongFile = match std::fs::read_to_string(path) {
         Ok(text) => serde_json::from_str(&text).map_err(|error| refused(format!("not ours: {error}")))?,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Map::new(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => PingPongFile::default(),
         Err(error) => return Err(refused(error.to_string())),
     };
-    file.insert("schema_version".into(), SCHEMA_VERSION.into());
-    let value = serde_json::to_value(figures).map_err(|error| refused(error.to_string()))?;
-    file.insert(name.into(), value);
-    let commands = file.entry("commands").or_insert_with(|| json!({}));
+    file.schema_version = SCHEMA_VERSION;
+    file.figures.insert(name.into(), figures);
     let command: Vec<String> = std::env::args().collect();
-    let commands =
-        commands.as_object_mut().ok_or_else(|| refused("not ours: 'commands' is no table".into()))?;
-    commands.insert(name.into(), command.join(" ").into());
+    file.commands.insert(name.into(), command.join(" "));
+    // As a value, whose keys are sorted.
+    let file = serde_json::to_value(file).map_err(|error| refused(error.to_string()))?;
     write_json(path, &file).map_err(|error| refused(error.to_string()))
 }

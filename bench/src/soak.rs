@@ -42,9 +42,9 @@ use plan::Plan;
 use protocol::bus::BusUrl;
 use protocol::exit::Exit;
 use realtime::Interrupt;
-use runlog::run_folder::write_json;
+use runlog::conditions::Conditions;
+use runlog::run_folder::{SCHEMA_VERSION, write_json};
 use segment::{Common, End, Outcome};
-use serde_json::json;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -301,15 +301,14 @@ impl Soaking {
 /// What a latency report wants to know of a run.
 fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Result<(), SoakError> {
     let path = folder.join("conditions.json");
-    let conditions = json!({
-        "schema_version": 1,
-        "load_generator": load.unwrap_or("none"),
-        "group": format!("{}, {}", spec.experiment, spec.in_words()),
-        "pair": spec.number,
-        "reference_command": null,
-        "reference_missing_because": "a soak measures no reference",
-        "probe": false,
-    });
+    let conditions = Conditions {
+        schema_version: SCHEMA_VERSION,
+        load_generator: Some(load.unwrap_or("none").into()),
+        group: Some(format!("{}, {}", spec.experiment, spec.in_words())),
+        pair: Some(spec.number.into()),
+        reference_missing_because: Some("a soak measures no reference".into()),
+        ..Conditions::default()
+    };
     write_json(&path, &conditions).map_err(|error| SoakError::output(&path, &error))
 }
 
@@ -326,8 +325,45 @@ fn in_words(outcome: &Outcome) -> String {
 mod tests {
     //! A segment that tests of the parts share.
 
-    use super::model::{Check, CheckResult, Figures, Segment};
+    use super::account::Row;
+    use super::memory::Memory;
+    use super::merged::Kept;
+    use super::model::{Check, CheckResult, Figures, Segment, Soak};
     use super::plan::Spec;
+
+    #[test]
+    fn no_key_of_a_soak_is_lost() {
+        let mut segment = segment(1, &[("account", CheckResult::Passed)]);
+        segment.account = vec![Row {
+            id: "110".into(),
+            sender: "controller".into(),
+            receiver: "emulator".into(),
+            sent: 1,
+            refused_at_sender: 0,
+            received: 1,
+            lost_on_wire: 0,
+            lost_at_queue: 0,
+            before_it_came: 0,
+            after_it_left: 0,
+            missing_by_gaps: Some(0),
+            pauses: 0,
+        }];
+        segment.memory = [("emulator".into(), Memory::default())].into();
+        let kept = Kept {
+            p50_ns: 1,
+            p90_ns: 1,
+            p99_ns: 1,
+            p999_ns: 1,
+            p9999_ns: 1,
+            max_ns: 1,
+            count: 1,
+            hdr_v2_base64: String::new(),
+        };
+        let distributions = [("emulator-wakeup".into(), kept)].into();
+        let soak = Soak { distributions, segments: vec![segment], ..Soak::default() };
+        let file = serde_json::to_value(soak).unwrap();
+        runlog::golden::check("soak.keys", &runlog::golden::keys(&file));
+    }
 
     /// A finished segment of experiment `e` with these checks.
     pub(super) fn segment(number: u32, checks: &[(&str, CheckResult)]) -> Segment {

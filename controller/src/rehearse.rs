@@ -4,7 +4,7 @@
 
 use crate::cli::RehearseArguments;
 use crate::recording::{Tables, sentence};
-use crate::report::{self, AxisReport, Report};
+use crate::report::{self, Report};
 use crate::run::RunError;
 use algorithms::guard::{STUCK, Stuck};
 use axis_control::node::News;
@@ -110,7 +110,7 @@ fn save(
     ended: &Ended,
 ) -> Result<Exit, RunError> {
     let node = ended.rehearsal.node();
-    let axes = AxisReport::of_node(node, inputs);
+    let axes = report::of_node(node, inputs);
     let stopped = report::stopped(&axes);
     let (exit, ended_because) = match stopped {
         _ if ended.interrupted => {
@@ -119,7 +119,7 @@ fn save(
         Some((name, axis)) => {
             (Exit::BoundBroken, format!("stopped before the end: {name}: {}", axis.chain_cause))
         }
-        None if axes.values().all(AxisReport::is_done) => (Exit::Good, "the controllers are done".to_owned()),
+        None if axes.values().all(report::is_done) => (Exit::Good, "the controllers are done".to_owned()),
         None if arguments.files.repeat => (Exit::Good, "the time asked for is over".to_owned()),
         None => (Exit::BoundBroken, "the time asked for was over before the experiment was done".to_owned()),
     };
@@ -134,10 +134,10 @@ fn save(
     let report = Report {
         schema_version: SCHEMA_VERSION,
         command_line: std::env::args().collect(),
-        version: env!("CARGO_PKG_VERSION"),
+        version: env!("CARGO_PKG_VERSION").into(),
         title: inputs.experiment.title.clone(),
         started_unix_s: None,
-        ended_well: exit == Exit::Good,
+        ended_well: Some(exit == Exit::Good),
         ended_because: ended_because.clone(),
         cycles_answered: node.answered(),
         rig_cycles_skipped: 0,
@@ -145,9 +145,9 @@ fn save(
         bus: BusCounters::default(),
         frames_late: 0,
         frames_duplicate: 0,
-        timing: TimingFigures::none(),
+        timing: TimingFigures::default(),
         allocations_in_cycle: None,
-        records_dropped: node.records_dropped(),
+        records_dropped: Some(node.records_dropped()),
         sensors_before_start: 0,
         timing_dropped: 0,
         realtime_granted: Vec::new(),

@@ -11,7 +11,7 @@ use crate::timing::Stopwatch;
 use crate::timing::setup::{self, RunStart};
 use algorithms::guard::STUCK;
 use axis_control::axis::AxisController;
-use axis_control::node::{Change, ControllerNode, IgnoredFrames, Outlets};
+use axis_control::node::{Change, ControllerNode, Outlets};
 use axis_control::setup::{InputError, Inputs, Mode};
 use crossbeam_channel::{Sender, bounded};
 use plant::Axis;
@@ -19,9 +19,9 @@ use plugin::PluginError;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;
 use realtime::{Clock, Continued, Freeze, Grants, Interrupt, MonotonicClock, Request};
+use runlog::controller_report::IgnoredFrames;
 use runlog::flight_dump;
 use runlog::run_folder::{SCHEMA_VERSION, clear, controller_results, write_json};
-use runlog::timing_recorder::TimingFigures;
 use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
@@ -211,7 +211,7 @@ struct Finished {
     outcome: RunOutcome,
     grants: Grants,
     bus: BusCounters,
-    axes: BTreeMap<&'static str, AxisReport>,
+    axes: BTreeMap<String, AxisReport>,
     answered: u64,
     skipped: u64,
     ignored: IgnoredFrames,
@@ -250,7 +250,7 @@ impl Work<'_> {
         if arguments.pace == Pace::Real {
             farewell::hear_out(bus, outcome.end == End::RigEnded);
         }
-        let mut axes = AxisReport::of_node(&node, inputs);
+        let mut axes = report::of_node(&node, inputs);
         for axis in Axis::ALL {
             if let (Some(report), Some(port)) = (axes.get_mut(axis.name()), node.port(axis)) {
                 report.xcp = Some(port.counters());
@@ -289,7 +289,7 @@ fn acquire_realtime(arguments: &RunArguments) -> Grants {
 
 fn verdict(arguments: &RunArguments, ended: &Ended) -> (Exit, String) {
     let Finished { outcome, axes, .. } = &ended.finished;
-    let done = arguments.files.repeat || axes.values().all(AxisReport::is_done);
+    let done = arguments.files.repeat || axes.values().all(report::is_done);
     let stopped = report::stopped(axes);
     let aborted = || {
         let why = stopped.map_or_else(String::new, |(name, axis)| format!(": {name}: {}", axis.chain_cause));
@@ -320,16 +320,16 @@ fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit,
     eprintln!(
         "controller: {ended_because}; {} cycles answered, {} sensor frames lost",
         finished.answered,
-        sum(|axis| axis.sensors_lost)
+        sum(|axis| axis.sensors_lost.unwrap_or_default())
     );
     let real = arguments.pace == Pace::Real;
     let report = Report {
         schema_version: SCHEMA_VERSION,
         command_line: std::env::args().collect(),
-        version: env!("CARGO_PKG_VERSION"),
+        version: env!("CARGO_PKG_VERSION").into(),
         title: inputs.experiment.title.clone(),
         started_unix_s: real.then_some(started.unix_s),
-        ended_well: exit == Exit::Good,
+        ended_well: Some(exit == Exit::Good),
         ended_because,
         cycles_answered: finished.answered,
         rig_cycles_skipped: finished.skipped,
@@ -337,9 +337,9 @@ fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit,
         bus,
         frames_late: sum(|axis| axis.sensors_late),
         frames_duplicate: sum(|axis| axis.sensors_duplicate),
-        timing: written.timing.unwrap_or_else(TimingFigures::none),
+        timing: written.timing.unwrap_or_default(),
         allocations_in_cycle: outcome.allocations.filter(|_| cfg!(feature = "count-allocations")),
-        records_dropped: finished.records_dropped,
+        records_dropped: Some(finished.records_dropped),
         sensors_before_start: outcome.stopwatch.before_start,
         timing_dropped: outcome.stopwatch.dropped,
         realtime_granted: grants.granted().to_vec(),

@@ -7,7 +7,8 @@ use protocol::exit::Exit;
 use protocol::frames::BIT_RATE_PER_S;
 use protocol::response_time::rig::{RigAnalysis, arrivals_text, in_us};
 use protocol::response_time::{Response, critical};
-use serde_json::Value;
+use protocol::wire_time::{IdentifierReport, WireTimeReport};
+use runlog::summary::Summary;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -27,36 +28,32 @@ pub fn print(arguments: &BusLoadArguments) -> Result<Exit, RunError> {
     Ok(Exit::Good)
 }
 
-fn wire_time(summary: &Path) -> Result<Value, RunError> {
+fn wire_time(summary: &Path) -> Result<WireTimeReport, RunError> {
     let refused = |reason: String| RunError::Input(format!("{}: {reason}", summary.display()));
     let text = std::fs::read_to_string(summary).map_err(|error| refused(error.to_string()))?;
-    let mut summary: Value = serde_json::from_str(&text).map_err(|error| refused(error.to_string()))?;
-    match summary["bus_host"]["wire_time"].take() {
-        Value::Null => Err(refused("the bus of this run took no time; run with ?bitrate=1000000".into())),
-        wire_time => Ok(wire_time),
-    }
+    let summary: Summary = serde_json::from_str(&text).map_err(|error| refused(error.to_string()))?;
+    let wire_time = summary.bus_host.and_then(|host| host.wire_time);
+    wire_time.ok_or_else(|| refused("the bus of this run took no time; run with ?bitrate=1000000".into()))
 }
 
-fn markdown(analysis: &RigAnalysis, run: &Value) -> String {
+fn markdown(analysis: &RigAnalysis, run: &WireTimeReport) -> String {
     let mut text = String::from(
         "| frame | id | bits, worst case | comes at most | bound, us | in a run, us | bound as it came there, us | bits there | \
          critical instant, us | bound of these frames, us |\n|---|---|---:|---|---:|---:|---:|---:|---:|---:|\n",
     );
     let as_it_came = analysis.clone().with(|frame| {
-        let arrivals = &run["identifiers"][format!("{:03X}", frame.message.id)]["arrivals"];
-        frame.allow_for(arrivals["least_distance_ns"].as_u64(), arrivals["release_jitter_ns"].as_u64());
+        let arrivals = seen_of(run, frame.message.id).map(|seen| seen.arrivals).unwrap_or_default();
+        frame.allow_for(arrivals.least_distance_ns, arrivals.release_jitter_ns);
         true
     });
     let bounds = analysis.responses().into_iter().zip(as_it_came.responses());
     for (place, (frame, (bound, as_it_came))) in analysis.frames().iter().zip(bounds).enumerate() {
-        let (message, seen) = (frame.message, &run["identifiers"][format!("{:03X}", frame.message.id)]);
+        let message = frame.message;
+        let seen = seen_of(run, message.id);
         let critical = critical::play(analysis, place, 1);
-        let bits = |which: usize| seen["bits"][which].as_u64();
-        let bits =
-            bits(0).zip(bits(1)).map_or_else(String::new, |(least, most)| format!("{least} to {most}"));
+        let bits = seen.map_or_else(String::new, |seen| format!("{} to {}", seen.bits[0], seen.bits[1]));
         let in_ns = |bound: Option<Response>| in_us(bound.map(|found| found.response_ns));
-        let measured =
-            seen["response_ns"]["max"].as_u64().map_or_else(|| "not sent".into(), |ns| in_us(Some(ns)));
+        let measured = seen.map_or_else(|| "not sent".into(), |seen| in_us(Some(seen.response_ns.max)));
         let _infallible = writeln!(
             text,
             "| {} | 0x{:03X} | {} | {} | {} | {measured} | {} | {bits} | {} | {} |",
@@ -70,14 +67,17 @@ fn markdown(analysis: &RigAnalysis, run: &Value) -> String {
             in_us(critical.map(|played| played.bound_ns)),
         );
     }
-    let number = |key: &str| run[key].as_u64().unwrap_or(0);
     let _infallible = write!(
         text,
         "\nThe run: {:.1} s, {} frames, {:.1} % of the wire busy, {} errors.",
-        number("observed_ns") as f64 * 1e-9,
-        number("frames"),
-        number("load_ppm") as f64 / 1e4,
-        number("errors"),
+        run.observed_ns as f64 * 1e-9,
+        run.frames,
+        run.load_ppm as f64 / 1e4,
+        run.errors,
     );
     text
+}
+
+fn seen_of(run: &WireTimeReport, id: u16) -> Option<&IdentifierReport> {
+    run.identifiers.get(&format!("{id:03X}"))
 }

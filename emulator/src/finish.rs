@@ -1,13 +1,14 @@
 //! The end of a run: `summary.json` written, the run told in a few lines, the exit code chosen.
 
 use crate::cli::RunArguments;
+use crate::event::Event;
 use crate::pace::End;
 use crate::recording::writer::WriterReport;
 use crate::run::{LoopOutcome, RunError, RunStart};
-use crate::summary::Summary;
 use protocol::exit::Exit;
 use realtime::{Percentiles, Recorder as Histogram};
 use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use runlog::summary::Summary;
 use std::path::Path;
 
 /// Saves what is left to save, tells the run in a few lines, and says how it went.
@@ -30,19 +31,18 @@ pub(crate) fn finish(
 }
 
 /// The run in a few lines, for whoever watches.
-fn tell(summary: &Summary, folder: &Path) {
-    let Summary { cycles, skipped, overruns, frames_sent, frames_received, .. } = summary;
-    let Summary { frames_lost, frames_malformed, stale_commands, .. } = summary;
+fn tell(summary: &Summary<Event>, folder: &Path) {
+    let Summary { overruns, frames_sent, frames_received, .. } = summary;
+    let (cycles, skipped) = (summary.cycles.unwrap_or_default(), summary.skipped.unwrap_or_default());
+    let Summary { frames_malformed, stale_commands, .. } = summary;
+    let frames_lost = summary.frames_lost.unwrap_or_default();
     eprintln!("emulator: {cycles} cycles, {skipped} of them skipped in {overruns} overruns");
     eprintln!(
         "emulator: {frames_sent} frames sent, {frames_received} received, {frames_lost} lost by their counters, \
          {frames_malformed} malformed, {stale_commands} stale commands"
     );
-    if summary.records_dropped > 0 {
-        eprintln!(
-            "emulator: {} records did not reach the files: the disk was too slow",
-            summary.records_dropped
-        );
+    if let Some(dropped) = summary.records_dropped.filter(|dropped| *dropped > 0) {
+        eprintln!("emulator: {dropped} records did not reach the files: the disk was too slow");
     }
     if summary.wakeup_ns.count > 0 {
         eprintln!("emulator: wake-up {}", summary.wakeup_ns);
@@ -57,7 +57,7 @@ fn summarise(
     epoch_offset_ns: u64,
     ended_because: String,
     passed: bool,
-) -> Summary {
+) -> Summary<Event> {
     let LoopOutcome { paced, figures, bus, host: bus_host } = outcome;
     let [drive_commands, load_commands] = figures.commands;
     let both = [drive_commands, load_commands];
@@ -77,14 +77,14 @@ fn summarise(
         position_error_dynamic_m: None,
         position_error_static_m: None,
         bus_log_cycle_zero_s: (paced.cycle_zero_ns + epoch_offset_ns) as f64 * 1e-9,
-        cycles: paced.cycles,
-        skipped: figures.skipped,
+        cycles: Some(paced.cycles),
+        skipped: Some(figures.skipped),
         overruns: loops.map_or(0, |statistics| statistics.overruns),
         late_completions: loops.map_or(0, |statistics| statistics.late_completions),
         frames_sent: bus.sent,
         frames_received: bus.received,
-        frames_lost: lost,
-        frames_lost_at_rig: lost,
+        frames_lost: Some(lost),
+        frames_lost_at_rig: Some(lost),
         frames_malformed: figures.frames.malformed + bus.malformed,
         frames_late: both.iter().map(|commands| commands.late).sum(),
         frames_duplicate: both.iter().map(|commands| commands.duplicate).sum(),
@@ -106,16 +106,16 @@ fn summarise(
         wall_clock_steps: rig_timing.wall_clock_steps,
         vitals: timing.vitals,
         allocations_in_cycle: paced.allocations.filter(|_| cfg!(feature = "count-allocations")),
-        records_dropped: figures.records_dropped,
+        records_dropped: Some(figures.records_dropped),
         ended_because,
-        passed,
+        passed: Some(passed),
         thresholds: serde_json::Map::new(),
         drive_commands,
         load_commands,
         frames_ignored: figures.frames,
         bus,
         bus_host,
-        event_count,
+        event_count: Some(event_count),
         events,
     }
 }

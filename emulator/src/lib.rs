@@ -15,7 +15,7 @@
 //! | [`console`] | what a person types |
 //! | [`telemetry`] | who looks on |
 //! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |
-//! | [`run`], [`inputs`], [`summary`], [`host_thread`], [`cli`] | around it |
+//! | [`run`], [`inputs`], [`host_thread`], [`cli`] | around it |
 
 pub mod bus_load;
 pub mod catalogue;
@@ -33,6 +33,5 @@ pub mod recording;
 mod rig;
 pub mod run;
 pub mod seal;
-pub mod summary;
 pub mod telemetry;
 pub mod wire_limits;

@@ -26,6 +26,7 @@ use protocol::frames::{ChainStatus, DecodeError, FaultMark, Frame, LinkRequest, 
 use realtime::Overrun;
 use rig_node::{Hand, Latched, RigNode, Taken, TickCause};
 use runlog::candump::FrameRecord;
+use runlog::summary::FrameCounters;
 use runlog::timing::CycleTiming;
 use std::time::Duration;
 
@@ -50,17 +51,6 @@ pub struct NodeParts {
     pub bench_frames: bool,
     /// Whether simulated time is the bus's time.
     pub lockstep: bool,
-}
-
-/// Frames that arrived, by what became of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct FrameCounters {
-    /// Not as `rig.dbc` says: length, checksum, reserved bits, a raw value out of range.
-    pub malformed: u64,
-    /// Identifiers that `rig.dbc` does not know, extended and remote frames.
-    pub unknown: u64,
-    /// Frames that only the rig sends.
-    pub second_rig: u64,
 }
 
 /// What the node counted.

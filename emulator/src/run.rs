@@ -19,7 +19,6 @@ use crate::pace::{self, Limits, Pace, RunContext, RunOutcome, Shared};
 use crate::recording::rig_timing::PROCESS;
 use crate::recording::writer::{Writer, WriterSetup};
 use crate::recording::{self, Recorder};
-use crate::summary::RunDescription;
 use crate::telemetry::{Described, Telemetry};
 use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
@@ -32,6 +31,7 @@ use realtime::{
 };
 use runlog::flight_dump::{self, Log};
 use runlog::run_folder::{SCHEMA_VERSION, clear_results, write_json};
+use runlog::summary::RunDescription;
 use runlog::timing_recorder::{Due, TimingSetup};
 use std::io;
 use std::path::Path;
@@ -387,7 +387,7 @@ fn describe(
     let description = RunDescription {
         schema_version: SCHEMA_VERSION,
         emulator_command_line: std::env::args().collect(),
-        emulator_version: env!("CARGO_PKG_VERSION"),
+        emulator_version: env!("CARGO_PKG_VERSION").into(),
         counts_allocations: cfg!(feature = "count-allocations"),
         started_unix_s: started.unix_s,
         pace: arguments.pace.to_string(),

@@ -103,7 +103,8 @@ pub enum BusError {
 }
 
 /// What a peer counted since it was opened.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct BusCounters {
     /// Frames handed to the bus.
     pub sent: u64,

@@ -8,13 +8,14 @@
 use crate::frames::ValveCommand;
 use crate::live_cycles::LiveCycles;
 use crate::sources::{SourceWatch, Step};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Age in cycles beyond which a command is stale (bus.md, Time).
 pub const STALE_AFTER_CYCLES: u64 = 20;
 
 /// What was counted of one axis's commands.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct CommandCounters {
     /// Commands taken over, whether or not a later one of the same cycle replaced them.
     pub accepted: u64,

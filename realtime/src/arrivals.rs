@@ -11,9 +11,10 @@
 //!
 //! Fed by a thread of normal priority from frames and their arrival stamps, in the order in which they arrived.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::clock::Instant;
 use crate::histogram::{Percentiles, Recorder};
@@ -32,10 +33,11 @@ pub struct Arrivals {
 }
 
 /// What `summary.json` and its like say of it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ArrivalFigures {
     /// The frame's name.
-    pub frame: &'static str,
+    pub frame: Cow<'static, str>,
     /// Its period, ms.
     pub period_ms: u64,
     /// Frames that came.
@@ -78,7 +80,14 @@ impl Arrivals {
     pub fn figures(&self) -> ArrivalFigures {
         let Self { frame, count, gaps, bursts, .. } = *self;
         let period_ms = self.period.as_millis() as u64;
-        ArrivalFigures { frame, period_ms, count, gaps, bursts, interval_ns: self.interval_ns.percentiles() }
+        ArrivalFigures {
+            frame: frame.into(),
+            period_ms,
+            count,
+            gaps,
+            bursts,
+            interval_ns: self.interval_ns.percentiles(),
+        }
     }
 }
 

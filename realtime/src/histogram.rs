@@ -22,7 +22,7 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, IntervalLogWriterError, Tag};
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::deflate::DeflateSerializer;
 
@@ -111,7 +111,8 @@ impl Serialize for Recorder {
 }
 
 /// What a report says of a distribution; in the unit of the samples. Nothing was measured: `None`, in JSON `null`.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Percentiles {
     /// Half of the samples were at most this.
     pub p50: Option<u64>,

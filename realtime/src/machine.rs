@@ -27,12 +27,13 @@ pub use kernel::{Preemption, Throttling};
 pub use memory::{Limits, Memory};
 
 use files::Root;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The machine as a run found it. Lists of CPUs and interrupts are in the kernel's form: `0-3,8`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Machine {
     /// The kernel: release, build, compiler.
     pub kernel: String,

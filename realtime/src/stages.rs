@@ -42,7 +42,7 @@
 use std::io;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::clock::Instant;
 use crate::histogram::Percentiles;
@@ -85,7 +85,8 @@ impl CycleStages {
 }
 
 /// Percentiles of a run, as JSON files show them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct StageFigures {
     /// Wake-up latency of each cycle that was due.
     pub wakeup_ns: Percentiles,

@@ -20,7 +20,7 @@
 use std::fs::File;
 use std::marker::PhantomData;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::signals::Continued;
 
@@ -45,7 +45,8 @@ pub struct VitalCounts {
 }
 
 /// Sums over a run, as `summary.json` shows them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct VitalTotals {
     /// Page faults served without the disk.
     pub minor_faults: u64,

@@ -8,7 +8,7 @@
 //! between two monotonic ones and takes the tightest of a few tries.
 
 use rustix::time::{ClockId, clock_gettime};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::clock::{Clock, Instant, MonotonicClock};
 
@@ -19,7 +19,8 @@ const TIGHT_NS: u64 = 20_000;
 const TRIES: u32 = 5;
 
 /// A step of the wall clock.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct WallClockStep {
     /// When it was noticed, in s after the watch began.
     pub at_s: f64,

@@ -10,7 +10,7 @@
 use crate::candump::{self, FrameRecord};
 use crate::run_folder::{SCHEMA_VERSION, named, write_json};
 use crate::timing::{CycleTiming, write_head, write_row};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 pub const FOLDER: &str = "flight";
 
 /// What happened, and when; as it stands in `event.json`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Event {
     /// See [`SCHEMA_VERSION`].
     pub schema_version: u32,

@@ -1,8 +1,13 @@
 //! The files and records of a run: each is written and read by one type.
 
 pub mod candump;
+pub mod conditions;
+pub mod controller_report;
 pub mod flight_dump;
+pub mod golden;
+pub mod ping_pong;
 pub mod run_folder;
+pub mod summary;
 pub mod telemetry;
 pub mod timing;
 pub mod timing_recorder;

@@ -20,7 +20,7 @@ use realtime::{
     ArrivalFigures, Arrivals, CycleStages, FlightRecorder, Instant, IntervalLog, Percentiles, Severity,
     StageAccount, StageFigures, Stamped, Trigger, VitalTotals,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -68,8 +68,9 @@ pub struct TimingSetup {
     pub copies_lines: bool,
 }
 
-/// The timing of a run, as the reports of both programs have it.
-#[derive(Clone, Debug, Serialize)]
+/// The timing of a run, as the reports of both programs have it; empty in simulated time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct TimingFigures {
     /// Percentiles of the stages.
     #[serde(flatten)]
@@ -83,7 +84,8 @@ pub struct TimingFigures {
 }
 
 /// Dumps of the flight recorder.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct FlightFigures {
     /// Dumps in the folder.
     pub dumps: u64,
@@ -91,17 +93,14 @@ pub struct FlightFigures {
     pub dropped: u64,
 }
 
-impl TimingFigures {
-    /// Of a run in simulated time.
-    #[must_use]
-    pub fn none() -> Self {
-        Self {
-            stages: StageAccount::new("none", PERIOD).figures(),
-            arrivals: Vec::new(),
-            vitals: VitalTotals::default(),
-            flight: FlightFigures::default(),
-        }
-    }
+/// Cycles sent, by the age in cycles of the command that acted over them; a cycle without a command is in none.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CommandAges {
+    /// Drive axis.
+    pub drive: BTreeMap<u64, u64>,
+    /// Load axis.
+    pub load: BTreeMap<u64, u64>,
 }
 
 /// In the ring by the time at which the thread woke.

@@ -8,6 +8,7 @@ use super::controlled::not_controlled;
 use super::files::RunFiles;
 use super::model::{Claim, Conditions};
 use super::reference;
+use realtime::Machine;
 use std::collections::BTreeMap;
 
 /// Cycles for a p99.9 that rests on a hundred samples.
@@ -96,7 +97,7 @@ fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
             runs.len()
         ));
     }
-    let cycles: u64 = runs.iter().filter_map(|run| run.summary["cycles"].as_u64()).sum();
+    let cycles: u64 = runs.iter().filter_map(|run| run.counted().cycles).sum();
     if cycles < CYCLES_FOR_P999 {
         reasons
             .push(format!("{cycles} cycles are too few for p99.9 and beyond: {CYCLES_FOR_P999} at least."));
@@ -114,8 +115,8 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
     }
     let dropped: u64 = runs
         .iter()
-        .flat_map(RunFiles::reports)
-        .filter_map(|(_, told)| told["records_dropped"].as_u64())
+        .flat_map(RunFiles::process_reports)
+        .filter_map(|(_, report)| report.records_dropped)
         .sum();
     if dropped > 0 {
         reasons.push(format!("{dropped} records did not reach the files."));
@@ -132,7 +133,7 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
         add(shared_cpu(run));
         add(of_the_run(run));
     }
-    if runs.iter().any(|run| run.run["counts_allocations"] == true) {
+    if runs.iter().any(|run| run.description().counts_allocations) {
         reasons.push("The build counts allocations, which costs time.".into());
     }
     reasons
@@ -195,29 +196,28 @@ fn shared_cpu(run: &RunFiles) -> Vec<String> {
 /// What the run itself, its build and its machine forbid.
 fn of_the_run(run: &RunFiles) -> Vec<String> {
     let mut found = Vec::new();
-    let machine = &run.run["machine"];
-    let word = |key: &str| machine[key].as_str().unwrap_or_default();
-    let build = &machine["build"];
-    let profile = build["profile"].as_str().unwrap_or_default();
-    if profile.starts_with("debug") || build["debug_assertions"] == true {
+    let Machine { build, hypervisor, clock_sources_available, processor, .. } = run.description().machine;
+    let profile = &build.profile;
+    if profile.starts_with("debug") || build.debug_assertions {
         found.push(format!("The emulator is a build for debugging ({profile})."));
     }
-    if run.summary["passed"] == false {
+    let summary = run.counted();
+    if summary.passed == Some(false) {
         found.push("The verdict of a run itself is not passed.".into());
     }
-    let count = |key: &str| run.summary[key].as_u64().unwrap_or_default() as f64;
-    if count("skipped") > SKIPPED_SHARE * count("cycles") {
-        let share = 100.0 * count("skipped") / count("cycles").max(1.0);
+    let (skipped, cycles) =
+        (summary.skipped.unwrap_or_default() as f64, summary.cycles.unwrap_or_default() as f64);
+    if skipped > SKIPPED_SHARE * cycles {
+        let share = 100.0 * skipped / cycles.max(1.0);
         found.push(format!("A run missed {share:.1} % of its cycles: {} % at most.", 100.0 * SKIPPED_SHARE));
     }
-    let is_kvm =
-        ["hypervisor", "clock_sources_available"].iter().any(|key| word(key).to_lowercase().contains("kvm"));
-    if word("processor").contains("TCG") || (word("processor").contains("QEMU Virtual CPU") && !is_kvm) {
+    let is_kvm = [hypervisor, clock_sources_available].iter().any(|word| word.to_lowercase().contains("kvm"));
+    if processor.contains("TCG") || (processor.contains("QEMU Virtual CPU") && !is_kvm) {
         found.push(
             "The machine is emulated by QEMU (TCG): its instructions take what the emulation takes.".into(),
         );
     }
-    if run.conditions["uncommitted_files"].as_u64() > Some(0) {
+    if run.circumstances().uncommitted_files > Some(0) {
         found.push(
             "The source tree held changes that nobody committed: the build is not told by its commit.".into(),
         );
@@ -276,7 +276,7 @@ mod tests {
                 run.summary["cycles"] = json!(20_000);
                 made_up::reference(run, (0..20_000).map(|_| 13_000).collect());
             }),
-            ("probe", |run| run.conditions["probe"] = json!(true)),
+            ("probe", |run| run.conditions.get_or_insert_default().probe = true),
             ("did not reach", |run| run.summary["records_dropped"] = json!(3)),
             ("priority 70, the rig 80", |run| reference_line(run, "cyclictest -p 70 -a 0 -i 1000")),
             ("CPU 1, the rig 0", |run| reference_line(run, "cyclictest --priority=80 --affinity=1")),
@@ -292,7 +292,7 @@ mod tests {
             ("not passed", |run| run.summary["passed"] = json!(false)),
             ("missed 0.2 %", |run| run.summary["skipped"] = json!(120)),
             ("QEMU (TCG)", |run| run.run["machine"]["processor"] = json!("QEMU TCG CPU version 2.5+")),
-            ("nobody committed", |run| run.conditions["uncommitted_files"] = json!(2)),
+            ("nobody committed", |run| run.conditions.get_or_insert_default().uncommitted_files = Some(2)),
             ("counts allocations", |run| run.run["counts_allocations"] = json!(true)),
         ];
         for (words, spoil) in cases {
@@ -309,7 +309,7 @@ mod tests {
         let mut runs = good();
         for run in &mut runs {
             run.run["machine"] = json!({ "kernel": "PREEMPT_DYNAMIC", "hypervisor": "KVM" });
-            run.conditions["load_generator"] = json!(null);
+            run.conditions.get_or_insert_default().load_generator = None;
         }
         let told = judged(&runs);
         assert!(told.supported && told.sentence.contains("virtual machine (KVM)"), "{told:?}");

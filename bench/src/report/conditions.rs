@@ -10,7 +10,9 @@ const VALUES_SHOWN: usize = 3;
 /// The conditions of all runs.
 #[must_use]
 pub fn conditions(runs: &[RunFiles]) -> Conditions {
-    let one_of = |key: &str| runs.iter().find_map(|run| run.conditions[key].as_str().map(str::to_owned));
+    let one_of = |of: fn(&runlog::conditions::Conditions) -> Option<String>| {
+        runs.iter().filter_map(|run| run.conditions.as_ref()).find_map(of)
+    };
     let reference = runs.iter().find_map(|run| run.reference.as_ref());
     let told_command = reference.map(|told| told.command_line.clone()).filter(|line| !line.is_empty());
     let with_resolution = |line: String| match reference {
@@ -21,13 +23,15 @@ pub fn conditions(runs: &[RunFiles]) -> Conditions {
         machine: machine(runs),
         command_lines: command_lines(runs),
         privileges: privileges(runs),
-        load_generator: one_of("load_generator"),
-        reference: reference.and(told_command.or_else(|| one_of("reference_command"))).map(with_resolution),
+        load_generator: one_of(|told| told.load_generator.clone()),
+        reference: reference
+            .and(told_command.or_else(|| one_of(|told| told.reference_command.clone())))
+            .map(with_resolution),
         reference_missing_because: reference.is_none().then(|| {
             let untold = "no run has a cyclictest.json; scripts/latency makes one beside each run";
-            one_of("reference_missing_because").unwrap_or_else(|| untold.into())
+            one_of(|told| told.reference_missing_because.clone()).unwrap_or_else(|| untold.into())
         }),
-        probe: runs.iter().any(|run| run.gaps.is_some() || run.conditions["probe"] == Value::Bool(true)),
+        probe: runs.iter().any(|run| run.gaps.is_some() || run.circumstances().probe),
     }
 }
 
@@ -65,18 +69,16 @@ fn machine(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
         flatten(&mut facts, "", &run.run["machine"]);
-        if !run.conditions["uncommitted_files"].is_null() {
-            facts.add("uncommitted files", &text(&run.conditions["uncommitted_files"]));
+        if let Some(files) = run.circumstances().uncommitted_files {
+            facts.add("uncommitted files", &files.to_string());
         }
         for key in ["emulator_version", "counts_allocations", "bus", "pace"] {
             if !run.run[key].is_null() {
                 facts.add(&key.replace('_', " "), &text(&run.run[key]));
             }
         }
-        for (process, told) in &run.controllers {
-            if !told["version"].is_null() {
-                facts.add(&format!("{process} version"), &text(&told["version"]));
-            }
+        for (process, told) in run.controller_reports().filter(|(_, told)| !told.version.is_empty()) {
+            facts.add(&format!("{process} version"), &told.version);
         }
     }
     facts.told()
@@ -107,26 +109,17 @@ fn text(value: &Value) -> String {
 
 fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
-    let line = |words: &Value| {
-        let words = words.as_array().into_iter().flatten().filter_map(Value::as_str);
-        words.collect::<Vec<_>>().join(" ")
-    };
     for run in runs {
-        let emulator = line(&run.run["emulator_command_line"]);
-        if !emulator.is_empty() {
-            facts.add("emulator", &emulator);
+        let emulator = run.description().emulator_command_line.join(" ");
+        let controllers =
+            run.controller_reports().map(|(process, told)| (process, told.command_line.join(" ")));
+        let lines = std::iter::once(("emulator", emulator)).chain(controllers);
+        lines.filter(|(_, line)| !line.is_empty()).for_each(|(process, line)| facts.add(process, &line));
+        if let Some(command) = run.circumstances().command {
+            facts.add("measured by", &command);
         }
-        for (process, told) in &run.controllers {
-            let controller = line(&told["command_line"]);
-            if !controller.is_empty() {
-                facts.add(process, &controller);
-            }
-        }
-        if let Some(command) = run.conditions["command"].as_str() {
-            facts.add("measured by", command);
-        }
-        for (name, command) in run.ping_pong["commands"].as_object().into_iter().flatten() {
-            facts.add(&format!("ping-pong {name}"), &text(command));
+        for (name, command) in &run.ping_pong.commands {
+            facts.add(&format!("ping-pong {name}"), command);
         }
     }
     facts.told()
@@ -135,15 +128,15 @@ fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
 fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
-        let told = std::iter::once(("emulator", &run.run));
-        let told = told.chain(run.controllers.iter().map(|(process, told)| (process.as_str(), told)));
-        for (process, told) in told {
-            for (key, word) in [("realtime_granted", "granted"), ("realtime_refused", "refused")] {
-                let list = told[key].as_array().into_iter().flatten().filter_map(Value::as_str);
-                let list = list.collect::<Vec<_>>().join(", ");
-                if !list.is_empty() {
-                    facts.add(&format!("{process}, {word}"), &list);
-                }
+        let emulator = run.description();
+        let emulator = ("emulator", [emulator.realtime_granted, emulator.realtime_refused]);
+        let controllers = run.controller_reports();
+        let controllers =
+            controllers.map(|(process, told)| (process, [told.realtime_granted, told.realtime_refused]));
+        for (process, lists) in std::iter::once(emulator).chain(controllers) {
+            for (list, word) in lists.iter().zip(["granted", "refused"]).filter(|(list, _)| !list.is_empty())
+            {
+                facts.add(&format!("{process}, {word}"), &list.join(", "));
             }
         }
     }
@@ -165,8 +158,9 @@ mod tests {
         assert_eq!(told.command_lines[0].value, "emulator run");
         assert!(told.privileges.iter().any(|fact| fact.name == "controller, granted"));
         let mut run = made_up::run(10);
-        run.conditions["command"] = "scripts/latency --pairs 2".into();
-        run.conditions["uncommitted_files"] = 3.into();
+        let told_of = run.conditions.as_mut().unwrap();
+        told_of.command = Some("scripts/latency --pairs 2".into());
+        told_of.uncommitted_files = Some(3);
         let with = conditions(&[run]);
         assert!(with.command_lines.iter().any(|fact| fact.value == "scripts/latency --pairs 2"));
         assert!(with.machine.iter().any(|fact| fact.name == "uncommitted files" && fact.value == "3"));

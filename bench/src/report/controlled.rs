@@ -5,7 +5,7 @@
 use super::claim::{cpus, virtual_machine};
 use super::files::RunFiles;
 use super::model::Conditions;
-use serde_json::Value;
+use realtime::Machine;
 use std::collections::BTreeSet;
 
 /// The sentences of all runs, each once.
@@ -27,7 +27,7 @@ pub fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String>
     if conditions.load_generator.is_none() {
         told.push("What else ran on the machine was not told.".into());
     }
-    let unknown = runs.iter().filter(|run| run.conditions.is_null()).count();
+    let unknown = runs.iter().filter(|run| run.conditions.is_none()).count();
     if unknown > 0 && runs.len() > unknown {
         told.push(format!("{unknown} run(s) have no conditions.json."));
     }
@@ -35,18 +35,17 @@ pub fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String>
 }
 
 fn of_run(run: &RunFiles) -> Vec<String> {
-    let machine = &run.run["machine"];
+    let machine = &run.description().machine;
     let cpus: BTreeSet<u64> = cpus(run).into_values().collect();
     let mut told = governors(machine);
-    let is_rt = |value: &Value| value.as_str().is_some_and(|text| text.contains("PREEMPT_RT"));
-    if !is_rt(&machine["preemption"]["model"]) && !is_rt(&machine["kernel"]) {
+    if ![&machine.preemption.model, &machine.kernel].iter().any(|text| text.contains("PREEMPT_RT")) {
         told.push("The kernel is not PREEMPT_RT: its own work can keep the loops waiting.".into());
     }
     told.extend(isolation(machine, &cpus));
     told.extend(cpus.iter().filter_map(|cpu| interrupts(machine, *cpu)));
     told.extend(siblings(machine, &cpus));
-    let throttling = machine["rt_throttling"]["about"].as_str();
-    if let Some(about) = throttling.filter(|about| about.starts_with("on")) {
+    let about = &machine.rt_throttling.about;
+    if about.starts_with("on") {
         told.push(format!("RT throttling is {about}: a loop that needs more is stopped for the rest."));
     }
     let held = |granted: &[&str]| granted.iter().any(|grant| grant.contains("cpu_dma_latency"));
@@ -59,22 +58,22 @@ fn of_run(run: &RunFiles) -> Vec<String> {
             idle_states(machine)
         ));
     }
-    match machine["clock_source"].as_str() {
-        Some("tsc") => {}
-        Some(source) => told.push(format!(
+    match machine.clock_source.as_str() {
+        "tsc" => {}
+        "" => told.push("The clock source is not known.".into()),
+        source => told.push(format!(
             "The clock source is {source}, not tsc: reading it takes longer, and its steps are its own."
         )),
-        None => told.push("The clock source is not known.".into()),
     }
-    if let Some(kib) = machine["memory"]["swap_used_kib"].as_u64().filter(|kib| *kib > 0) {
+    if let Some(kib) = machine.memory.swap_used_kib.filter(|kib| *kib > 0) {
         told.push(format!("{kib} KiB of swap were in use: other programs waited for their pages."));
     }
     told
 }
 
 /// Each policy that is not `performance`: one among others that are must not pass.
-fn governors(machine: &Value) -> Vec<String> {
-    let policies = machine["frequency_governors"].as_array().map(Vec::as_slice).unwrap_or_default();
+fn governors(machine: &Machine) -> Vec<String> {
+    let policies = &machine.frequency_governors;
     if policies.is_empty() {
         return vec!["The CPUs' frequency governor is not known.".into()];
     }
@@ -90,11 +89,11 @@ fn governors(machine: &Value) -> Vec<String> {
         (governor != "performance")
             .then(|| format!("The frequency governor of {cpus} is {governor}: their clock may change."))
     };
-    policies.iter().filter_map(Value::as_str).filter_map(sentence).collect()
+    policies.iter().filter_map(|policy| sentence(policy)).collect()
 }
 
-fn isolation(machine: &Value, loops: &BTreeSet<u64>) -> Option<String> {
-    let list = machine["isolated"].as_str().unwrap_or_default();
+fn isolation(machine: &Machine, loops: &BTreeSet<u64>) -> Option<String> {
+    let list = machine.isolated.as_str();
     let isolated = in_list(list);
     if isolated.is_empty() {
         return Some("No CPU is isolated: interrupts and other threads share those of the loops.".into());
@@ -109,8 +108,8 @@ fn isolation(machine: &Value, loops: &BTreeSet<u64>) -> Option<String> {
 }
 
 /// `may come: 1,3-5; do come: none`, as the machine's facts say it.
-fn interrupts(machine: &Value, cpu: u64) -> Option<String> {
-    let (may, does) = machine["interrupts"][format!("CPU {cpu}")].as_str()?.split_once("; do come: ")?;
+fn interrupts(machine: &Machine, cpu: u64) -> Option<String> {
+    let (may, does) = machine.interrupts.get(&format!("CPU {cpu}"))?.split_once("; do come: ")?;
     let may = may.trim_start_matches("may come: ");
     match (may, does) {
         (_, does) if does != "none" => Some(format!("Interrupts come to CPU {cpu} of the loops: {does}.")),
@@ -119,8 +118,8 @@ fn interrupts(machine: &Value, cpu: u64) -> Option<String> {
     }
 }
 
-fn siblings(machine: &Value, loops: &BTreeSet<u64>) -> Option<String> {
-    let cores = machine["smt"].as_str()?.strip_prefix("CPUs that share a core: ")?;
+fn siblings(machine: &Machine, loops: &BTreeSet<u64>) -> Option<String> {
+    let cores = machine.smt.strip_prefix("CPUs that share a core: ")?;
     let cores = cores.split(" (").next().unwrap_or(cores).split("; ");
     let of_loops: Vec<_> = cores.filter(|core| !in_list(core).is_disjoint(loops)).collect();
     (!of_loops.is_empty()).then(|| {
@@ -131,9 +130,8 @@ fn siblings(machine: &Value, loops: &BTreeSet<u64>) -> Option<String> {
     })
 }
 
-fn idle_states(machine: &Value) -> String {
-    let states = machine["idle_states"].as_array().into_iter().flatten().filter_map(Value::as_str);
-    let states = states.collect::<Vec<_>>().join(", ");
+fn idle_states(machine: &Machine) -> String {
+    let states = machine.idle_states.join(", ");
     if states.is_empty() { states } else { format!(" ({states})") }
 }
 

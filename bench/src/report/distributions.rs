@@ -5,19 +5,11 @@ use super::joined::{self, Series};
 use super::model::{Distribution, Maximum, PercentilesNs};
 use super::samples::Samples;
 use super::{kinds, reference};
-use serde_json::Value;
+use realtime::Percentiles;
 use std::collections::BTreeMap;
 
 /// Share of one-way latencies that may be below zero before the report says so.
 const BELOW_ZERO_SHARE: f64 = 0.01;
-
-/// Keys of the summaries' percentiles, and what the log calls them.
-const SUMMARY_KEYS: [(&str, &str); 4] = [
-    ("wakeup_ns", "wakeup"),
-    ("execution_ns", "execution"),
-    ("period_error_ns", "period-error"),
-    ("round_trip_ns", "round-trip"),
-];
 
 /// The distributions of a run, by tag, the reference's among them; tells what could not be had.
 #[must_use]
@@ -64,18 +56,23 @@ pub fn percentiles_of_run(
 ) -> BTreeMap<String, PercentilesNs> {
     let mut told: BTreeMap<_, _> =
         series.iter().map(|(tag, series)| (tag.clone(), series.samples.percentiles_ns())).collect();
-    for (process, summary) in run.reports() {
-        for (key, what) in SUMMARY_KEYS {
-            let tag =
-                if what == "round-trip" { format!("drive-{what}") } else { format!("{process}-{what}") };
-            if let Some(percentiles) = percentiles(&summary[key]) {
+    for (process, report) in run.process_reports() {
+        let stages = &report.timing.stages;
+        for (tag, figures) in [
+            (format!("{process}-wakeup"), &stages.wakeup_ns),
+            (format!("{process}-execution"), &stages.execution_ns),
+            (format!("{process}-period-error"), &stages.period_error_ns),
+            ("drive-round-trip".to_owned(), &report.round_trip_ns),
+        ] {
+            if let Some(percentiles) = percentiles(figures) {
                 told.entry(tag).or_insert(percentiles);
             }
         }
     }
     for (name, _) in kinds::PING_PONGS {
-        let figures = &run.ping_pong[name];
-        for (end, figures) in [("", figures), (kinds::TO_ARRIVAL, &figures["to_arrival_ns"])] {
+        let Some(figures) = run.ping_pong.figures.get(name) else { continue };
+        let to_arrival = figures.to_arrival_ns.as_ref().map(|figures| (kinds::TO_ARRIVAL, figures));
+        for (end, figures) in std::iter::once(("", &figures.round_trip_ns)).chain(to_arrival) {
             if let Some(percentiles) = percentiles(figures) {
                 told.entry(format!("{}{name}{end}", kinds::PING_PONG)).or_insert(percentiles);
             }
@@ -84,18 +81,18 @@ pub fn percentiles_of_run(
     told
 }
 
-/// Percentiles as the summaries write them; nothing without samples.
+/// Percentiles of the summaries; nothing without samples.
 #[must_use]
-pub fn percentiles(told: &Value) -> Option<PercentilesNs> {
-    let at = |key: &str, least: u64| told[key].as_u64().filter(|_| told["count"].as_u64() >= Some(least));
-    let count = told["count"].as_u64().filter(|count| *count > 0)?;
-    Some(PercentilesNs {
-        p50: at("p50", 1),
-        p90: at("p90", 10),
-        p99: at("p99", 100),
-        p999: at("p999", 1000),
-        p9999: at("p9999", 10_000),
-        max: at("max", 1),
+pub fn percentiles(told: &Percentiles) -> Option<PercentilesNs> {
+    let count = told.count;
+    let at = |value: Option<u64>, least: u64| value.filter(|_| count >= least);
+    (count > 0).then(|| PercentilesNs {
+        p50: told.p50,
+        p90: at(told.p90, 10),
+        p99: at(told.p99, 100),
+        p999: at(told.p999, 1000),
+        p9999: at(told.p9999, 10_000),
+        max: told.max,
         count,
     })
 }

@@ -6,7 +6,14 @@ use super::kinds::PING_PONGS;
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
+use runlog::conditions::Conditions;
+use runlog::controller_report::ControllerReport;
+use runlog::flight_dump;
+use runlog::ping_pong::PingPongFile;
+use runlog::summary::{NotedEvent, ProcessReport, RunDescription, Summary};
 use runlog::timing::{self, CycleTiming};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -23,13 +30,13 @@ const LONGEST_SECOND_S: f64 = 1.5;
 pub struct RunFiles {
     /// Its folder.
     pub folder: PathBuf,
-    /// `summary.json`; null when missing.
+    /// `summary.json` as it stands, since the report lists every count in it; null when missing.
     pub summary: Value,
-    /// `run.json`; null when missing.
+    /// `run.json` as it stands, since the report lists every fact of the machine; null when missing.
     pub run: Value,
-    /// `conditions.json`; null when missing.
-    pub conditions: Value,
-    /// `controller*.json` by process.
+    /// `conditions.json`; `None` when missing.
+    pub conditions: Option<Conditions>,
+    /// `controller*.json` by process, as they stand.
     pub controllers: BTreeMap<String, Value>,
     /// Distributions of all logs by tag, with the maximum of each second.
     pub logged: BTreeMap<String, Series>,
@@ -47,8 +54,8 @@ pub struct RunFiles {
     pub reference: Option<Reference>,
     /// Ping-pongs beside this run, by tag.
     pub ping_pongs: BTreeMap<String, Samples>,
-    /// `ping-pong.json`; null when missing.
-    pub ping_pong: Value,
+    /// `ping-pong.json`; empty when missing.
+    pub ping_pong: PingPongFile,
     /// What is missing or damaged, a sentence each.
     pub lacks: Vec<String>,
 }
@@ -68,9 +75,10 @@ impl RunFiles {
         run.summary = run.json("summary.json");
         run.run = run.json("run.json");
         run.conditions = run.json("conditions.json");
+        run.judge_types();
         for process in PROCESSES {
             if process != "emulator" {
-                let told = run.json(&format!("{process}.json"));
+                let told: Value = run.json(&format!("{process}.json"));
                 if !told.is_null() {
                     run.controllers.insert(process.into(), told);
                 }
@@ -113,7 +121,7 @@ impl RunFiles {
         }
     }
 
-    fn json(&mut self, name: &str) -> Value {
+    fn json<T: DeserializeOwned + Default>(&mut self, name: &str) -> T {
         self.parse(name, |text| serde_json::from_str(text)).unwrap_or_default()
     }
 
@@ -169,8 +177,8 @@ impl RunFiles {
                 continue;
             }
             let process = process.to_owned();
-            let event = self.json(&format!("flight/{name}/event.json"));
-            if let (Some(cycle), Some(late_ns)) = (event["cycle"].as_u64(), event["late_ns"].as_u64()) {
+            let event = self.parse(&format!("flight/{name}/event.json"), |text| serde_json::from_str(text));
+            if let Some(flight_dump::Event { cycle, late_ns, .. }) = event {
                 self.told_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
             }
             if self.rows.contains_key(&process) {
@@ -181,6 +189,18 @@ impl RunFiles {
         }
         for (process, rows) in taken {
             self.rows.insert(process, rows.into_values().collect());
+        }
+    }
+
+    /// Says which files are not as their types have them.
+    fn judge_types(&mut self) {
+        let summary =
+            (!self.summary.is_null()).then(|| Summary::<NotedEvent>::deserialize(&self.summary).err());
+        let run = (!self.run.is_null()).then(|| RunDescription::<Value>::deserialize(&self.run).err());
+        for (name, error) in [("summary.json", summary), ("run.json", run)] {
+            if let Some(error) = error.flatten() {
+                self.lacks.push(format!("{name} is not as this version writes it: {error}"));
+            }
         }
     }
 
@@ -211,17 +231,45 @@ impl RunFiles {
     /// When the run began, s since 1970; nothing when it is not told.
     #[must_use]
     pub fn started_unix_s(&self) -> Option<f64> {
-        self.run["started_unix_s"].as_f64()
+        self.description().started_unix_s
     }
 
     /// How long it was, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        let told = self.summary["cycles"].as_u64().map(|cycles| cycles as f64 * 1e-3);
-        told.unwrap_or(self.logged_until_s)
+        let cycles = self.counted().cycles;
+        cycles.map_or(self.logged_until_s, |cycles| cycles as f64 * 1e-3)
     }
 
-    /// `summary.json` and each `controller*.json`, by process.
+    /// `summary.json`; empty when missing.
+    #[must_use]
+    pub fn counted(&self) -> Summary {
+        typed(&self.summary)
+    }
+
+    /// `run.json`; empty when missing.
+    #[must_use]
+    pub fn description(&self) -> RunDescription {
+        typed(&self.run)
+    }
+
+    /// `conditions.json`; empty when missing.
+    #[must_use]
+    pub fn circumstances(&self) -> Conditions {
+        self.conditions.clone().unwrap_or_default()
+    }
+
+    /// Each `controller*.json` by process.
+    pub fn controller_reports(&self) -> impl Iterator<Item = (&str, ControllerReport)> {
+        self.controllers.iter().map(|(process, told)| (process.as_str(), typed(told)))
+    }
+
+    /// What `summary.json` and each `controller*.json` have in common, by process.
+    pub fn process_reports(&self) -> impl Iterator<Item = (&str, ProcessReport)> {
+        self.reports().map(|(process, told)| (process, typed(told)))
+    }
+
+    /// `summary.json` and each `controller*.json` as they stand, by process.
     pub fn reports(&self) -> impl Iterator<Item = (&str, &Value)> {
         let emulator = std::iter::once(("emulator", &self.summary));
         emulator.chain(self.controllers.iter().map(|(process, told)| (process.as_str(), told)))
@@ -234,6 +282,11 @@ impl RunFiles {
             .into_iter()
             .chain(self.controllers.iter().map(|(process, told)| (process.as_str(), words_of(told))))
     }
+}
+
+/// A file as its type; empty where it is missing or not as its type has it, which [`RunFiles::lacks`] says.
+fn typed<T: DeserializeOwned + Default>(value: &Value) -> T {
+    T::deserialize(value).unwrap_or_default()
 }
 
 fn words_of(told: &Value) -> Vec<&str> {

@@ -9,8 +9,8 @@ use super::explain::rules::in_words;
 use super::files::RunFiles;
 use super::joined::PERIOD_NS;
 use super::model::{Cause, Event, Finding};
+use runlog::controller_report::ControllerReport;
 use runlog::timing::CycleTiming;
-use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Page faults of a process after its first second that are a storm; memory that is locked gives none.
@@ -66,16 +66,11 @@ fn explained_ns(events: &[Event], cause: Cause) -> u64 {
     of(events, cause).map(|event| event.late_ns.max(event.slow_ns)).sum()
 }
 
-/// A count under a key of each process's report, summed.
-fn total<'a>(values: impl Iterator<Item = &'a Value>) -> u64 {
-    values.filter_map(Value::as_u64).sum()
-}
-
 fn stopped(runs: &[RunFiles], events: &[Event], cause: Cause) -> Option<Finding> {
     let is_rig = cause == Cause::EmulatorStopped;
-    let reports = runs.iter().flat_map(RunFiles::reports);
+    let reports = runs.iter().flat_map(RunFiles::process_reports);
     let of_process = reports.filter(|(process, _)| (*process == "emulator") == is_rig);
-    let counted = total(of_process.map(|(_, told)| &told["vitals"]["continued"]));
+    let counted = of_process.map(|(_, report)| report.timing.vitals.continued).sum::<u64>();
     let seen = of(events, cause).count() as u64;
     let count = counted.max(seen);
     let who = if is_rig { "The emulator" } else { "A controller" };
@@ -129,9 +124,10 @@ fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
     let (mut skipped, mut worst_ns, mut untold) = (0, 0, 0);
     for run in runs {
         let rows = run.rows.get("emulator").map(Vec::as_slice).unwrap_or_default();
-        let counted = run.summary["skipped"].as_u64();
+        let summary = run.counted();
+        let counted = summary.skipped;
         let logged = run.logged.get("emulator-wakeup").and_then(|series| series.samples.max_ns());
-        let longest_ns = logged.or(run.summary["wakeup_ns"]["max"].as_u64());
+        let longest_ns = logged.or(summary.wakeup_ns.max);
         let missing = counted.unwrap_or_default().saturating_sub(rows.iter().map(|row| row.skipped).sum());
         let late_ns = |row: &CycleTiming| (row.woke_ns + row.skipped * PERIOD_NS).saturating_sub(row.due_ns);
         let of_rows_ns = rows.iter().map(late_ns).max().unwrap_or_default();
@@ -170,9 +166,8 @@ fn page_faults(runs: &[RunFiles], events: &[Event]) -> Option<Finding> {
     let cause = Cause::PageFaults;
     let mut faults = 0;
     let mut storms = Vec::new();
-    for (process, told) in runs.iter().flat_map(RunFiles::reports) {
-        let vitals = &told["vitals"];
-        let of_process = total([&vitals["minor_faults"], &vitals["major_faults"]].into_iter());
+    for (process, report) in runs.iter().flat_map(RunFiles::process_reports) {
+        let of_process = report.timing.vitals.minor_faults + report.timing.vitals.major_faults;
         faults += of_process;
         if of_process > STORM_FAULTS {
             storms.push(process.to_owned());
@@ -207,20 +202,20 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
     let mut count = 0;
     let mut who = Vec::new();
     for run in runs {
-        for peer in run.summary["bus_host"]["peers"].as_array().into_iter().flatten() {
-            let dropped = sum_of(&peer["dropped_at_queue"]);
+        for peer in run.counted().bus_host.iter().flat_map(|host| &host.peers) {
+            let dropped = peer.dropped_at_queue.total();
             if dropped > 0 {
                 count += dropped;
-                let listens = peer["frames_received"].as_u64() == Some(0);
-                let name = peer["name"].as_str().unwrap_or("a peer");
-                who.push(format!(
-                    "{name} ({})",
-                    if listens { "a listener, which sends nothing" } else { "a sender too" }
-                ));
+                let what = if peer.frames_received == 0 {
+                    "a listener, which sends nothing"
+                } else {
+                    "a sender too"
+                };
+                who.push(format!("{} ({what})", peer.name));
             }
         }
-        for (process, told) in run.reports() {
-            let dropped = told["bus"]["dropped_on_receive"].as_u64().unwrap_or_default();
+        for (process, report) in run.process_reports() {
+            let dropped = report.bus.unwrap_or_default().dropped_on_receive;
             if dropped > 0 {
                 count += dropped;
                 who.push(process.to_owned());
@@ -241,36 +236,29 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
     })
 }
 
-/// The sum of counts by name.
-fn sum_of(counts: &Value) -> u64 {
-    total(counts.as_object().into_iter().flat_map(|counts| counts.values()))
-}
-
 /// Frames that never came, by gaps in the counters at rig and controllers.
 #[must_use]
 pub fn lost_by_gaps(run: &RunFiles) -> u64 {
-    let at_rig = run.summary["frames_lost_at_rig"].as_u64();
-    let by_axis = || total(["drive_commands", "load_commands"].iter().map(|key| &run.summary[key]["lost"]));
-    let axes = run.controllers.values().flat_map(|told| told["axes"].as_object().into_iter().flatten());
-    let at_controllers = axes.map(|(_, axis)| match &axis["sensors_lost"] {
-        Value::Object(_) => sum_of(&axis["sensors_lost"]),
-        count => count.as_u64().unwrap_or_default(),
-    });
-    at_rig.unwrap_or_else(by_axis) + at_controllers.sum::<u64>()
+    let summary = run.counted();
+    let by_axis = summary.drive_commands.lost + summary.load_commands.lost;
+    let of_process =
+        |report: ControllerReport| report.axes.values().filter_map(|axis| axis.sensors_lost).sum::<u64>();
+    let at_controllers = run.controller_reports().map(|(_, report)| of_process(report)).sum::<u64>();
+    summary.frames_lost_at_rig.unwrap_or(by_axis) + at_controllers
 }
 
 fn frame_loss(runs: &[RunFiles]) -> Option<Finding> {
     let (mut lost, mut at_queues, mut on_wire) = (0, 0, 0);
     for run in runs {
         lost += lost_by_gaps(run);
-        let host = &run.summary["bus_host"];
-        on_wire += sum_of(&host["injected_loss"]);
-        // A listener's queue says nothing of what rig and controllers missed.
-        let peers = host["peers"].as_array().into_iter().flatten();
-        let ours = peers.filter(|peer| peer["frames_received"].as_u64().is_some_and(|sent| sent > 0));
-        at_queues += ours.map(|peer| sum_of(&peer["dropped_at_queue"])).sum::<u64>();
-        at_queues += total(run.reports().map(|(_, told)| &told["bus"]["dropped_on_receive"]));
-        at_queues += total(run.reports().map(|(_, told)| &told["bus"]["dropped_on_send"]));
+        if let Some(host) = run.counted().bus_host {
+            on_wire += host.injected_loss.total();
+            // A listener's queue says nothing of what rig and controllers missed.
+            let ours = host.peers.iter().filter(|peer| peer.frames_received > 0);
+            at_queues += ours.map(|peer| peer.dropped_at_queue.total()).sum::<u64>();
+        }
+        let buses = run.process_reports().filter_map(|(_, report)| report.bus);
+        at_queues += buses.map(|bus| bus.dropped_on_receive + bus.dropped_on_send).sum::<u64>();
     }
     let unaccounted = lost.saturating_sub(at_queues);
     (unaccounted > 0 || on_wire > 0).then(|| {
@@ -292,11 +280,9 @@ fn frame_loss(runs: &[RunFiles]) -> Option<Finding> {
 }
 
 fn clock_step(runs: &[RunFiles]) -> Option<Finding> {
-    let reports = runs.iter().flat_map(RunFiles::reports);
-    let steps: Vec<f64> = reports
-        .flat_map(|(_, told)| told["wall_clock_steps"].as_array().into_iter().flatten())
-        .filter_map(|step| step["step_s"].as_f64())
-        .collect();
+    let reports = runs.iter().flat_map(RunFiles::process_reports);
+    let steps: Vec<f64> =
+        reports.flat_map(|(_, report)| report.wall_clock_steps).map(|step| step.step_s).collect();
     let largest = steps.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
     Some(Finding {
         cause: Cause::ClockStep,

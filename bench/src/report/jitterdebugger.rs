@@ -51,9 +51,9 @@ fn one(tag: &str, samples: &Samples) -> Value {
 
 /// What `uname` would have said on the machine of the first run, as far as run.json tells.
 fn sysinfo(runs: &[RunFiles]) -> Value {
-    let machine = runs.first().map_or(&Value::Null, |run| &run.run["machine"]);
+    let machine = runs.first().map(|run| run.description().machine).unwrap_or_default();
     // "Linux version 6.1.0 (builder) (compiler) #1 SMP date".
-    let kernel = machine["kernel"].as_str().unwrap_or_default();
+    let kernel = machine.kernel.as_str();
     let release =
         kernel.strip_prefix("Linux version ").unwrap_or(kernel).split(' ').next().unwrap_or_default();
     let version = kernel.find('#').map_or("", |start| &kernel[start..]);
@@ -63,7 +63,7 @@ fn sysinfo(runs: &[RunFiles]) -> Value {
         "release": release,
         "version": version,
         "machine": std::env::consts::ARCH,
-        "cpus_online": machine["processors"].as_u64().unwrap_or_default(),
+        "cpus_online": machine.processors,
     })
 }
 

@@ -4,6 +4,7 @@ use super::files::RunFiles;
 use super::joined::PERIOD_NS;
 use super::samples::Samples;
 use realtime::VitalCounts;
+use runlog::conditions::Conditions;
 use runlog::timing::{CycleTiming, Exchange};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -49,8 +50,11 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
         "bus": { "dropped_on_receive": 0 },
     });
     run.controllers.insert("controller".into(), controller);
-    run.conditions =
-        serde_json::json!({ "load_generator": "none, idle machine", "group": "a", "probe": false });
+    run.conditions = Some(Conditions {
+        load_generator: Some("none, idle machine".into()),
+        group: Some("a".into()),
+        ..Conditions::default()
+    });
     run
 }
 
@@ -154,7 +158,7 @@ pub(crate) fn write(run: &RunFiles, folder: &Path) {
         |name: &str, value: &serde_json::Value| std::fs::write(folder.join(name), value.to_string()).unwrap();
     json("summary.json", &run.summary);
     json("run.json", &run.run);
-    json("conditions.json", &run.conditions);
+    json("conditions.json", &serde_json::json!(run.conditions));
     run.controllers.iter().for_each(|(process, told)| json(&format!("{process}.json"), told));
     for (process, rows) in &run.rows {
         let mut table = Vec::new();

@@ -4,6 +4,8 @@ use super::distributions::percentiles;
 use super::files::RunFiles;
 use super::findings;
 use super::model::{ArrivalRow, PercentilesNs, RunPart};
+use realtime::ArrivalFigures;
+use runlog::summary::ProcessReport;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -13,7 +15,7 @@ const NO_GROUP: &str = "all";
 /// A run's part of the report.
 #[must_use]
 pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String, PercentilesNs>) -> RunPart {
-    let told_group = run.conditions["group"].as_str();
+    let told_group = run.conditions.as_ref().and_then(|told| told.group.as_deref());
     RunPart {
         folder: run.folder.display().to_string(),
         group: group.or(told_group).unwrap_or(NO_GROUP).to_owned(),
@@ -22,7 +24,7 @@ pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String
         counts: counts(run),
         percentiles_ns,
         arrivals: arrivals(run),
-        passed: run.summary["passed"].as_bool().unwrap_or_default(),
+        passed: run.counted().passed.unwrap_or_default(),
         lacks: run.lacks.clone(),
     }
 }
@@ -62,22 +64,19 @@ fn add(counts: &mut BTreeMap<String, u64>, name: &str, value: &Value) {
 }
 
 fn arrivals(run: &RunFiles) -> Vec<ArrivalRow> {
-    let mut rows = Vec::new();
-    for (receiver, told) in run.reports() {
-        for row in told["arrivals"].as_array().into_iter().flatten() {
-            let count = |key: &str| row[key].as_u64().unwrap_or_default();
-            rows.push(ArrivalRow {
-                receiver: receiver.to_owned(),
-                frame: row["frame"].as_str().unwrap_or("?").to_owned(),
-                period_ms: count("period_ms"),
-                count: count("count"),
-                gaps: count("gaps"),
-                bursts: row["bursts"].as_u64(),
-                interval_ns: percentiles(&row["interval_ns"]).unwrap_or_default(),
-            });
-        }
-    }
-    rows
+    let of_process = |(receiver, report): (&str, ProcessReport)| {
+        let row = |told: ArrivalFigures| ArrivalRow {
+            receiver: receiver.to_owned(),
+            frame: told.frame.into_owned(),
+            period_ms: told.period_ms,
+            count: told.count,
+            gaps: told.gaps,
+            bursts: told.bursts,
+            interval_ns: percentiles(&told.interval_ns).unwrap_or_default(),
+        };
+        report.timing.arrivals.into_iter().map(row).collect::<Vec<_>>()
+    };
+    run.process_reports().flat_map(of_process).collect()
 }
 
 #[cfg(test)]

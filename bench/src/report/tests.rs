@@ -31,6 +31,15 @@ fn a_report_goes_through_its_file_unchanged() {
 }
 
 #[test]
+fn no_key_of_a_report_is_lost() {
+    let mut run = made_up::run(3000);
+    made_up::stall(&mut run, "emulator", 500, 5_400_000).vitals.continued = 1;
+    made_up::reference(&mut run, (0..3000).map(|n| 9_000 + n).collect());
+    let report = serde_json::to_value(report_of(vec![run; 6])).unwrap();
+    runlog::golden::check("report.keys", &runlog::golden::keys(&report));
+}
+
+#[test]
 fn all_files_are_written_and_the_log_holds_every_sample() {
     let folder = tempfile::tempdir().unwrap();
     made_up::write(&made_up::run(2000), &folder.path().join("1"));

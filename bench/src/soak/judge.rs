@@ -7,6 +7,7 @@ use super::model::{Check, CheckResult, Figures};
 use super::plan::Spec;
 use super::segment::{End, Outcome};
 use crate::thresholds;
+use runlog::summary::ProcessReport;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -54,7 +55,7 @@ pub fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: boo
         positions(&evidence, judge_positions),
     ]);
     let account = account.unwrap_or_default();
-    let machine = evidence.run["machine"].clone();
+    let machine = evidence.machine.clone();
     Judged { checks, figures: evidence.figures(), account, memory, machine }
 }
 
@@ -104,13 +105,14 @@ fn in_numbers(account: &Account) -> String {
 
 /// The injected loss was as frequent as asked for; that every lost frame was found is the account's and the gaps' affair.
 fn loss(spec: &Spec, evidence: &Evidence, account: &Account) -> Check {
-    let injected = counts(&evidence.summary["bus_host"]["injected_loss"]).total();
+    let host = evidence.summary.bus_host.as_ref();
+    let injected = host.map_or(0, |host| host.injected_loss.total());
     let Some(loss) = spec.loss else {
         let detail = format!("no loss asked for, {injected} frames lost on purpose");
         let result = if injected == 0 { CheckResult::Skipped } else { CheckResult::Failed };
         return check("loss", result, &detail);
     };
-    let frames = counts(&evidence.summary["bus_host"]["on_wire"]).total() + injected;
+    let frames = host.map_or(0, |host| host.on_wire.total()) + injected;
     let expected = loss * frames as f64;
     let allowed = LOSS_DEVIATIONS * (expected * (1.0 - loss)).sqrt();
     let found = account.rows.iter().any(|row| row.missing_by_gaps.is_some_and(|missing| missing > 0));
@@ -143,15 +145,15 @@ fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
 /// Every record reached the files, and the log holds every frame that the rig counted.
 fn records(evidence: &Evidence, outcome: &Outcome) -> Check {
     let mut broken = Vec::new();
-    for (name, told) in evidence.controllers.iter().chain([(&"emulator".to_owned(), &evidence.summary)]) {
-        match told["records_dropped"].as_u64() {
+    for (name, report) in &evidence.reports {
+        match report.records_dropped {
             Some(0) => {}
             Some(dropped) => broken.push(format!("{name}: {dropped} records did not reach the files")),
             None => broken.push(format!("{name} left no report")),
         }
     }
-    let mut counted = counts(&evidence.summary["bus"]["sent_by_id"]);
-    counted.add_all(&counts(&evidence.summary["bus"]["received_by_id"]));
+    let mut counted = counts(evidence.summary.bus.sent_by_id.by_name());
+    counted.add_all(&counts(evidence.summary.bus.received_by_id.by_name()));
     match &evidence.log {
         Err(error) => broken.push(error.clone()),
         Ok(log) if broken.is_empty() => {
@@ -174,8 +176,8 @@ const STALL_NS: u64 = 5_000_000;
 
 /// Why broken bounds on position errors do not count, if they do not.
 fn excuse(evidence: &Evidence, judge: bool) -> Option<String> {
-    let late = |told: &Value| told["wakeup_ns"]["max"].as_u64().unwrap_or(0);
-    let stall_ns = evidence.controllers.values().map(late).fold(late(&evidence.summary), u64::max);
+    let late = |report: &ProcessReport| report.timing.stages.wakeup_ns.max;
+    let stall_ns = evidence.reports.values().filter_map(late).max().unwrap_or_default();
     if !judge {
         Some("told, not judged: bounds of an experiment driven once".into())
     } else if stall_ns >= STALL_NS {
@@ -188,13 +190,14 @@ fn excuse(evidence: &Evidence, judge: bool) -> Option<String> {
 /// The position errors against the experiment's bounds on them; what did not come about in the segment's time is not judged.
 fn positions(evidence: &Evidence, judge: bool) -> Check {
     let drive = evidence.drive();
-    let keys = ["position_error_dynamic_m", "position_error_static_m"];
-    let measured: Map<_, _> = keys
-        .iter()
-        .filter(|key| drive[**key].is_number())
-        .map(|key| ((*key).to_owned(), drive[*key].clone()))
-        .collect();
-    let experiment = evidence.run["experiment_toml"].as_str().unwrap_or_default().parse::<toml::Table>();
+    let measured: Map<_, _> = [
+        ("position_error_dynamic_m", drive.and_then(|drive| drive.position_error_dynamic_m)),
+        ("position_error_static_m", drive.and_then(|drive| drive.position_error_static_m)),
+    ]
+    .into_iter()
+    .filter_map(|(key, error_m)| Some((key.to_owned(), json!(error_m?))))
+    .collect();
+    let experiment = evidence.run.experiment_toml.as_deref().unwrap_or_default().parse::<toml::Table>();
     let passed =
         experiment.ok().and_then(|table| table.get("passed")?.as_table().cloned()).unwrap_or_default();
     let bounds: toml::Table = passed.into_iter().filter(|(key, _)| measured.contains_key(key)).collect();
@@ -222,17 +225,38 @@ fn positions(evidence: &Evidence, judge: bool) -> Check {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use realtime::{Percentiles, StageFigures};
+    use runlog::controller_report::{AxisReport, ControllerReport};
+    use runlog::summary::{RunDescription, Summary};
+    use runlog::timing_recorder::TimingFigures;
 
     fn segment(error_m: f64, rig_late_ns: u64, controller_late_ns: u64) -> Evidence {
-        let drive = json!({ "position_error_dynamic_m": error_m });
-        let controller = json!({
-            "wakeup_ns": { "max": controller_late_ns },
-            "axes": { "drive": drive },
-        });
+        let report = |late_ns: u64| ProcessReport {
+            timing: TimingFigures {
+                stages: StageFigures {
+                    wakeup_ns: Percentiles { max: Some(late_ns), ..Percentiles::default() },
+                    ..StageFigures::default()
+                },
+                ..TimingFigures::default()
+            },
+            ..ProcessReport::default()
+        };
+        let drive = AxisReport { position_error_dynamic_m: Some(error_m), ..AxisReport::default() };
+        let controller =
+            ControllerReport { axes: [("drive".into(), drive)].into(), ..ControllerReport::default() };
         Evidence {
-            summary: json!({ "wakeup_ns": { "max": rig_late_ns } }),
-            run: json!({ "experiment_toml": "[passed]\nposition_error_dynamic_m = 0.005\n" }),
+            summary: Summary::default(),
+            run: RunDescription {
+                experiment_toml: Some("[passed]\nposition_error_dynamic_m = 0.005\n".into()),
+                ..RunDescription::default()
+            },
+            machine: Value::Null,
             controllers: [("controller".to_owned(), controller)].into(),
+            reports: [
+                ("controller".to_owned(), report(controller_late_ns)),
+                ("emulator".to_owned(), report(rig_late_ns)),
+            ]
+            .into(),
             log: Err("none is needed".into()),
         }
     }

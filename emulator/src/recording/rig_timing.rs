@@ -9,9 +9,8 @@ use realtime::stages::Further;
 use realtime::{Percentiles, WallClockStep, WallClockWatch};
 use runlog::candump::FrameRecord;
 use runlog::timing::CycleTiming;
-use runlog::timing_recorder::{TimingFigures, TimingRecorder, TimingSetup};
-use serde::Serialize;
-use std::collections::{BTreeMap, VecDeque};
+use runlog::timing_recorder::{CommandAges, TimingFigures, TimingRecorder, TimingSetup};
+use std::collections::VecDeque;
 use std::io;
 
 /// Name of this process in tags and folders.
@@ -21,8 +20,8 @@ const AXES: [&str; 2] = ["drive", "load"];
 /// Steps of the wall clock that are kept.
 const MOST_STEPS: usize = 100;
 
-/// The timing of a run, for `summary.json`.
-#[derive(Clone, Debug)]
+/// The timing of a run, for `summary.json`; empty in simulated time.
+#[derive(Clone, Debug, Default)]
 pub struct RigTimingReport {
     /// Stages, arrivals, the kernel's counters, the flight recorder.
     pub timing: TimingFigures,
@@ -34,29 +33,6 @@ pub struct RigTimingReport {
     pub command_age_cycles: CommandAges,
     /// Steps of the wall clock.
     pub wall_clock_steps: Vec<WallClockStep>,
-}
-
-/// Of a run in simulated time.
-impl Default for RigTimingReport {
-    fn default() -> Self {
-        let none = [realtime::Recorder::new().percentiles(); 2];
-        Self {
-            timing: TimingFigures::none(),
-            round_trip_ns: none,
-            command_age_ns: none,
-            command_age_cycles: CommandAges::default(),
-            wall_clock_steps: Vec::new(),
-        }
-    }
-}
-
-/// Cycles sent, by the age in cycles of the command that acted over them; a cycle without a command is in none.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct CommandAges {
-    /// Drive axis.
-    pub drive: BTreeMap<u64, u64>,
-    /// Load axis.
-    pub load: BTreeMap<u64, u64>,
 }
 
 /// Records the rig's timing.

@@ -24,6 +24,7 @@ use crate::socket_file::SocketFile;
 use crate::wire_time::WireEvent;
 use rustix::event::{PollFd, PollFlags, Timespec, epoll, poll};
 use rustix::net::SendFlags;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
 use std::mem::MaybeUninit;
@@ -223,7 +224,9 @@ impl Host {
     /// What was counted so far.
     pub(super) fn report(&self) -> HostReport {
         let wire_time = self.timed.as_ref().map(|timed| timed.report(&self.report.peers));
-        HostReport { wire_time, faults: self.wire.met().clone(), ..self.report.clone() }
+        let met = self.wire.met().iter();
+        let faults = met.map(|(name, frames)| (Cow::Borrowed(*name), frames.clone())).collect();
+        HostReport { wire_time, faults, ..self.report.clone() }
     }
 
     /// Takes everyone who waits.

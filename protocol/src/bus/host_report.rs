@@ -4,7 +4,9 @@
 
 use crate::can::CanFrame;
 use crate::wire_time::WireTimeReport;
-use serde::{Serialize, Serializer};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Frames by identifier. Written by the names that candump gives identifiers, `110`; what is no plain data frame by all
@@ -34,6 +36,12 @@ impl FramesById {
         self.0.is_empty()
     }
 
+    /// Frames of all identifiers.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.0.values().sum()
+    }
+
     /// Frames of each identifier, by its name.
     #[must_use]
     pub fn by_name(&self) -> BTreeMap<String, u64> {
@@ -53,12 +61,25 @@ impl Serialize for FramesById {
     }
 }
 
+impl<'de> Deserialize<'de> for FramesById {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let by_name = BTreeMap::<String, u64>::deserialize(deserializer)?;
+        let parsed =
+            by_name.iter().map(|(name, frames)| Some((u32::from_str_radix(name, 16).ok()?, *frames)));
+        parsed
+            .collect::<Option<_>>()
+            .map(Self)
+            .ok_or_else(|| D::Error::custom("an identifier is hexadecimal"))
+    }
+}
+
 /// What the host saw of one peer. To the frame, for each identifier of others:
 ///
 /// ```text
 ///   on_wire = before_it_came + delivered + dropped_at_queue + missed_in_bus_off + after_it_left
 /// ```
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct PeerReport {
     /// Name in the barrier, else the process number.
     pub name: String,
@@ -79,7 +100,8 @@ pub struct PeerReport {
 }
 
 /// What the host counted.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct HostReport {
     /// Frames that reached the wire, lost ones included.
     pub frames: u64,
@@ -91,7 +113,7 @@ pub struct HostReport {
     pub malformed: u64,
     /// Frames that met a fault of the wire, by its name and by identifier; those of a babbling node are those that it said.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub faults: BTreeMap<&'static str, FramesById>,
+    pub faults: BTreeMap<Cow<'static, str>, FramesById>,
     /// The peers in the order in which they came.
     pub peers: Vec<PeerReport>,
     /// What a wire that keeps time counted; left out where it takes none.
@@ -115,5 +137,7 @@ mod tests {
             serde_json::to_string(&report).unwrap(),
             r#"{"frames":5,"injected_loss":{"011":2,"40000110":1,"7FF":1,"80000110":1},"on_wire":{},"malformed":0,"peers":[]}"#
         );
+        let text = serde_json::to_string(&report).unwrap();
+        assert_eq!(serde_json::from_str::<HostReport>(&text).unwrap(), report, "read as it was written");
     }
 }

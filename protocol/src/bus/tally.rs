@@ -5,7 +5,8 @@
 
 use crate::can::CanFrame;
 use crate::frames::MESSAGES;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// Name under which all identifiers are written that `rig.dbc` does not know, and frames that are no plain data frame.
@@ -50,6 +51,18 @@ impl Serialize for FrameTally {
     }
 }
 
+/// Names that `rig.dbc` does not know, as in a file of another version, are counted together.
+impl<'de> Deserialize<'de> for FrameTally {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut tally = Self::default();
+        for (name, frames) in BTreeMap::<String, u64>::deserialize(deserializer)? {
+            let place = MESSAGES.iter().position(|spec| format!("{:03X}", spec.id) == name);
+            *place.map_or(&mut tally.others, |place| &mut tally.known[place]) += frames;
+        }
+        Ok(tally)
+    }
+}
+
 impl fmt::Debug for FrameTally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_map().entries(self.by_name()).finish()
@@ -72,7 +85,9 @@ mod tests {
             CanFrame::from_raw(EXTENDED_FLAG | 0x110, &[]),
         ];
         frames.iter().for_each(|frame| tally.count(frame));
-        assert_eq!(serde_json::to_string(&tally).unwrap(), r#"{"110":1,"120":2,"others":2}"#);
+        let text = r#"{"110":1,"120":2,"others":2}"#;
+        assert_eq!(serde_json::to_string(&tally).unwrap(), text);
+        assert_eq!(serde_json::from_str::<FrameTally>(text).unwrap(), tally);
     }
 
     #[test]

@@ -4,11 +4,12 @@
 use crate::bus::host::FramesById;
 use crate::can::CanFrame;
 use crate::frames::MessageSpec;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Time from entering a node's queue to the end of the transmission, intermission included, in ns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ResponseReport {
     /// Shortest.
     pub min: u64,
@@ -19,7 +20,8 @@ pub struct ResponseReport {
 }
 
 /// How frames of one identifier came: what a bound must allow for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ArrivalReport {
     /// Shortest time between two of them, ns; null when there were less than two.
     pub least_distance_ns: Option<u64>,
@@ -28,7 +30,8 @@ pub struct ArrivalReport {
 }
 
 /// What was seen of one identifier.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct IdentifierReport {
     /// Frames sent to their end.
     pub frames: u64,
@@ -45,7 +48,8 @@ pub struct IdentifierReport {
 }
 
 /// What became of one node.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct NodeReport {
     /// Name in the barrier, else the process number; `rig` for one in the host.
     pub name: String,
@@ -72,7 +76,8 @@ pub struct NodeReport {
 }
 
 /// How much later than the model says something was done, ns of the machine's clock. It changes nothing in the model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Lateness {
     /// How often it was done.
     pub count: u64,
@@ -95,7 +100,8 @@ impl Lateness {
 }
 
 /// What a modelled wire counted. All times but the two of [`Lateness`] are of the model's clock.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct WireTimeReport {
     /// Bit rate.
     pub bits_per_s: u32,

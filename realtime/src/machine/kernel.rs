@@ -2,11 +2,12 @@
 
 use super::files::{Root, field};
 use flate2::read::GzDecoder;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::io::Read;
 
 /// How the kernel lets an urgent thread take the CPU.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Preemption {
     /// `PREEMPT_RT`, `full`, `lazy`, `voluntary`, `none`, or `unknown`.
     pub model: String,
@@ -126,7 +127,8 @@ const VIRTUAL_MACHINES: [&str; 12] = [
 ];
 
 /// The kernel's brake on real-time threads. Off is -1; else a thread that never sleeps is stopped for the rest of each period.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Throttling {
     /// What real-time threads may have of each period, us; -1: all; null: unknown.
     pub runtime_us: Option<i64>,

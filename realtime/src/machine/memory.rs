@@ -1,10 +1,11 @@
 //! Memory and what may be taken from it, limits of the process, load.
 
 use super::files::{Root, field};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Memory, swap, huge pages.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Memory {
     /// All of it, KiB; null: unknown.
     pub total_kib: Option<u64>,
@@ -38,7 +39,8 @@ impl Memory {
 }
 
 /// What this process may ask of the system; a right such as CAP_SYS_NICE, which root has, goes beyond.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Limits {
     /// Highest FIFO priority, 0: none.
     pub rtprio: String,

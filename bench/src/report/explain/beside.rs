@@ -2,6 +2,7 @@
 
 use crate::report::files::RunFiles;
 use crate::report::model::Event;
+use runlog::summary::{NotedEvent, Summary};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,7 +19,7 @@ pub fn add(event: &mut Event, run: &RunFiles) {
         event.frames = frames(&run.folder.join(&dump).join("bus.log"));
         event.dump = Some(dump);
     }
-    event.rig_events = rig_events(&run.summary, event.cycle, last);
+    event.rig_events = rig_events(&run.counted(), event.cycle, last);
 }
 
 /// The folder of the dump of these cycles, within the run's.
@@ -49,19 +50,18 @@ fn frames(log: &Path) -> BTreeMap<String, u64> {
 }
 
 /// What the rig noted near these cycles, but for the missed cycles themselves.
-fn rig_events(summary: &Value, first: u64, last: u64) -> Vec<String> {
+fn rig_events(summary: &Summary, first: u64, last: u64) -> Vec<String> {
     let near = first.saturating_sub(RIG_WITHIN_CYCLES)..=last + RIG_WITHIN_CYCLES;
-    let noted = summary["events"].as_array().map_or(&[][..], Vec::as_slice);
-    let mut told: Vec<_> = noted.iter().filter_map(|noted| in_words(noted, &near)).collect();
-    if summary["event_count"].as_u64().is_some_and(|count| count > noted.len() as u64) {
+    let mut told: Vec<_> = summary.events.iter().filter_map(|noted| in_words(noted, &near)).collect();
+    if summary.event_count.is_some_and(|count| count > summary.events.len() as u64) {
         told.push("Of what came often the rig noted the first only.".to_owned());
     }
     told
 }
 
-fn in_words(noted: &Value, near: &std::ops::RangeInclusive<u64>) -> Option<String> {
-    let cycle = noted["cycle"].as_u64().filter(|cycle| near.contains(cycle))?;
-    let (name, details) = match &noted["kind"] {
+fn in_words(noted: &NotedEvent, near: &std::ops::RangeInclusive<u64>) -> Option<String> {
+    let cycle = Some(noted.cycle).filter(|cycle| near.contains(cycle))?;
+    let (name, details) = match &noted.kind {
         Value::String(name) => (name.as_str(), String::new()),
         Value::Object(kind) => {
             kind.iter().next().map(|(name, details)| (name.as_str(), details.to_string()))?

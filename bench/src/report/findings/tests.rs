@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::report::{explain, made_up};
-use serde_json::json;
+use serde_json::{Value, json};
 
 fn found(run: RunFiles) -> Vec<Cause> {
     let events = explain::events(0, &run);

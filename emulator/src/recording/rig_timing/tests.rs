@@ -9,6 +9,7 @@ use protocol::frames::ValveCommand;
 use runlog::flight_dump::{self, Log};
 use runlog::timing::{Exchange, read as read_rows};
 use runlog::timing_recorder::{Due, FlightFigures};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
@@ -148,7 +149,7 @@ fn only_good_cyclic_frames_of_others_are_looked_at() {
     let [arrivals] = &report.timing.arrivals[..] else { panic!("{:?}", report.timing.arrivals) };
     assert_eq!(arrivals.bursts, Some(0));
     assert_eq!(
-        (arrivals.frame, arrivals.period_ms, arrivals.count, arrivals.gaps),
+        (arrivals.frame.as_ref(), arrivals.period_ms, arrivals.count, arrivals.gaps),
         ("DriveValveCommand", 1, 10, 0)
     );
 }

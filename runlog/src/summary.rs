@@ -1,28 +1,26 @@
-//! `run.json` at the start of a run and `summary.json` at its end: what was used, and what was counted.
+//! What the emulator leaves: `run.json` at the start of a run and `summary.json` at its end.
 //!
-//! Keys that others read are those of bus.md. What only the controllers know (the position errors) stands as null until
-//! the controllers' own files are joined to it.
+//! Keys that others read are those of bus.md. A file of an earlier version lacks newer fields: they are read as their defaults,
+//! and fields whose absence means something are options, which the emulator always writes.
 
-use crate::event::Event;
-use crate::node::FrameCounters;
-use crate::recording::rig_timing::CommandAges;
-use plant::Scene;
+use crate::timing_recorder::{CommandAges, FlightFigures, TimingFigures};
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
 use protocol::commands::CommandCounters;
 use realtime::{ArrivalFigures, Machine, Percentiles, VitalTotals, WallClockStep};
-use runlog::timing_recorder::FlightFigures;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-/// `run.json`: what a run was made with.
-#[derive(Debug, Serialize)]
-pub struct RunDescription {
-    /// See [`runlog::run_folder::SCHEMA_VERSION`].
+/// `run.json`: what a run was made with. `S` is the scene, `M` the machine.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, bound(deserialize = "S: Deserialize<'de> + Default, M: Deserialize<'de> + Default"))]
+pub struct RunDescription<S = Value, M = Machine> {
+    /// See [`crate::run_folder::SCHEMA_VERSION`].
     pub schema_version: u32,
     /// The emulator's command line.
     pub emulator_command_line: Vec<String>,
     /// The emulator's version.
-    pub emulator_version: &'static str,
+    pub emulator_version: String,
     /// Whether the build counts allocations, which costs a little time.
     pub counts_allocations: bool,
     /// Start of the run's clock, in s since 1970; null in lockstep, whose time is simulated.
@@ -40,7 +38,7 @@ pub struct RunDescription {
     /// The script of faults as it was read; null without one.
     pub faults_toml: Option<String>,
     /// Initial state of the rig as used, and what people do to it when.
-    pub rig_setup: Scene,
+    pub rig_setup: S,
     /// Whether a sealed file was read, in which nobody but the rig looks; which effects it switches on stands in `truth.csv`
     /// alone.
     pub sealed: bool,
@@ -49,13 +47,14 @@ pub struct RunDescription {
     /// What it refused, with the remedy.
     pub realtime_refused: Vec<String>,
     /// The machine.
-    pub machine: Machine,
+    pub machine: M,
 }
 
-/// `summary.json` as the emulator knows it.
-#[derive(Debug, Serialize)]
-pub struct Summary {
-    /// See [`runlog::run_folder::SCHEMA_VERSION`].
+/// `summary.json` as the emulator writes it; `bench summary` joins the controllers' reports to it. `E` is an event.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, bound(deserialize = "E: Deserialize<'de> + Default"))]
+pub struct Summary<E = NotedEvent> {
+    /// See [`crate::run_folder::SCHEMA_VERSION`].
     pub schema_version: u32,
     /// Largest |set-point - position sensor| while the set-point moves; the controllers know it.
     pub position_error_dynamic_m: Option<f64>,
@@ -64,9 +63,9 @@ pub struct Summary {
     /// When cycle 0 was due, in s of the time stamps of `bus.log`; cycle k was due k ms later.
     pub bus_log_cycle_zero_s: f64,
     /// Cycles begun, skipped ones included.
-    pub cycles: u64,
+    pub cycles: Option<u64>,
     /// Cycles computed late and not sent.
-    pub skipped: u64,
+    pub skipped: Option<u64>,
     /// Wake-ups that missed at least one cycle.
     pub overruns: u64,
     /// Cycles whose work ended after the next deadline.
@@ -76,9 +75,9 @@ pub struct Summary {
     /// Frames that the rig took from the bus.
     pub frames_received: u64,
     /// Frames that never came, by gaps in the counters at the receivers.
-    pub frames_lost: u64,
+    pub frames_lost: Option<u64>,
     /// The part of it that the rig missed: commands of both axes.
-    pub frames_lost_at_rig: u64,
+    pub frames_lost_at_rig: Option<u64>,
     /// Frames that were counted and ignored because they are not as `rig.dbc` says.
     pub frames_malformed: u64,
     /// Commands accepted a cycle or more later than the cycle after the one that they answer.
@@ -122,13 +121,13 @@ pub struct Summary {
     /// Allocations in the 1 ms path after the first second; null unless built with `count-allocations`.
     pub allocations_in_cycle: Option<u64>,
     /// Records that did not reach the files because a queue was full.
-    pub records_dropped: u64,
+    pub records_dropped: Option<u64>,
     /// Why the run ended.
     pub ended_because: String,
     /// Whether the run ended well and, once joined, kept all its thresholds.
-    pub passed: bool,
+    pub passed: Option<bool>,
     /// Bounds on named figures; filled when the files are joined.
-    pub thresholds: serde_json::Map<String, serde_json::Value>,
+    pub thresholds: serde_json::Map<String, Value>,
     /// Commands of the drive axis by what became of them.
     pub drive_commands: CommandCounters,
     /// Commands of the load axis by what became of them.
@@ -140,7 +139,46 @@ pub struct Summary {
     /// What the host of the embedded bus counted; null when the emulator did not host it.
     pub bus_host: Option<HostReport>,
     /// Events in all.
-    pub event_count: u64,
+    pub event_count: Option<u64>,
     /// The first events of each kind.
-    pub events: Vec<Event>,
+    pub events: Vec<E>,
+}
+
+/// An event as it stands in a file, whatever its kind.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct NotedEvent {
+    /// The rig's cycle.
+    pub cycle: u64,
+    /// Its name, or an object of its name and its details.
+    pub kind: Value,
+}
+
+/// Frames that arrived at the rig and were ignored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrameCounters {
+    /// Not as `rig.dbc` says: length, checksum, reserved bits, a raw value out of range.
+    pub malformed: u64,
+    /// Identifiers that `rig.dbc` does not know, extended and remote frames.
+    pub unknown: u64,
+    /// Frames that only the rig sends.
+    pub second_rig: u64,
+}
+
+/// What `summary.json` and `controller.json` have in common.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct ProcessReport {
+    /// Stages, arrivals, the kernel's counters, dumps.
+    #[serde(flatten)]
+    pub timing: TimingFigures,
+    /// Drive sensors handed over to command received; the emulator's alone.
+    pub round_trip_ns: Percentiles,
+    /// The process's counters of the bus; `None` for a process that left no report of its end.
+    pub bus: Option<BusCounters>,
+    /// Records that did not reach the files.
+    pub records_dropped: Option<u64>,
+    /// Steps of the wall clock; the emulator's alone.
+    pub wall_clock_steps: Vec<WallClockStep>,
 }

@@ -1,0 +1,3 @@
+//! The files of a run, read and written again.
+
+mod formats;
