@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_cannot_be_written_is_told_with_what_to_do() {
+    fn a_file_that_cannot_be_written_is_reported_with_what_to_do() {
         let scratch = tempfile::tempdir().unwrap();
         fs::create_dir(scratch.path().join("report.json.part")).unwrap();
         let error = write(&scratch.path().join("report.json"), "after").unwrap_err().to_string();

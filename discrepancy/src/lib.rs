@@ -1,32 +1,31 @@
-//! Where a measurement and its simulation disagree, and what is missing.
+//! Model discrepancy: where a measurement and its simulation disagree, and which effect is missing.
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`records`] | one reader of records, whatever their form: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
-//! | [`single_equation`] | a model that is one balance alone, and the real records |
-//! | [`check`] | whether a record can be used, and its noise |
-//! | [`gridded_record`] | a record on the simulation's grid |
-//! | [`sensor_inverse`] | where the pistons were, by sensors that lie |
-//! | [`windows`] | a record in windows, each simulated from its own start |
-//! | [`engine`] | all records with everything that is simulated of them |
-//! | [`fit`] | what some columns explain of the windows |
-//! | [`candidates`] | every effect at every place, and how its numbers are moved |
-//! | [`parameters`] | numbers of the baseline that may merely be wrong |
-//! | [`calibrate`] | these numbers from records |
-//! | [`screen`] | how much each candidate would explain |
-//! | [`refit`] | effects fitted in the simulator itself |
-//! | [`name`](mod@name) | which effects are missing |
-//! | [`extend`] | the rig file with what was found |
-//! | [`locate`] | unknown inputs of each balance: where model and records disagree |
-//! | [`outside`] | what the catalogue does not have: dependence, curve, formula |
+//! | [`records`] | readers of records: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
+//! | [`check`] | fitness of a record, and its noise |
+//! | [`gridded_record`] | a record on the grid of the simulation, with smoothed states |
+//! | `sensor_inverse` | from readings to states, by the sensor models of a rig |
+//! | [`windows`] | multiple shooting: whitened residuals of windows |
+//! | [`engine`] | training records with their simulations and sensitivities |
+//! | `fit` | robust least squares over windows, standard errors |
 //! | `stats` | order statistics and means |
-//! | [`tabulate`] | the same added to the rig as a table |
-//! | [`next`] | the experiment that would tell apart what a record does not |
-//! | [`verify`] | the held-out record: both models, frozen |
-//! | [`report`] | what was found, as data |
-//! | [`workflow`] | all of it in order |
-//! | [`commands`], [`cli`] | the program |
-//! | [`page`] | the same as one page for people |
+//! | [`candidates`] | effects at places, and the scaling of their numbers |
+//! | [`parameters`] | baseline parameters as nuisance parameters |
+//! | [`calibrate`] | calibration of these parameters |
+//! | [`screen`] | linear screening of candidates |
+//! | [`refit`] | Gauss-Newton fit of effects in the simulator |
+//! | [`name`](mod@name) | forward selection and backward elimination of effects |
+//! | [`extend`] | the extended rig file |
+//! | [`locate`] | unknown inputs of each balance |
+//! | [`outside`] | terms outside the catalogue: dependence, curve, formula |
+//! | `tabulate` | such terms as tables of the rig file |
+//! | [`next`] | experiment design for ambiguous explanations |
+//! | `verify` | both models on the held-out record |
+//! | [`single_equation`] | the same for a model of one balance, without simulation |
+//! | [`report`], `page` | results as data and as a page |
+//! | [`workflow`] | the steps in order |
+//! | [`commands`], [`cli`], `folder` | the program |
 
 pub mod calibrate;
 pub mod candidates;

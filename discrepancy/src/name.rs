@@ -1,10 +1,10 @@
 //! Names missing effects by forward selection: screen linearly, refit in the simulator, accept or reject, eliminate backwards.
 //!
 //! ```text
-//!   parameters alone ──► screening of all candidates ──► the best fitted in the simulator ──► takes enough?
-//!                             ▲                                                                  │ yes: joins the model
-//!                             └──────── what is left, the model's own columns beside ────────────┘ up to three times
-//!   each that joined is taken out once: what is not missed goes; what fits as well as one of them is its alternative
+//!   calibration ──► linear screening of all candidates ──► refit of the best in the simulator ──► gain sufficient?
+//!                             ▲                                                                      │ yes: joins the model
+//!                             └───────── residual of the model, its sensitivities beside ────────────┘ up to three times
+//!   backward elimination of each effect; fits of the same round with nearly the same loss are its alternatives
 //! ```
 //!
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it

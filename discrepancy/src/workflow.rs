@@ -1,7 +1,7 @@
 //! The whole workflow, from records and rig file to report, page and extended rig file.
 //!
 //! ```text
-//!   records ─► check ─► course ─► parameters alone ─► locate ─► name ─► extend ─┬─► report, page, rig.toml
+//!   records ─► check ─► grid ─► parameters alone ─► locate ─► name ─► extend ─┬─► report, page, rig.toml
 //!                 └─ cannot be used: bad-data                   next ◄── alike  └─► verify: opens the held-out record, alone
 //! ```
 //!

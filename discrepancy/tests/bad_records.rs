@@ -192,7 +192,7 @@ fn good_records_have_no_findings_and_their_noise_and_steps_are_told() {
 }
 
 #[test]
-fn noise_is_told_at_half_twice_and_four_times_the_specified() {
+fn noise_is_reported_at_half_twice_and_four_times_the_specified() {
     for factor in [0.5, 2.0, 4.0] {
         let rig = RigParameters::baseline()
             .with("sensors.position_noise_um", &[20.0 * factor])
@@ -398,7 +398,7 @@ fn is_fatal_of_time(sheet: &Sheet, kind: &str) {
 }
 
 #[test]
-fn jitter_of_a_tenth_of_a_millisecond_is_borne_and_told() {
+fn jitter_of_a_tenth_of_a_millisecond_is_borne_and_reported() {
     // Up to 0.17 ms to each side: 0.1 ms rms.
     let wobble =
         |row: usize| 0.34e-3 * ((row as u32).wrapping_mul(2_654_435_761) as f64 / f64::from(u32::MAX) - 0.5);
@@ -408,7 +408,7 @@ fn jitter_of_a_tenth_of_a_millisecond_is_borne_and_told() {
 }
 
 #[test]
-fn an_absent_value_is_told_and_survived() {
+fn an_absent_value_is_reported_and_survived() {
     let record = {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("measurement.csv");
@@ -430,7 +430,7 @@ fn an_absent_value_is_told_and_survived() {
 }
 
 #[test]
-fn a_parked_load_is_told_and_spoils_nothing() {
+fn a_parked_load_is_reported_and_spoils_nothing() {
     let checked = simulated(&RigParameters::baseline(), false, 4).checked();
     assert!(checked.report.usable, "{}", texts(&checked));
     assert_eq!(kinds(&checked), ["parked"], "{}", texts(&checked));

@@ -123,7 +123,7 @@ fn where_a_listener_missed_a_command_nobody_knows_what_acted() {
 }
 
 #[test]
-fn what_is_no_log_is_told_with_its_line() {
+fn what_is_no_log_is_reported_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.log");
     for (text, hint) in [

@@ -18,7 +18,7 @@ fn found(engine: &Engine<'_>) -> Finer {
 }
 
 #[test]
-fn what_is_told_of_a_parameter_is_what_was_simulated_and_a_rig_file() {
+fn what_is_reported_of_a_parameter_is_what_was_simulated_and_a_rig_file() {
     let rig = RigParameters::baseline();
     let records = [gridded(&rig, &rig)];
     let engine = Engine::new(&records, &rig);

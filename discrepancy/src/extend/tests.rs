@@ -63,7 +63,7 @@ fn each_effect_is_switched_on_as_it_was_added_at_each_of_its_places() {
 }
 
 #[test]
-fn a_new_table_tells_value_error_unit_range_and_records() {
+fn a_new_table_states_value_error_unit_range_and_records() {
     let old = RigParameters::BASELINE_TOML;
     let new = extend(old, "rig.toml", &[leakage()], &[], Axis::Drive, &records()).unwrap();
     assert!(new.starts_with(old));

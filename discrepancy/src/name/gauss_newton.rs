@@ -1,7 +1,7 @@
 //! Gauss-Newton on all numbers of a model in the simulator, with backtracking, and their standard errors.
 //!
 //! ```text
-//!   effects and needed parameters ──► Gauss-Newton on all of them ──► accepted only when the simulator leaves less
+//!   effects and needed parameters ──► Gauss-Newton step ──► accepted only when the simulated loss falls
 //! ```
 //!
 //! Forward selection moves the parameters on the linearised model, which suffices to compare models. The final numbers come from

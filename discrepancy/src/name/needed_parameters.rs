@@ -1,7 +1,7 @@
 //! Backward elimination of parameters: those that the model does not need return to the rig file's values, and it is refitted.
 //!
 //! ```text
-//!   loss with all ──► the one that is missed least goes, while its going costs less than it is worth ──► fitted again
+//!   loss with all ──► drop the parameter with the smallest rise of the loss, while it is below the threshold ──► refit
 //! ```
 //!
 //! Free parameters absorb noise, and of two correlated ones both move where one is off. The report, the extended rig file and the

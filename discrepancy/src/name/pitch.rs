@@ -1,10 +1,10 @@
 //! Grid search for the pitch of a ripple, since a local fit ends in a side lobe.
 //!
 //! ```text
-//!   ripple off ──► a column for each of so many pitches ──► the one that explains most, its amplitude as it says ──► fitted
+//!   ripple off ──► a column for each pitch of a grid ──► the pitch and amplitude with the smallest loss ──► refit
 //! ```
 //!
-//! Over a travel D two pitches are alike while D (1/P_1 - 1/P_2) is well below one: pitches are tried evenly in 1/P.
+//! Over a travel D two pitches are indistinguishable while D (1/P_1 - 1/P_2) is well below one, so that the grid is even in 1/P.
 
 use super::{NUMBER_COSTS, STEPS, around_of};
 use crate::engine::Engine;

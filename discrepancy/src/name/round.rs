@@ -1,8 +1,8 @@
 //! One round of forward selection: which candidate joins the model.
 //!
 //! ```text
-//!   screened ──► the few that gain most ──► each fitted beside the model ──► the best of them again, with sensitivities of
-//!                                                                            their own, at their pitch, from their own home
+//!   screened ──► the few with the largest gain ──► each refitted beside the model ──► the best relinearised, at their best
+//!                                                                                     pitch, with re-estimated start states
 //! ```
 
 use super::elimination::same;

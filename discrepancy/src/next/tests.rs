@@ -137,7 +137,7 @@ fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
 }
 
 #[test]
-fn what_no_experiment_separates_is_told_with_what_would() {
+fn what_no_experiment_separates_is_reported_with_what_would() {
     let one = |name: &str| Explanation { rig: RigParameters::baseline(), names: vec![name.to_owned()] };
     let explanations = [one("inclination drive"), one("force-sensor-offset drive")];
     let table = [Judged { name: "chirps", pairs: vec![(0, 1, weak(1.0)), (1, 0, weak(2.0))] }];

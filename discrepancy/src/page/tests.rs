@@ -134,7 +134,7 @@ fn bad_data_shows_its_findings_first_and_no_pictures() {
 }
 
 #[test]
-fn parameters_are_told_with_what_the_rig_file_says() {
+fn parameters_are_reported_with_what_the_rig_file_says() {
     let seen = text(&made(Verdict::ParametersOnly));
     assert!(seen.contains("parameter:mass: 5.263 \u{b1} 0.041 kg, the rig file says 5.00 kg"), "{seen}");
 }

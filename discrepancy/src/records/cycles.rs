@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rig_that_starts_anew_is_told_with_its_line() {
+    fn a_rig_that_starts_anew_is_reported_with_its_line() {
         let log = [sensors(500, 0), tick(500, 0, 0), sensors(0, 5_000_000_000), tick(0, 0, 5_000_000_000)];
         let message = find(Path::new("a.log"), &log).err().unwrap().to_string();
         assert!(message.contains("a.log:2: the rig starts anew (cycle 0 after 5"), "{message}");

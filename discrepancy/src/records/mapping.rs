@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_told_with_key_value_and_what_does() {
+    fn what_makes_no_sense_is_reported_with_key_value_and_what_does() {
         for (from, to, hint) in [
             (
                 "\"mm\"",

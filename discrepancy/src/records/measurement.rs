@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_told_with_line_column_and_value() {
+    fn what_cannot_be_read_is_reported_with_line_column_and_value() {
         for (text, hint) in [
             ("time_s,drive_valve\n0,x\n", "measurement.csv:2: drive_valve = 'x'; allowed is a finite number"),
             ("time_s,drive_valve\n0,NaN\n", "drive_valve = 'NaN'"),

@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_last_line_is_left_out_and_told() {
+    fn a_cut_last_line_is_left_out_and_reported() {
         let table = parse("a,b\n1,2\n3", &Layout::default()).unwrap();
         assert_eq!((table.rows.len(), table.cut), (1, Some(3)));
         assert_eq!(parse("a,b\n1,2\n3,4", &Layout::default()).unwrap().cut, None);
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_is_told_with_its_line() {
+    fn what_is_no_table_is_reported_with_its_line() {
         for (text, hint) in [
             ("", "has no rows"),
             ("a,b\n", "has no rows"),

@@ -117,7 +117,7 @@ fn a_chamber_whose_valve_passes_more_has_another_scale_and_no_effect() {
 }
 
 #[test]
-fn a_model_file_is_told_from_a_rig_file() {
+fn a_model_file_is_distinguished_from_a_rig_file() {
     assert!(is_model_file("kind = \"mass\"\n"));
     assert!(!is_model_file(&std::fs::read_to_string(baseline_file()).unwrap()));
     assert!(!is_model_file("kind = "));
