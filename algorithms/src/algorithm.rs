@@ -9,8 +9,8 @@
 //! An algorithm holds its state and nothing else: parameters come with each step, since they may change while running.
 //! It neither allocates nor blocks; that its result is a number is checked behind it.
 
-use crate::parameters::{Declared, Parameter};
 use plant::RigParameters;
+use settings::parameters::{Declared, Parameter};
 
 /// What the pre-controller has made ready. The C interface has the same layout: numbers of 8 bytes, in this order.
 #[repr(C)]
@@ -62,7 +62,7 @@ pub trait Algorithm: Send {
     fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64;
 }
 
-/// A control algorithm whose parameters are declared by [`crate::parameters!`]: it reads them as fields, and is an [`Algorithm`]
+/// A control algorithm whose parameters are declared by [`settings::parameters!`]: it reads them as fields, and is an [`Algorithm`]
 /// by that.
 pub trait ControlLaw: Send {
     /// Its parameters.

@@ -18,7 +18,7 @@
 //! Source: [Neugebauer 2011, section 4], manual mode.
 
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
-use crate::parameters::declare;
+use settings::parameters::declare;
 
 /// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
@@ -29,7 +29,7 @@ pub(crate) const KIND: Kind = Kind {
     make: |_| Box::new(ForceManual),
 };
 
-crate::parameters! {
+settings::parameters! {
     /// Parameters of `force-manual`.
     struct Parameters {
         gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.015, "velocity for each error"),

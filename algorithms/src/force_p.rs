@@ -11,7 +11,7 @@
 //! Source: [Neugebauer 2011, section 4].
 
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
-use crate::parameters::declare;
+use settings::parameters::declare;
 
 /// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
@@ -22,7 +22,7 @@ pub(crate) const KIND: Kind = Kind {
     make: |_| Box::new(ForceP),
 };
 
-crate::parameters! {
+settings::parameters! {
     /// Parameters of `force-p`.
     struct Parameters {
         gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.012, "velocity for each error"),

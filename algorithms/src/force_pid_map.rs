@@ -28,8 +28,8 @@
 
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
 use crate::linearisation::Air;
-use crate::parameters::declare;
 use plant::RigParameters;
+use settings::parameters::declare;
 use std::f64::consts::TAU;
 
 /// In the list of algorithms.
@@ -41,7 +41,7 @@ pub(crate) const KIND: Kind = Kind {
     make: |rig| Box::new(ForcePidMap::new(rig)),
 };
 
-crate::parameters! {
+settings::parameters! {
     /// Parameters of `force-pid-map`.
     struct Parameters {
         gain_per_s: declare("1/s", [0.0, 400.0], 150.0, "rate of force for each error"),

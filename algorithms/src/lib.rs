@@ -3,7 +3,6 @@
 //! | file | holds |
 //! |---|---|
 //! | [`algorithm`] | what an algorithm gets, what it returns, how it is listed |
-//! | [`parameters`] | name, unit, range, default and meaning of a parameter |
 //! | [`guard`] | the watch over every algorithm: finite results, in time |
 //! | [`linearisation`] | from a velocity to a valve opening |
 //! | [`rest_zone`] | when a rod is left alone |
@@ -15,7 +14,6 @@ mod force_p;
 mod force_pid_map;
 pub mod guard;
 pub mod linearisation;
-pub mod parameters;
 mod position_cascade;
 mod position_p;
 mod position_pid;

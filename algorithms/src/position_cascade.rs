@@ -32,9 +32,9 @@
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
 use crate::linearisation::Air;
-use crate::parameters::declare;
 use crate::rest_zone::{self, RestZone};
 use plant::RigParameters;
+use settings::parameters::declare;
 
 /// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
@@ -45,7 +45,7 @@ pub(crate) const KIND: Kind = Kind {
     make: |rig| Box::new(PositionCascade::new(rig)),
 };
 
-crate::parameters! {
+settings::parameters! {
     /// Parameters of `position-cascade`.
     struct Parameters {
         gain_per_s: gain(15.0),

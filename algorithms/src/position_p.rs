@@ -10,8 +10,8 @@
 //! Source: [Neugebauer 2011, section 4].
 
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
-use crate::parameters::{Declaration, declare};
 use crate::rest_zone::{self, RestZone};
+use settings::parameters::{Declaration, declare};
 
 /// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
@@ -31,7 +31,7 @@ pub(super) const fn gain(default_per_s: f64) -> Declaration {
 pub(super) const VELOCITY_FEED_FORWARD: Declaration =
     declare("", [0.0, 2.0], 1.0, "share of the set-point's rate that is fed forward");
 
-crate::parameters! {
+settings::parameters! {
     /// Parameters of `position-p`.
     struct Parameters {
         gain_per_s: gain(20.0),

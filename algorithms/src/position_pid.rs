@@ -17,8 +17,8 @@
 
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
-use crate::parameters::declare;
 use crate::rest_zone::{self, RestZone};
+use settings::parameters::declare;
 
 /// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
@@ -29,7 +29,7 @@ pub(crate) const KIND: Kind = Kind {
     make: |_| Box::new(PositionPid::default()),
 };
 
-crate::parameters! {
+settings::parameters! {
     /// Parameters of `position-pid`.
     struct Parameters {
         gain_per_s: gain(30.0),

@@ -13,7 +13,7 @@
 //! mm/s in the middle of the stroke. e: error, m; b, c: viscous friction and stiffness of the air.
 
 use crate::algorithm::Ready;
-use crate::parameters::{Declaration, declare};
+use settings::parameters::{Declaration, declare};
 
 /// A rod that leaves no band of this half-width, m, over [`STANDING_S`] stands: slower than 2 mm/s. Five times the
 /// sensor's noise.

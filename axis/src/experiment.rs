@@ -35,15 +35,13 @@
 //! `[rig]` is the emulator's and `[passed]` the report's; they may hold what they like.
 
 pub mod axis;
-pub mod section;
 
 pub use axis::{AxisExperiment, ByHandLimits, Change, During, Prepare, ProgramReference, SetPoints};
-pub use section::ExperimentError;
 
 use crate::chains::AfterStop;
 use crate::chains::main::Start;
-use algorithms::parameters::Parameter;
-use section::{Section, Source};
+use settings::parameters::Parameter;
+use settings::{Section, SettingsError, Source};
 use std::path::Path;
 
 /// An experiment, checked.
@@ -109,8 +107,8 @@ impl Experiment {
     /// The experiment in `text`, for a stroke of `stroke_m`. `file` is for messages, and tables are read beside it.
     ///
     /// # Errors
-    /// [`ExperimentError`] for TOML that does not parse, unknown or missing keys, values out of range, and bad tables.
-    pub fn from_toml(text: &str, file: &Path, stroke_m: f64) -> Result<Self, ExperimentError> {
+    /// [`SettingsError`] for TOML that does not parse, unknown or missing keys, values out of range, and bad tables.
+    pub fn from_toml(text: &str, file: &Path, stroke_m: f64) -> Result<Self, SettingsError> {
         let source = Source::parse(text, file)?;
         let mut root = source.root();
         let title = root.needed_text("title", "what the experiment is called")?.text;
@@ -142,7 +140,7 @@ impl Experiment {
 }
 
 impl RunSection {
-    fn read(section: Option<Section<'_>>) -> Result<Self, ExperimentError> {
+    fn read(section: Option<Section<'_>>) -> Result<Self, SettingsError> {
         let Some(mut section) = section else { return Ok(Self::default()) };
         let run = Self {
             repetitions: section.whole_or_default(&REPETITIONS)?,
@@ -180,7 +178,7 @@ impl Default for RunSection {
 }
 
 impl Recording {
-    fn read(section: Option<Section<'_>>) -> Result<Self, ExperimentError> {
+    fn read(section: Option<Section<'_>>) -> Result<Self, SettingsError> {
         let Some(mut section) = section else { return Ok(Self { every_cycles: 1 }) };
         let every_cycles = section.whole_or_default(&EVERY)?;
         section.finish()?;

@@ -63,13 +63,10 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, ParameterSetError> 
         })?;
         for (task, values) in tasks {
             for (key, value) in values {
-                let line = 1 + text[..value.span().start.min(text.len())].matches('\n').count();
+                let line = settings::line_of(text, value.span().start);
                 let place = format!("{file}:{line}: ");
                 let name = format!("{task}.{key}");
-                let number = value
-                    .as_ref()
-                    .as_float()
-                    .or_else(|| value.as_ref().as_integer().map(|whole| whole as f64));
+                let number = settings::number_of(value.as_ref());
                 let value = number.ok_or_else(|| {
                     ParameterSetError(format!("{place}{axis_name}.{name} = {}: not a number", value.as_ref()))
                 })?;

@@ -9,9 +9,9 @@
 
 use algorithms::algorithm::Ready;
 use algorithms::linearisation::Linearisation;
-use algorithms::parameters::declare;
+use settings::parameters::declare;
 
-algorithms::parameters! {
+settings::parameters! {
     /// Parameters of the post-controller.
     pub struct Parameters {
         every_cycles: crate::program::EVERY_CYCLES,

@@ -11,12 +11,12 @@
 //! T is the time between the two samples that there are: cycles that the rig skipped pass for the filters too.
 
 use algorithms::algorithm::Ready;
-use algorithms::parameters::declare;
 use plant::Axis;
 use protocol::frames::Sensors;
+use settings::parameters::declare;
 use std::f64::consts::TAU;
 
-algorithms::parameters! {
+settings::parameters! {
     /// Parameters of the pre-controller.
     pub struct Parameters {
         every_cycles: crate::program::EVERY_CYCLES,

@@ -20,8 +20,8 @@ use crate::pre_controller::{self, Geometry, PreController};
 use crate::set_point::{Actual, ForceSetPoint, SetPoint};
 use algorithms::algorithm::{Quantity, Ready};
 use algorithms::guard::{AlgorithmFault, Guarded};
-use algorithms::parameters::{Declaration, OutOfRange, Parameter, declare};
 use protocol::frames::Sensors;
+use settings::parameters::{Declaration, OutOfRange, Parameter, declare};
 use std::ops::Range;
 
 /// Multiple of the basic cycle of a task; the first parameter of each.

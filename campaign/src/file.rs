@@ -242,8 +242,8 @@ struct At<'a> {
 
 impl At<'_> {
     fn error(&self, span: &Range<usize>, message: String) -> FileError {
-        let before = &self.text[..span.start.min(self.text.len())];
-        FileError { file: self.path.display().to_string(), line: 1 + before.matches('\n').count(), message }
+        let line = settings::line_of(self.text, span.start);
+        FileError { file: self.path.display().to_string(), line, message }
     }
 
     fn kind(&self, form: &Form) -> Result<Kind, FileError> {

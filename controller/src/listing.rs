@@ -4,13 +4,13 @@ use crate::cli::{A2lArguments, OneAxis};
 use crate::run::RunError;
 use algorithms::SHIPPED;
 use algorithms::algorithm::Quantity;
-use algorithms::parameters::Parameter;
 use axis_control::axis::AxisController;
 use axis_control::chains::{force, matching, settled};
 use axis_control::setup::{FileArguments, Inputs, Mode};
 use axis_control::{parameter_set, post_controller, pre_controller};
 use plant::Axis;
 use protocol::exit::Exit;
+use settings::parameters::Parameter;
 use std::io::{self, Write};
 use xcp::a2l::{self, Described};
 

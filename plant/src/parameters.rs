@@ -16,7 +16,11 @@ use serde::Serialize;
 
 use reader::Entries;
 pub use reader::ParameterError;
-pub use table::VALVE_POINTS;
+use table::Groups;
+pub use table::{
+    CylinderParameters, FrictionParameters, GasParameters, LinkageParameters, MassParameters,
+    SensorParameters, StartParameters, SupplyParameters, VALVE_POINTS, ValveParameters,
+};
 
 use crate::effects::sheet::{Place, Switched};
 use crate::effects::tabulated::Tabulated;
@@ -26,107 +30,8 @@ use crate::effects::tabulated::Tabulated;
 pub struct RigParameters {
     #[serde(skip)]
     entries: Entries,
-    supply: SupplyParameters,
-    gas: GasParameters,
-    valve: ValveParameters,
-    cylinder: CylinderParameters,
-    friction: FrictionParameters,
-    mass: MassParameters,
-    linkage: LinkageParameters,
-    start: StartParameters,
-    sensors: SensorParameters,
-}
-
-/// Table `[supply]`: pressures are absolute.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // the names carry quantity and unit; meaning and range stand in table::KEYS
-pub struct SupplyParameters {
-    pub pressure_pa: f64,
-    pub exhaust_pressure_pa: f64,
-    pub atmospheric_pressure_pa: f64,
-    pub discharge_time_constant_s: f64,
-    pub recovery_time_constant_s: f64,
-    pub check_valve_pressure_pa: f64,
-}
-
-/// Table `[gas]`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct GasParameters {
-    pub normal_pressure_pa: f64,
-    pub temperature_k: f64,
-}
-
-/// Table `[valve]`: openings |s| and the K_V of both edges at them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct ValveParameters {
-    pub spool_time_constant_s: f64,
-    pub flow_lag_time_constant_s: f64,
-    pub opening: [f64; VALVE_POINTS],
-    pub kv_supply_m3_per_h: [f64; VALVE_POINTS],
-    pub kv_exhaust_m3_per_h: [f64; VALVE_POINTS],
-}
-
-/// Table `[cylinder]`, the same for both axes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct CylinderParameters {
-    pub stroke_m: f64,
-    pub piston_area_m2: f64,
-    pub annulus_area_m2: f64,
-    pub dead_volume_m3: f64,
-}
-
-/// Table `[friction]`, the same for both axes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct FrictionParameters {
-    pub break_away_force_n: f64,
-    pub sliding_force_n: f64,
-    pub viscous_n_s_per_m: f64,
-}
-
-/// Table `[mass]`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct MassParameters {
-    pub drive_kg: f64,
-    pub carriage_kg: f64,
-    pub load_kg: f64,
-    pub added_limit_kg: f64,
-}
-
-/// Table `[linkage]`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct LinkageParameters {
-    pub gap_m: f64,
-    pub stiffness_n_per_m: f64,
-    pub damping_n_s_per_m: f64,
-}
-
-/// Table `[start]`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct StartParameters {
-    pub rod_side_pressure_pa: f64,
-}
-
-/// Table `[sensors]`; see [`SensorParameters::position_step_m`] and its siblings for the step of one count.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[allow(missing_docs)] // as above
-pub struct SensorParameters {
-    pub position_range_m: f64,
-    pub position_bits: u32,
-    pub position_noise_m: f64,
-    pub load_position_offset_m: f64,
-    pub force_range_n: f64,
-    pub force_bits: u32,
-    pub force_noise_n: f64,
-    pub pressure_range_pa: f64,
-    pub pressure_bits: u32,
-    pub pressure_noise_pa: f64,
+    #[serde(flatten)]
+    groups: Groups,
 }
 
 impl SensorParameters {
@@ -276,111 +181,10 @@ impl RigParameters {
         &self.entries.effects
     }
 
-    /// Supply, exhaust and emergency stop.
-    pub fn supply(&self) -> &SupplyParameters {
-        &self.supply
-    }
-
-    /// Normal conditions.
-    pub fn gas(&self) -> &GasParameters {
-        &self.gas
-    }
-
-    /// Valve characteristic and lags.
-    pub fn valve(&self) -> &ValveParameters {
-        &self.valve
-    }
-
-    /// Areas, stroke, dead volume.
-    pub fn cylinder(&self) -> &CylinderParameters {
-        &self.cylinder
-    }
-
-    /// Friction of each axis.
-    pub fn friction(&self) -> &FrictionParameters {
-        &self.friction
-    }
-
-    /// Moving masses.
-    pub fn mass(&self) -> &MassParameters {
-        &self.mass
-    }
-
-    /// Gap and contact of the linkage.
-    pub fn linkage(&self) -> &LinkageParameters {
-        &self.linkage
-    }
-
-    /// Start pressures.
-    pub fn start(&self) -> &StartParameters {
-        &self.start
-    }
-
-    /// Ranges, resolutions and noise of the sensors.
-    pub fn sensors(&self) -> &SensorParameters {
-        &self.sensors
-    }
-
     fn from_entries(entries: Entries) -> Result<Self, ParameterError> {
         check_together(&entries)?;
-        let si = |table: &str, name: &str| entries.si(table, name);
-        Ok(RigParameters {
-            supply: SupplyParameters {
-                pressure_pa: si("supply", "pressure_bar"),
-                exhaust_pressure_pa: si("supply", "exhaust_pressure_bar"),
-                atmospheric_pressure_pa: si("supply", "atmospheric_pressure_bar"),
-                discharge_time_constant_s: si("supply", "discharge_time_constant_s"),
-                recovery_time_constant_s: si("supply", "recovery_time_constant_s"),
-                check_valve_pressure_pa: si("supply", "check_valve_pressure_bar"),
-            },
-            gas: GasParameters {
-                normal_pressure_pa: si("gas", "normal_pressure_pa"),
-                temperature_k: si("gas", "temperature_k"),
-            },
-            valve: ValveParameters {
-                spool_time_constant_s: si("valve", "spool_time_constant_ms"),
-                flow_lag_time_constant_s: si("valve", "flow_lag_time_constant_ms"),
-                opening: entries.si_points("valve", "opening"),
-                kv_supply_m3_per_h: entries.si_points("valve", "kv_supply_m3_per_h"),
-                kv_exhaust_m3_per_h: entries.si_points("valve", "kv_exhaust_m3_per_h"),
-            },
-            cylinder: CylinderParameters {
-                stroke_m: si("cylinder", "stroke_mm"),
-                piston_area_m2: si("cylinder", "piston_area_mm2"),
-                annulus_area_m2: si("cylinder", "annulus_area_mm2"),
-                dead_volume_m3: si("cylinder", "dead_volume_cm3"),
-            },
-            friction: FrictionParameters {
-                break_away_force_n: si("friction", "break_away_force_n"),
-                sliding_force_n: si("friction", "sliding_force_n"),
-                viscous_n_s_per_m: si("friction", "viscous_n_per_mm_per_s"),
-            },
-            mass: MassParameters {
-                drive_kg: si("mass", "drive_kg"),
-                carriage_kg: si("mass", "carriage_kg"),
-                load_kg: si("mass", "load_kg"),
-                added_limit_kg: si("mass", "added_limit_kg"),
-            },
-            linkage: LinkageParameters {
-                gap_m: si("linkage", "gap_mm"),
-                stiffness_n_per_m: si("linkage", "stiffness_n_per_m"),
-                damping_n_s_per_m: si("linkage", "damping_n_s_per_m"),
-            },
-            start: StartParameters { rod_side_pressure_pa: si("start", "rod_side_pressure_bar") },
-            sensors: SensorParameters {
-                position_range_m: si("sensors", "position_range_mm"),
-                position_bits: si("sensors", "position_bits") as u32,
-                position_noise_m: si("sensors", "position_noise_um"),
-                load_position_offset_m: si("sensors", "load_position_offset_mm"),
-                force_range_n: si("sensors", "force_range_n"),
-                force_bits: si("sensors", "force_bits") as u32,
-                force_noise_n: si("sensors", "force_noise_n"),
-                pressure_range_pa: si("sensors", "pressure_range_bar"),
-                pressure_bits: si("sensors", "pressure_bits") as u32,
-                pressure_noise_pa: si("sensors", "pressure_noise_pa"),
-            },
-            entries,
-        })
+        let groups = Groups::of(|table, name| entries.si_points(table, name));
+        Ok(RigParameters { entries, groups })
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::interface::{FORCE, POSITION};
 use crate::wrong::Wrong;
 use algorithms::algorithm::{Quantity, Ready};
-use algorithms::parameters::Parameter;
+use settings::parameters::Parameter;
 use std::f64::consts::TAU;
 use std::hint::black_box;
 

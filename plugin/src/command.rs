@@ -3,8 +3,8 @@
 use crate::child::{self, Trier};
 use crate::{Description, PluginError, describe};
 use algorithms::algorithm::Quantity;
-use algorithms::parameters::Parameter;
 use protocol::exit::Exit;
+use settings::parameters::Parameter;
 use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;

@@ -17,8 +17,8 @@ use crate::interface::{
 use crate::wrong::Wrong;
 use crate::{Description, Tell};
 use algorithms::algorithm::Ready;
-use algorithms::parameters::Parameter;
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+use settings::parameters::Parameter;
 use std::error::Error;
 use std::ffi::{c_char, c_void};
 use std::mem::ManuallyDrop;

@@ -30,8 +30,8 @@ mod interface;
 mod wrong;
 
 use algorithms::algorithm::{Algorithm, Quantity, Ready};
-use algorithms::parameters::Parameter;
 use plant::RigParameters;
+use settings::parameters::Parameter;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! Why a library is refused: what is wrong and what to do about it.
 
 use crate::interface::{Descriptor, INTERFACE_VERSION, LONGEST_TEXT, MOST_PARAMETERS};
-use algorithms::parameters::OutOfRange;
+use settings::parameters::OutOfRange;
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitStatus;

@@ -19,11 +19,11 @@ use a2lfile::{
     CompuVtab, ConversionType, DataType, EcuAddress, FncValues, Group, IndexMode, MatrixDim, Measurement,
     Module, ReadOnly, RecordLayout, RefCharacteristic, RefMeasurement, Root, ValuePairsStruct,
 };
-use algorithms::parameters::Parameter;
 use axis_control::program::Variable;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use plant::Axis;
 use protocol::frames::BIT_RATE_PER_S;
+use settings::parameters::Parameter;
 
 /// What the file describes.
 pub struct Described<'a> {

@@ -5,8 +5,8 @@
 //! daq_packets_per_cycle = 1    # 1 to 4; the bus has one in reserve, for all controllers together
 //! ```
 
-use algorithms::parameters::Parameter;
 use serde::Deserialize;
+use settings::parameters::Parameter;
 use std::path::{Path, PathBuf};
 
 /// Bytes of a key.
@@ -78,9 +78,7 @@ impl XcpConfig {
         // The library shows the line that is wrong, which may be the key's.
         let File { key, daq_packets_per_cycle } =
             toml::from_str(text).map_err(|error: toml::de::Error| {
-                let line = error
-                    .span()
-                    .map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+                let line = settings::line_of(text, error.span().map_or(0, |span| span.start));
                 format!("line {line}: {}", error.message())
             })?;
         let packets = DAQ_PACKETS

@@ -330,7 +330,7 @@ fn width(region: Region) -> u32 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use algorithms::parameters::{Parameter, declare};
+    use settings::parameters::{Parameter, declare};
 
     /// Whoever is told, and remembers.
     #[derive(Default)]

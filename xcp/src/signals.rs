@@ -3,9 +3,9 @@
 //! A signal is a number of the cycle that was just answered, in SI. On the wire of XCP it is a float of four bytes or a count,
 //! so that it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
 
-use algorithms::parameters::Parameter;
 use axis_control::axis::{AxisController, AxisRecord};
 use protocol::frames::{DRIVE_CHAIN_STATUS, Sensors, SignalSpec, ValveCommand};
+use settings::parameters::Parameter;
 
 /// How a value lies in memory; Intel byte order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,7 +13,7 @@
 //! nothing.
 
 use crate::signals::{COUNT, Format, SIGNALS};
-use algorithms::parameters::Parameter;
+use settings::parameters::Parameter;
 
 /// Samples that the buffer holds at most.
 pub const CAPACITY: usize = 4096;

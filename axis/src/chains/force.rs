@@ -27,13 +27,13 @@
 //! ends with its mean: a rod that bounces within the gap of the linkage is fast at times and goes nowhere.
 
 use super::{CYCLE_S, Entered, Fault, cycles, elapsed_s};
-use algorithms::parameters::declare;
 use protocol::frames::ForceChainState;
+use settings::parameters::declare;
 
 /// Name of the table of [`Parameters`].
 pub const TABLE: &str = "force-chain";
 
-algorithms::parameters! {
+settings::parameters! {
     /// Parameters of the force chain.
     pub struct Parameters {
         high_force_n: declare("N", [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),

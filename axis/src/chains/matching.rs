@@ -18,13 +18,13 @@
 //! A matched offset holds until the next one, or until the rig restarts.
 
 use super::{Entered, Fault, Partner, cycles};
-use algorithms::parameters::declare;
 use protocol::frames::MatchingChainState;
+use settings::parameters::declare;
 
 /// Name of the table of [`Parameters`].
 pub const TABLE: &str = "matching-chain";
 
-algorithms::parameters! {
+settings::parameters! {
     /// Parameters of the matching chain.
     pub struct Parameters {
         average_s: declare("s", [0.01, 60.0], 0.5, "time over which both positions are averaged"),

@@ -11,12 +11,12 @@
 //! after more than 20 cycles without a sample, for which a valve command is stale too, the window begins anew.
 
 use super::{cycles, elapsed_s};
-use algorithms::parameters::declare;
+use settings::parameters::declare;
 
 /// Name of the table of [`Bounds`].
 pub const TABLE: &str = "settled";
 
-algorithms::parameters! {
+settings::parameters! {
     /// Bounds of a settled axis.
     pub struct Bounds {
         still_m: declare("m", [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest").at_start_only(),

@@ -22,10 +22,10 @@
 //! With a largest speed (or rate) by hand, the first frame `HandSetPoint` that finds the row at rest takes over: from then on the
 //! axis follows these frames while the experiment lasts, and the row no more.
 
-use super::section::{ExperimentError, Section};
 use crate::set_point::{ForceProfile, Motion, reading};
 use algorithms::algorithm::Quantity;
-use algorithms::parameters::Parameter;
+use settings::parameters::Parameter;
+use settings::{Section, SettingsError};
 use std::path::{Path, PathBuf};
 
 /// What one axis does.
@@ -169,7 +169,7 @@ impl AxisExperiment {
         mut section: Section<'_>,
         usual: Quantity,
         stroke_m: f64,
-    ) -> Result<Self, ExperimentError> {
+    ) -> Result<Self, SettingsError> {
         let program = program(&mut section)?;
         let start = Parameter::new(("start_m", "m"), [0.0, stroke_m], 0.0, "where initial positioning goes");
         let start_m = section.number(&start)?;
@@ -234,7 +234,7 @@ impl AxisExperiment {
 
 const FORCE_KEYS: [&str; 4] = ["force_limit_n", "initial_force_n", "initial_ramp_s", "by_hand_rate_n_per_s"];
 
-fn program(section: &mut Section<'_>) -> Result<ProgramReference, ExperimentError> {
+fn program(section: &mut Section<'_>) -> Result<ProgramReference, SettingsError> {
     let program = section.needed_text("program", "a name in programs, or a path ending in .toml")?;
     let is_name = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
     if program.text.ends_with(".toml") || (!program.text.is_empty() && program.text.chars().all(is_name)) {
@@ -247,7 +247,7 @@ fn program(section: &mut Section<'_>) -> Result<ProgramReference, ExperimentErro
     Err(section.wrong_at("program", &said))
 }
 
-fn change(mut section: Section<'_>) -> Result<Change, ExperimentError> {
+fn change(mut section: Section<'_>) -> Result<Change, SettingsError> {
     let at_s = section.needed_number(&AT)?;
     let parameter = section.needed_text("parameter", "which one, such as algorithm.gain_per_s")?;
     let value = section.needed_number(&VALUE)?;

@@ -27,10 +27,10 @@ use crate::pre_controller::{self, Geometry, PreController};
 use algorithms::algorithm::{Algorithm, Quantity};
 use algorithms::guard::Guarded;
 use algorithms::linearisation::{Law, Linearisation};
-use algorithms::parameters::Parameter;
 use plant::{Axis, RigParameters};
 use realtime::MonotonicClock;
 use serde::Deserialize;
+use settings::parameters::Parameter;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -171,8 +171,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn error(&self, place: usize, problem: &str) -> ProgramError {
-        let text = &self.source.text;
-        let line = 1 + text[..place.min(text.len())].matches('\n').count();
+        let line = settings::line_of(&self.source.text, place);
         ProgramError(format!("{}:{line}: {problem}", self.source.path.display()))
     }
 
@@ -189,7 +188,7 @@ impl Reader<'_> {
                 None => parameter.default,
                 Some(entry) => {
                     let place = entry.span().start;
-                    let value = number(entry.as_ref()).ok_or_else(|| {
+                    let value = settings::number_of(entry.as_ref()).ok_or_else(|| {
                         self.error(
                             place,
                             &format!("{name}.{} = {}: not a number", parameter.name, entry.as_ref()),
@@ -291,10 +290,6 @@ impl Reader<'_> {
 
 fn names() -> String {
     algorithms::SHIPPED.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
-}
-
-fn number(value: &toml::Value) -> Option<f64> {
-    value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64))
 }
 
 #[cfg(test)]

@@ -22,9 +22,9 @@ pub mod spring;
 use super::law::{Given, Law, Moment};
 use super::row::{Lasting, Place, Row};
 use super::{Actual, ForceSetPoint};
-use crate::experiment::section::ExperimentError;
-use algorithms::parameters::Parameter;
 use at_position::AtPosition;
+use settings::SettingsError;
+use settings::parameters::Parameter;
 use std::fmt;
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ pub struct Kind {
     /// What it does, in a few words.
     pub about: &'static str,
     /// Reads one from its table.
-    pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Load>, ExperimentError>,
+    pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Load>, SettingsError>,
 }
 
 /// A force that depends on what the axis does.
@@ -75,7 +75,7 @@ impl Lasting for Segment {
 
 impl Segment {
     /// Reads the load of a segment's table.
-    pub(super) fn read_load(kind: &Kind, given: &mut Given<'_, '_>) -> Result<Self, ExperimentError> {
+    pub(super) fn read_load(kind: &Kind, given: &mut Given<'_, '_>) -> Result<Self, SettingsError> {
         let load = (kind.read)(given)?;
         let base = Parameter::new(
             ("base_force_n", "N"),

@@ -7,9 +7,9 @@
 use super::{
     bestehorn, chirp, modified_sine, pseudo_random_steps, ramp, rest, sine, step, table, trapezoidal,
 };
-use crate::experiment::section::{ExperimentError, Section};
 use algorithms::algorithm::Quantity;
-use algorithms::parameters::Parameter;
+use settings::parameters::Parameter;
+use settings::{Section, SettingsError};
 use std::fmt;
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ pub struct Kind {
     /// What its row may be of.
     pub serves: &'static [Quantity],
     /// Reads one from its table.
-    pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Law>, ExperimentError>,
+    pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError>,
 }
 
 /// Laws of both.
@@ -149,13 +149,13 @@ pub(crate) struct Given<'g, 'a> {
 
 impl Given<'_, '_> {
     /// A value of the row's own unit that must be given: `to` reads `to_m` or `to_n`.
-    pub(crate) fn place(&mut self, stem: &str, meaning: &'static str) -> Result<f64, ExperimentError> {
+    pub(crate) fn place(&mut self, stem: &str, meaning: &'static str) -> Result<f64, SettingsError> {
         let parameter = self.own(stem, self.scale.most(), meaning);
         self.section.needed_number(&parameter)
     }
 
     /// A deviation to both sides that must be given.
-    pub(crate) fn amplitude(&mut self) -> Result<f64, ExperimentError> {
+    pub(crate) fn amplitude(&mut self) -> Result<f64, SettingsError> {
         let parameter = self.own("amplitude", 0.5 * self.scale.most(), "deviation to either side");
         self.section.needed_number(&parameter)
     }
@@ -167,12 +167,12 @@ impl Given<'_, '_> {
     }
 
     /// The `duration_s` that must be given.
-    pub(crate) fn duration_s(&mut self, least_s: f64) -> Result<f64, ExperimentError> {
+    pub(crate) fn duration_s(&mut self, least_s: f64) -> Result<f64, SettingsError> {
         self.number(&Parameter::new(("duration_s", "s"), [least_s, LONGEST_S], 1.0, "how long it takes"))
     }
 
     /// A number that must be given.
-    pub(crate) fn number(&mut self, parameter: &Parameter) -> Result<f64, ExperimentError> {
+    pub(crate) fn number(&mut self, parameter: &Parameter) -> Result<f64, SettingsError> {
         self.section.needed_number(parameter)
     }
 }

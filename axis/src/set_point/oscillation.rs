@@ -11,8 +11,8 @@
 
 use super::bestehorn;
 use super::law::{Given, Law, Moment};
-use crate::experiment::section::ExperimentError;
-use algorithms::parameters::Parameter;
+use settings::SettingsError;
+use settings::parameters::Parameter;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ impl Oscillation {
     pub(super) fn read(
         given: &mut Given<'_, '_>,
         [from_hz, to_hz]: [f64; 2],
-    ) -> Result<Arc<dyn Law>, ExperimentError> {
+    ) -> Result<Arc<dyn Law>, SettingsError> {
         let amplitude = given.amplitude()?;
         let duration_s = given.duration_s(0.01)?;
         let fade_s = given.section.number_or_default(&FADE)?;

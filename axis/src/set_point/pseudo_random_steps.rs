@@ -10,10 +10,10 @@
 
 use super::law::{BOTH, Given, Kind, Law, Moment};
 use super::step::JUMP_S;
-use crate::experiment::section::ExperimentError;
-use algorithms::parameters::Parameter;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
+use settings::SettingsError;
+use settings::parameters::Parameter;
 use std::sync::Arc;
 
 /// In the list of laws.
@@ -31,7 +31,7 @@ static LEVELS: Parameter =
 /// Steps that a segment may have; they are drawn when it is read.
 const MOST_STEPS: f64 = 1e6;
 
-fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, ExperimentError> {
+fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
     let amplitude = given.amplitude()?;
     let hold_s = given.number(&HOLD)?;
     let duration_s = given.duration_s(0.001)?;

@@ -4,8 +4,8 @@ use super::force::{self, ForceProfile, Segment, at_position::AtPosition};
 use super::law::{self, Given, Law, Scale};
 use super::row::Lasting;
 use super::{Motion, table};
-use crate::experiment::section::{ExperimentError, Section};
 use algorithms::algorithm::Quantity;
+use settings::{Section, SettingsError};
 use std::sync::Arc;
 
 /// Keys that say what a law is of, where the law alone does not.
@@ -17,7 +17,7 @@ const TELLING: [(&str, Quantity); 4] = [
 ];
 
 /// What the row is of; `None` when none of its segments says.
-pub(crate) fn quantity(segments: &[Section<'_>]) -> Result<Option<Quantity>, ExperimentError> {
+pub(crate) fn quantity(segments: &[Section<'_>]) -> Result<Option<Quantity>, SettingsError> {
     let mut first = None;
     for segment in segments {
         let Some(own) = own_quantity(segment) else { continue };
@@ -53,7 +53,7 @@ pub(crate) fn motion(
     start_m: f64,
     segments: Vec<Section<'_>>,
     stroke_m: f64,
-) -> Result<Motion, ExperimentError> {
+) -> Result<Motion, SettingsError> {
     let scale = Scale { quantity: Quantity::Position, stroke_m, force_limit_n: 0.0 };
     let mut from = start_m;
     let mut laws = Vec::new();
@@ -73,7 +73,7 @@ pub(crate) fn forces(
     [initial_n, limit_n]: [f64; 2],
     sections: Vec<Section<'_>>,
     stroke_m: f64,
-) -> Result<ForceProfile, ExperimentError> {
+) -> Result<ForceProfile, SettingsError> {
     let scale = Scale { quantity: Quantity::Force, stroke_m, force_limit_n: limit_n };
     let mut from = initial_n;
     let mut segments = Vec::new();
@@ -95,7 +95,7 @@ pub(crate) fn forces(
 }
 
 /// The law called `name`, within the limits of its row.
-fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, ExperimentError> {
+fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
     let quantity = given.scale.quantity;
     let kind = law::KINDS.iter().find(|kind| kind.name == name && kind.serves.contains(&quantity));
     let Some(kind) = kind else {

@@ -8,7 +8,7 @@
 
 use super::law::{BOTH, Kind};
 use super::oscillation::Oscillation;
-use algorithms::parameters::Parameter;
+use settings::parameters::Parameter;
 
 /// In the list of laws.
 pub const KIND: Kind = Kind {

@@ -13,8 +13,8 @@
 //! Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300 (the mean, here unweighted).
 
 use super::law::{BOTH, Given, Kind, Law, Moment};
-use crate::experiment::section::ExperimentError;
 use algorithms::algorithm::Quantity;
+use settings::SettingsError;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ const START_TOLERANCE_M: f64 = 1e-5;
 /// Points that a file may hold.
 const MOST_POINTS: usize = 1_000_000;
 
-fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, ExperimentError> {
+fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
     let file = given.section.needed_text("file", "the CSV file, relative to the experiment's folder")?;
     let path = given.section.beside(&file.text);
     let smooth = given.section.choice("interpolation", &[("linear", false), ("smooth", true)])?;

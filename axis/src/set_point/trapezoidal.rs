@@ -11,7 +11,7 @@
 
 use super::law::{Kind, Law, Moment};
 use algorithms::algorithm::Quantity;
-use algorithms::parameters::Parameter;
+use settings::parameters::Parameter;
 use std::sync::Arc;
 
 /// In the list of laws.

@@ -8,7 +8,7 @@ mod position_pi;
 mod refused;
 
 /// So that `position_pi.rs` compiles as it would beside the shipped algorithms.
-use algorithms::{algorithm, parameters};
+use algorithms::algorithm;
 
 /// Counts what the watched part of a test allocates.
 #[global_allocator]

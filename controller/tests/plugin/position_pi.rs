@@ -1,7 +1,7 @@
 //! Position: proportional-integral with velocity feed-forward.
 
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
-use crate::parameters::declare;
+use settings::parameters::declare;
 
 /// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
@@ -12,7 +12,7 @@ pub(crate) const KIND: Kind = Kind {
     make: |_rig| Box::new(PositionPi::default()),
 };
 
-crate::parameters! {
+settings::parameters! {
     /// Parameters of `position-pi`.
     struct Parameters {
         gain_per_s: declare("1/s", [0.0, 100.0], 20.0, "velocity for each error"),

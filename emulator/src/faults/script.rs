@@ -22,6 +22,7 @@
 
 use super::{Fault, FaultError};
 use plant::Truth;
+use settings::number;
 use std::fmt;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -168,7 +169,7 @@ struct Reader<'t> {
 
 impl Reader<'_> {
     fn line(&self, offset: usize) -> usize {
-        1 + self.text.as_bytes()[..offset.min(self.text.len())].iter().filter(|byte| **byte == b'\n').count()
+        settings::line_of(self.text, offset)
     }
 
     fn refuse(&self, offset: usize, problem: impl Into<Problem>) -> ScriptError {
@@ -176,7 +177,7 @@ impl Reader<'_> {
     }
 
     fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
-        self.text.get(value.span()).unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+        settings::written(self.text, value.span())
     }
 
     /// The value is none that is allowed.
@@ -196,7 +197,7 @@ impl Reader<'_> {
             match (key.get_ref().as_ref(), value.get_ref()) {
                 ("seed", _) => {
                     let whole = |number: &f64| (0.0..=9e15).contains(number) && *number == number.trunc();
-                    let seed = as_number(value.get_ref()).filter(whole);
+                    let seed = number(value.get_ref()).filter(whole);
                     script.seed = seed
                         .ok_or_else(|| self.bad_value("seed", value, "whole numbers from 0 to 9e15"))?
                         as u64;
@@ -234,7 +235,7 @@ impl Reader<'_> {
         let numbers: Vec<_> = table
             .iter()
             .filter(|(key, _)| !OWN_KEYS.contains(&key.get_ref().as_ref()))
-            .map(|(key, value)| (key.get_ref().to_string(), as_number(value.get_ref()), self.written(value)))
+            .map(|(key, value)| (key.get_ref().to_string(), number(value.get_ref()), self.written(value)))
             .collect();
         let fault = Fault::new(name, at, &numbers).map_err(|error| {
             let blamed = match &error {
@@ -263,7 +264,7 @@ impl Reader<'_> {
     fn condition(&self, table: &DeTable<'_>, signal: Option<&str>) -> Result<Option<Condition>, ScriptError> {
         let bound = |key: &str| {
             let Some(value) = table.get(key) else { return Ok(None) };
-            let number = as_number(value.get_ref()).filter(|number| number.is_finite());
+            let number = number(value.get_ref()).filter(|number| number.is_finite());
             number.map(Some).ok_or_else(|| self.bad_value(key, value, "finite numbers"))
         };
         let (above, below) = (bound("above")?, bound("below")?);
@@ -294,20 +295,10 @@ impl Reader<'_> {
     /// A time as a cycle.
     fn cycle(&self, table: &DeTable<'_>, key: &str, least_s: f64) -> Result<Option<u64>, ScriptError> {
         let Some(value) = table.get(key) else { return Ok(None) };
-        let time_s = as_number(value.get_ref()).filter(|time_s| (least_s..=LONGEST_S).contains(time_s));
+        let time_s = number(value.get_ref()).filter(|time_s| (least_s..=LONGEST_S).contains(time_s));
         let time_s =
             time_s.ok_or_else(|| self.bad_value(key, value, format!("{least_s} to {LONGEST_S} s")))?;
         Ok(Some((time_s * 1000.0).round() as u64))
-    }
-}
-
-fn as_number(value: &DeValue<'_>) -> Option<f64> {
-    match value {
-        DeValue::Float(float) => float.as_str().parse().ok(),
-        DeValue::Integer(integer) => {
-            i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|whole| whole as f64)
-        }
-        _ => None,
     }
 }
 

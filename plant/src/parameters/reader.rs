@@ -140,14 +140,14 @@ impl Entries {
 
     /// The value of a single-number key, in SI.
     pub(super) fn si(&self, table: &str, name: &str) -> f64 {
-        self.si_points::<1>(table, name)[0]
+        self.si_points(table, name)[0]
     }
 
-    /// The values of a key that holds several numbers, in SI.
-    pub(super) fn si_points<const N: usize>(&self, table: &str, name: &str) -> [f64; N] {
-        let unit = KEYS.iter().find(|key| key.table == table && key.name == name).map(|key| key.unit);
-        let numbers = &self.entry(table, name).numbers;
-        std::array::from_fn(|i| unit.map_or(numbers[i], |unit| unit.to_si(numbers[i])))
+    /// The values of a key, in SI.
+    pub(super) fn si_points(&self, table: &str, name: &str) -> Vec<f64> {
+        let key = KEYS.iter().find(|key| key.table == table && key.name == name);
+        let unit = key.map_or(Unit::One, |key| key.unit);
+        self.entry(table, name).numbers.iter().map(|number| unit.to_si(*number)).collect()
     }
 
     /// The same rig with one key changed, in the file's unit.
@@ -240,14 +240,12 @@ impl<'t> Place<'t> {
 
 impl Place<'_> {
     pub(super) fn line(&self, offset: usize) -> usize {
-        1 + self.text.as_bytes()[..offset.min(self.text.len())].iter().filter(|byte| **byte == b'\n').count()
+        settings::line_of(self.text, offset)
     }
 
-    /// The value as the file writes it, on one line and cut to a readable length.
+    /// The value as the file writes it.
     pub(super) fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
-        let words =
-            self.text.get(value.span()).unwrap_or("").split_whitespace().collect::<Vec<_>>().join(" ");
-        if words.chars().count() > 60 { words.chars().take(57).chain("...".chars()).collect() } else { words }
+        settings::written(self.text, value.span())
     }
 
     fn refuse_unknown(&self, root: &DeTable<'_>) -> Result<(), ParameterError> {
@@ -298,8 +296,8 @@ impl Place<'_> {
         let text = self.written(value);
         let line = self.line(value.span().start);
         let numbers = match value.get_ref() {
-            DeValue::Array(items) => items.iter().map(|item| as_number(item.get_ref())).collect(),
-            single => as_number(single).map(|number| vec![number]),
+            DeValue::Array(items) => items.iter().map(|item| settings::number(item.get_ref())).collect(),
+            single => settings::number(single).map(|number| vec![number]),
         };
         let is_array = matches!(value.get_ref(), DeValue::Array(_));
         match numbers {
@@ -316,16 +314,6 @@ impl Place<'_> {
                 range: key.range(),
             }),
         }
-    }
-}
-
-pub(super) fn as_number(value: &DeValue<'_>) -> Option<f64> {
-    match value {
-        DeValue::Float(float) => float.as_str().parse().ok(),
-        DeValue::Integer(integer) => {
-            i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|whole| whole as f64)
-        }
-        _ => None,
     }
 }
 

@@ -12,7 +12,7 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::reader::{ParameterError, Place as Text, as_number};
+use super::reader::{ParameterError, Place as Text};
 use crate::effects::sheet::{EffectKey, Sheet, Switched};
 use crate::effects::{SHEETS, sheet};
 
@@ -88,7 +88,8 @@ fn read_numbers(
                 range: key.range(),
             });
         };
-        let number = as_number(value.get_ref()).ok_or_else(|| wrong(text, &path, value, &key.range()))?;
+        let number =
+            settings::number(value.get_ref()).ok_or_else(|| wrong(text, &path, value, &key.range()))?;
         // Written so that a NaN, which TOML admits, fails.
         if number >= key.min && number <= key.max {
             return Ok(number);

@@ -1,12 +1,16 @@
-//! The one table of the rig's parameters: key, unit, allowed range, meaning and source of each.
+//! The one table of the rig's parameters: field in SI, key, unit, allowed range, source and meaning of each.
 //!
-//! The reader checks a file against it, the error messages quote it, and a test compares the comments of the
-//! shipped `rig.toml` with it, so there is no second place where a range is written.
+//! The groups of [`RigParameters`] are made of it, the reader checks a file against it, the error messages quote it, and a test
+//! compares the comments of the shipped `rig.toml` with it, so there is no second place where a key or a range is written.
 //!
 //! A range is where the model and its integration are meant to hold (property tests run over all of it); it
 //! is wider than any rig of this kind and narrower than what a number can be.
 
 use std::fmt;
+
+use serde::Serialize;
+
+use super::RigParameters;
 
 /// A unit of the rig file; the model computes in SI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,27 +171,82 @@ impl fmt::Display for Key {
 /// Points of each valve table.
 pub const VALVE_POINTS: usize = 6;
 
-const fn number(
-    table: &'static str,
-    name: &'static str,
-    (unit, min, max): (Unit, f64, f64),
-    meaning: &'static str,
-    source: &'static str,
-) -> Key {
-    Key { table, name, unit, min, max, count: 1, meaning, source }
+/// What a key of the rig file becomes: a number, a whole number, or the points of a valve table.
+trait Held {
+    /// Numbers of the file.
+    const COUNT: usize;
+
+    /// From the numbers in SI, as many as these.
+    fn held(si: &[f64]) -> Self;
 }
 
-const fn points(name: &'static str, (unit, min, max): (Unit, f64, f64), meaning: &'static str) -> Key {
-    Key {
-        table: "valve",
-        name,
-        unit,
-        min,
-        max,
-        count: VALVE_POINTS,
-        meaning,
-        source: "rig-model.md, One axis",
+impl Held for f64 {
+    const COUNT: usize = 1;
+
+    fn held(si: &[f64]) -> Self {
+        si[0]
     }
+}
+
+impl Held for u32 {
+    const COUNT: usize = 1;
+
+    fn held(si: &[f64]) -> Self {
+        si[0] as u32
+    }
+}
+
+impl<const N: usize> Held for [f64; N] {
+    const COUNT: usize = N;
+
+    fn held(si: &[f64]) -> Self {
+        std::array::from_fn(|i| si[i])
+    }
+}
+
+/// Declares each key once, as `field: type = key [unit, min, max], source, meaning;`: its row of [`KEYS`], its field in SI, and how
+/// the field gets its number.
+macro_rules! rig_file {
+    ($($(#[$doc:meta])* $table:ident: $group:ident, $about:literal {
+        $($field:ident: $number:ty = $key:ident [$unit:ident, $min:expr, $max:expr], $source:expr, $meaning:literal;)*
+    })*) => {
+        /// Every key of the rig file, in the order of the shipped one.
+        pub const KEYS: &[Key] = &[$($(Key {
+            table: stringify!($table),
+            name: stringify!($key),
+            unit: Unit::$unit,
+            min: $min,
+            max: $max,
+            count: <$number as Held>::COUNT,
+            meaning: $meaning,
+            source: $source,
+        },)*)*];
+
+        $($(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+        pub struct $group { $(#[doc = $meaning] pub $field: $number,)* }
+        )*
+
+        /// The numbers of one rig in SI, table by table.
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        pub(super) struct Groups { $($table: $group,)* }
+
+        impl Groups {
+            /// `si` gives the numbers of a key, in SI.
+            pub(super) fn of(si: impl Fn(&str, &str) -> Vec<f64>) -> Self {
+                Groups { $($table: $group {
+                    $($field: Held::held(&si(stringify!($table), stringify!($key))),)*
+                },)* }
+            }
+        }
+
+        impl RigParameters {
+            $(#[doc = $about]
+            pub fn $table(&self) -> &$group {
+                &self.groups.$table
+            })*
+        }
+    };
 }
 
 const AXIS: &str = "rig-model.md, One axis";
@@ -196,47 +255,70 @@ const STOP: &str = "rig-model.md, Emergency stop";
 const START: &str = "rig-model.md, Start";
 const SENSORS: &str = "rig-model.md, Sensors";
 
-/// Every key of the rig file, in the order of the shipped one.
-#[rustfmt::skip] // one key, one line
-pub const KEYS: &[Key] = {
-    use Unit::*;
-    &[
-    number("supply", "pressure_bar", (Bar, 3.0, 12.0), "absolute supply pressure in normal running", AXIS),
-    number("supply", "exhaust_pressure_bar", (Bar, 0.9, 1.5), "absolute pressure behind the valve's exhaust", AXIS),
-    number("supply", "atmospheric_pressure_bar", (Bar, 0.9, 1.1), "absolute pressure around the rods; an emergency stop discharges the supply to it", AXIS),
-    number("supply", "discharge_time_constant_s", (Second, 0.005, 5.0), "decay of the supply node after an emergency stop", STOP),
-    number("supply", "recovery_time_constant_s", (Second, 0.005, 5.0), "recovery of the supply node after the release", STOP),
-    number("supply", "check_valve_pressure_bar", (Bar, 1.2, 6.0), "pilot pressure below which the non-return valves at the chambers are shut", STOP),
-    number("gas", "normal_pressure_pa", (Pascal, 95000.0, 110000.0), "pressure of the normal volume, p_N", "paper eq. (1); rig-model.md, One axis"),
-    number("gas", "temperature_k", (Kelvin, 253.15, 333.15), "gas temperature, constant in the isothermal baseline", AXIS),
-    number("valve", "spool_time_constant_ms", (Millisecond, 0.2, 20.0), "first-order lag of the spool, tau_v", "paper section 3; rig-model.md, One axis"),
-    number("valve", "flow_lag_time_constant_ms", (Millisecond, 0.001, 50.0), "first-order lag of a chamber's net flow, tau_q", AXIS),
-    points("opening", (One, 0.0, 1.0), "spool openings |s| of both K_V tables, from 0 to 1, growing by at least 0.001"),
-    points("kv_supply_m3_per_h", (CubicMetrePerHour, 0.0, 3.0), "K_V of the supply edge at these openings, 0 at 0, never falling"),
-    points("kv_exhaust_m3_per_h", (CubicMetrePerHour, 0.0, 3.0), "K_V of the exhaust edge at these openings, 0 at 0, never falling"),
-    number("cylinder", "stroke_mm", (Millimetre, 50.0, 2000.0), "stroke L of both cylinders", AXIS),
-    number("cylinder", "piston_area_mm2", (SquareMillimetre, 300.0, 8000.0), "piston area on the cap side, A_a (50 mm bore)", AXIS),
-    number("cylinder", "annulus_area_mm2", (SquareMillimetre, 200.0, 7900.0), "piston area on the rod side, A_b (20 mm rod), smaller than the cap side", AXIS),
-    number("cylinder", "dead_volume_cm3", (CubicCentimetre, 5.0, 200.0), "dead volume and hose of each chamber, V_0", AXIS),
-    number("friction", "break_away_force_n", (Newton, 0.0, 300.0), "largest force that a piston at rest withstands, F_stat, not below the sliding force", AXIS),
-    number("friction", "sliding_force_n", (Newton, 0.0, 300.0), "sliding friction, F_sli", AXIS),
-    number("friction", "viscous_n_per_mm_per_s", (NewtonSecondPerMillimetre, 0.0, 10.0), "viscous friction, b", AXIS),
-    number("mass", "drive_kg", (Kilogram, 1.0, 50.0), "all that moves with the drive's piston, without added weights", MASSES),
-    number("mass", "carriage_kg", (Kilogram, 0.1, 49.0), "the part of it that lies behind the force sensor, less than all of it", MASSES),
-    number("mass", "load_kg", (Kilogram, 0.5, 50.0), "piston, rod and eye of the load axis", MASSES),
-    number("mass", "added_limit_kg", (Kilogram, 0.0, 100.0), "weights that can be added to the carriage", MASSES),
-    number("linkage", "gap_mm", (Millimetre, 0.0, 5.0), "play of the load eye in the carriage, both sides together", MASSES),
-    number("linkage", "stiffness_n_per_m", (NewtonPerMetre, 1e4, 1e7), "contact stiffness, k", MASSES),
-    number("linkage", "damping_n_s_per_m", (NewtonSecondPerMetre, 0.0, 1e4), "contact damping, c", MASSES),
-    number("start", "rod_side_pressure_bar", (Bar, 0.9, 12.0), "absolute start pressure of the rod-side chambers, between exhaust and supply", START),
-    number("sensors", "position_range_mm", (Millimetre, 50.0, 2000.0), "position that the largest count stands for; 0 counts are 0", SENSORS),
-    number("sensors", "position_bits", (Bits, 8.0, 16.0), "unsigned resolution of the position", SENSORS),
-    number("sensors", "position_noise_um", (Micrometre, 0.0, 1000.0), "noise of the position, rms", SENSORS),
-    number("sensors", "load_position_offset_mm", (Millimetre, -5.0, 5.0), "what the load's position sensor reads too much", SENSORS),
-    number("sensors", "force_range_n", (Newton, 100.0, 20000.0), "force that the largest count stands for, both signs", SENSORS),
-    number("sensors", "force_bits", (Bits, 8.0, 16.0), "signed resolution of the force", SENSORS),
-    number("sensors", "force_noise_n", (Newton, 0.0, 50.0), "noise of the force, rms", SENSORS),
-    number("sensors", "pressure_range_bar", (Bar, 2.0, 20.0), "pressure that the largest count stands for; 0 counts are vacuum", SENSORS),
-    number("sensors", "pressure_bits", (Bits, 8.0, 14.0), "unsigned resolution of the pressure", SENSORS),
-    number("sensors", "pressure_noise_pa", (Pascal, 0.0, 20000.0), "noise of the pressure, rms", SENSORS),
-]};
+rig_file! {
+    /// Table `[supply]`: pressures are absolute.
+    supply: SupplyParameters, "Supply, exhaust and emergency stop." {
+        pressure_pa: f64 = pressure_bar [Bar, 3.0, 12.0], AXIS, "absolute supply pressure in normal running";
+        exhaust_pressure_pa: f64 = exhaust_pressure_bar [Bar, 0.9, 1.5], AXIS, "absolute pressure behind the valve's exhaust";
+        atmospheric_pressure_pa: f64 = atmospheric_pressure_bar [Bar, 0.9, 1.1], AXIS, "absolute pressure around the rods; an emergency stop discharges the supply to it";
+        discharge_time_constant_s: f64 = discharge_time_constant_s [Second, 0.005, 5.0], STOP, "decay of the supply node after an emergency stop";
+        recovery_time_constant_s: f64 = recovery_time_constant_s [Second, 0.005, 5.0], STOP, "recovery of the supply node after the release";
+        check_valve_pressure_pa: f64 = check_valve_pressure_bar [Bar, 1.2, 6.0], STOP, "pilot pressure below which the non-return valves at the chambers are shut";
+    }
+    /// Table `[gas]`.
+    gas: GasParameters, "Normal conditions." {
+        normal_pressure_pa: f64 = normal_pressure_pa [Pascal, 95000.0, 110000.0], "paper eq. (1); rig-model.md, One axis", "pressure of the normal volume, p_N";
+        temperature_k: f64 = temperature_k [Kelvin, 253.15, 333.15], AXIS, "gas temperature, constant in the isothermal baseline";
+    }
+    /// Table `[valve]`: openings |s| and the K_V of both edges at them.
+    valve: ValveParameters, "Valve characteristic and lags." {
+        spool_time_constant_s: f64 = spool_time_constant_ms [Millisecond, 0.2, 20.0], "paper section 3; rig-model.md, One axis", "first-order lag of the spool, tau_v";
+        flow_lag_time_constant_s: f64 = flow_lag_time_constant_ms [Millisecond, 0.001, 50.0], AXIS, "first-order lag of a chamber's net flow, tau_q";
+        opening: [f64; VALVE_POINTS] = opening [One, 0.0, 1.0], AXIS, "spool openings |s| of both K_V tables, from 0 to 1, growing by at least 0.001";
+        kv_supply_m3_per_h: [f64; VALVE_POINTS] = kv_supply_m3_per_h [CubicMetrePerHour, 0.0, 3.0], AXIS, "K_V of the supply edge at these openings, 0 at 0, never falling";
+        kv_exhaust_m3_per_h: [f64; VALVE_POINTS] = kv_exhaust_m3_per_h [CubicMetrePerHour, 0.0, 3.0], AXIS, "K_V of the exhaust edge at these openings, 0 at 0, never falling";
+    }
+    /// Table `[cylinder]`, the same for both axes.
+    cylinder: CylinderParameters, "Areas, stroke, dead volume." {
+        stroke_m: f64 = stroke_mm [Millimetre, 50.0, 2000.0], AXIS, "stroke L of both cylinders";
+        piston_area_m2: f64 = piston_area_mm2 [SquareMillimetre, 300.0, 8000.0], AXIS, "piston area on the cap side, A_a (50 mm bore)";
+        annulus_area_m2: f64 = annulus_area_mm2 [SquareMillimetre, 200.0, 7900.0], AXIS, "piston area on the rod side, A_b (20 mm rod), smaller than the cap side";
+        dead_volume_m3: f64 = dead_volume_cm3 [CubicCentimetre, 5.0, 200.0], AXIS, "dead volume and hose of each chamber, V_0";
+    }
+    /// Table `[friction]`, the same for both axes.
+    friction: FrictionParameters, "Friction of each axis." {
+        break_away_force_n: f64 = break_away_force_n [Newton, 0.0, 300.0], AXIS, "largest force that a piston at rest withstands, F_stat, not below the sliding force";
+        sliding_force_n: f64 = sliding_force_n [Newton, 0.0, 300.0], AXIS, "sliding friction, F_sli";
+        viscous_n_s_per_m: f64 = viscous_n_per_mm_per_s [NewtonSecondPerMillimetre, 0.0, 10.0], AXIS, "viscous friction, b";
+    }
+    /// Table `[mass]`.
+    mass: MassParameters, "Moving masses." {
+        drive_kg: f64 = drive_kg [Kilogram, 1.0, 50.0], MASSES, "all that moves with the drive's piston, without added weights";
+        carriage_kg: f64 = carriage_kg [Kilogram, 0.1, 49.0], MASSES, "the part of it that lies behind the force sensor, less than all of it";
+        load_kg: f64 = load_kg [Kilogram, 0.5, 50.0], MASSES, "piston, rod and eye of the load axis";
+        added_limit_kg: f64 = added_limit_kg [Kilogram, 0.0, 100.0], MASSES, "weights that can be added to the carriage";
+    }
+    /// Table `[linkage]`.
+    linkage: LinkageParameters, "Gap and contact of the linkage." {
+        gap_m: f64 = gap_mm [Millimetre, 0.0, 5.0], MASSES, "play of the load eye in the carriage, both sides together";
+        stiffness_n_per_m: f64 = stiffness_n_per_m [NewtonPerMetre, 1e4, 1e7], MASSES, "contact stiffness, k";
+        damping_n_s_per_m: f64 = damping_n_s_per_m [NewtonSecondPerMetre, 0.0, 1e4], MASSES, "contact damping, c";
+    }
+    /// Table `[start]`.
+    start: StartParameters, "Start pressures." {
+        rod_side_pressure_pa: f64 = rod_side_pressure_bar [Bar, 0.9, 12.0], START, "absolute start pressure of the rod-side chambers, between exhaust and supply";
+    }
+    /// Table `[sensors]`; see [`SensorParameters::position_step_m`] and its siblings for the step of one count.
+    sensors: SensorParameters, "Ranges, resolutions and noise of the sensors." {
+        position_range_m: f64 = position_range_mm [Millimetre, 50.0, 2000.0], SENSORS, "position that the largest count stands for; 0 counts are 0";
+        position_bits: u32 = position_bits [Bits, 8.0, 16.0], SENSORS, "unsigned resolution of the position";
+        position_noise_m: f64 = position_noise_um [Micrometre, 0.0, 1000.0], SENSORS, "noise of the position, rms";
+        load_position_offset_m: f64 = load_position_offset_mm [Millimetre, -5.0, 5.0], SENSORS, "what the load's position sensor reads too much";
+        force_range_n: f64 = force_range_n [Newton, 100.0, 20000.0], SENSORS, "force that the largest count stands for, both signs";
+        force_bits: u32 = force_bits [Bits, 8.0, 16.0], SENSORS, "signed resolution of the force";
+        force_noise_n: f64 = force_noise_n [Newton, 0.0, 50.0], SENSORS, "noise of the force, rms";
+        pressure_range_pa: f64 = pressure_range_bar [Bar, 2.0, 20.0], SENSORS, "pressure that the largest count stands for; 0 counts are vacuum";
+        pressure_bits: u32 = pressure_bits [Bits, 8.0, 14.0], SENSORS, "unsigned resolution of the pressure";
+        pressure_noise_pa: f64 = pressure_noise_pa [Pascal, 0.0, 20000.0], SENSORS, "noise of the pressure, rms";
+    }
+}

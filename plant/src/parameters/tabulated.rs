@@ -11,7 +11,7 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::reader::{ParameterError, Place as Text, as_number};
+use super::reader::{ParameterError, Place as Text};
 use super::switched::{unknown, wrong};
 use crate::effects::tabulated::{Balance, POINTS, Tabulated, Variable};
 use crate::state::Axis;
@@ -105,7 +105,7 @@ fn numbers(
     let path = format!("tabulated.{key}");
     let value = table.get(key).ok_or_else(|| missing(key, line, text, &range))?;
     let numbers: Option<Vec<f64>> = match value.get_ref() {
-        DeValue::Array(items) => items.iter().map(|item| as_number(item.get_ref())).collect(),
+        DeValue::Array(items) => items.iter().map(|item| settings::number(item.get_ref())).collect(),
         _ => None,
     };
     let numbers = numbers.ok_or_else(|| wrong(text, &path, value, &range))?;

@@ -167,7 +167,7 @@ struct Check<'a> {
 
 impl Check<'_> {
     fn line(&self, offset: usize) -> usize {
-        1 + self.text.as_bytes()[..offset.min(self.text.len())].iter().filter(|byte| **byte == b'\n').count()
+        settings::line_of(self.text, offset)
     }
 
     /// A place on the stroke.

@@ -24,7 +24,8 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
+    "settings",
     "protocol",
     "realtime",
     "runlog",
@@ -44,21 +45,23 @@ const ROOMS: [&str; 16] = [
 ];
 /// Which of them each room may depend on, tests included.
 const KNOWS: &[(&str, &[&str])] = &[
+    ("settings", &[]),
     ("protocol", &[]),
     ("realtime", &[]),
     ("runlog", &["protocol", "realtime"]),
-    ("plant", &[]),
+    ("plant", &["settings"]),
     ("fmu", &["plant"]),
     ("rig_node", &["protocol", "plant"]),
-    ("emulator", &["protocol", "realtime", "runlog", "plant", "rig-node"]),
-    ("algorithms", &["realtime", "plant"]),
-    ("plugin", &["protocol", "plant", "algorithms"]),
-    ("axis", &["protocol", "realtime", "runlog", "plant", "algorithms", "plugin"]),
-    ("xcp", &["protocol", "runlog", "plant", "algorithms", "axis-control"]),
+    ("emulator", &["settings", "protocol", "realtime", "runlog", "plant", "rig-node"]),
+    ("algorithms", &["settings", "realtime", "plant"]),
+    ("plugin", &["settings", "protocol", "plant", "algorithms"]),
+    ("axis", &["settings", "protocol", "realtime", "runlog", "plant", "algorithms", "plugin"]),
+    ("xcp", &["settings", "protocol", "runlog", "plant", "algorithms", "axis-control"]),
     ("rehearsal", &["protocol", "runlog", "plant", "rig-node", "axis-control"]),
     (
         "controller",
         &[
+            "settings",
             "protocol",
             "realtime",
             "runlog",
@@ -71,7 +74,10 @@ const KNOWS: &[(&str, &[&str])] = &[
         ],
     ),
     ("discrepancy", &["protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "bench"]),
-    ("campaign", &["protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "bench"]),
+    (
+        "campaign",
+        &["settings", "protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "bench"],
+    ),
 ];
 
 /// House-style: who knows whom.

@@ -6,11 +6,11 @@
 //!
 //! An axis that begins beyond the position has not passed it. Once stepped it stays, however often the axis comes back.
 
-use crate::experiment::section::ExperimentError;
 use crate::set_point::Actual;
 use crate::set_point::law::{Given, Moment};
 use crate::set_point::step::JUMP_S;
-use algorithms::parameters::Parameter;
+use settings::SettingsError;
+use settings::parameters::Parameter;
 
 /// The key that tells this step from one in time.
 pub(in crate::set_point) const KEY: &str = "at_position_m";
@@ -45,7 +45,7 @@ pub(super) struct Crossing {
 }
 
 impl AtPosition {
-    pub(in crate::set_point) fn read(given: &mut Given<'_, '_>) -> Result<Self, ExperimentError> {
+    pub(in crate::set_point) fn read(given: &mut Given<'_, '_>) -> Result<Self, SettingsError> {
         let to_n = given.place("to", "force after the step")?;
         let position =
             Parameter::new((KEY, "m"), [0.0, given.scale.stroke_m], 0.0, "position at which the force steps");

@@ -10,7 +10,7 @@
 
 use super::{Kind, Load};
 use crate::set_point::Actual;
-use algorithms::parameters::Parameter;
+use settings::parameters::Parameter;
 use std::sync::Arc;
 
 /// In the list of loads.

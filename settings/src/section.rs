@@ -3,7 +3,8 @@
 //! Every number is checked against a [`Parameter`]. A key that nobody asked for is refused by [`Section::finish`], which names
 //! those that were asked for.
 
-use algorithms::parameters::Parameter;
+use crate::parameters::Parameter;
+use crate::{line_of, number, written};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -11,7 +12,7 @@ use toml::de::{DeTable, DeValue};
 /// A file that cannot be used: file, line, key, value and what is allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
-pub struct ExperimentError(String);
+pub struct SettingsError(String);
 
 /// A TOML file that is being read.
 pub struct Source<'a> {
@@ -24,10 +25,10 @@ impl<'a> Source<'a> {
     /// Parses `text`; `file` is for messages, and paths in it are relative to its folder.
     ///
     /// # Errors
-    /// [`ExperimentError`] for what is no TOML.
-    pub fn parse(text: &'a str, file: &'a Path) -> Result<Self, ExperimentError> {
+    /// [`SettingsError`] for what is no TOML.
+    pub fn parse(text: &'a str, file: &'a Path) -> Result<Self, SettingsError> {
         let root =
-            DeTable::parse(text).map_err(|error| ExperimentError(format!("{}: {error}", file.display())))?;
+            DeTable::parse(text).map_err(|error| SettingsError(format!("{}: {error}", file.display())))?;
         Ok(Self { text, file, root })
     }
 
@@ -38,14 +39,11 @@ impl<'a> Source<'a> {
     }
 
     fn line(&self, at: usize) -> usize {
-        1 + self.text.as_bytes()[..at.min(self.text.len())].iter().filter(|byte| **byte == b'\n').count()
+        line_of(self.text, at)
     }
 
-    /// The value as it is written, on one line.
     fn written(&self, value: &Spanned<DeValue<'_>>) -> String {
-        let text = self.text.get(value.span()).unwrap_or_default();
-        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        if words.chars().count() > 60 { words.chars().take(57).chain("...".chars()).collect() } else { words }
+        written(self.text, value.span())
     }
 }
 
@@ -93,16 +91,9 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No number, or out of range.
-    pub fn number(&mut self, parameter: &Parameter) -> Result<Option<f64>, ExperimentError> {
+    pub fn number(&mut self, parameter: &Parameter) -> Result<Option<f64>, SettingsError> {
         let Some(value) = self.value(&parameter.name) else { return Ok(None) };
-        let number = match value.get_ref() {
-            DeValue::Float(float) => float.as_str().parse().ok(),
-            DeValue::Integer(integer) => {
-                i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|whole| whole as f64)
-            }
-            _ => None,
-        };
-        match number {
+        match number(value.get_ref()) {
             Some(number) => {
                 parameter.check(number).map(Some).map_err(|error| self.told(value, &error.to_string()))
             }
@@ -119,7 +110,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No number, or out of range.
-    pub fn number_or_default(&mut self, parameter: &Parameter) -> Result<f64, ExperimentError> {
+    pub fn number_or_default(&mut self, parameter: &Parameter) -> Result<f64, SettingsError> {
         Ok(self.number(parameter)?.unwrap_or(parameter.default))
     }
 
@@ -127,7 +118,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// Missing, no number, or out of range.
-    pub fn needed_number(&mut self, parameter: &Parameter) -> Result<f64, ExperimentError> {
+    pub fn needed_number(&mut self, parameter: &Parameter) -> Result<f64, SettingsError> {
         let Parameter { name, unit, least, most, meaning, .. } = parameter;
         let missing = format!("{name} is missing: {meaning}, {least} to {most} {unit}");
         self.number(parameter)?.ok_or_else(|| self.lacks(missing.trim_end()))
@@ -137,7 +128,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No whole number, or out of range.
-    pub fn whole_or_default(&mut self, parameter: &Parameter) -> Result<u32, ExperimentError> {
+    pub fn whole_or_default(&mut self, parameter: &Parameter) -> Result<u32, SettingsError> {
         let number = self.number_or_default(parameter)?;
         if number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number) {
             return Ok(number as u32);
@@ -150,7 +141,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No text.
-    pub fn text(&mut self, key: &str) -> Result<Option<Text>, ExperimentError> {
+    pub fn text(&mut self, key: &str) -> Result<Option<Text>, SettingsError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         match value.get_ref().as_str() {
             Some(text) => Ok(Some(Text { text: text.into(), line: self.source.line(value.span().start) })),
@@ -165,7 +156,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// Missing, or no text.
-    pub fn needed_text(&mut self, key: &str, meaning: &str) -> Result<Text, ExperimentError> {
+    pub fn needed_text(&mut self, key: &str, meaning: &str) -> Result<Text, SettingsError> {
         self.text(key)?.ok_or_else(|| self.lacks(&format!("{key} is missing: {meaning}")))
     }
 
@@ -173,7 +164,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// None of them.
-    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T, ExperimentError> {
+    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T, SettingsError> {
         let Some(written) = self.text(key)? else { return Ok(choices[0].1) };
         self.chosen(key, &written.text, choices)
     }
@@ -182,7 +173,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No list, or one that holds something else.
-    pub fn choices<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<Vec<T>, ExperimentError> {
+    pub fn choices<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<Vec<T>, SettingsError> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let list = value.get_ref().as_array();
         let texts = list.and_then(|list| list.iter().map(|item| item.get_ref().as_str()).collect());
@@ -193,7 +184,7 @@ impl<'a> Section<'a> {
         texts.into_iter().map(|text| self.chosen(key, text, choices)).collect()
     }
 
-    fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T, ExperimentError> {
+    fn chosen<T: Copy>(&self, key: &str, text: &str, choices: &[(&str, T)]) -> Result<T, SettingsError> {
         choices.iter().find(|(name, _)| *name == text).map(|(_, choice)| *choice).ok_or_else(|| {
             let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
             self.wrong_at(key, &format!("{key} = \"{text}\"; allowed is {}", names.join(", ")))
@@ -204,7 +195,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No table.
-    pub fn section(&mut self, key: &str) -> Result<Option<Self>, ExperimentError> {
+    pub fn section(&mut self, key: &str) -> Result<Option<Self>, SettingsError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.inner(self.path_of(key), value).map(Some)
     }
@@ -213,7 +204,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No list of tables.
-    pub fn sections(&mut self, key: &str) -> Result<Vec<Self>, ExperimentError> {
+    pub fn sections(&mut self, key: &str) -> Result<Vec<Self>, SettingsError> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let Some(list) = value.get_ref().as_array() else {
             return Err(
@@ -228,11 +219,11 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// No table.
-    pub fn opaque(&mut self, key: &str) -> Result<toml::Table, ExperimentError> {
+    pub fn opaque(&mut self, key: &str) -> Result<toml::Table, SettingsError> {
         let Some(section) = self.section(key)? else { return Ok(toml::Table::new()) };
         // The text parsed before, so its parts do.
         let whole: toml::Table = toml::from_str(self.source.text)
-            .map_err(|error| ExperimentError(format!("{}: {error}", self.source.file.display())))?;
+            .map_err(|error| SettingsError(format!("{}: {error}", self.source.file.display())))?;
         let keys = section.path.split('.');
         let found = keys.into_iter().try_fold(whole, |table, key| table.get(key)?.as_table().cloned());
         Ok(found.unwrap_or_default())
@@ -248,25 +239,25 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// The first of them.
-    pub fn finish(&self) -> Result<(), ExperimentError> {
+    pub fn finish(&self) -> Result<(), SettingsError> {
         let unknown = |name: &&Spanned<_>| !self.asked.iter().any(|asked| name.get_ref() == asked);
         let Some(name) = self.table.keys().find(unknown) else { return Ok(()) };
         let line = self.source.line(name.span().start);
         let path = self.path_of(name.get_ref());
         let said = format!("{line}: unknown key {path}; allowed is {}", self.asked.join(", "));
-        Err(ExperimentError(format!("{}:{said}", self.source.file.display())))
+        Err(SettingsError(format!("{}:{said}", self.source.file.display())))
     }
 
     /// An error of the whole table.
     #[must_use]
-    pub fn wrong(&self, said: &str) -> ExperimentError {
+    pub fn wrong(&self, said: &str) -> SettingsError {
         let dot = if self.path.is_empty() { "" } else { "." };
-        ExperimentError(format!("{}:{}: {}{dot}{said}", self.source.file.display(), self.line(), self.path))
+        SettingsError(format!("{}:{}: {}{dot}{said}", self.source.file.display(), self.line(), self.path))
     }
 
     /// An error of the value under `key`, which begins with that key.
     #[must_use]
-    pub fn wrong_at(&self, key: &str, said: &str) -> ExperimentError {
+    pub fn wrong_at(&self, key: &str, said: &str) -> SettingsError {
         match self.table.iter().find(|(name, _)| name.get_ref() == key) {
             Some((_, value)) => self.told(value, said),
             None => self.wrong(said),
@@ -274,14 +265,14 @@ impl<'a> Section<'a> {
     }
 
     /// A missing key, with those that are there: it may be one of them, misspelt.
-    fn lacks(&self, said: &str) -> ExperimentError {
+    fn lacks(&self, said: &str) -> SettingsError {
         let keys: Vec<&str> = self.table.keys().map(|name| name.get_ref().as_ref()).collect();
         self.wrong(&format!("{said}; the keys here are {}", keys.join(", ")))
     }
 
-    fn told(&self, value: &Spanned<DeValue<'_>>, said: &str) -> ExperimentError {
+    fn told(&self, value: &Spanned<DeValue<'_>>, said: &str) -> SettingsError {
         let line = self.source.line(value.span().start);
-        ExperimentError(format!("{}:{line}: {}", self.source.file.display(), self.path_of(said)))
+        SettingsError(format!("{}:{line}: {}", self.source.file.display(), self.path_of(said)))
     }
 
     fn path_of(&self, key: &str) -> String {
@@ -295,10 +286,10 @@ impl<'a> Section<'a> {
         self.table.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
     }
 
-    fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>) -> Result<Self, ExperimentError> {
+    fn inner(&self, path: String, value: &'a Spanned<DeValue<'a>>) -> Result<Self, SettingsError> {
         let Some(table) = value.get_ref().as_table() else {
             let line = self.source.line(value.span().start);
-            return Err(ExperimentError(format!(
+            return Err(SettingsError(format!(
                 "{}:{line}: {path} must be a table",
                 self.source.file.display()
             )));

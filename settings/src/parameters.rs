@@ -151,9 +151,9 @@ pub trait Declared: Sized {
 /// Declares parameters: a struct with a field for each, its table and its defaults.
 ///
 /// ```
-/// use algorithms::parameters::declare;
+/// use settings::parameters::declare;
 ///
-/// algorithms::parameters! {
+/// settings::parameters! {
 ///     /// Parameters of a position control.
 ///     pub struct Position {
 ///         gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"),
@@ -170,16 +170,16 @@ pub trait Declared: Sized {
 /// The parameter of another algorithm does not compile, as a field or as a whole:
 ///
 /// ```compile_fail,E0609
-/// # use algorithms::parameters::declare;
-/// # algorithms::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
-/// # algorithms::parameters! { struct Force { gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.01, "velocity for each error"), } }
+/// # use settings::parameters::declare;
+/// # settings::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
+/// # settings::parameters! { struct Force { gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.01, "velocity for each error"), } }
 /// let velocity_m_per_s = 0.01 * Position::default().gain_m_per_n_s;
 /// ```
 ///
 /// ```compile_fail,E0308
-/// # use algorithms::parameters::declare;
-/// # algorithms::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
-/// # algorithms::parameters! { struct Force { gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.01, "velocity for each error"), } }
+/// # use settings::parameters::declare;
+/// # settings::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
+/// # settings::parameters! { struct Force { gain_m_per_n_s: declare("m/(N s)", [0.0, 0.05], 0.01, "velocity for each error"), } }
 /// fn position_control(error_m: f64, parameters: &Position) -> f64 {
 ///     parameters.gain_per_s * error_m
 /// }
@@ -189,8 +189,8 @@ pub trait Declared: Sized {
 /// Nor does a place in place of a name:
 ///
 /// ```compile_fail,E0608
-/// # use algorithms::parameters::declare;
-/// # algorithms::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
+/// # use settings::parameters::declare;
+/// # settings::parameters! { struct Position { gain_per_s: declare("1/s", [0.0, 200.0], 20.0, "velocity for each error"), } }
 /// let velocity_m_per_s = 0.01 * Position::default()[0];
 /// ```
 #[macro_export]
