@@ -4,13 +4,13 @@ use crate::conformance::cli::ConformanceArguments;
 use crate::export::cli::ExportArguments;
 use crate::export_fmu::ExportFmuArguments;
 use crate::gateway::cli::GatewayArguments;
-use crate::latency_table::LatencyTableArguments;
 use crate::ping_pong::cli::{PingPongArguments, PongArguments};
 use crate::probe::cli::ProbeArguments;
 use crate::replay::cli::ReplayArguments;
 use crate::soak::cli::{ChildArguments, SoakArguments};
-use crate::watch::cli::WatchArguments;
 use clap::{Args, Parser, Subcommand};
+use latency::table::LatencyTableArguments;
+use live::cli::WatchArguments;
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;
 

@@ -6,12 +6,12 @@
 pub mod differences;
 mod overlay;
 
-use crate::SummaryError;
 use crate::drawing::Picture;
-use crate::grid::Grid;
-use crate::page_style::{document, escaped};
 use crate::runs::{Run, rows};
-use crate::table::{in_use, without_unit};
+use figures::SummaryError;
+use pagekit::grid::Grid;
+use pagekit::number::{in_use, without_unit};
+use pagekit::page::{document, escaped};
 use std::path::{Path, PathBuf};
 
 /// The table: a row for each figure that any run has, and the change against the first run.

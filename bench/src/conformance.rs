@@ -23,10 +23,10 @@ mod line;
 mod stand_in;
 mod watch;
 
-use crate::SummaryError;
 use crate::junit::{self, Case};
 use crate::soak::model::CheckResult;
 use cli::{CheckPace, ConformanceArguments};
+use figures::SummaryError;
 use judge::{Phase, case};
 use line::{Broken, Line};
 use protocol::bus::{BusError, BusUrl, WireOptions};

@@ -4,7 +4,7 @@
 //! there are few, so that black and white does. Of the samples that fall into one pixel column the smallest and the largest
 //! are drawn: no spike is lost, and a minute is as small as a second. Legends stand above the curves, not on them.
 
-use crate::series::{Series, Span};
+use figures::series::{Series, Span};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;

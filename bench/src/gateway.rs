@@ -23,9 +23,9 @@ mod client;
 pub mod parser;
 pub mod session;
 
-use crate::SummaryError;
 use cli::GatewayArguments;
 use client::{Client, ClientReport, Ended, LONGEST_FRAME};
+use figures::SummaryError;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, Received};
 use protocol::can::CanFrame;
 use protocol::exit::Exit;
@@ -155,7 +155,7 @@ struct Gateway {
 
 impl Gateway {
     fn open(arguments: &GatewayArguments) -> Result<Self, GatewayError> {
-        let name = arguments.name.clone().or_else(|| name_of(&arguments.bus));
+        let name = arguments.name.clone().or_else(|| arguments.bus.name());
         let name = name.ok_or_else(|| GatewayError::Name(arguments.bus.to_string()))?;
         let listen = |reason: io::Error| GatewayError::Listen {
             address: arguments.listen,
@@ -409,18 +409,8 @@ fn tell_loss(client: &Client) {
     }
 }
 
-/// The name of a bus as clients open it: the interface, or the file name of the socket.
-pub(crate) fn name_of(bus: &BusUrl) -> Option<String> {
-    let name = match bus {
-        BusUrl::Can { interface } => interface.clone(),
-        BusUrl::Unix { path, .. } => path.file_name()?.to_str()?.to_owned(),
-    };
-    let writable = |c: char| c.is_ascii_graphic() && c != '<' && c != '>';
-    (name.len() <= parser::LONGEST_NAME && name.chars().all(writable)).then_some(name)
-}
-
 /// The time of day `age_ns` ago, ns since the Unix epoch: what clients expect of a time stamp.
-pub(crate) fn wall_clock_ns(age_ns: u64) -> u64 {
+fn wall_clock_ns(age_ns: u64) -> u64 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     (now.as_nanos() as u64).saturating_sub(age_ns)
 }

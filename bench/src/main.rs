@@ -7,16 +7,14 @@ use bench::conformance::{self, ConformanceError};
 use bench::gateway::{self, GatewayError};
 use bench::ping_pong::{self, PingPongError};
 use bench::replay::ReplayError;
-use bench::report::{self, ReportError};
 use bench::runs::{self, Run, RunsError};
 use bench::soak::SoakError;
 use bench::soak::processes::become_child;
-use bench::watch::WatchError;
-use bench::{
-    SummaryError, compare, export, export_fmu, figures, join, latency_table, picture, probe, replay, soak,
-    spread, table, thresholds, watch,
-};
+use bench::{compare, export, export_fmu, picture, probe, replay, soak, spread};
 use clap::Parser;
+use figures::{SummaryError, join, table, thresholds};
+use latency::ReportError;
+use live::LiveError;
 use protocol::exit::Exit;
 use runlog::run_folder::write_json;
 use std::fmt::Display;
@@ -36,9 +34,10 @@ fn main() -> ExitCode {
             Ok(Exit::Good)
         }
         Command::CheckExperiment(arguments) => check(&arguments).map_err(Into::into),
-        Command::LatencyTable(arguments) => {
-            latency_table::table(&arguments).map(|text| print(&text)).map(|()| Exit::Good).map_err(Into::into)
-        }
+        Command::LatencyTable(arguments) => latency::table::table(&arguments)
+            .map(|text| print(&text))
+            .map(|()| Exit::Good)
+            .map_err(Into::into),
         Command::Replay(arguments) => return told(replay::run(&arguments), ReplayError::exit),
         Command::ExportFmu(arguments) => export_fmu::run(&arguments).map_err(Into::into),
         Command::Export(arguments) => export::run(&arguments).map_err(Into::into),
@@ -49,7 +48,7 @@ fn main() -> ExitCode {
             return told(conformance::run(&arguments), ConformanceError::exit);
         }
         Command::Gateway(arguments) => return told(gateway::run(&arguments), GatewayError::exit),
-        Command::Watch(arguments) => return told(watch::run(&arguments), WatchError::exit),
+        Command::Watch(arguments) => return told(live::run(&arguments), LiveError::exit),
         Command::Soak(arguments) => return told(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
         Command::SoakChild(arguments) => {
             eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));
@@ -127,24 +126,24 @@ fn spread_runs(arguments: &SpreadArguments) -> Result<Exit, RunsError> {
 }
 
 fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
-    let chosen = report::choice::choose(&arguments.folders, &arguments.group)?;
+    let chosen = latency::choice::choose(&arguments.folders, &arguments.group)?;
     if arguments.compare && chosen.len() < 2 {
         return Err(ReportError::OneRun);
     }
     let compare = arguments.compare || !arguments.group.is_empty();
-    let mut made = report::make(&chosen, arguments.title.as_deref(), compare);
+    let mut made = latency::make(&chosen, arguments.title.as_deref(), compare);
     if let Some(file) = &arguments.bounds {
         made.judge(file)?;
     }
-    let out = arguments.out.clone().unwrap_or_else(|| report::choice::default_out(&chosen));
-    report::output::write(&made, &out, arguments.markdown_only)?;
-    print(&report::markdown::table(&made.report));
+    let out = arguments.out.clone().unwrap_or_else(|| latency::choice::default_out(&chosen));
+    latency::output::write(&made, &out, arguments.markdown_only)?;
+    print(&latency::markdown::table(&made.report));
     print(&format!("\n  report in {}", out.display()));
     Ok(if made.is_broken() { Exit::BoundBroken } else { Exit::Good })
 }
 
 fn name_cause(arguments: &CauseArguments) -> Result<Exit, ReportError> {
-    let (name, sentence) = report::cause::name(&report::cause::read(&arguments.file)?);
+    let (name, sentence) = latency::cause::name(&latency::cause::read(&arguments.file)?);
     eprintln!("{sentence}");
     print(&name);
     Ok(Exit::Good)

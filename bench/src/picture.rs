@@ -2,11 +2,11 @@
 //!
 //! Panels are drawn for what there is: a load axis that does nothing has none. The strip on top shows the main chain's states.
 
-use crate::SummaryError;
 use crate::drawing::{BLUE, Band, Curve, GREEN, PURPLE, Panel, Picture, VERMILION};
-use crate::figures::emergency_stop;
-use crate::record::{Record, largest_step};
-use crate::series::{Series, Span};
+use figures::SummaryError;
+use figures::emergency_stop;
+use figures::record::{Record, largest_step};
+use figures::series::{Series, Span};
 use plotters::style::RGBColor;
 use std::path::Path;
 
@@ -103,7 +103,7 @@ fn caption(record: &Record) -> String {
 /// The main chain's states.
 fn bands(record: &Record) -> Vec<Band> {
     let states = record.leader().states("main_chain").iter();
-    let band = |entry: &crate::tables_read::StateSpan| Band {
+    let band = |entry: &figures::tables_read::StateSpan| Band {
         label: entry.state.replace('-', " "),
         span: entry.span,
         is_main: entry.state == "experiment",
@@ -182,7 +182,7 @@ fn panels(record: &Record) -> Vec<Panel> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::made::{chain, each_ms, table};
+    use figures::record::made::{chain, each_ms, table};
 
     fn record() -> Record {
         let measured = table(&[

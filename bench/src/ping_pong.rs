@@ -18,8 +18,8 @@ pub mod cli;
 mod line;
 mod rally;
 
-use crate::report::kinds::{PING_PONG, TO_ARRIVAL};
 use cli::{PingPongArguments, PongArguments};
+use latency::kinds::{PING_PONG, TO_ARRIVAL};
 use line::{Line, OnBus, OnSocket};
 use protocol::bus::{self, BusError, BusUrl, StampClock};
 use protocol::exit::Exit;

@@ -1,9 +1,9 @@
 //! Several runs together: their folders read, their experiments held against each other, their figures side by side.
 
-use crate::SummaryError;
-use crate::figures::{self, position};
-use crate::join::{experiment, read_object};
-use crate::record::{self, Record};
+use figures::SummaryError;
+use figures::join::{experiment, read_object};
+use figures::record::{self, Record};
+use figures::{self, position};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

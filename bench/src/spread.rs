@@ -1,8 +1,8 @@
 //! Repetitions of one experiment: how much each figure spreads.
 
-use crate::grid::Grid;
 use crate::runs::{Run, rows};
-use crate::table::{in_use, without_unit};
+use pagekit::grid::Grid;
+use pagekit::number::{in_use, without_unit};
 use serde_json::{Map, Value, json};
 
 /// A figure over the runs that have it.

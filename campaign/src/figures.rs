@@ -1,6 +1,6 @@
 //! The figures that a campaign of experiments can collect: those of `bench figures`, and the two that a summary has at its top.
 
-use bench::figures as of_bench;
+use figures as of_runs;
 
 /// Figures at the top of a summary.
 pub const TOP: [&str; 2] = ["position_error_dynamic_m", "position_error_static_m"];
@@ -8,12 +8,12 @@ pub const TOP: [&str; 2] = ["position_error_dynamic_m", "position_error_static_m
 /// Whether there is a figure of this name.
 #[must_use]
 pub fn is_known(name: &str) -> bool {
-    TOP.contains(&name) || of_bench::definition(name).is_some()
+    TOP.contains(&name) || of_runs::definition(name).is_some()
 }
 
 /// All of them.
 #[must_use]
 pub fn all() -> Vec<String> {
-    let definitions = of_bench::definitions().map(|definition| definition.name);
+    let definitions = of_runs::definitions().map(|definition| definition.name);
     TOP.into_iter().chain(definitions).map(str::to_owned).collect()
 }

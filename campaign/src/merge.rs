@@ -6,7 +6,7 @@ use crate::campaign::Campaign;
 use crate::factor::Values;
 use crate::figures::TOP;
 use crate::parts::{PartError, Parts, beside};
-use bench::figures::definition;
+use figures::definition;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

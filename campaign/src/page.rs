@@ -10,10 +10,10 @@ mod worst;
 use crate::campaign::Campaign;
 use crate::figures::TOP;
 use crate::merge::Results;
-use bench::figures::definition;
-use bench::grid::Grid;
-use bench::page_style::{document, escaped};
-use bench::table::{in_use, short, without_unit};
+use figures::definition;
+use pagekit::grid::Grid;
+use pagekit::number::{in_use, short, without_unit};
+use pagekit::page::{document, escaped};
 use std::fmt::Write as _;
 
 /// Figures that the page shows when the campaign's file names none to be worst.

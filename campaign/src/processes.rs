@@ -10,7 +10,7 @@ use crate::figures::TOP;
 use crate::outcome::{Ended, Outcome};
 use crate::shelf::Shelf;
 use axis_control::experiment::Experiment;
-use bench::{SummaryError, join};
+use figures::{SummaryError, join};
 use protocol::exit::Exit;
 use serde_json::Value as Json;
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 //!
 //! First the verdict in a sentence with the names, then the disagreement as a picture, what is known of each name, the picture
 //! after; below that the evidence, in the order in which somebody who doubts the verdict would ask for it. A section that has
-//! nothing to say is left out. Markup that an XML parser reads too, in the style of all pages ([`bench::page_style`]).
+//! nothing to say is left out. Markup that an XML parser reads too, in the style of all pages ([`pagekit::page`]).
 //!
 //! | file | holds |
 //! |---|---|
@@ -28,7 +28,7 @@ mod verdict;
 mod words;
 
 use crate::report::{Report, Verdict};
-use bench::page_style::{document, escaped};
+use pagekit::page::{document, escaped};
 
 /// Numbers of one signal over time, in the unit that stands beside them; what is missing is not finite.
 pub(crate) type Values = Vec<f64>;

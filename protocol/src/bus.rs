@@ -34,7 +34,7 @@ use std::time::Duration;
 
 pub use hosted_rig::HostedRig;
 pub use tally::{FrameTally, OTHERS};
-pub use url::{BusUrl, UrlError, WireOptions};
+pub use url::{BusUrl, LONGEST_NAME, UrlError, WireOptions};
 pub use wire::{Frames, WireFault, WireNode, WireOrder, WireOrders};
 
 /// The clock that stamps frames: the time of what happened so many ns ago, in ns since an epoch of the caller's choice.

@@ -1,7 +1,7 @@
 //! Pairs of runs, one with something and one without, in turns: what it costs, with the interval of the difference.
 
-use bench::grid::Grid;
-use bench::median::{Median, median};
+use figures::median::{Median, median};
+use pagekit::grid::Grid;
 use std::time::Instant;
 
 /// A figure of a run: its name, and how it is read.

@@ -109,7 +109,7 @@ fn the_page_shows_a_run_and_a_hand_on_it_reaches_the_rig() {
 
 #[test]
 fn what_is_vendored_is_as_it_was_published() {
-    let folder = workspace().join("bench/src/watch/page/vendor/uplot");
+    let folder = workspace().join("live/src/page/vendor/uplot");
     let mut command = Command::new("sha256sum");
     command.args(["--check", "--strict", "SHA256SUMS"]).current_dir(folder);
     let ended = Running::start("sha256sum", &mut command).wait().expect_code(0);

@@ -6,11 +6,11 @@
 
 use super::change;
 use crate::drawing::{COLOURS, Curve, Panel, Picture};
-use crate::grid::Grid;
-use crate::record::MEASURED;
 use crate::runs::Run;
-use crate::series::{Series, Span};
-use crate::table::in_use;
+use figures::record::MEASURED;
+use figures::series::{Series, Span};
+use pagekit::grid::Grid;
+use pagekit::number::in_use;
 
 /// Length of the means, s.
 const MEAN_S: f64 = 0.02;

@@ -2,9 +2,9 @@
 
 use crate::drawing::{COLOURS, Curve, Panel, Picture};
 use crate::picture;
-use crate::record::Record;
 use crate::runs::Run;
-use crate::series::{Series, Span};
+use figures::record::Record;
+use figures::series::{Series, Span};
 use plotters::style::BLACK;
 
 const METRE_IN_MM: f64 = 1e3;

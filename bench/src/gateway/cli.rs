@@ -34,7 +34,7 @@ pub struct GatewayArguments {
 
 fn bus_name(text: &str) -> Result<String, String> {
     let allowed = |c: char| c.is_ascii_graphic() && c != '<' && c != '>';
-    if (1..=super::parser::LONGEST_NAME).contains(&text.len()) && text.chars().all(allowed) {
+    if (1..=protocol::bus::LONGEST_NAME).contains(&text.len()) && text.chars().all(allowed) {
         return Ok(text.into());
     }
     Err("a name has 1 to 64 printable ASCII characters without spaces, '<' and '>'".into())

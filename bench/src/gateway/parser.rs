@@ -14,12 +14,11 @@
 //!
 //! Source: socketcand, `doc/protocol.md`; python-can 4, `interfaces/socketcand`; SavvyCAN, `socketcand.cpp`.
 
+use protocol::bus::LONGEST_NAME;
 use protocol::can::{CanFrame, EXTENDED_FLAG};
 
 /// Longest request in bytes, brackets not counted: twice what the longest one that is allowed needs.
 pub const LONGEST_REQUEST: usize = 128;
-/// Longest name of a bus in bytes.
-pub const LONGEST_NAME: usize = 64;
 
 /// What a client asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]

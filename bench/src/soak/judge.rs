@@ -6,7 +6,7 @@ use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
 use super::model::{Check, CheckResult, Figures};
 use super::plan::Spec;
 use super::segment::{End, Outcome};
-use crate::thresholds;
+use figures::thresholds;
 use runlog::summary::ProcessReport;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;

@@ -2,8 +2,8 @@
 
 use crate::campaign::Campaign;
 use crate::merge::Results;
-use bench::grid::Grid;
-use bench::page_style::escaped;
+use pagekit::grid::Grid;
+use pagekit::page::escaped;
 
 /// The matrices that the campaign's file asks for.
 pub(super) fn section(campaign: &Campaign, results: &Results) -> String {

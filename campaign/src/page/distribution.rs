@@ -2,8 +2,8 @@
 
 use super::{name, quantile, sorted, value};
 use crate::merge::Results;
-use bench::grid::Grid;
-use bench::page_style::escaped;
+use pagekit::grid::Grid;
+use pagekit::page::escaped;
 use std::fmt::Write as _;
 
 /// Bars of a histogram.

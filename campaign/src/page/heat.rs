@@ -4,8 +4,8 @@ use super::{name, quantile, sorted, value};
 use crate::campaign::Campaign;
 use crate::factor::{Factor, Values};
 use crate::merge::Results;
-use bench::page_style::escaped;
-use bench::table::short;
+use pagekit::number::short;
+use pagekit::page::escaped;
 use std::fmt::Write as _;
 
 /// Classes that a range is cut into.

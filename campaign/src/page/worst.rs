@@ -4,8 +4,8 @@ use super::{name, value};
 use crate::campaign::Campaign;
 use crate::factor::Values;
 use crate::merge::{Results, Unfinished};
-use bench::grid::Grid;
-use bench::page_style::escaped;
+use pagekit::grid::Grid;
+use pagekit::page::escaped;
 
 /// Runs that are told of each figure.
 const TOLD: usize = 8;
@@ -50,7 +50,7 @@ fn values(campaign: &Campaign, run: u64) -> String {
     let point = campaign.points.point(run);
     let told = campaign.file.factors.iter().zip(&point.values).map(|(factor, value)| match &factor.values {
         Values::Range(_) => {
-            format!("{} {}", factor.name, value.number().map_or_else(String::new, bench::table::short))
+            format!("{} {}", factor.name, value.number().map_or_else(String::new, pagekit::number::short))
         }
         Values::List(_) => format!("{} {value}", factor.name),
     });

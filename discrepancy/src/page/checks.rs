@@ -3,7 +3,7 @@
 use super::markup::{Cell, folded, heading, number, table, words as said};
 use super::words;
 use crate::report::{ChannelCheck, Finding, RecordCheck, Report};
-use bench::page_style::escaped;
+use pagekit::page::escaped;
 
 /// The section.
 pub(super) fn checks(report: &Report) -> String {

@@ -5,7 +5,7 @@
 
 use super::decimate::Column;
 use super::words;
-use bench::page_style::escaped;
+use pagekit::page::escaped;
 use std::fmt::Write as _;
 
 /// Width of all drawings, in user units.

@@ -143,7 +143,7 @@ fn unknown(outside: &Outside) -> String {
     if let Some(formula) = &outside.formula {
         text += &format!(
             "<p>A formula that fits: <code style=\"font-size:1.1rem\">{}</code></p>\n",
-            bench::page_style::escaped(formula)
+            pagekit::page::escaped(formula)
         );
     } else {
         text += &paragraph("No short formula fits.");
@@ -258,7 +258,7 @@ pub(super) fn next(report: &Report) -> String {
         });
         text += &format!(
             "<p>Run <code>{}</code>, which stands beside this page.{divergence}</p>\n",
-            bench::page_style::escaped(experiment)
+            pagekit::page::escaped(experiment)
         );
     }
     if let Some(otherwise) = &next.otherwise {

@@ -1,6 +1,6 @@
 //! Tables, lists and sections as markup. A table that is too wide scrolls in its box, by keyboard too.
 
-use bench::page_style::escaped;
+use pagekit::page::escaped;
 use std::fmt::Write as _;
 
 /// A cell of a table.

@@ -2,7 +2,7 @@
 
 use super::words;
 use crate::report::{NamedEffect, Report, Verdict};
-use bench::page_style::escaped;
+use pagekit::page::escaped;
 
 /// What the page is called.
 pub(super) fn title(verdict: Verdict) -> &'static str {

@@ -65,12 +65,27 @@ pub enum UrlError {
 /// Longest time that a bus-off node may be told to wait, ms.
 const LONGEST_RESTART_MS: u32 = 60_000;
 
+/// Longest name of a bus, bytes.
+pub const LONGEST_NAME: usize = 64;
+
 /// Longest path that fits `sockaddr_un` with its closing zero.
 const LONGEST_SOCKET_PATH: usize = 107;
 /// `IFNAMSIZ` less the closing zero.
 const LONGEST_INTERFACE: usize = 15;
 
 impl BusUrl {
+    /// The name by which clients open the bus: the interface, or the file name of the socket. None when it is longer than
+    /// [`LONGEST_NAME`], or has a character that is not printable ASCII, or `<` or `>`, which delimit socketcand's messages.
+    #[must_use]
+    pub fn name(&self) -> Option<String> {
+        let name = match self {
+            Self::Can { interface } => interface.clone(),
+            Self::Unix { path, .. } => path.file_name()?.to_str()?.to_owned(),
+        };
+        let is_writable = |c: char| c.is_ascii_graphic() && c != '<' && c != '>';
+        (name.len() <= LONGEST_NAME && name.chars().all(is_writable)).then_some(name)
+    }
+
     /// The embedded bus where this user's programs look for it: `$XDG_RUNTIME_DIR/airbench/bus0`, else a folder of
     /// the user's own under the temporary folder.
     #[must_use]

@@ -6,7 +6,7 @@
 use crate::interval::Rate;
 use crate::score::tables::{BESIDE, ConfusionRow, Split, Spread};
 use crate::score::{Case, Score};
-use bench::page_style::{document, escaped};
+use pagekit::page::{document, escaped};
 use plant::effects::SHEETS;
 use std::fmt::Write;
 

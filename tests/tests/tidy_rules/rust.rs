@@ -24,7 +24,7 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 17] = [
+const ROOMS: [&str; 21] = [
     "settings",
     "protocol",
     "realtime",
@@ -38,6 +38,10 @@ const ROOMS: [&str; 17] = [
     "xcp",
     "rehearsal",
     "controller",
+    "pagekit",
+    "figures",
+    "latency",
+    "live",
     "bench",
     "discrepancy",
     "campaign",
@@ -73,10 +77,24 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rehearsal",
         ],
     ),
-    ("discrepancy", &["protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "bench"]),
+    ("pagekit", &[]),
+    ("figures", &["runlog", "pagekit"]),
+    ("latency", &["protocol", "realtime", "runlog", "pagekit", "figures"]),
+    ("live", &["protocol", "realtime", "runlog", "pagekit", "latency"]),
+    ("discrepancy", &["protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "pagekit"]),
     (
         "campaign",
-        &["settings", "protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "bench"],
+        &[
+            "settings",
+            "protocol",
+            "realtime",
+            "runlog",
+            "plant",
+            "axis-control",
+            "rehearsal",
+            "pagekit",
+            "figures",
+        ],
     ),
 ];
 
@@ -116,6 +134,8 @@ pub(super) const CRATE_EDGES: Rule = Rule {
         ("controller/Cargo.toml", "[dependencies]\nrig = { package = \"emulator\", version = \"1\" }\n", 2),
         ("discrepancy/Cargo.toml", "[dependencies]\nemulator.workspace = true\n", 2),
         ("campaign/Cargo.toml", "[dependencies]\ndiscrepancy.workspace = true\n", 2),
+        ("figures/Cargo.toml", "[dependencies]\nbench.workspace = true\n", 2),
+        ("discrepancy/Cargo.toml", "[dependencies]\nfigures.workspace = true\n", 2),
     ],
     good: &[
         ("protocol/Cargo.toml", "[package]\nname = \"protocol\"\n[dependencies]\nplantuml = \"1\"\n"),

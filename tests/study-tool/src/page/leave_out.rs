@@ -5,7 +5,7 @@ use crate::compare::verdicts;
 use crate::leave_out::tables::{Split, Tables};
 use crate::score::tables::Spread;
 use crate::score::{Case, Score};
-use bench::page_style::escaped;
+use pagekit::page::escaped;
 
 /// Names, titles and markup of the sections.
 pub(super) fn sections(score: &Score, tables: &Tables) -> Vec<(&'static str, &'static str, String)> {

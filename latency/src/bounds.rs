@@ -1,0 +1,243 @@
+//! Bounds of a threshold file held against a report.
+//!
+//! ```toml
+//! [bounds]
+//! "emulator-wakeup.p99_ns" = { max = 50000 }
+//! "ratio.emulator-wakeup.p50" = { max = 1.1 }                   # against cyclictest
+//! "ratio.drive-round-trip.p50/ping-pong-bus" = { max = 1.5 }    # against another reference
+//! "counts.skipped" = { max = 0 }
+//! "findings.frame-loss" = { max = 0 }
+//! ```
+//!
+//! Figures: a distribution of all runs with `p50_ns`, `p90_ns`, `p99_ns`, `p999_ns`, `p9999_ns`, `max_ns` or `count`; a ratio's
+//! median; a count summed over the runs; how often a cause was found. A ratio whose interval crosses its bound neither keeps
+//! nor breaks it ([`resolution`]). A figure that exists and was not measured breaks its bound; one that does not exist is an
+//! error, which names those that do.
+
+use super::kinds;
+use super::model::{BoundResult, Cause, PercentilesNs, Ratio, Report};
+use super::ratios;
+use super::resolution::{self, Verdict};
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+/// Figures that a message names.
+const NAMED: usize = 12;
+
+/// What is wrong with a threshold file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BoundsError {
+    /// No TOML.
+    #[error("{0}")]
+    Toml(String),
+    /// No such table, or something else beside it.
+    #[error("it holds a table [bounds] and nothing else")]
+    NoTable,
+    /// A bound that is none.
+    #[error("[bounds] {figure}: write it as {{ max = 50000 }}, {{ min = 1 }} or with both")]
+    Shape {
+        /// Its figure.
+        figure: String,
+    },
+    /// No such figure.
+    #[error("[bounds] {figure}: no such figure; there are {known}")]
+    Unknown {
+        /// What the file says.
+        figure: String,
+        /// What there is.
+        known: String,
+    },
+}
+
+/// Judges a report by the text of a threshold file.
+///
+/// # Errors
+/// [`BoundsError`] with the figure and what would be right.
+pub fn judge(text: &str, report: &Report) -> Result<Vec<BoundResult>, BoundsError> {
+    let file: toml::Table =
+        text.parse().map_err(|error: toml::de::Error| BoundsError::Toml(error.to_string()))?;
+    let bounds = file.get("bounds").and_then(toml::Value::as_table).filter(|_| file.len() == 1);
+    let bounds = bounds.ok_or(BoundsError::NoTable)?;
+    bounds.iter().map(|(figure, bound)| one(figure, bound, report)).collect()
+}
+
+fn one(figure: &str, bound: &toml::Value, report: &Report) -> Result<BoundResult, BoundsError> {
+    let shape = || BoundsError::Shape { figure: figure.to_owned() };
+    let bound = bound.as_table().filter(|bound| !bound.is_empty()).ok_or_else(shape)?;
+    if bound.keys().any(|key| key != "min" && key != "max") {
+        return Err(shape());
+    }
+    let side = |key: &str| {
+        let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
+        bound
+            .get(key)
+            .map(|value| number(value).filter(|value| value.is_finite()).ok_or_else(shape))
+            .transpose()
+    };
+    let (min, max) = (side("min")?, side("max")?);
+    let value = value(figure, report).ok_or_else(|| unknown(figure, report))?;
+    let ratio = figure.strip_prefix("ratio.").and_then(|name| ratio(name, report));
+    let verdict = match ratio {
+        Some(ratio) => resolution::verdict(ratio, min, max),
+        None if value.is_some_and(|value| {
+            min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max)
+        }) =>
+        {
+            Verdict::Kept
+        }
+        None => Verdict::Broken,
+    };
+    let (resolved, pairs_to_resolve) = match verdict {
+        Verdict::NotResolved { pairs } => (false, pairs),
+        Verdict::Kept | Verdict::Broken => (true, None),
+    };
+    Ok(BoundResult {
+        figure: figure.to_owned(),
+        value,
+        min,
+        max,
+        kept: verdict == Verdict::Kept,
+        interval: ratio.and_then(|ratio| ratio.interval),
+        resolved,
+        pairs_to_resolve,
+    })
+}
+
+/// The ratio of a name as [`ratios::short_name`] makes it.
+fn ratio<'a>(name: &str, report: &'a Report) -> Option<&'a Ratio> {
+    report.ratios.iter().find(|ratio| ratios::short_name(&ratio.name) == name)
+}
+
+/// The value of a figure: the inner nothing when it was not measured, the outer when there is none of that name.
+fn value(figure: &str, report: &Report) -> Option<Option<f64>> {
+    if let Some(name) = figure.strip_prefix("ratio.") {
+        let known = ratios::names().any(|known| ratios::short_name(&known) == name);
+        return ratio(name, report).map(|ratio| Some(ratio.median)).or(known.then_some(None));
+    }
+    if let Some(name) = figure.strip_prefix("counts.") {
+        let counts: Vec<_> = report.runs.iter().filter_map(|run| run.counts.get(name)).collect();
+        return (!counts.is_empty()).then(|| Some(counts.into_iter().sum::<u64>() as f64));
+    }
+    if let Some(name) = figure.strip_prefix("findings.") {
+        let cause: Cause = serde_json::from_value(Value::String(name.to_owned())).ok()?;
+        let found = report.findings.iter().find(|finding| finding.cause == cause);
+        return Some(Some(found.map_or(0.0, |finding| finding.count as f64)));
+    }
+    let (tag, key) = figure.rsplit_once('.')?;
+    let of = of_percentiles(key)?;
+    let told = report.distributions.iter().find(|distribution| distribution.name == tag);
+    let known = || kinds::place(tag) != usize::MAX;
+    told.map(|told| of(&told.percentiles_ns)).or_else(|| known().then_some(None))
+}
+
+fn of_percentiles(key: &str) -> Option<fn(&PercentilesNs) -> Option<f64>> {
+    Some(match key {
+        "p50_ns" => |told| told.p50.map(|ns| ns as f64),
+        "p90_ns" => |told| told.p90.map(|ns| ns as f64),
+        "p99_ns" => |told| told.p99.map(|ns| ns as f64),
+        "p999_ns" => |told| told.p999.map(|ns| ns as f64),
+        "p9999_ns" => |told| told.p9999.map(|ns| ns as f64),
+        "max_ns" => |told| told.max.map(|ns| ns as f64),
+        "count" => |told| Some(told.count as f64),
+        _ => return None,
+    })
+}
+
+/// Names what there is, what looks most like the figure first.
+fn unknown(figure: &str, report: &Report) -> BoundsError {
+    let mut known: BTreeSet<String> = BTreeSet::new();
+    for distribution in &report.distributions {
+        for key in ["p50_ns", "p99_ns", "p999_ns", "max_ns", "count"] {
+            known.insert(format!("{}.{key}", distribution.name));
+        }
+    }
+    known.extend(ratios::names().map(|name| format!("ratio.{}", ratios::short_name(&name))));
+    known.extend(report.runs.iter().flat_map(|run| run.counts.keys().map(|key| format!("counts.{key}"))));
+    known.insert("findings.frame-loss".into());
+    let mut known: Vec<_> = known.into_iter().collect();
+    let alike = |name: &String| name.chars().zip(figure.chars()).take_while(|(a, b)| a == b).count();
+    known.sort_by_key(|name| std::cmp::Reverse(alike(name)));
+    let more = known.len().saturating_sub(NAMED);
+    known.truncate(NAMED);
+    let more = if more > 0 { format!(" and {more} more; report.json holds them all") } else { String::new() };
+    BoundsError::Unknown { figure: figure.to_owned(), known: format!("{}{more}", known.join(", ")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+    use crate::tests::report_of;
+
+    fn judged(text: &str) -> Result<Vec<BoundResult>, BoundsError> {
+        judge(text, &report_of(vec![made_up::run(2000)]))
+    }
+
+    #[test]
+    fn bounds_are_kept_or_broken_and_what_was_not_measured_breaks() {
+        let text = "[bounds]\n\"emulator-wakeup.p99_ns\" = { max = 50000 }\n\"emulator-wakeup.max_ns\" = { max = 11000 }\n\
+                    \"counts.skipped\" = { max = 0 }\n\"counts.cycles\" = { min = 2000, max = 2000 }\n\
+                    \"ratio.emulator-wakeup.p50\" = { max = 1.1 }\n\"cyclictest.p50_ns\" = { max = 1e9 }\n\
+                    \"findings.frame-loss\" = { max = 0 }\n\"emulator-wakeup.p9999_ns\" = { max = 1e9 }";
+        let kept: Vec<_> =
+            judged(text).unwrap().into_iter().map(|bound| (bound.figure, bound.kept)).collect();
+        let broken: Vec<_> =
+            kept.iter().filter(|(_, kept)| !kept).map(|(figure, _)| figure.as_str()).collect();
+        let expected = [
+            "cyclictest.p50_ns",
+            "emulator-wakeup.max_ns",
+            "emulator-wakeup.p9999_ns",
+            "ratio.emulator-wakeup.p50",
+        ];
+        assert_eq!(kept.len(), 8);
+        assert_eq!(
+            {
+                let mut broken = broken;
+                broken.sort_unstable();
+                broken
+            },
+            expected
+        );
+    }
+
+    #[test]
+    fn a_ratio_is_judged_by_its_interval() {
+        let mut report = report_of(vec![made_up::run(2000)]);
+        let name = "emulator-wakeup p99 / cyclictest p99";
+        let mut judged = |factors: [u64; 10]| {
+            let pairs_ns = factors.map(|factor| (factor * 100, 10_000)).into();
+            report.ratios = vec![ratios::ratio(name.into(), pairs_ns).unwrap()];
+            let text = "[bounds]\n\"ratio.emulator-wakeup.p99\" = { max = 1.1 }";
+            judge(text, &report).unwrap().remove(0)
+        };
+        let bound = judged([20, 27, 60, 80, 105, 105, 200, 300, 495, 600]);
+        assert_eq!((bound.value, bound.interval), (Some(1.05), Some((0.27, 4.95))));
+        assert_eq!(bound.verdict(), Verdict::NotResolved { pairs: Some(11_111) });
+        assert!(!bound.kept && !bound.resolved);
+        assert_eq!(judged([99; 10]).verdict(), Verdict::Kept);
+        assert_eq!(judged([124; 10]).verdict(), Verdict::Broken);
+        let text = serde_json::to_string(&bound).unwrap();
+        let told = "\"kept\":false,\"interval\":[0.27,4.95],\"resolved\":false,\"pairs_to_resolve\":11111";
+        assert!(text.contains(told), "{text}");
+        // A report of before says nothing of it.
+        let before = "{\"figure\":\"a\",\"value\":null,\"min\":null,\"max\":1,\"kept\":false}";
+        let before: BoundResult = serde_json::from_str(before).unwrap();
+        assert_eq!(before.verdict(), Verdict::Broken);
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused_with_what_would() {
+        let unknown = judged("[bounds]\n\"emulator-wakeup.p98_ns\" = { max = 1 }").unwrap_err().to_string();
+        assert!(unknown.contains("no such figure; there are emulator-wakeup."), "{unknown}");
+        assert!(judged("[bounds]\n\"counts.nothing\" = { max = 1 }").is_err());
+        for text in [
+            "[bounds]\n\"counts.skipped\" = 3",
+            "[bounds]\n\"counts.skipped\" = { most = 3 }",
+            "[bounds]\n\"counts.skipped\" = { max = nan }",
+        ] {
+            assert!(matches!(judged(text), Err(BoundsError::Shape { .. })), "{text}");
+        }
+        assert_eq!(judged("max = 3").unwrap_err(), BoundsError::NoTable);
+        assert!(matches!(judged("[bounds"), Err(BoundsError::Toml(_))));
+    }
+}

@@ -1,0 +1,318 @@
+//! Whether runs support a latency claim: what must be so is so, and what was not controlled is said.
+//!
+//! *Reasons* are what a claim cannot do without: real-time priority, locked memory, CPUs of their own, a reference measured in
+//! turns with the runs, enough cycles for the percentiles that are told, no probe that burns the CPUs, no record lost. *Not
+//! controlled* is what another machine or another hour may do differently, and what a reader must know to judge.
+
+use super::controlled::not_controlled;
+use super::files::RunFiles;
+use super::model::{Claim, Conditions};
+use super::reference;
+use realtime::Machine;
+use std::collections::BTreeMap;
+
+/// Cycles for a p99.9 that rests on a hundred samples.
+const CYCLES_FOR_P999: u64 = 100_000;
+/// Runs with a reference between them that are taken as alternating.
+const PAIRS: usize = 2;
+/// Share of cycles that may be missed.
+const SKIPPED_SHARE: f64 = 1e-3;
+/// How much longer or shorter than its run a reference may be and still be a slice of the same length.
+const SAME_LENGTH: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+/// Interval of the reference: the cycle's.
+const INTERVAL_US: &str = "1000";
+
+/// Judges the runs.
+#[must_use]
+pub fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
+    let reasons = reasons(runs, conditions);
+    let not_controlled = not_controlled(runs, conditions);
+    let supported = reasons.is_empty();
+    let sentence = match (supported, virtual_machine(conditions)) {
+        (false, _) => format!("These runs support no latency claim, for {} reason(s).", reasons.len()),
+        (true, Some(host)) => format!(
+            "These runs support a claim about p50 and p99 beside the reference on this virtual machine ({host}); the largest \
+             values are those of its host."
+        ),
+        (true, None) => "These runs support a latency claim for this machine under this load.".to_owned(),
+    };
+    Claim { supported, sentence, reasons, not_controlled }
+}
+
+/// What is known of runs that still go on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SoFar {
+    /// What speaks against a claim, whatever comes.
+    pub against: Vec<String>,
+    /// What a claim cannot do without and is not there yet.
+    pub missing: Vec<String>,
+}
+
+/// Judges runs that still go on by the same rules.
+#[must_use]
+pub fn so_far(runs: &[RunFiles], conditions: &Conditions) -> SoFar {
+    let against = [not_granted(runs), disturbed(runs, conditions)].concat();
+    SoFar { against, missing: missing(runs, conditions) }
+}
+
+fn reasons(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+    [not_granted(runs), missing(runs, conditions), disturbed(runs, conditions)].concat()
+}
+
+/// What processes ran without.
+fn not_granted(runs: &[RunFiles]) -> Vec<String> {
+    let mut reasons = Vec::new();
+    for (word, lack) in [
+        ("SCHED_FIFO", "real-time priority (SCHED_FIFO)"),
+        ("memory locked", "locked memory"),
+        ("pinned to CPU", "a CPU of its own"),
+    ] {
+        let without = |(process, granted): (&str, Vec<&str>)| {
+            (!granted.iter().any(|grant| grant.contains(word))).then(|| process.to_owned())
+        };
+        let mut who: Vec<_> =
+            runs.iter().flat_map(|run| run.granted().filter_map(without).collect::<Vec<_>>()).collect();
+        who.sort();
+        who.dedup();
+        if !who.is_empty() {
+            reasons.push(format!("{} ran without {lack}.", who.join(" and ")));
+        }
+    }
+    reasons
+}
+
+/// What is not told, or too little.
+fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+    let mut reasons = Vec::new();
+    let unknown = runs.iter().filter(|run| run.run.is_null() || run.controllers.is_empty()).count();
+    if unknown > 0 {
+        reasons.push(format!("What was granted is not told by all processes of {unknown} run(s)."));
+    }
+    let pairs = runs.iter().filter(|run| run.reference.is_some()).count();
+    if let Some(why) = &conditions.reference_missing_because {
+        reasons.push(format!("There is no reference beside the runs: {}.", why.trim_end_matches('.')));
+    } else if pairs < PAIRS || pairs < runs.len() {
+        reasons.push(format!(
+            "The reference did not alternate with the runs: {pairs} of {} have one.",
+            runs.len()
+        ));
+    }
+    let cycles: u64 = runs.iter().filter_map(|run| run.counted().cycles).sum();
+    if cycles < CYCLES_FOR_P999 {
+        reasons
+            .push(format!("{cycles} cycles are too few for p99.9 and beyond: {CYCLES_FOR_P999} at least."));
+    }
+    reasons
+}
+
+/// What was not as it should have been.
+fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+    let mut reasons = Vec::new();
+    if conditions.probe {
+        reasons.push(
+            "The probe kept the CPUs busy: it keeps them awake, and takes caches from the loops.".into(),
+        );
+    }
+    let dropped: u64 = runs
+        .iter()
+        .flat_map(RunFiles::process_reports)
+        .filter_map(|(_, report)| report.records_dropped)
+        .sum();
+    if dropped > 0 {
+        reasons.push(format!("{dropped} records did not reach the files."));
+    }
+    let mut add = |found: Vec<String>| {
+        for sentence in found {
+            if !reasons.contains(&sentence) {
+                reasons.push(sentence);
+            }
+        }
+    };
+    for run in runs {
+        add(unlike_reference(run));
+        add(shared_cpu(run));
+        add(of_the_run(run));
+    }
+    if runs.iter().any(|run| run.description().counts_allocations) {
+        reasons.push("The build counts allocations, which costs time.".into());
+    }
+    reasons
+}
+
+/// What a process was granted after these words, such as the number of its CPU.
+fn after<'a>(granted: &[&'a str], words: &str) -> Option<&'a str> {
+    granted.iter().find_map(|grant| grant.split_once(words)?.1.split_whitespace().next())
+}
+
+/// CPU of each process of a run that has one of its own.
+pub(super) fn cpus(run: &RunFiles) -> BTreeMap<&str, u64> {
+    let cpu = |granted: &[&str]| after(granted, "pinned to CPU ")?.parse().ok();
+    run.granted().filter_map(|(process, granted)| Some((process, cpu(&granted)?))).collect()
+}
+
+/// Where the reference was not measured as the rig runs.
+fn unlike_reference(run: &RunFiles) -> Vec<String> {
+    let Some(told) = &run.reference else { return Vec::new() };
+    let mut unlike = Vec::new();
+    let rig = run.granted().next().filter(|(process, _)| *process == "emulator");
+    let granted = rig.map(|(_, granted)| granted).unwrap_or_default();
+    let line = &told.command_line;
+    let mut compare = |what: &str, theirs: Option<&str>, ours: Option<&str>| {
+        // What the rig lacks is a reason of its own.
+        if let Some(ours) = ours.filter(|ours| theirs != Some(ours)) {
+            let theirs = theirs.unwrap_or("none");
+            unlike.push(format!("The reference had {what} {theirs}, the rig {ours}."));
+        }
+    };
+    let priority = after(&granted, "SCHED_FIFO priority ");
+    compare(
+        "priority",
+        reference::option(line, 'p', "priority").or(reference::option(line, 'p', "prio")),
+        priority,
+    );
+    compare("CPU", reference::option(line, 'a', "affinity"), after(&granted, "pinned to CPU "));
+    let interval = reference::option(line, 'i', "interval").unwrap_or(INTERVAL_US);
+    compare("an interval in us of", Some(interval), Some(INTERVAL_US));
+    let length_s = told.samples.count() as f64 * interval.parse::<f64>().unwrap_or_default() * 1e-6;
+    let share = length_s / run.duration_s();
+    if !SAME_LENGTH.contains(&share) {
+        let ours_s = run.duration_s();
+        unlike.push(format!("A reference of {length_s:.0} s stands beside a run of {ours_s:.0} s."));
+    }
+    unlike
+}
+
+fn shared_cpu(run: &RunFiles) -> Vec<String> {
+    let mut of_cpu: BTreeMap<u64, Vec<&str>> = BTreeMap::new();
+    for (process, cpu) in cpus(run) {
+        of_cpu.entry(cpu).or_default().push(process);
+    }
+    let shared = of_cpu.into_iter().filter(|(_, who)| who.len() > 1);
+    shared
+        .map(|(cpu, who)| format!("{} shared CPU {cpu}: they wait for each other.", who.join(" and ")))
+        .collect()
+}
+
+/// What the run itself, its build and its machine forbid.
+fn of_the_run(run: &RunFiles) -> Vec<String> {
+    let mut found = Vec::new();
+    let Machine { build, hypervisor, clock_sources_available, processor, .. } = run.description().machine;
+    let profile = &build.profile;
+    if profile.starts_with("debug") || build.debug_assertions {
+        found.push(format!("The emulator is a build for debugging ({profile})."));
+    }
+    let summary = run.counted();
+    if summary.passed == Some(false) {
+        found.push("The verdict of a run itself is not passed.".into());
+    }
+    let (skipped, cycles) =
+        (summary.skipped.unwrap_or_default() as f64, summary.cycles.unwrap_or_default() as f64);
+    if skipped > SKIPPED_SHARE * cycles {
+        let share = 100.0 * skipped / cycles.max(1.0);
+        found.push(format!("A run missed {share:.1} % of its cycles: {} % at most.", 100.0 * SKIPPED_SHARE));
+    }
+    let is_kvm = [hypervisor, clock_sources_available].iter().any(|word| word.to_lowercase().contains("kvm"));
+    if processor.contains("TCG") || (processor.contains("QEMU Virtual CPU") && !is_kvm) {
+        found.push(
+            "The machine is emulated by QEMU (TCG): its instructions take what the emulation takes.".into(),
+        );
+    }
+    if run.circumstances().uncommitted_files > Some(0) {
+        found.push(
+            "The source tree held changes that nobody committed: the build is not told by its commit.".into(),
+        );
+    }
+    found
+}
+
+/// The hypervisor, if the machine has one.
+pub(super) fn virtual_machine(conditions: &Conditions) -> Option<&str> {
+    let fact = conditions.machine.iter().find(|fact| fact.name.to_lowercase().contains("hypervisor"))?;
+    let none = ["none", "no", "unknown", "false", ""];
+    (!none.iter().any(|word| fact.value.eq_ignore_ascii_case(word))).then_some(fact.value.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conditions::conditions;
+    use crate::made_up;
+    use serde_json::json;
+
+    fn good() -> Vec<RunFiles> {
+        let mut run = made_up::run(10);
+        run.summary["cycles"] = json!(60_000);
+        made_up::reference(&mut run, (0..60_000).map(|_| 13_000).collect());
+        vec![run.clone(), run]
+    }
+
+    fn reference_line(run: &mut RunFiles, line: &str) {
+        run.reference.as_mut().unwrap().command_line = line.into();
+    }
+
+    fn judged(runs: &[RunFiles]) -> Claim {
+        claim(runs, &conditions(runs))
+    }
+
+    #[test]
+    fn runs_with_everything_support_a_claim() {
+        let told = judged(&good());
+        assert!(told.supported, "{:?}", told.reasons);
+        assert_eq!(told.not_controlled, [""; 0]);
+    }
+
+    #[test]
+    fn each_reason_is_told() {
+        type Spoil = fn(&mut RunFiles);
+        let cases: [(&str, Spoil); 18] = [
+            ("SCHED_FIFO", |run| run.run["realtime_granted"] = json!(["memory locked", "pinned to CPU 0"])),
+            ("a CPU of its own", |run| {
+                run.controllers.get_mut("controller").unwrap()["realtime_granted"] =
+                    json!(["memory locked", "SCHED_FIFO"]);
+            }),
+            ("not told by all", |run| run.controllers.clear()),
+            ("did not alternate", |run| run.reference = None),
+            ("too few", |run| {
+                run.summary["cycles"] = json!(20_000);
+                made_up::reference(run, (0..20_000).map(|_| 13_000).collect());
+            }),
+            ("probe", |run| run.conditions.get_or_insert_default().probe = true),
+            ("did not reach", |run| run.summary["records_dropped"] = json!(3)),
+            ("priority 70, the rig 80", |run| reference_line(run, "cyclictest -p 70 -a 0 -i 1000")),
+            ("CPU 1, the rig 0", |run| reference_line(run, "cyclictest --priority=80 --affinity=1")),
+            ("CPU none, the rig 0", |run| reference_line(run, "cyclictest -p80 -i1000")),
+            ("beside a run of 60 s", |run| {
+                made_up::reference(run, (0..9_000).map(|_| 13_000).collect());
+            }),
+            ("shared CPU 0", |run| {
+                run.controllers.get_mut("controller").unwrap()["realtime_granted"][2] =
+                    json!("pinned to CPU 0");
+            }),
+            ("debugging", |run| run.run["machine"]["build"]["profile"] = json!("debug, opt-level 0")),
+            ("not passed", |run| run.summary["passed"] = json!(false)),
+            ("missed 0.2 %", |run| run.summary["skipped"] = json!(120)),
+            ("QEMU (TCG)", |run| run.run["machine"]["processor"] = json!("QEMU TCG CPU version 2.5+")),
+            ("nobody committed", |run| run.conditions.get_or_insert_default().uncommitted_files = Some(2)),
+            ("counts allocations", |run| run.run["counts_allocations"] = json!(true)),
+        ];
+        for (words, spoil) in cases {
+            let mut runs = good();
+            spoil(&mut runs[1]);
+            let told = judged(&runs);
+            assert!(!told.supported && told.reasons.len() == 1, "{words}: {:?}", told.reasons);
+            assert!(told.reasons[0].contains(words), "{:?}", told.reasons);
+        }
+    }
+
+    #[test]
+    fn what_was_not_controlled_is_said_and_weakens_the_sentence() {
+        let mut runs = good();
+        for run in &mut runs {
+            run.run["machine"] = json!({ "kernel": "PREEMPT_DYNAMIC", "hypervisor": "KVM" });
+            run.conditions.get_or_insert_default().load_generator = None;
+        }
+        let told = judged(&runs);
+        assert!(told.supported && told.sentence.contains("virtual machine (KVM)"), "{told:?}");
+        assert!(told.not_controlled.len() >= 5, "{:?}", told.not_controlled);
+    }
+}

@@ -1,0 +1,187 @@
+//! Where and how it was measured, as facts: each name with the value that all runs share, or those that they do not.
+
+use super::files::RunFiles;
+use super::model::{Conditions, Fact};
+use serde_json::Value;
+
+/// Values of a fact that are shown when runs differ.
+const VALUES_SHOWN: usize = 3;
+
+/// The conditions of all runs.
+#[must_use]
+pub fn conditions(runs: &[RunFiles]) -> Conditions {
+    let one_of = |of: fn(&runlog::conditions::Conditions) -> Option<String>| {
+        runs.iter().filter_map(|run| run.conditions.as_ref()).find_map(of)
+    };
+    let reference = runs.iter().find_map(|run| run.reference.as_ref());
+    let told_command = reference.map(|told| told.command_line.clone()).filter(|line| !line.is_empty());
+    let with_resolution = |line: String| match reference {
+        Some(told) if told.whole_us => format!("{line} (whole us, the fraction left out)"),
+        _ => line,
+    };
+    Conditions {
+        machine: machine(runs),
+        command_lines: command_lines(runs),
+        privileges: privileges(runs),
+        load_generator: one_of(|told| told.load_generator.clone()),
+        reference: reference
+            .and(told_command.or_else(|| one_of(|told| told.reference_command.clone())))
+            .map(with_resolution),
+        reference_missing_because: reference.is_none().then(|| {
+            let untold = "no run has a cyclictest.json; scripts/latency makes one beside each run";
+            one_of(|told| told.reference_missing_because.clone()).unwrap_or_else(|| untold.into())
+        }),
+        probe: runs.iter().any(|run| run.gaps.is_some() || run.circumstances().probe),
+    }
+}
+
+/// Facts gathered by name, in the order in which they first came.
+#[derive(Default)]
+struct Facts(Vec<(String, Vec<String>)>);
+
+impl Facts {
+    fn add(&mut self, name: &str, value: &str) {
+        let place = self.0.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
+            self.0.push((name.to_owned(), Vec::new()));
+            self.0.len() - 1
+        });
+        let values = &mut self.0[place].1;
+        if !values.iter().any(|known| known == value) {
+            values.push(value.to_owned());
+        }
+    }
+
+    fn told(self) -> Vec<Fact> {
+        let told = |(name, mut values): (String, Vec<String>)| {
+            let more = values.len().saturating_sub(VALUES_SHOWN);
+            values.truncate(VALUES_SHOWN);
+            if more > 0 {
+                values.push(format!("and {more} more"));
+            }
+            Fact { name, value: values.join("; ") }
+        };
+        self.0.into_iter().map(told).collect()
+    }
+}
+
+/// Everything under `machine` of run.json, nested objects flattened, and the build.
+fn machine(runs: &[RunFiles]) -> Vec<Fact> {
+    let mut facts = Facts::default();
+    for run in runs {
+        flatten(&mut facts, "", &run.run["machine"]);
+        if let Some(files) = run.circumstances().uncommitted_files {
+            facts.add("uncommitted files", &files.to_string());
+        }
+        for key in ["emulator_version", "counts_allocations", "bus", "pace"] {
+            if !run.run[key].is_null() {
+                facts.add(&key.replace('_', " "), &text(&run.run[key]));
+            }
+        }
+        for (process, told) in run.controller_reports().filter(|(_, told)| !told.version.is_empty()) {
+            facts.add(&format!("{process} version"), &told.version);
+        }
+    }
+    facts.told()
+}
+
+fn flatten(facts: &mut Facts, name: &str, value: &Value) {
+    match value {
+        Value::Object(parts) => {
+            for (key, part) in parts {
+                let key = key.replace('_', " ");
+                let name = if name.is_empty() { key } else { format!("{name}: {key}") };
+                flatten(facts, &name, part);
+            }
+        }
+        Value::Null if name.is_empty() => {}
+        value => facts.add(name, &text(value)),
+    }
+}
+
+fn text(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Null => "unknown".into(),
+        Value::Array(parts) => parts.iter().map(text).collect::<Vec<_>>().join(", "),
+        other => other.to_string(),
+    }
+}
+
+fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
+    let mut facts = Facts::default();
+    for run in runs {
+        let emulator = run.description().emulator_command_line.join(" ");
+        let controllers =
+            run.controller_reports().map(|(process, told)| (process, told.command_line.join(" ")));
+        let lines = std::iter::once(("emulator", emulator)).chain(controllers);
+        lines.filter(|(_, line)| !line.is_empty()).for_each(|(process, line)| facts.add(process, &line));
+        if let Some(command) = run.circumstances().command {
+            facts.add("measured by", &command);
+        }
+        for (name, command) in &run.ping_pong.commands {
+            facts.add(&format!("ping-pong {name}"), command);
+        }
+    }
+    facts.told()
+}
+
+fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
+    let mut facts = Facts::default();
+    for run in runs {
+        let emulator = run.description();
+        let emulator = ("emulator", [emulator.realtime_granted, emulator.realtime_refused]);
+        let controllers = run.controller_reports();
+        let controllers =
+            controllers.map(|(process, told)| (process, [told.realtime_granted, told.realtime_refused]));
+        for (process, lists) in std::iter::once(emulator).chain(controllers) {
+            for (list, word) in lists.iter().zip(["granted", "refused"]).filter(|(list, _)| !list.is_empty())
+            {
+                facts.add(&format!("{process}, {word}"), &list.join(", "));
+            }
+        }
+    }
+    facts.told()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+
+    #[test]
+    fn machine_facts_are_flattened_and_told_once() {
+        let told = conditions(&[made_up::run(10), made_up::run(10)]);
+        let value =
+            |name: &str| told.machine.iter().find(|fact| fact.name == name).map(|fact| fact.value.as_str());
+        assert_eq!(value("preemption: model"), Some("PREEMPT_RT"));
+        assert_eq!(value("processors"), Some("2"));
+        assert_eq!(told.command_lines[0].value, "emulator run");
+        assert!(told.privileges.iter().any(|fact| fact.name == "controller, granted"));
+        let mut run = made_up::run(10);
+        let told_of = run.conditions.as_mut().unwrap();
+        told_of.command = Some("scripts/latency --pairs 2".into());
+        told_of.uncommitted_files = Some(3);
+        let with = conditions(&[run]);
+        assert!(with.command_lines.iter().any(|fact| fact.value == "scripts/latency --pairs 2"));
+        assert!(with.machine.iter().any(|fact| fact.name == "uncommitted files" && fact.value == "3"));
+        assert!(told.reference.is_none() && told.reference_missing_because.is_some());
+    }
+
+    #[test]
+    fn facts_that_differ_are_all_told() {
+        let mut other = made_up::run(10);
+        other.run["machine"]["kernel"] = "another".into();
+        let told = conditions(&[made_up::run(10), other]);
+        let kernel = told.machine.iter().find(|fact| fact.name == "kernel").unwrap();
+        assert!(kernel.value.ends_with("; another"), "{kernel:?}");
+    }
+
+    #[test]
+    fn a_reference_in_whole_us_says_so() {
+        let mut run = made_up::run(10);
+        made_up::reference(&mut run, [13_000].into_iter().collect());
+        run.reference.as_mut().unwrap().whole_us = true;
+        let told = conditions(&[run]).reference.unwrap();
+        assert!(told.starts_with("cyclictest -p 80") && told.contains("whole us"), "{told}");
+    }
+}

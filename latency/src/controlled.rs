@@ -1,0 +1,205 @@
+//! What was not controlled: what another machine or another hour may do differently, a sentence each, from the machine's facts.
+//!
+//! CPUs are those that the loops were pinned to.
+
+use super::claim::{cpus, virtual_machine};
+use super::files::RunFiles;
+use super::model::Conditions;
+use realtime::Machine;
+use std::collections::BTreeSet;
+
+/// The sentences of all runs, each once.
+#[must_use]
+pub fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
+    let mut told = Vec::new();
+    if let Some(host) = virtual_machine(conditions) {
+        told.push(format!(
+            "The machine is a virtual one ({host}): its host may stop it at any time, unseen from inside."
+        ));
+    }
+    for run in runs {
+        for sentence in of_run(run) {
+            if !told.contains(&sentence) {
+                told.push(sentence);
+            }
+        }
+    }
+    if conditions.load_generator.is_none() {
+        told.push("What else ran on the machine was not told.".into());
+    }
+    let unknown = runs.iter().filter(|run| run.conditions.is_none()).count();
+    if unknown > 0 && runs.len() > unknown {
+        told.push(format!("{unknown} run(s) have no conditions.json."));
+    }
+    told
+}
+
+fn of_run(run: &RunFiles) -> Vec<String> {
+    let machine = &run.description().machine;
+    let cpus: BTreeSet<u64> = cpus(run).into_values().collect();
+    let mut told = governors(machine);
+    if ![&machine.preemption.model, &machine.kernel].iter().any(|text| text.contains("PREEMPT_RT")) {
+        told.push("The kernel is not PREEMPT_RT: its own work can keep the loops waiting.".into());
+    }
+    told.extend(isolation(machine, &cpus));
+    told.extend(cpus.iter().filter_map(|cpu| interrupts(machine, *cpu)));
+    told.extend(siblings(machine, &cpus));
+    let about = &machine.rt_throttling.about;
+    if about.starts_with("on") {
+        told.push(format!("RT throttling is {about}: a loop that needs more is stopped for the rest."));
+    }
+    let held = |granted: &[&str]| granted.iter().any(|grant| grant.contains("cpu_dma_latency"));
+    let refused: Vec<_> =
+        run.granted().filter(|(_, granted)| !held(granted)).map(|(process, _)| process).collect();
+    if !refused.is_empty() {
+        told.push(format!(
+            "{} did not hold /dev/cpu_dma_latency: CPUs may sleep deeply{}, and wake up late.",
+            refused.join(" and "),
+            idle_states(machine)
+        ));
+    }
+    match machine.clock_source.as_str() {
+        "tsc" => {}
+        "" => told.push("The clock source is not known.".into()),
+        source => told.push(format!(
+            "The clock source is {source}, not tsc: reading it takes longer, and its steps are its own."
+        )),
+    }
+    if let Some(kib) = machine.memory.swap_used_kib.filter(|kib| *kib > 0) {
+        told.push(format!("{kib} KiB of swap were in use: other programs waited for their pages."));
+    }
+    told
+}
+
+/// Each policy that is not `performance`: one among others that are must not pass.
+fn governors(machine: &Machine) -> Vec<String> {
+    let policies = &machine.frequency_governors;
+    if policies.is_empty() {
+        return vec!["The CPUs' frequency governor is not known.".into()];
+    }
+    let sentence = |policy: &str| {
+        if policy.starts_with("no cpufreq") {
+            return Some(
+                "This machine shows no frequency control (no cpufreq): whoever sets the clock of its CPUs is not in this kernel."
+                    .into(),
+            );
+        }
+        let (cpus, rest) = policy.split_once(": governor ")?;
+        let governor = rest.split(',').next().unwrap_or(rest);
+        (governor != "performance")
+            .then(|| format!("The frequency governor of {cpus} is {governor}: their clock may change."))
+    };
+    policies.iter().filter_map(|policy| sentence(policy)).collect()
+}
+
+fn isolation(machine: &Machine, loops: &BTreeSet<u64>) -> Option<String> {
+    let list = machine.isolated.as_str();
+    let isolated = in_list(list);
+    if isolated.is_empty() {
+        return Some("No CPU is isolated: interrupts and other threads share those of the loops.".into());
+    }
+    let shared: Vec<_> = loops.difference(&isolated).map(u64::to_string).collect();
+    (!shared.is_empty()).then(|| {
+        format!(
+            "CPU {} of the loops is not among the isolated ones ({list}): others share it.",
+            shared.join(", ")
+        )
+    })
+}
+
+/// `may come: 1,3-5; do come: none`, as the machine's facts say it.
+fn interrupts(machine: &Machine, cpu: u64) -> Option<String> {
+    let (may, does) = machine.interrupts.get(&format!("CPU {cpu}"))?.split_once("; do come: ")?;
+    let may = may.trim_start_matches("may come: ");
+    match (may, does) {
+        (_, does) if does != "none" => Some(format!("Interrupts come to CPU {cpu} of the loops: {does}.")),
+        ("none", _) => None,
+        (may, _) => Some(format!("Interrupts may come to CPU {cpu} of the loops: {may}.")),
+    }
+}
+
+fn siblings(machine: &Machine, loops: &BTreeSet<u64>) -> Option<String> {
+    let cores = machine.smt.strip_prefix("CPUs that share a core: ")?;
+    let cores = cores.split(" (").next().unwrap_or(cores).split("; ");
+    let of_loops: Vec<_> = cores.filter(|core| !in_list(core).is_disjoint(loops)).collect();
+    (!of_loops.is_empty()).then(|| {
+        format!(
+            "CPUs of the loops share a core with others ({}): what runs there slows them.",
+            of_loops.join("; ")
+        )
+    })
+}
+
+fn idle_states(machine: &Machine) -> String {
+    let states = machine.idle_states.join(", ");
+    if states.is_empty() { states } else { format!(" ({states})") }
+}
+
+/// CPUs of a list in the kernel's form, `0-3,8`; none for words.
+fn in_list(list: &str) -> BTreeSet<u64> {
+    let part = |part: &str| {
+        let (first, last) = part.trim().split_once('-').unwrap_or((part.trim(), part.trim()));
+        Some(first.parse::<u64>().ok()?..=last.parse().ok()?)
+    };
+    list.split(',').filter_map(part).flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+    use serde_json::json;
+
+    #[test]
+    fn a_machine_with_everything_has_nothing_to_tell() {
+        assert_eq!(of_run(&made_up::run(10)), [""; 0]);
+    }
+
+    #[test]
+    fn each_fact_has_its_sentence() {
+        let cases = [
+            ("frequency_governors", json!(["no cpufreq: whoever"]), "no frequency control (no cpufreq)"),
+            (
+                "frequency_governors",
+                json!(["CPUs 0: governor performance, driver x", "CPUs 1: governor powersave, driver x"]),
+                "governor of CPUs 1 is powersave",
+            ),
+            ("isolated", json!("1-3"), "CPU 0 of the loops is not among the isolated ones (1-3)"),
+            ("isolated", json!("none"), "No CPU is isolated"),
+            (
+                "interrupts",
+                json!({ "CPU 1": "may come: 3-5; do come: 24 virtio0" }),
+                "to CPU 1 of the loops: 24 virtio0",
+            ),
+            (
+                "interrupts",
+                json!({ "CPU 0": "may come: 3-5; do come: none" }),
+                "may come to CPU 0 of the loops: 3-5",
+            ),
+            ("smt", json!("CPUs that share a core: 0,2; 3,4 (control: on)"), "with others (0,2)"),
+            (
+                "rt_throttling",
+                json!({ "about": "on: 950000 us of each 1000000 us" }),
+                "RT throttling is on: 950000",
+            ),
+            ("clock_source", json!("kvm-clock"), "clock source is kvm-clock"),
+            ("memory", json!({ "swap_used_kib": 12 }), "12 KiB of swap"),
+        ];
+        for (key, value, words) in cases {
+            let mut run = made_up::run(10);
+            run.run["machine"][key] = value;
+            let told = of_run(&run);
+            assert!(told.len() == 1 && told[0].contains(words), "{words}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn a_refused_latency_tells_the_idle_states() {
+        let mut run = made_up::run(10);
+        run.run["realtime_granted"].as_array_mut().unwrap().remove(0);
+        run.run["machine"]["idle_states"] = json!(["C6: 133 us to leave"]);
+        let told = of_run(&run);
+        assert!(told.len() == 1 && told[0].starts_with("emulator did not hold"), "{told:?}");
+        assert!(told[0].contains("(C6: 133 us to leave)"), "{told:?}");
+    }
+}

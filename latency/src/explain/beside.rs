@@ -1,0 +1,115 @@
+//! What was noted beside an event: the flight recorder's dump of it with its frames, and what the rig reported.
+
+use crate::files::RunFiles;
+use crate::model::Event;
+use runlog::summary::{NotedEvent, Summary};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Cycles on each side of an event in which a dump of it may have its own cycle: neighbours are one event.
+const DUMP_WITHIN_CYCLES: u64 = 5;
+/// Cycles, of 1 ms, on each side of an event from which the rig's own events are told.
+const RIG_WITHIN_CYCLES: u64 = 10;
+
+/// Adds to an event of this run what lies beside it in the run's folder and summary.
+pub fn add(event: &mut Event, run: &RunFiles) {
+    let last = event.cycle + event.skipped;
+    if let Some(dump) = dump(&run.folder, &event.process, event.cycle, last) {
+        event.frames = frames(&run.folder.join(&dump).join("bus.log"));
+        event.dump = Some(dump);
+    }
+    event.rig_events = rig_events(&run.counted(), event.cycle, last);
+}
+
+/// The folder of the dump of these cycles, within the run's.
+fn dump(folder: &Path, process: &str, first: u64, last: u64) -> Option<String> {
+    let entries = std::fs::read_dir(folder.join("flight")).ok()?;
+    let near = entries.filter_map(|entry| {
+        let name = entry.ok()?.file_name().into_string().ok()?;
+        // PROCESS-CYCLE-TRIGGER, and a process may have a dash in its name.
+        let mut parts = name.rsplitn(3, '-').skip(1);
+        let (cycle, of): (u64, _) = (parts.next()?.parse().ok()?, parts.next()?);
+        let is_near = (first.saturating_sub(DUMP_WITHIN_CYCLES)..=last + DUMP_WITHIN_CYCLES).contains(&cycle);
+        (of == process && is_near).then(|| (cycle.abs_diff(last), format!("flight/{name}")))
+    });
+    near.min().map(|(_, name)| name)
+}
+
+/// Frames of a log of candump by identifier; nothing without one.
+fn frames(log: &Path) -> BTreeMap<String, u64> {
+    let text = std::fs::read_to_string(log).unwrap_or_default();
+    let mut counts = BTreeMap::new();
+    // (seconds) bus IDENTIFIER#DATA
+    for frame in text.lines().filter_map(|line| line.split_whitespace().nth(2)) {
+        if let Some((identifier, _)) = frame.split_once('#') {
+            *counts.entry(identifier.to_owned()).or_default() += 1;
+        }
+    }
+    counts
+}
+
+/// What the rig noted near these cycles, but for the missed cycles themselves.
+fn rig_events(summary: &Summary, first: u64, last: u64) -> Vec<String> {
+    let near = first.saturating_sub(RIG_WITHIN_CYCLES)..=last + RIG_WITHIN_CYCLES;
+    let mut told: Vec<_> = summary.events.iter().filter_map(|noted| in_words(noted, &near)).collect();
+    if summary.event_count.is_some_and(|count| count > summary.events.len() as u64) {
+        told.push("Of what came often the rig noted the first only.".to_owned());
+    }
+    told
+}
+
+fn in_words(noted: &NotedEvent, near: &std::ops::RangeInclusive<u64>) -> Option<String> {
+    let cycle = Some(noted.cycle).filter(|cycle| near.contains(cycle))?;
+    let (name, details) = match &noted.kind {
+        Value::String(name) => (name.as_str(), String::new()),
+        Value::Object(kind) => {
+            kind.iter().next().map(|(name, details)| (name.as_str(), details.to_string()))?
+        }
+        _ => return None,
+    };
+    (name != "skipped").then(|| format!("Cycle {cycle}: {name} {details}").trim_end().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{explain, made_up};
+    use serde_json::json;
+
+    #[test]
+    fn the_dump_its_frames_and_the_rigs_own_events_stand_beside_an_event() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut run = made_up::run(500);
+        made_up::stall(&mut run, "emulator", 100, 3_700_000);
+        run.folder = folder.path().into();
+        run.summary["event_count"] = json!(4);
+        run.summary["events"] = json!([
+            { "cycle": 20, "kind": "emergency_stop" },
+            { "cycle": 99, "kind": { "skipped": { "cycles": 3 } } },
+            { "cycle": 103, "kind": { "stale": { "axis": "drive" } } },
+            { "cycle": 112, "kind": "bus_lost" },
+        ]);
+        for name in ["emulator-0000000103-overrun", "controller-0000000103-late", "emulator-0000000300-late"]
+        {
+            let dump = folder.path().join("flight").join(name);
+            std::fs::create_dir_all(&dump).unwrap();
+            let log = "(1.000000) bus0 120#3E3E\n(1.000100) bus0 110#FF\n(1.001000) bus0 120#3F3E\n";
+            std::fs::write(dump.join("bus.log"), log).unwrap();
+        }
+        let mut event = explain::events(0, &run).remove(0);
+        add(&mut event, &run);
+        assert_eq!(event.dump.as_deref(), Some("flight/emulator-0000000103-overrun"));
+        assert_eq!(event.frames, BTreeMap::from([("110".to_owned(), 1), ("120".to_owned(), 2)]));
+        assert_eq!(event.rig_events, ["Cycle 103: stale {\"axis\":\"drive\"}", "Cycle 112: bus_lost"]);
+    }
+
+    #[test]
+    fn without_a_dump_nothing_is_named() {
+        let mut run = made_up::run(500);
+        made_up::stall(&mut run, "emulator", 100, 3_700_000);
+        let mut event = explain::events(0, &run).remove(0);
+        add(&mut event, &run);
+        assert_eq!((event.dump, event.frames.len(), event.rig_events.len()), (None, 0, 0));
+    }
+}

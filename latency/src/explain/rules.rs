@@ -1,0 +1,297 @@
+//! From what was seen of a late cycle to its cause, with the evidence that a person can check.
+//!
+//! The rules in their order; the first that holds names the cause. *It* is the lateness or the slowness, whichever is larger.
+//!
+//! | rule | cause |
+//! |---|---|
+//! | the process was continued by SIGCONT in these cycles | emulator-stopped, controller-stopped |
+//! | the probe saw the CPU stand still, no thread running on it, for half of it or more | machine-stood-still |
+//! | as the next, and the other process was late in the same moment without waiting for a CPU | machine-stood-still |
+//! | the thread waited for the CPU for half of it or more, in the worst cycle or over all of the event | cpu-contention |
+//! | more page faults than 20, or faults that explain a third of it | page-faults |
+//! | the work was slow, nobody else was, and nothing else is known of it | unexplained |
+//! | the probe watched that CPU and saw it free all the time | unexplained |
+//! | the kernel does not tell how long threads wait | unexplained |
+//! | none of these | machine-stood-still, as what is left |
+//!
+//! A late timer interrupt leaves no trace in the scheduler: the thread was not yet ready, so it did not wait, and nobody was
+//! ahead of it. On a virtual machine that is how its host's doings look from inside. What another CPU wakes is ready at
+//! once: there a CPU that stands still looks like waiting, which is why the probe and the other process are asked first.
+
+use crate::model::Cause;
+use crate::probe::Watched;
+use realtime::VitalCounts;
+
+/// Faults in a cycle from which on they are a cause by themselves: a locked process has none.
+const MANY_FAULTS: u64 = 20;
+/// What a fault costs about, ns: minor on this kind of machine 0.5 to 2 us, major at least a read from a fast disk. A guess.
+const MINOR_FAULT_NS: u64 = 1_000;
+const MAJOR_FAULT_NS: u64 = 100_000;
+
+/// Whether the kernel tells something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Known {
+    /// It does.
+    Yes,
+    /// It does not.
+    No,
+}
+
+/// What was seen of an event, at its worst cycle.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Which process.
+    pub process: String,
+    /// How late, ns.
+    pub late_ns: u64,
+    /// How much slower than usual, ns.
+    pub slow_ns: u64,
+    /// Cycles missed.
+    pub missed: u64,
+    /// Lengths of the stages receive, step, send, ns.
+    pub stages_ns: [u64; 3],
+    /// What the kernel counted.
+    pub vitals: VitalCounts,
+    /// SIGCONTs in the event's cycles and right after.
+    pub continued: u64,
+    /// Whether the kernel tells for how long threads wait for a CPU.
+    pub run_delay: Known,
+    /// Time that it waited for a CPU in all cycles of the event, ns.
+    pub waited_ns: u64,
+    /// Lateness or slowness of all cycles of the event, ns.
+    pub together_ns: u64,
+    /// Whether a probe watched this CPU.
+    pub probe_watched: Watched,
+    /// Longest gap of that probe within the event in which no thread had the CPU, ns.
+    pub still_ns: u64,
+    /// Longest in which another one had, ns.
+    pub another_ns: u64,
+    /// Longest gap on another CPU in which no thread had it, ns.
+    pub still_elsewhere_ns: u64,
+    /// Other processes that were late or slow in the same moment: name, by how much, for how long they waited for a CPU, ns.
+    pub others: Vec<(String, u64, u64)>,
+    /// Whether another process woke on time meanwhile, on another CPU.
+    pub ran_elsewhere: bool,
+}
+
+/// A cause with its reasons.
+#[derive(Clone, Debug)]
+pub struct Told {
+    /// What it was.
+    pub cause: Cause,
+    /// One sentence.
+    pub sentence: String,
+    /// What speaks for it, and what against.
+    pub evidence: Vec<String>,
+}
+
+/// Names the cause.
+#[must_use]
+pub fn cause(seen: &Seen) -> Told {
+    let cause = first_that_holds(seen);
+    Told { cause, sentence: sentence(cause, seen), evidence: evidence(seen) }
+}
+
+fn first_that_holds(seen: &Seen) -> Cause {
+    let bad_ns = seen.bad_ns();
+    let waited = seen.waited_half();
+    let slow = seen.slow_ns > seen.late_ns;
+    if seen.continued > 0 {
+        return if seen.process == "emulator" { Cause::EmulatorStopped } else { Cause::ControllerStopped };
+    }
+    if seen.still_ns.saturating_mul(2) >= bad_ns {
+        return Cause::MachineStoodStill;
+    }
+    if waited {
+        return if seen.other_stood_still() { Cause::MachineStoodStill } else { Cause::CpuContention };
+    }
+    if seen.faults() > MANY_FAULTS || seen.fault_cost_ns().saturating_mul(3) >= bad_ns {
+        return Cause::PageFaults;
+    }
+    if slow {
+        let elsewhere = seen.still_elsewhere_ns.saturating_mul(2) >= bad_ns || seen.other_stood_still();
+        return if elsewhere { Cause::MachineStoodStill } else { Cause::Unexplained };
+    }
+    let cpu_was_free =
+        seen.probe_watched == Watched::Yes && seen.still_ns.max(seen.another_ns).saturating_mul(4) < bad_ns;
+    if cpu_was_free || seen.run_delay == Known::No {
+        return Cause::Unexplained;
+    }
+    Cause::MachineStoodStill
+}
+
+impl Seen {
+    /// What is to be explained, ns.
+    fn bad_ns(&self) -> u64 {
+        self.late_ns.max(self.slow_ns)
+    }
+
+    /// Whether it waited for a CPU for half of it or more, in the worst cycle or over all of them.
+    fn waited_half(&self) -> bool {
+        self.vitals.run_delay_ns.saturating_mul(2) >= self.bad_ns()
+            || self.waited_ns.saturating_mul(2) >= self.together_ns
+    }
+
+    /// Whether something shows that the machine ran: a thread that kept the probe away, a process on another CPU, or that the
+    /// rig, which its own CPU's timer wakes, was ready for half of it.
+    #[must_use]
+    pub fn machine_ran(&self) -> bool {
+        self.another_ns.saturating_mul(2) >= self.bad_ns()
+            || self.ran_elsewhere
+            || (self.process == "emulator" && self.waited_half())
+    }
+
+    fn faults(&self) -> u64 {
+        self.vitals.minor_faults + self.vitals.major_faults
+    }
+
+    fn fault_cost_ns(&self) -> u64 {
+        self.vitals.minor_faults * MINOR_FAULT_NS + self.vitals.major_faults * MAJOR_FAULT_NS
+    }
+
+    /// Whether another process was about as late in the same moment, and not because it waited for a CPU.
+    fn other_stood_still(&self) -> bool {
+        let still = |(_, bad_ns, waited_ns): &(String, u64, u64)| {
+            bad_ns.saturating_mul(2) >= self.bad_ns() && waited_ns.saturating_mul(2) < *bad_ns
+        };
+        self.others.iter().any(still)
+    }
+}
+
+/// A length of time as a person reads it.
+#[must_use]
+pub fn in_words(ns: u64) -> String {
+    match ns {
+        0..1_000 => format!("{ns} ns"),
+        1_000..1_000_000 => format!("{:.1} us", ns as f64 * 1e-3),
+        1_000_000..1_000_000_000 => format!("{:.2} ms", ns as f64 * 1e-6),
+        _ => format!("{:.2} s", ns as f64 * 1e-9),
+    }
+}
+
+fn sentence(cause: Cause, seen: &Seen) -> String {
+    let Seen { process, missed, vitals, .. } = seen;
+    let what = if seen.slow_ns > seen.late_ns {
+        format!("The {process} was {} slower than usual", in_words(seen.slow_ns))
+    } else {
+        format!("The {process} woke {} late", in_words(seen.late_ns))
+    };
+    let and_missed = match missed {
+        0 => String::new(),
+        1 => " and missed 1 cycle".into(),
+        missed => format!(" and missed {missed} cycles"),
+    };
+    let cpu = vitals.cpu;
+    let because = match cause {
+        Cause::EmulatorStopped | Cause::ControllerStopped => {
+            "because its process was stopped and continued by a signal".to_owned()
+        }
+        Cause::CpuContention => format!(
+            "because other threads had CPU {cpu} for {}: to a FIFO thread only threads of the same or a higher priority, \
+             interrupts and the kernel's stop threads can do that",
+            in_words(seen.waited_ns)
+        ),
+        Cause::PageFaults => {
+            format!("because it had to wait for pages: {} faults in one cycle", seen.faults())
+        }
+        Cause::MachineStoodStill if seen.still_ns.saturating_mul(2) >= seen.bad_ns() => format!(
+            "because the machine stood still: for {} no thread ran on CPU {cpu}, which the probe saw",
+            in_words(seen.still_ns)
+        ),
+        Cause::MachineStoodStill if seen.other_stood_still() || seen.still_elsewhere_ns > 0 => {
+            let waited = in_words(seen.waited_ns);
+            // The kernel's account and the other witness contradict each other: a waiting thread has a CPU that runs.
+            let (likely, although) = if seen.waited_half() {
+                (
+                    "most likely ",
+                    format!(
+                        ", although by the kernel's account it was ready and waited {waited} for CPU {cpu}"
+                    ),
+                )
+            } else {
+                ("", String::new())
+            };
+            format!(
+                "{likely}because the machine stood still: more than this process was late in the same moment{although}"
+            )
+        }
+        Cause::MachineStoodStill => format!(
+            "most likely because the machine stood still: it waited only {} of {} for CPU {cpu}, had {} page faults and was \
+             not stopped, so that the timer's interrupt itself came late",
+            in_words(seen.waited_ns),
+            in_words(seen.together_ns),
+            if seen.faults() == 0 { "no".to_owned() } else { seen.faults().to_string() }
+        ),
+        _ if seen.probe_watched == Watched::Yes && seen.slow_ns <= seen.late_ns => {
+            format!("and nothing explains it: the probe saw CPU {cpu} free in that time")
+        }
+        _ if seen.slow_ns > seen.late_ns => {
+            "and nothing that was recorded tells whether its work was longer or the CPU stood still under it"
+                .to_owned()
+        }
+        _ => "and nothing that was recorded explains it".to_owned(),
+    };
+    format!("{what}{and_missed}, {because}.")
+}
+
+fn evidence(seen: &Seen) -> Vec<String> {
+    let Seen { vitals, .. } = seen;
+    let mut told = Vec::new();
+    if seen.continued > 0 {
+        told.push(format!("SIGCONT was counted {} time(s) in these cycles.", seen.continued));
+    }
+    told.push(match seen.run_delay {
+        Known::Yes => format!("It was ready and waited for the CPU for {}.", in_words(seen.waited_ns)),
+        Known::No => "The kernel does not tell how long threads wait for a CPU.".to_owned(),
+    });
+    told.push(format!(
+        "Page faults in the cycle: {} minor, {} major.",
+        vitals.minor_faults, vitals.major_faults
+    ));
+    if vitals.involuntary_switches > 0 {
+        told.push(format!("Another thread took the CPU from it {} time(s).", vitals.involuntary_switches));
+    }
+    if vitals.voluntary_switches > 1 {
+        let switches = vitals.voluntary_switches;
+        told.push(format!(
+            "It gave the CPU away {switches} times; once a cycle is usual, so its own work blocked."
+        ));
+    }
+    if seen.slow_ns > seen.late_ns {
+        let [receive, step, send] = seen.stages_ns.map(in_words);
+        told.push(format!("Stages of that cycle: receive {receive}, step {step}, send {send}."));
+    }
+    for (other, bad_ns, waited_ns) in &seen.others {
+        let (bad, waited) = (in_words(*bad_ns), in_words(*waited_ns));
+        told.push(format!(
+            "In the same moment {other} was late or slow by {bad}, of which it waited {waited} for a CPU."
+        ));
+    }
+    told.push(probe_evidence(seen));
+    told
+}
+
+fn probe_evidence(seen: &Seen) -> String {
+    let cpu = seen.vitals.cpu;
+    let mut text = if seen.probe_watched == Watched::No {
+        format!("No probe watched CPU {cpu}: whether it stood still was not seen directly.")
+    } else if seen.probe_watched == Watched::NotTold {
+        format!("The probe's table has no gap of CPU {cpu}, and does not tell whether that CPU was watched.")
+    } else if seen.still_ns > 0 {
+        format!(
+            "The probe saw CPU {cpu} stand still for {} of it, no other thread running.",
+            in_words(seen.still_ns)
+        )
+    } else if seen.another_ns > 0 {
+        format!(
+            "The probe was kept from CPU {cpu} by another thread for {} of it.",
+            in_words(seen.another_ns)
+        )
+    } else {
+        format!("The probe on CPU {cpu} saw no gap in that time.")
+    };
+    if seen.still_elsewhere_ns > 0 {
+        text.push_str(&format!(" Another CPU stood still for {} of it.", in_words(seen.still_elsewhere_ns)));
+    }
+    text
+}

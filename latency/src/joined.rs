@@ -1,0 +1,168 @@
+//! Rows of rig and controllers on one clock: how long a frame was on its way, each way, each axis.
+//!
+//! ```text
+//!   rig, cycle k                 sensors handed over ──────────────► sensors arrived      controller, cycle k
+//!   rig, a later cycle           command arrived     ◄────────────── answer handed over   controller, cycle k
+//! ```
+//!
+//! The later cycle of the rig says which cycle's sensors its command answers. Handing over is stamped before the call that sends,
+//! so the call itself is part of the way. What still comes out below zero counts as 0 and is counted.
+
+use super::files::{PROCESSES, RunFiles};
+use super::samples::Samples;
+use runlog::timing::{CycleTiming, Exchange};
+use std::collections::{BTreeMap, HashMap};
+
+/// Length of a cycle, ns.
+pub const PERIOD_NS: u64 = 1_000_000;
+
+/// Samples, and the largest of each second.
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    /// The samples.
+    pub samples: Samples,
+    /// Largest of each second of the run, ns.
+    pub maxima_ns: BTreeMap<u64, u64>,
+}
+
+impl Series {
+    /// Counts one sample of a cycle of the rig.
+    pub fn record(&mut self, cycle: u64, ns: u64) {
+        self.samples.record(ns, 1);
+        let largest = self.maxima_ns.entry(cycle * PERIOD_NS / 1_000_000_000).or_default();
+        *largest = ns.max(*largest);
+    }
+}
+
+/// What joining gave.
+#[derive(Clone, Debug, Default)]
+pub struct OneWay {
+    /// By tag.
+    pub series: BTreeMap<String, Series>,
+    /// Latencies below what the stamps can tell.
+    pub below_zero: u64,
+}
+
+/// Picks the exchange of an axis.
+type OfAxis = fn(&CycleTiming) -> Exchange;
+
+/// One-way latencies of a run with rows of both sides.
+#[must_use]
+pub fn one_way(run: &RunFiles) -> OneWay {
+    let mut found = OneWay::default();
+    let Some(rig) = run.rows.get("emulator") else { return found };
+    let axes: [(&str, OfAxis); 2] = [("drive", |row| row.drive), ("load", |row| row.load)];
+    for (axis, exchange) in axes {
+        let controllers = PROCESSES.iter().filter(|process| **process != "emulator");
+        let rows = controllers.filter_map(|process| run.rows.get(*process)).flatten();
+        // Whoever drives this axis has stamps of it.
+        let answered: HashMap<u64, Exchange> =
+            rows.map(|row| (row.cycle, exchange(row))).filter(|(_, told)| told.sensors_ns > 0).collect();
+        for row in rig {
+            let told = exchange(row);
+            if let Some(other) = answered.get(&row.cycle).filter(|_| told.sensors_ns > 0) {
+                found.record(
+                    &format!("{axis}-rig-to-controller"),
+                    row.cycle,
+                    told.sensors_ns,
+                    other.sensors_ns,
+                );
+            }
+            let answer =
+                answered.get(&told.answers).filter(|other| told.command_ns > 0 && other.command_ns > 0);
+            if let Some(other) = answer {
+                found.record(
+                    &format!("{axis}-controller-to-rig"),
+                    row.cycle,
+                    other.command_ns,
+                    told.command_ns,
+                );
+            }
+        }
+    }
+    found
+}
+
+impl OneWay {
+    fn record(&mut self, tag: &str, cycle: u64, sent_ns: u64, arrived_ns: u64) {
+        self.below_zero += u64::from(arrived_ns < sent_ns);
+        let ns = arrived_ns.saturating_sub(sent_ns);
+        if !self.series.contains_key(tag) {
+            self.series.insert(tag.to_owned(), Series::default());
+        }
+        if let Some(series) = self.series.get_mut(tag) {
+            series.record(cycle, ns);
+        }
+    }
+}
+
+/// What the rows of one process say by themselves, by tag: for runs whose log is missing.
+#[must_use]
+pub fn of_rows(process: &str, rows: &[CycleTiming]) -> BTreeMap<String, Series> {
+    let mut found: BTreeMap<String, Series> = BTreeMap::new();
+    let mut record = |what: &str, cycle: u64, ns: u64| {
+        found.entry(format!("{process}-{what}")).or_default().record(cycle, ns);
+    };
+    for row in rows {
+        let late_ns = row.woke_ns.saturating_sub(row.due_ns);
+        let completion_ns = row.done_ns.saturating_sub(row.due_ns);
+        if process == "emulator" {
+            // Each missed cycle was late too, against its own scheduled time, and done when this one was.
+            for n in 1..=row.skipped.min(row.cycle) {
+                record("wakeup", row.cycle, late_ns + n * PERIOD_NS);
+                record("completion", row.cycle, completion_ns + n * PERIOD_NS);
+            }
+        }
+        record("wakeup", row.cycle, late_ns);
+        record("receive", row.cycle, row.receive_ns);
+        record("step", row.cycle, row.step_ns);
+        record("send", row.cycle, row.send_ns);
+        record("execution", row.cycle, row.done_ns.saturating_sub(row.woke_ns));
+        record("completion", row.cycle, completion_ns);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+
+    #[test]
+    fn latencies_are_told_each_way_and_for_each_axis() {
+        let run = made_up::run(1000);
+        let told = one_way(&run);
+        let tags: Vec<_> = told.series.keys().map(String::as_str).collect();
+        let ways = [
+            "drive-controller-to-rig",
+            "drive-rig-to-controller",
+            "load-controller-to-rig",
+            "load-rig-to-controller",
+        ];
+        assert_eq!(tags, ways);
+        for (tag, ns) in [
+            ("drive-rig-to-controller", made_up::TO_CONTROLLER_NS),
+            ("load-controller-to-rig", made_up::TO_RIG_NS),
+        ] {
+            let told = told.series[tag].samples.percentiles_ns();
+            let p50 = told.p50.unwrap();
+            assert!((ns..=ns + ns / 500).contains(&p50), "{tag}: {p50}");
+            assert!(told.count > 990, "{tag}: {}", told.count);
+        }
+        assert_eq!(told.below_zero, 0);
+    }
+
+    #[test]
+    fn a_cycle_that_the_rig_missed_is_late_against_its_own_time() {
+        let mut run = made_up::run(100);
+        made_up::stall(&mut run, "emulator", 50, 5_300_000);
+        let told = of_rows("emulator", &run.rows["emulator"]);
+        let wakeup = &told["emulator-wakeup"].samples;
+        assert_eq!(wakeup.count(), 100);
+        let late = wakeup.histogram().count_between(1_000_000, 10_000_000);
+        assert_eq!(late, 5, "5.3, 4.3, 3.3, 2.3 and 1.3 ms late");
+        let completion = &told["emulator-completion"].samples;
+        assert_eq!(completion.count(), 100);
+        assert!(completion.histogram().max() >= wakeup.histogram().max());
+    }
+}

@@ -1,0 +1,211 @@
+//! The latency report: what runs left behind, joined on one clock, its worst events explained, a reference beside it.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`model`] | what a report says: `report.json` |
+//! | [`choice`] | which runs, in which groups |
+//! | [`files`] | what a run left in its folder |
+//! | [`hlog`] | interval logs, read and written |
+//! | [`probe`] | gaps that the spin-gap probe saw |
+//! | [`mod@reference`] | cyclictest's own JSON |
+//! | [`kinds`] | the distributions that a report knows |
+//! | [`samples`] | percentiles, bins |
+//! | [`joined`] | rows of rig and controllers on one clock |
+//! | [`distributions`] | distributions of each run, and all runs added up |
+//! | [`parts`] | the runs one by one |
+//! | [`explain`] | late cycles with their causes |
+//! | [`findings`] | what disturbed the runs as a whole |
+//! | [`cause`] | the one cause that a report names |
+//! | [`ratios`] | ours against the reference, pair by pair |
+//! | [`tallies`] | counts that a reader looks for first |
+//! | [`conditions`] | where and how it was measured |
+//! | [`claim`] | whether that supports a latency claim |
+//! | [`controlled`] | what was not controlled |
+//! | [`comparison`] | groups of runs side by side |
+//! | [`bounds`] | a threshold file held against a report |
+//! | [`resolution`] | whether pairs suffice to say that a ratio keeps its bound |
+//! | [`markdown`] | the summary for a merge request, and the short table |
+//! | [`jitterdebugger`] | wake-up latencies in its JSON |
+//! | [`output`] | all files of a report |
+//! | [`page`] | the report as one page |
+//! | [`table`] | the table of ratios that `scripts/latency` ends with |
+
+pub mod bounds;
+pub mod cause;
+pub mod choice;
+pub mod claim;
+pub mod comparison;
+pub mod conditions;
+pub mod controlled;
+pub mod distributions;
+pub mod explain;
+pub mod files;
+pub mod findings;
+pub mod hlog;
+pub mod jitterdebugger;
+pub mod joined;
+pub mod kinds;
+pub mod markdown;
+pub mod model;
+pub mod output;
+pub mod page;
+pub mod parts;
+pub mod probe;
+pub mod ratios;
+pub mod reference;
+pub mod resolution;
+pub mod samples;
+pub mod table;
+pub mod tallies;
+
+#[cfg(test)]
+mod made_up;
+
+use self::choice::Chosen;
+use self::files::RunFiles;
+use self::joined::Series;
+use self::model::{Report, SCHEMA, SCHEMA_VERSION};
+use self::resolution::Verdict;
+use self::samples::Samples;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Events that a report tells.
+const WORST: usize = 10;
+
+/// What keeps a report from being made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A folder without a run.
+    #[error(
+        "{0} holds no run, nor do the folders in it: name a folder with summary.json, run.json, emulator.hlog or \
+         emulator-timing.csv"
+    )]
+    NoRun(PathBuf),
+    /// A comparison of one run.
+    #[error(
+        "--compare: one run cannot be compared; name another folder, or put folders into groups with --group NAME=FOLDER"
+    )]
+    OneRun,
+    /// A group that says no folder.
+    #[error("--group {0}: write it as NAME=FOLDER")]
+    Group(String),
+    /// A file cannot be read.
+    #[error("cannot read {file}: {reason}")]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system or the parser said.
+        reason: String,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {file}: {reason}; choose another folder with --out")]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl ReportError {
+    fn read(file: &Path, reason: impl ToString) -> Self {
+        Self::Read { file: file.into(), reason: reason.to_string() }
+    }
+
+    fn write(file: &Path, reason: impl ToString) -> Self {
+        Self::Write { file: file.into(), reason: reason.to_string() }
+    }
+}
+
+/// A report with what its files are made of.
+#[derive(Debug)]
+pub struct Made {
+    /// What it says.
+    pub report: Report,
+    /// The runs as they were read.
+    pub runs: Vec<RunFiles>,
+    /// The distributions of each run, by tag.
+    pub series: Vec<BTreeMap<String, Series>>,
+    /// Those of all runs.
+    pub sums: BTreeMap<String, Samples>,
+}
+
+/// Makes the report of these runs, with groups side by side if asked for.
+#[must_use]
+pub fn make(chosen: &[Chosen], title: Option<&str>, compare: bool) -> Made {
+    let runs = chosen.iter().map(|chosen| RunFiles::read(&chosen.folder)).collect();
+    let groups: Vec<_> = chosen.iter().map(|chosen| chosen.group.as_deref()).collect();
+    from_files(runs, &groups, title, compare)
+}
+
+/// Makes the report of runs that were read; `groups` may name the group of each.
+#[must_use]
+pub fn from_files(
+    mut runs: Vec<RunFiles>,
+    groups: &[Option<&str>],
+    title: Option<&str>,
+    compare: bool,
+) -> Made {
+    let series: Vec<_> = runs.iter_mut().map(distributions::of_run).collect();
+    let sums = distributions::add_up(&series);
+    let part = |(place, run): (usize, &RunFiles)| {
+        let group = groups.get(place).copied().flatten();
+        parts::part(run, group, distributions::percentiles_of_run(run, &series[place]))
+    };
+    let parts: Vec<_> = runs.iter().enumerate().map(part).collect();
+    let mut events: Vec<_> =
+        runs.iter().enumerate().flat_map(|(place, run)| explain::events(place, run)).collect();
+    explain::sort_by_severity(&mut events);
+    let mut events = explain::one_of_each_moment(events);
+    let findings = findings::find(&runs, &events);
+    events.truncate(WORST);
+    events.iter_mut().for_each(|event| explain::beside::add(event, &runs[event.run]));
+    let conditions = conditions::conditions(&runs);
+    let report = Report {
+        schema: SCHEMA.into(),
+        schema_version: SCHEMA_VERSION,
+        title: title.map_or_else(|| default_title(&runs), str::to_owned),
+        made_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |now| now.as_secs() as f64),
+        claim: claim::claim(&runs, &conditions),
+        conditions,
+        distributions: distributions::shown(&series, &sums),
+        ratios: ratios::ratios(&parts),
+        worst: events,
+        findings,
+        comparison: if compare { comparison::compare(&parts) } else { None },
+        runs: parts,
+        bounds: Vec::new(),
+    };
+    Made { report, runs, series, sums }
+}
+
+fn default_title(runs: &[RunFiles]) -> String {
+    match runs {
+        [one] => format!("Latency report of {}", one.folder.display()),
+        _ => format!("Latency report of {} runs", runs.len()),
+    }
+}
+
+impl Made {
+    /// Holds the bounds of a threshold file against the report.
+    ///
+    /// # Errors
+    /// [`ReportError::Read`]: a file that cannot be read, or says something that makes no sense.
+    pub fn judge(&mut self, file: &Path) -> Result<(), ReportError> {
+        let text = std::fs::read_to_string(file).map_err(|error| ReportError::read(file, error))?;
+        self.report.bounds =
+            bounds::judge(&text, &self.report).map_err(|error| ReportError::read(file, error))?;
+        Ok(())
+    }
+
+    /// Whether a bound was broken; one that is not resolved was not.
+    #[must_use]
+    pub fn is_broken(&self) -> bool {
+        self.report.bounds.iter().any(|bound| bound.verdict() == Verdict::Broken)
+    }
+}
+
+#[cfg(test)]
+mod tests;

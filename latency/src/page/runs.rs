@@ -1,0 +1,166 @@
+//! The runs one by one: how regularly frames came, what was counted, each run's percentiles.
+
+use super::figures::{PERCENTILES, percentiles};
+use crate::model::{ArrivalRow, PercentilesNs, RunPart};
+use crate::tallies;
+use pagekit::grid::Grid;
+use pagekit::markup::{Cell, Table, folded, list, number, words as text};
+use pagekit::number;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What came of one frame at one receiver over all runs.
+#[derive(Default)]
+struct Arrivals {
+    period_ms: u64,
+    count: u64,
+    gaps: u64,
+    /// None of a frame that is sent on change too.
+    bursts: Option<u64>,
+    /// The largest of any run; percentiles of runs cannot be added up.
+    p99: Option<u64>,
+    p999: Option<u64>,
+    max: Option<u64>,
+}
+
+impl Arrivals {
+    fn add(&mut self, row: &ArrivalRow) {
+        let of = &row.interval_ns;
+        self.period_ms = row.period_ms;
+        self.count += row.count;
+        self.gaps += row.gaps;
+        self.bursts = row.bursts.map(|bursts| bursts + self.bursts.unwrap_or(0)).or(self.bursts);
+        self.p99 = self.p99.max(of.p99);
+        self.p999 = self.p999.max(of.p999);
+        self.max = self.max.max(of.max);
+    }
+}
+
+/// Gaps and bursts of each cyclic frame, over all runs and for each.
+pub(super) fn arrivals(runs: &[RunPart]) -> String {
+    let mut sums: BTreeMap<(&str, &str), Arrivals> = BTreeMap::new();
+    let head = ["receiver", "frame", "period, ms", "came", "gaps", "bursts"];
+    let intervals = ["interval p99, µs", "p99.9, µs", "longest, µs"];
+    let mut each = Table::new("Arrivals of each run", ["run"].into_iter().chain(head).chain(intervals));
+    for (run, part) in runs.iter().enumerate() {
+        for row in &part.arrivals {
+            sums.entry((&row.receiver, &row.frame)).or_default().add(row);
+            let mut one = Arrivals::default();
+            one.add(row);
+            let names = [text(format!("{run}")), text(&row.receiver)];
+            each.row(names.into_iter().chain(arrival_cells(&row.frame, &one)));
+        }
+    }
+    let mut table = Table::new("Arrivals over all runs", head.into_iter().chain(intervals));
+    for ((receiver, frame), sum) in &sums {
+        table.row([text(*receiver)].into_iter().chain(arrival_cells(frame, sum)));
+    }
+    let said = "Over all runs; of the percentiles the largest of any run. A gap is an interval longer than one and a half \
+                periods, a burst one shorter than half a period; cycles that the rig missed are gaps too.";
+    let all = table.html_or("None was measured.");
+    if sums.is_empty() || runs.len() < 2 {
+        return format!("{}{all}", pagekit::markup::paragraph(said));
+    }
+    format!(
+        "{}{all}{}",
+        pagekit::markup::paragraph(said),
+        folded("Each run", &each.html_or("None was measured."))
+    )
+}
+
+/// A frame and what came of it.
+fn arrival_cells(frame: &str, of: &Arrivals) -> Vec<Cell> {
+    let counts = [of.period_ms, of.count, of.gaps].map(|value| number(number::count(value)));
+    let bursts = of.bursts.map_or_else(|| text("sent on change too"), |bursts| number(number::count(bursts)));
+    let lengths = [of.p99, of.p999, of.max].map(|ns| number(number::maybe_us(ns)));
+    [text(frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
+}
+
+/// The runs, what each counted, and each one's percentiles.
+pub(super) fn counts(runs: &[RunPart]) -> String {
+    let mut table =
+        Table::new("Runs", ["run", "folder", "group", "started", "length, s", "the rig's verdict"]);
+    for (run, part) in runs.iter().enumerate() {
+        let verdict = if part.passed { "passed" } else { "not passed" };
+        table.row([
+            text(format!("{run}")),
+            text(&part.folder),
+            text(&part.group),
+            text(number::instant(part.started_unix_s)),
+            number(number::decimal(part.duration_s, 1)),
+            Cell::Judged(Some(part.passed), verdict.into()),
+        ]);
+    }
+    format!(
+        "{}{}{}{}{}{}",
+        table.html_or("No run was given."),
+        lacking(runs),
+        tally("Lost, late, duplicate, malformed frames", tallies::frames(runs)),
+        tally("Command age in cycles", tallies::command_ages(runs)),
+        counted(runs),
+        each_percentiles(runs)
+    )
+}
+
+/// A table of counts under its heading.
+fn tally(title: &str, grid: Option<Grid>) -> String {
+    let Some(grid) = grid else { return String::new() };
+    let mut table = Table::new(title, grid.head);
+    for mut row in grid.rows {
+        let counts = row.split_off(1);
+        table.row(row.into_iter().map(text).chain(counts.into_iter().map(number)));
+    }
+    format!("<h3>{title}</h3>\n{}", table.html_or("Nothing was counted."))
+}
+
+/// What folders do not hold, and the page therefore does not say.
+fn lacking(runs: &[RunPart]) -> String {
+    let said = runs.iter().enumerate().filter(|(_, part)| !part.lacks.is_empty());
+    let said = said.map(|(run, part)| format!("<h3>Run {run} lacks</h3>\n{}", list(&part.lacks, "")));
+    said.collect()
+}
+
+/// A row for each count, its sum first. Counts of parts that are 0 throughout are folded away; those of the whole always stand.
+fn counted(runs: &[RunPart]) -> String {
+    let names: BTreeSet<&str> = runs.iter().flat_map(|run| run.counts.keys().map(String::as_str)).collect();
+    let value = |run: &RunPart, name: &str| run.counts.get(name).copied();
+    let is_shown = |name: &&str| !name.contains('.') || runs.iter().any(|run| value(run, name) > Some(0));
+    let (shown, zero): (Vec<_>, Vec<_>) = names.into_iter().partition(is_shown);
+    let table = |names: &[&str]| {
+        let sum = (runs.len() > 1).then(|| "all".to_owned());
+        let columns = (0..runs.len()).map(|run| format!("run {run}"));
+        let mut table = Table::new("Counts", ["count".to_owned()].into_iter().chain(sum).chain(columns));
+        for name in names {
+            let sum = runs.iter().filter_map(|run| value(run, name)).fold(0, u64::saturating_add);
+            let sum = (runs.len() > 1).then(|| number(number::count(sum)));
+            let told = |run| number(value(run, name).map_or_else(|| number::NOTHING.into(), number::count));
+            table.row([text(*name)].into_iter().chain(sum).chain(runs.iter().map(told)));
+        }
+        table.html_or("Nothing was counted.")
+    };
+    if zero.is_empty() {
+        return table(&shown);
+    }
+    let summary =
+        format!("{} that are 0 in every run", number::counted(zero.len() as u64, "count", "counts"));
+    table(&shown) + &folded(&summary, &table(&zero))
+}
+
+fn each_percentiles(runs: &[RunPart]) -> String {
+    let mut by_name: BTreeMap<&str, Vec<(usize, &PercentilesNs)>> = BTreeMap::new();
+    for (run, part) in runs.iter().enumerate() {
+        for (name, of) in &part.percentiles_ns {
+            by_name.entry(name).or_default().push((run, of));
+        }
+    }
+    if by_name.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new("Percentiles of each run in µs", ["all in µs"].into_iter().chain(PERCENTILES));
+    for (name, of_runs) in by_name {
+        table.group(name);
+        for (run, of) in of_runs {
+            table.row([text(format!("run {run}"))].into_iter().chain(percentiles(of)));
+        }
+    }
+    folded("Percentiles of each run", &table.html_or(""))
+}

@@ -1,0 +1,120 @@
+//! The runs one by one: counts, arrivals, and where each came from.
+
+use super::distributions::percentiles;
+use super::files::RunFiles;
+use super::findings;
+use super::model::{ArrivalRow, PercentilesNs, RunPart};
+use realtime::ArrivalFigures;
+use runlog::summary::ProcessReport;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Group of a run that says none.
+const NO_GROUP: &str = "all";
+
+/// A run's part of the report.
+#[must_use]
+pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String, PercentilesNs>) -> RunPart {
+    let told_group = run.conditions.as_ref().and_then(|told| told.group.as_deref());
+    RunPart {
+        folder: run.folder.display().to_string(),
+        group: group.or(told_group).unwrap_or(NO_GROUP).to_owned(),
+        started_unix_s: run.started_unix_s().unwrap_or_default(),
+        duration_s: run.duration_s(),
+        counts: counts(run),
+        percentiles_ns,
+        arrivals: arrivals(run),
+        passed: run.counted().passed.unwrap_or_default(),
+        lacks: run.lacks.clone(),
+    }
+}
+
+/// Counts of the summary by their keys, nested ones joined by points; those of a controller begin with its name.
+fn counts(run: &RunFiles) -> BTreeMap<String, u64> {
+    const NO_COUNTS: [&str; 3] = ["schema_version", "thresholds", "figures"];
+    let mut counts = BTreeMap::new();
+    for (process, told) in run.reports() {
+        let prefix = if process == "emulator" { String::new() } else { format!("{process}.") };
+        for (key, value) in told.as_object().into_iter().flatten() {
+            // Percentiles are no counts, and what joining copied from the controllers' own files stands there.
+            let copied =
+                process == "emulator" && ["axes", "controller", "controllers"].contains(&key.as_str());
+            // A sum in ns, such as the time that a thread waited for its CPU, is a count of its own.
+            let is_distribution = key.ends_with("_ns") && !value.is_number();
+            if !is_distribution && !NO_COUNTS.contains(&key.as_str()) && !copied {
+                add(&mut counts, &format!("{prefix}{key}"), value);
+            }
+        }
+    }
+    if !run.summary.is_null() || !run.controllers.is_empty() {
+        counts.insert("frames_lost_by_gaps".into(), findings::lost_by_gaps(run));
+    }
+    counts
+}
+
+fn add(counts: &mut BTreeMap<String, u64>, name: &str, value: &Value) {
+    match value {
+        Value::Number(number) => counts.extend(number.as_u64().map(|count| (name.to_owned(), count))),
+        Value::Object(parts) => parts
+            .iter()
+            .filter(|(key, value)| !key.ends_with("_ns") || value.is_number())
+            .for_each(|(key, value)| add(counts, &format!("{name}.{key}"), value)),
+        _ => {}
+    }
+}
+
+fn arrivals(run: &RunFiles) -> Vec<ArrivalRow> {
+    let of_process = |(receiver, report): (&str, ProcessReport)| {
+        let row = |told: ArrivalFigures| ArrivalRow {
+            receiver: receiver.to_owned(),
+            frame: told.frame.into_owned(),
+            period_ms: told.period_ms,
+            count: told.count,
+            gaps: told.gaps,
+            bursts: told.bursts,
+            interval_ns: percentiles(&told.interval_ns).unwrap_or_default(),
+        };
+        report.timing.arrivals.into_iter().map(row).collect::<Vec<_>>()
+    };
+    run.process_reports().flat_map(of_process).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up;
+    use serde_json::json;
+
+    #[test]
+    fn counts_keep_their_keys_and_percentiles_are_none() {
+        let mut run = made_up::run(50);
+        run.summary["wakeup_ns"] = json!({ "p50": 3, "count": 50 });
+        run.summary["vitals"] = json!({ "minor_faults": 4, "run_delay_ns": 5 });
+        let told = part(&run, None, BTreeMap::new());
+        assert_eq!(told.counts["cycles"], 50);
+        assert_eq!(told.counts["vitals.minor_faults"], 4);
+        assert_eq!(told.counts["controller.axes.drive.sensors_lost"], 0);
+        assert_eq!(told.counts["vitals.run_delay_ns"], 5);
+        assert!(!told.counts.keys().any(|key| key.contains("wakeup_ns")));
+        assert_eq!((told.group.as_str(), told.passed), ("a", true));
+        assert_eq!(part(&run, Some("b"), BTreeMap::new()).group, "b");
+    }
+
+    #[test]
+    fn arrivals_of_all_receivers_are_listed() {
+        let mut run = made_up::run(50);
+        let row = |frame: &str| {
+            json!([{ "frame": frame, "period_ms": 1, "count": 49, "gaps": 2, "bursts": 1,
+            "interval_ns": { "p50": 1_000_000, "max": 2_000_000, "count": 49 } }])
+        };
+        run.summary["arrivals"] = row("DriveValveCommand");
+        run.summary["arrivals"][0]["bursts"] = json!(null);
+        run.controllers.get_mut("controller").unwrap()["arrivals"] = row("DriveSensors");
+        let told = arrivals(&run);
+        let names: Vec<_> =
+            told.iter().map(|row| (row.receiver.as_str(), row.frame.as_str(), row.gaps)).collect();
+        assert_eq!(names, [("emulator", "DriveValveCommand", 2), ("controller", "DriveSensors", 2)]);
+        assert_eq!(told[0].interval_ns.p50, Some(1_000_000));
+        assert_eq!((told[0].bursts, told[1].bursts), (None, Some(1)));
+    }
+}

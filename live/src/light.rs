@@ -1,0 +1,78 @@
+//! The light: whether the run that goes on supports a latency claim, by the rules of the report and by what is known so far.
+//!
+//! `no`: something speaks against it that the rest of the run will hardly mend. `doubtful`: nothing does, but something is still
+//! missing; without a reference in turns with the runs that stays so to the end, as it does in the report. `yes`: the report
+//! would say so. Missed cycles count as in the report, by their share of the run so far: a light that went out for them may come
+//! back once the share is small again, and the count stands beside it in any case.
+
+use latency::claim;
+use latency::conditions::conditions;
+use latency::files::RunFiles;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// The run as the rules see it.
+#[derive(Debug, Default)]
+pub struct Light {
+    folder: Option<PathBuf>,
+    run: RunFiles,
+}
+
+impl Light {
+    /// Of the run in this folder.
+    #[must_use]
+    pub fn new(folder: Option<&Path>) -> Self {
+        Self { folder: folder.map(Path::to_path_buf), run: RunFiles::default() }
+    }
+
+    /// Judges anew, after so many cycles of which so many were skipped.
+    #[must_use]
+    pub fn judge(&mut self, cycles: u64, skipped: u64) -> Value {
+        if self.run.run.is_null() {
+            // The emulator writes it when it has asked for its privileges, which is after it let viewers in.
+            self.run.run = self.folder.as_deref().and_then(read).unwrap_or_default();
+        }
+        if self.run.run.is_null() {
+            let reason = "What the emulator was granted is not known: its run.json was not found.";
+            return json!({ "supported": "doubtful", "reasons": [reason] });
+        }
+        self.run.summary = json!({ "cycles": cycles, "skipped": skipped });
+        let runs = std::slice::from_ref(&self.run);
+        let so_far = claim::so_far(runs, &conditions(runs));
+        let supported = match (so_far.against.is_empty(), so_far.missing.is_empty()) {
+            (false, _) => "no",
+            (true, false) => "doubtful",
+            (true, true) => "yes",
+        };
+        let reasons = [so_far.against, so_far.missing].concat();
+        json!({ "supported": supported, "reasons": reasons })
+    }
+}
+
+fn read(folder: &Path) -> Option<Value> {
+    let text = std::fs::read_to_string(folder.join("run.json")).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(run: &Value, skipped: u64) -> Value {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("run.json"), run.to_string()).unwrap();
+        Light::new(Some(folder.path())).judge(10_000, skipped)
+    }
+
+    #[test]
+    fn what_speaks_against_a_claim_puts_it_out_and_what_is_missing_makes_it_doubtful() {
+        let granted = json!(["SCHED_FIFO priority 80", "memory locked", "pinned to CPU 0"]);
+        let run = json!({ "realtime_granted": granted, "machine": { "build": { "profile": "release" } } });
+        assert_eq!(judged(&run, 10)["supported"], "doubtful");
+        let missed = judged(&run, 11);
+        assert_eq!(missed["supported"], "no");
+        assert!(missed["reasons"][0].as_str().unwrap().contains("missed 0.1 %"), "{missed}");
+        assert_eq!(judged(&json!({ "realtime_granted": [] }), 0)["supported"], "no");
+        assert_eq!(Light::new(None).judge(1, 0)["supported"], "doubtful");
+    }
+}

@@ -1,0 +1,137 @@
+//! The loop's heartbeat out of the telemetry's histograms: wake-ups and round trips, of all that was heard and of the last 10 s.
+
+use latency::hlog;
+use latency::samples::Samples;
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+
+/// Seconds that count as the last ones.
+const RECENT_S: usize = 10;
+/// What is shown, and the tags of the log that it is made of.
+const SHOWN: [(&str, &[&str]); 2] =
+    [("wake_up", &["emulator-wakeup"]), ("round_trip", &["drive-round-trip", "load-round-trip"])];
+
+/// One of those shown.
+#[derive(Debug, Default)]
+struct Distribution {
+    whole: Samples,
+    /// By the second in which they began.
+    recent: VecDeque<(u64, Samples)>,
+}
+
+/// The heartbeat of a run.
+#[derive(Debug, Default)]
+pub struct Rhythm {
+    distributions: [Distribution; SHOWN.len()],
+}
+
+impl Rhythm {
+    /// Takes a line of an interval log.
+    ///
+    /// # Errors
+    /// [`hlog::LogError`] when it is none.
+    pub fn take(&mut self, line: &str) -> Result<(), hlog::LogError> {
+        hlog::each(&format!("{line}\n"), |passing| {
+            let known = SHOWN.iter().position(|(_, tags)| tags.contains(&passing.tag));
+            let Some(distribution) = known.map(|place| &mut self.distributions[place]) else { return };
+            distribution.whole.add_histogram(passing.histogram);
+            let second = passing.start_s as u64;
+            let recent = &mut distribution.recent;
+            if recent.back().is_none_or(|(newest, _)| *newest != second) {
+                recent.push_back((second, Samples::default()));
+                if recent.len() > RECENT_S {
+                    recent.pop_front();
+                }
+            }
+            if let Some((_, samples)) = recent.back_mut() {
+                samples.add_histogram(passing.histogram);
+            }
+        })
+    }
+
+    /// Percentiles of all that was heard, us; null where there are too few samples for one.
+    #[must_use]
+    pub fn percentiles(&self) -> Value {
+        let us = |ns: Option<u64>| ns.map(|ns| ns as f64 / 1e3);
+        let told = |distribution: &Distribution| {
+            let told = distribution.whole.percentiles_ns();
+            json!({
+                "p50": us(told.p50),
+                "p90": us(told.p90),
+                "p99": us(told.p99),
+                "p999": us(told.p999),
+                "max": us(told.max),
+                "count": told.count,
+            })
+        };
+        self.each(told)
+    }
+
+    /// Bins on a logarithmic axis: upper end in us, and samples.
+    #[must_use]
+    pub fn histograms(&self) -> Value {
+        let bins = |samples: &Samples| -> Value {
+            samples.bins().iter().map(|bin| json!([bin.to_ns as f64 / 1e3, bin.count])).collect()
+        };
+        self.each(|distribution| {
+            let mut recent = Samples::default();
+            distribution.recent.iter().for_each(|(_, samples)| recent.add(samples));
+            json!({ "whole": bins(&distribution.whole), "last_10_s": bins(&recent) })
+        })
+    }
+
+    /// The samples of all that was heard, by name.
+    pub fn samples(&self) -> impl Iterator<Item = (&'static str, &Samples)> {
+        SHOWN.iter().zip(&self.distributions).map(|((name, _), distribution)| (*name, &distribution.whole))
+    }
+
+    fn each(&self, tell: impl Fn(&Distribution) -> Value) -> Value {
+        let told = SHOWN.iter().zip(&self.distributions);
+        told.map(|((name, _), distribution)| ((*name).to_owned(), tell(distribution)))
+            .collect::<serde_json::Map<_, _>>()
+            .into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use latency::hlog::Interval;
+
+    fn lines(tag: &str, start_s: f64, ns: u64) -> Vec<String> {
+        let samples = std::iter::repeat_n(ns, 100).collect();
+        let interval = Interval { tag: tag.into(), start_s, duration_s: 1.0, samples };
+        let mut log = Vec::new();
+        hlog::write(&mut log, 0.0, [&interval]).unwrap();
+        String::from_utf8(log).unwrap().lines().map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn what_is_old_counts_in_the_whole_alone() {
+        let mut rhythm = Rhythm::default();
+        for second in 0..RECENT_S + 5 {
+            for line in lines("emulator-wakeup", second as f64, if second < 5 { 50_000 } else { 10_000 }) {
+                rhythm.take(&line).unwrap();
+            }
+        }
+        let told = rhythm.histograms();
+        let count = |which: &str| -> u64 {
+            let bins = told["wake_up"][which].as_array().unwrap();
+            bins.iter().map(|bin| bin[1].as_u64().unwrap()).sum()
+        };
+        assert_eq!((count("whole"), count("last_10_s")), (1500, 1000));
+        assert_eq!(told["wake_up"]["last_10_s"].as_array().unwrap().len(), 1, "all of one length");
+        assert_eq!(rhythm.percentiles()["wake_up"]["count"], 1500);
+        assert_eq!(rhythm.percentiles()["round_trip"]["p50"], Value::Null);
+    }
+
+    #[test]
+    fn both_axes_count_as_round_trips_and_others_as_nothing() {
+        let mut rhythm = Rhythm::default();
+        for tag in ["drive-round-trip", "load-round-trip", "emulator-step"] {
+            lines(tag, 0.0, 20_000).iter().for_each(|line| rhythm.take(line).unwrap());
+        }
+        assert_eq!(rhythm.percentiles()["round_trip"]["count"], 200);
+        assert!(rhythm.take("Tag=a,0,1,2,nothing").is_err());
+    }
+}

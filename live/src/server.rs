@@ -1,0 +1,484 @@
+//! Who gets what: the loop over bus, telemetry and clients, the paths, and the orders.
+
+use super::LiveError;
+use super::assets;
+use super::cli::WatchArguments;
+use super::client::{Client, refusal};
+use super::control::{self, Order};
+use super::feed::Feed;
+use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, response, said};
+use super::metrics;
+use super::view::{Audience, View};
+use super::wire::CONSOLE;
+use crate::wall_clock_ns;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use protocol::bus::{self, Bus, BusUrl, Received};
+use protocol::frames::{EmergencyStop, Frame};
+use protocol::periods::EMERGENCY_STOP_CYCLES;
+use runlog::candump::FrameRecord;
+use runlog::telemetry::Packet;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Time between two looks at bus and telemetry, ms.
+const TURN_MS: u64 = 10;
+/// Frames of the bus that are taken in one turn: more than a full bus carries in ten of them.
+const FRAMES_A_TURN: usize = 4096;
+/// Times between events of each kind, ms.
+const ROWS_MS: u64 = 50;
+const STATE_MS: u64 = 200;
+const SECOND_MS: u64 = 1000;
+const HEARTBEAT_MS: u64 = 5000;
+/// Longest history that is handed out, s.
+const LONGEST_HISTORY_S: f64 = 60.0;
+/// Bytes of a token: too many to be guessed.
+const TOKEN_BYTES: usize = 16;
+/// Interface name in saved logs of a bus without a name of its own.
+const NAMELESS: &str = "bus0";
+
+/// What became of a record that was saved for a client, or why it was not.
+type Saved = (u64, io::Result<String>);
+
+/// The page and everything behind it.
+pub(super) struct Server {
+    bus: Box<dyn Bus>,
+    url: BusUrl,
+    bus_was_up: bool,
+    feed: Option<Feed>,
+    view: View,
+    listener: TcpListener,
+    address: SocketAddr,
+    clients: Vec<Client>,
+    most_clients: usize,
+    next_client: u64,
+    /// What a client shows that may act; `None` when nobody may.
+    token: Option<String>,
+    save_to: Option<PathBuf>,
+    saved: (Sender<Saved>, Receiver<Saved>),
+    saving: bool,
+    /// Clients whose commands the emulator has not answered yet, in their order.
+    asked: VecDeque<u64>,
+    /// When the console's stop is due on the bus again, while it is held.
+    stop_due_ms: Option<u64>,
+    missed_by_gone: u64,
+    began: Instant,
+    due: Due,
+}
+
+/// When the next events are due, ms.
+#[derive(Default)]
+struct Due {
+    turn: u64,
+    rows: u64,
+    state: u64,
+    second: u64,
+    heartbeat: u64,
+}
+
+impl Server {
+    pub(super) fn open(arguments: &WatchArguments) -> Result<Self, LiveError> {
+        let address = arguments.http;
+        let refused = |reason: io::Error| LiveError::Listen { address, reason: reason.to_string() };
+        let bus = bus::open(&arguments.bus, Box::new(wall_clock_ns))?;
+        let listener = TcpListener::bind(address).map_err(refused)?;
+        listener.set_nonblocking(true).map_err(refused)?;
+        let token = arguments.control.then(draw_token).transpose().map_err(LiveError::System)?;
+        Ok(Self {
+            bus_was_up: bus.is_up(),
+            bus,
+            url: arguments.bus.clone(),
+            feed: arguments.telemetry.clone().map(Feed::new),
+            view: View::new(arguments.run.as_deref()),
+            address: listener.local_addr().map_err(refused)?,
+            listener,
+            clients: Vec::new(),
+            most_clients: usize::from(arguments.clients),
+            next_client: 0,
+            token,
+            save_to: arguments.save.clone(),
+            saved: bounded(1),
+            saving: false,
+            asked: VecDeque::new(),
+            stop_due_ms: None,
+            missed_by_gone: 0,
+            began: Instant::now(),
+            due: Due::default(),
+        })
+    }
+
+    pub(super) fn announce(&self) {
+        let secret = self.token.as_ref().map_or_else(String::new, |token| format!("#token={token}"));
+        eprintln!("bench watch: {} at http://{}/{secret} ; Ctrl-C ends it", self.url, self.address);
+        if !self.address.ip().is_loopback() {
+            let what = if self.token.is_some() { "and, with the token, move the rig" } else { "there" };
+            eprintln!(
+                "bench watch: warning: {} is not loopback: whoever reaches it sees the run {what}",
+                self.address
+            );
+        }
+        if !self.bus_was_up {
+            eprintln!("bench watch: {} has no host yet; waiting for it", self.url);
+        }
+    }
+
+    /// Waits for something to do, and does it.
+    pub(super) fn turn(&mut self) -> io::Result<()> {
+        let (readable, someone_waits) = self.wait()?;
+        let now_ms = self.now_ms();
+        if someone_waits {
+            self.let_in(now_ms);
+        }
+        for place in readable {
+            if let Some(request) = self.clients[place].read(now_ms) {
+                self.serve(place, &request, now_ms);
+            }
+        }
+        if now_ms >= self.due.turn {
+            self.due.turn = now_ms + TURN_MS;
+            self.hear(now_ms);
+            self.repeat_stop(now_ms);
+            self.tell(now_ms);
+        }
+        self.clients.iter_mut().for_each(|client| client.write(now_ms));
+        let gone = self.clients.extract_if(.., |client| client.is_gone());
+        self.missed_by_gone += gone.map(|client| client.missed).sum::<u64>();
+        Ok(())
+    }
+
+    /// Which clients have sent something, and whether somebody waits at the door.
+    fn wait(&self) -> io::Result<(Vec<usize>, bool)> {
+        let left_ms = self.due.turn.saturating_sub(self.now_ms());
+        let timeout = Timespec { tv_sec: 0, tv_nsec: (left_ms * 1_000_000) as i64 };
+        let mut polled = vec![PollFd::new(&self.listener, PollFlags::IN)];
+        for client in &self.clients {
+            let out = if client.has_something_to_write() { PollFlags::OUT } else { PollFlags::empty() };
+            polled.push(PollFd::new(client.stream(), PollFlags::IN | out));
+        }
+        match poll(&mut polled, Some(&timeout)) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let told = |polled: &PollFd<'_>| {
+            polled.revents().intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR)
+        };
+        let readable = polled[1..].iter().enumerate().filter(|(_, client)| told(client));
+        Ok((readable.map(|(place, _)| place).collect(), told(&polled[0])))
+    }
+
+    fn let_in(&mut self, now_ms: u64) {
+        while let Ok((stream, _)) = self.listener.accept() {
+            if self.clients.len() >= self.most_clients {
+                // Whether it reads this is its own affair; the socket's buffer takes it at once.
+                let _ = stream.set_nonblocking(true).and_then(|()| (&stream).write(&refusal()));
+                continue;
+            }
+            self.next_client += 1;
+            // A socket that takes no options is that of a client that has gone already.
+            self.clients.extend(Client::new(stream, self.next_client, now_ms));
+        }
+    }
+
+    /// Takes what came by bus and telemetry.
+    fn hear(&mut self, now_ms: u64) {
+        for _ in 0..FRAMES_A_TURN {
+            match self.bus.receive() {
+                Received::Frame(frame, stamp_ns) => self.view.frame(FrameRecord { stamp_ns, frame }, now_ms),
+                Received::Barrier(_) => {}
+                Received::Nothing => break,
+            }
+        }
+        let bus_is_up = self.bus.is_up();
+        if std::mem::replace(&mut self.bus_was_up, bus_is_up) != bus_is_up {
+            self.tell_status(now_ms);
+        }
+        let Some(feed) = &mut self.feed else { return };
+        let (had_telemetry, mut described) = (self.view.telemetry, false);
+        let (view, mut answers) = (&mut self.view, Vec::new());
+        let gone = feed.turn(|packet| match packet {
+            Packet::Answer(text) => answers.push(text),
+            packet => {
+                described |= matches!(packet, Packet::Description(_));
+                view.packet(packet);
+            }
+        });
+        answers.iter().for_each(|text| self.hand_on(text, now_ms));
+        if gone {
+            self.view.telemetry = false;
+            for number in std::mem::take(&mut self.asked) {
+                self.answer(number, said(Status::Busy, "the emulator is gone"), now_ms);
+            }
+        }
+        // Connected is told with the description, not before it: who hears of it asks for that at once.
+        if described || had_telemetry && gone {
+            self.tell_status(now_ms);
+        }
+    }
+
+    /// Gives the emulator's answer to the client that asked for it.
+    fn hand_on(&mut self, text: &str, now_ms: u64) {
+        let Some(number) = self.asked.pop_front() else { return };
+        let answer: Value = serde_json::from_str(text).unwrap_or_default();
+        let told = match (answer["ok"] == true, answer["text"].as_str().unwrap_or_default()) {
+            (true, "") => said(Status::Good, "the emulator obeys"),
+            (true, text) => said(Status::Good, text),
+            (false, text) => said(Status::BadRequest, text),
+        };
+        self.answer(number, told, now_ms);
+    }
+
+    fn answer(&mut self, number: u64, response: Vec<u8>, now_ms: u64) {
+        // One that has gone meanwhile needs none.
+        if let Some(client) = self.clients.iter_mut().find(|client| client.number == number) {
+            client.answer(response, now_ms);
+        }
+    }
+
+    /// Tells listeners what is due.
+    fn tell(&mut self, now_ms: u64) {
+        for message in self.view.take_messages() {
+            self.broadcast("message", &message, now_ms);
+        }
+        if is_due(&mut self.due.rows, now_ms, ROWS_MS)
+            && let Some(rows) = self.view.rows.take_fresh()
+        {
+            self.broadcast("rows", &rows, now_ms);
+        }
+        if is_due(&mut self.due.second, now_ms, SECOND_MS) {
+            self.view.wire.turn(now_ms);
+            self.view.second();
+            self.broadcast("histograms", &self.view.rhythm.histograms(), now_ms);
+        }
+        if is_due(&mut self.due.state, now_ms, STATE_MS) {
+            self.broadcast("state", &self.view.state(self.audience(now_ms)), now_ms);
+        }
+        if is_due(&mut self.due.heartbeat, now_ms, HEARTBEAT_MS) {
+            self.offer(&HEARTBEAT.into(), now_ms);
+        }
+        if let Ok((number, saved)) = self.saved.1.try_recv() {
+            self.saving = false;
+            let told = match saved {
+                Ok(told) => said(Status::Good, &told),
+                Err(error) => said(Status::BadRequest, &error.to_string()),
+            };
+            self.answer(number, told, now_ms);
+        }
+    }
+
+    fn tell_status(&mut self, now_ms: u64) {
+        let status = self.status();
+        let of = |what: &str| status[what].as_str().unwrap_or_default();
+        eprintln!("bench watch: bus {}, telemetry {}", of("bus"), of("telemetry"));
+        self.broadcast("status", &status, now_ms);
+    }
+
+    fn status(&self) -> Value {
+        let word = |is_there: bool| if is_there { "connected" } else { "gone" };
+        json!({ "bus": word(self.bus.is_up()), "telemetry": word(self.view.telemetry) })
+    }
+
+    fn broadcast(&mut self, name: &str, data: &Value, now_ms: u64) {
+        if self.clients.iter().any(Client::is_streaming) {
+            self.offer(&http::event(name, data).into(), now_ms);
+        }
+    }
+
+    fn offer(&mut self, event: &Arc<[u8]>, now_ms: u64) {
+        let listeners = self.clients.iter_mut().filter(|client| client.is_streaming());
+        listeners.for_each(|client| client.offer(event, now_ms));
+    }
+
+    fn audience(&self, now_ms: u64) -> Audience {
+        let missed: u64 = self.clients.iter().map(|client| client.missed).sum();
+        let viewers = self.clients.iter().filter(|client| client.is_streaming()).count();
+        Audience { viewers, missed: self.missed_by_gone + missed, now_ms }
+    }
+
+    /// Answers a request, now or when it is done.
+    fn serve(&mut self, place: usize, request: &Request, now_ms: u64) {
+        let is_for_us = request.host.as_deref().is_some_and(|host| is_ours(host, self.address.port()));
+        if !is_for_us {
+            let why = "ask by the address that was printed: this server goes by no other name";
+            return self.clients[place].answer(said(Status::Forbidden, why), now_ms);
+        }
+        if request.path == "/api/control" {
+            let number = self.clients[place].number;
+            if let Some(answer) = self.control(number, request, now_ms) {
+                self.clients[place].answer(answer, now_ms);
+            }
+            return;
+        }
+        if request.method != "GET" {
+            let why = "only GET here; POST goes to /api/control";
+            return self.clients[place].answer(said(Status::MethodNotAllowed, why), now_ms);
+        }
+        let answer = match request.path.as_str() {
+            "/api/events" => {
+                self.clients[place].stream_events(now_ms);
+                let first = http::event("status", &self.status());
+                return self.clients[place].offer(&first.into(), now_ms);
+            }
+            "/api/description" => json_response(Status::Good, &self.view.description(self.token.is_some())),
+            "/api/state" => {
+                json_response(Status::Good, &self.view.state_with_messages(self.audience(now_ms)))
+            }
+            "/api/history" => self.history(&request.query),
+            "/metrics" => {
+                let text = metrics::text(&self.view, self.audience(now_ms), self.bus.is_up());
+                response(Status::Good, "text/plain; version=0.0.4; charset=utf-8", text.as_bytes())
+            }
+            path => match assets::find(path) {
+                Some(asset) => response(Status::Good, asset.content_type, asset.body),
+                None => said(Status::NotFound, "there is nothing by this name"),
+            },
+        };
+        self.clients[place].answer(answer, now_ms);
+    }
+
+    fn history(&self, query: &str) -> Vec<u8> {
+        let asked = query.split('&').find_map(|pair| pair.strip_prefix("seconds="));
+        let seconds = asked.map_or(Ok(LONGEST_HISTORY_S), str::parse);
+        match seconds {
+            Ok(seconds) if (0.0..=LONGEST_HISTORY_S).contains(&seconds) => {
+                json_response(Status::Good, &self.view.rows.last(seconds))
+            }
+            _ => said(Status::BadRequest, &format!("seconds: 0 to {LONGEST_HISTORY_S}")),
+        }
+    }
+
+    /// Obeys an order if it may be given; `None` when the answer comes later.
+    fn control(&mut self, number: u64, request: &Request, now_ms: u64) -> Option<Vec<u8>> {
+        if request.method != "POST" {
+            return Some(said(Status::MethodNotAllowed, "orders come by POST"));
+        }
+        let Some(token) = &self.token else {
+            return Some(said(
+                Status::Forbidden,
+                "this page only looks on: it was started without --control",
+            ));
+        };
+        // Browsers tell which page a request comes from; programs tell nothing, and need the token all the same.
+        let host = request.host.as_deref().unwrap_or_default();
+        if request.origin.as_deref().is_some_and(|origin| origin != format!("http://{host}")) {
+            return Some(said(Status::Forbidden, "this request comes from another page"));
+        }
+        let shown = request.token.as_deref().unwrap_or_default();
+        if !is_same(token.as_bytes(), shown.as_bytes()) {
+            return Some(said(
+                Status::Unauthorized,
+                "the token is missing or wrong: open the address that was printed",
+            ));
+        }
+        match control::read(&request.body) {
+            Ok(order) => self.obey(number, order, now_ms),
+            Err(why) => Some(said(Status::BadRequest, &why)),
+        }
+    }
+
+    fn obey(&mut self, number: u64, order: Order, now_ms: u64) -> Option<Vec<u8>> {
+        match order {
+            Order::Stop => {
+                self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
+                Some(self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(false)), now_ms))
+            }
+            Order::Release => {
+                self.stop_due_ms = None;
+                Some(self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(true)), now_ms))
+            }
+            Order::Frame(frame) => Some(self.send(&frame, now_ms)),
+            Order::SetPoint { axis, position_m, force_n } => {
+                let asked = self.view.wire.hand_set_point(axis, position_m, force_n);
+                Some(match asked {
+                    Some(asked) => self.send(&Frame::HandSetPoint(asked), now_ms),
+                    None => said(Status::Busy, "no controller of this axis is heard"),
+                })
+            }
+            Order::Line(line) => {
+                let left = self.feed.as_mut().is_some_and(|feed| feed.command(&line));
+                if left {
+                    self.asked.push_back(number);
+                    return None;
+                }
+                Some(said(Status::Busy, "no emulator listens: start it with --telemetry and --console"))
+            }
+            Order::Save(seconds) => self.save(number, seconds),
+        }
+    }
+
+    /// Puts a frame on the bus, and tells whether it left.
+    fn send(&mut self, frame: &Frame, now_ms: u64) -> Vec<u8> {
+        let encoded = match frame.encode() {
+            Ok(encoded) => encoded,
+            Err(error) => return said(Status::BadRequest, &error.to_string()),
+        };
+        match self.bus.send(&encoded) {
+            Ok(_) => {
+                // A peer does not hear itself.
+                self.view.sent(encoded, wall_clock_ns(0));
+                if let Frame::ConsoleEmergencyStop(stop) = frame {
+                    self.note_stop(*stop, now_ms);
+                }
+                said(Status::Good, "on the bus")
+            }
+            Err(error) => said(Status::Busy, &error.to_string()),
+        }
+    }
+
+    fn note_stop(&mut self, stop: EmergencyStop, now_ms: u64) {
+        self.view.wire.note_stop(CONSOLE, stop, now_ms);
+    }
+
+    /// Sends the console's stop again, as `rig.dbc` has it while its cause lasts; also to a rig that was not there before.
+    fn repeat_stop(&mut self, now_ms: u64) {
+        if self.stop_due_ms.is_some_and(|due_ms| now_ms >= due_ms) {
+            self.stop_due_ms = Some(now_ms + EMERGENCY_STOP_CYCLES);
+            let _ = self.send(&Frame::ConsoleEmergencyStop(EmergencyStop::of_operator(false)), now_ms);
+        }
+    }
+
+    fn save(&mut self, number: u64, seconds: f64) -> Option<Vec<u8>> {
+        let Some(folder) = self.save_to.clone().or_else(|| self.view.run_folder()) else {
+            return Some(said(Status::BadRequest, "no folder is known: start with --save DIR"));
+        };
+        if std::mem::replace(&mut self.saving, true) {
+            return Some(said(Status::Busy, "a record is being saved already"));
+        }
+        let interface = self.url.name().unwrap_or_else(|| NAMELESS.into());
+        let record = self.view.minute.last(seconds, &folder, &interface, self.view.set_up());
+        let done = self.saved.0.clone();
+        // The disk may take its time; the page does not wait for it.
+        std::thread::spawn(move || done.send((number, record.write())));
+        None
+    }
+
+    fn now_ms(&self) -> u64 {
+        self.began.elapsed().as_millis() as u64
+    }
+}
+
+/// Whether it is time, and then when it is again.
+fn is_due(due_ms: &mut u64, now_ms: u64, every_ms: u64) -> bool {
+    let is_time = now_ms >= *due_ms;
+    if is_time {
+        *due_ms = now_ms + every_ms;
+    }
+    is_time
+}
+
+/// A token that nobody can guess.
+fn draw_token() -> io::Result<String> {
+    let mut bytes = [0; TOKEN_BYTES];
+    std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Whether two texts are the same, in a time that does not tell where they differ.
+fn is_same(one: &[u8], other: &[u8]) -> bool {
+    let differ = one.iter().zip(other).fold(0, |differ, (a, b)| differ | (a ^ b));
+    one.len() == other.len() && differ == 0
+}

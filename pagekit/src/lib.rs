@@ -1,0 +1,15 @@
+//! What all pages share, so that a page of any program looks and reads like the others.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`page`] | stylesheet, frame of a document, escaped text |
+//! | [`markup`] | tables, lists, sections |
+//! | [`grid`] | a table of words, in Markdown and HTML |
+//! | [`svg`] | scales, lines, markers, drawings |
+//! | [`number`] | numbers, lengths of time and dates as a person reads them |
+
+pub mod grid;
+pub mod markup;
+pub mod number;
+pub mod page;
+pub mod svg;

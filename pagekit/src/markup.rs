@@ -1,0 +1,154 @@
+//! Tables, lists and facts as markup. Every table stands in a box of its own that scrolls, by keyboard too, where it is too wide.
+
+use crate::page::escaped;
+use std::fmt::Write as _;
+
+/// A cell of a table.
+pub enum Cell {
+    /// A few words, left-aligned, in one line.
+    Words(String),
+    /// A sentence, which may be broken.
+    Sentence(String),
+    /// A number, right-aligned.
+    Number(String),
+    /// Text with something said below it in small letters.
+    About(String, String),
+    /// Good, bad, or neither; its words, a sign and its colour say so.
+    Judged(Option<bool>, String),
+}
+
+/// Text.
+pub fn words(text: impl Into<String>) -> Cell {
+    Cell::Words(text.into())
+}
+
+/// A number.
+pub fn number(text: impl Into<String>) -> Cell {
+    Cell::Number(text.into())
+}
+
+impl Cell {
+    fn is_number(&self) -> bool {
+        matches!(self, Self::Number(_))
+    }
+
+    fn html(&self) -> String {
+        match self {
+            Self::Words(text) | Self::Sentence(text) | Self::Number(text) => escaped(text),
+            Self::About(text, about) if about.is_empty() => escaped(text),
+            Self::About(text, about) => {
+                format!("{}<span class=\"about\">{}</span>", escaped(text), escaped(about))
+            }
+            Self::Judged(is_good, text) => {
+                let (class, sign) = match is_good {
+                    Some(true) => ("good", '✓'),
+                    Some(false) => ("bad", '✗'),
+                    None => ("open", '?'),
+                };
+                format!("<span class=\"{class}\">{sign} {}</span>", escaped(text))
+            }
+        }
+    }
+}
+
+/// A table.
+pub struct Table {
+    label: String,
+    head: Vec<String>,
+    rows: String,
+    numbers: Vec<bool>,
+}
+
+impl Table {
+    /// An empty table; the label is what a screen reader calls its box.
+    pub fn new<Name: Into<String>>(label: impl Into<String>, head: impl IntoIterator<Item = Name>) -> Self {
+        let head: Vec<String> = head.into_iter().map(Into::into).collect();
+        let numbers = vec![false; head.len()];
+        Self { label: label.into(), head, rows: String::new(), numbers }
+    }
+
+    /// A row; the first cell names it.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        self.marked_row("", cells);
+    }
+
+    /// A row of a class of the stylesheet.
+    pub fn marked_row(&mut self, class: &str, cells: impl IntoIterator<Item = Cell>) {
+        self.rows.push_str(&if class.is_empty() { "<tr>".into() } else { format!("<tr class=\"{class}\">") });
+        for (place, cell) in cells.into_iter().enumerate() {
+            if let Some(is_number) = self.numbers.get_mut(place) {
+                *is_number |= cell.is_number();
+            }
+            let class = match cell {
+                Cell::Number(_) => " class=\"n\"",
+                Cell::Sentence(_) => " class=\"long\"",
+                _ => "",
+            };
+            let (tag, scope) = if place == 0 { ("th", " scope=\"row\"") } else { ("td", "") };
+            let _ = write!(self.rows, "<{tag}{scope}{class}>{}</{tag}>", cell.html());
+        }
+        self.rows.push_str("</tr>\n");
+    }
+
+    /// A line over all columns above the rows that belong together.
+    pub fn group(&mut self, name: &str) {
+        let width = self.head.len();
+        let _ = writeln!(
+            self.rows,
+            "<tr class=\"group\"><th scope=\"rowgroup\" colspan=\"{width}\">{}</th></tr>",
+            escaped(name)
+        );
+    }
+
+    /// The table, or that there is nothing to be in it.
+    pub fn html_or(&self, nothing: &str) -> String {
+        if self.rows.is_empty() {
+            return none(nothing);
+        }
+        let head = self.head.iter().zip(&self.numbers).map(|(name, is_number)| {
+            let class = if *is_number { " class=\"n\"" } else { "" };
+            format!("<th scope=\"col\"{class}>{}</th>", escaped(name))
+        });
+        let head: String = head.collect();
+        format!(
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">\n<table>\n\
+             <thead><tr>{head}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n</div>\n",
+            escaped(&self.label),
+            self.rows
+        )
+    }
+}
+
+/// That there is nothing.
+pub fn none(sentence: &str) -> String {
+    format!("<p class=\"none\">{}</p>\n", escaped(sentence))
+}
+
+/// A paragraph of text.
+pub fn paragraph(text: &str) -> String {
+    format!("<p class=\"lead\">{}</p>\n", escaped(text))
+}
+
+/// A list of sentences, or that there are none.
+pub fn list(sentences: &[String], nothing: &str) -> String {
+    if sentences.is_empty() {
+        return none(nothing);
+    }
+    let items: String =
+        sentences.iter().map(|sentence| format!("<li>{}</li>\n", escaped(sentence))).collect();
+    format!("<ul>\n{items}</ul>\n")
+}
+
+/// Something that is opened by who wants to see it.
+pub fn folded(summary: &str, markup: &str) -> String {
+    format!("<details>\n<summary>{}</summary>\n{markup}</details>\n", escaped(summary))
+}
+
+/// A section with its heading; the identifier is what the list of contents points at.
+pub fn section(identifier: &str, title: &str, markup: &str) -> String {
+    format!(
+        "<section id=\"{identifier}\" aria-labelledby=\"{identifier}-title\">\n\
+         <h2 id=\"{identifier}-title\">{}</h2>\n{markup}</section>\n",
+        escaped(title)
+    )
+}
