@@ -14,6 +14,7 @@ use crate::model::{Ratio, Report, RunPart};
 use crate::ratios;
 use crate::resolution::{self, Verdict};
 use clap::Args;
+use figures::median::median;
 use pagekit::grid::Grid;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -80,7 +81,10 @@ fn spinning(runs: &[RunPart]) -> Option<Ratio> {
 fn grid(rows: &[Ratio]) -> Grid {
     let us = |ns: f64| format!("{:.2}", ns / 1e3);
     let row = |ratio: &Ratio| {
-        let of = |side: fn(&(u64, u64)) -> u64| us(median(ratio.pairs_ns.iter().map(side).collect()));
+        let of = |side: fn(&(u64, u64)) -> u64| {
+            us(median(ratio.pairs_ns.iter().map(|pair| side(pair) as f64).collect())
+                .map_or(0.0, |middle| middle.value))
+        };
         let interval = match (ratio.interval, ratio.confidence) {
             (Some((from, to)), Some(confidence)) => {
                 format!("{from:.2} to {to:.2} ({:.1} %)", 100.0 * confidence)
@@ -119,16 +123,6 @@ fn grid(rows: &[Ratio]) -> Grid {
 /// Whether `name` begins with `start` and a word ends there.
 fn starts(name: &str, start: &str) -> bool {
     name.strip_prefix(start).is_some_and(|rest| rest.starts_with(' '))
-}
-
-fn median(mut values_ns: Vec<u64>) -> f64 {
-    values_ns.sort_unstable();
-    let count = values_ns.len();
-    match count {
-        0 => 0.0,
-        count if count % 2 == 1 => values_ns[count / 2] as f64,
-        count => f64::midpoint(values_ns[count / 2 - 1] as f64, values_ns[count / 2] as f64),
-    }
 }
 
 fn head(report: &Report, made_by: Option<&str>) -> String {

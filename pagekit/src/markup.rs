@@ -13,41 +13,57 @@ pub enum Cell {
     Number(String),
     /// Text with something said below it in small letters.
     About(String, String),
-    /// Good, bad, or neither; its words, a sign and its colour say so.
-    Judged(Option<bool>, String),
+    /// Good or bad, shown by sign, words and colour.
+    Judged(bool, String),
+    /// Neither good nor bad.
+    Open(String),
+    /// Words on a ground that is darker the larger the share, from 0 to 1.
+    Shaded(f64, String),
 }
 
 /// Text.
+#[must_use]
 pub fn words(text: impl Into<String>) -> Cell {
     Cell::Words(text.into())
 }
 
 /// A number.
+#[must_use]
 pub fn number(text: impl Into<String>) -> Cell {
     Cell::Number(text.into())
 }
 
 impl Cell {
     fn is_number(&self) -> bool {
-        matches!(self, Self::Number(_))
+        matches!(self, Self::Number(_) | Self::Shaded(..))
     }
 
-    fn html(&self) -> String {
-        match self {
-            Self::Words(text) | Self::Sentence(text) | Self::Number(text) => escaped(text),
-            Self::About(text, about) if about.is_empty() => escaped(text),
+    fn written(&self, tag: &str, scope: &str) -> String {
+        let marked = |class: &str, sign: char, text: &str| {
+            format!("<span class=\"{class}\">{sign} {}</span>", escaped(text))
+        };
+        let (attributes, inside) = match self {
+            Self::Words(text) => (String::new(), escaped(text)),
+            Self::Sentence(text) => (" class=\"long\"".into(), escaped(text)),
+            Self::Number(text) => (" class=\"n\"".into(), escaped(text)),
+            Self::About(text, about) if about.is_empty() => (String::new(), escaped(text)),
             Self::About(text, about) => {
-                format!("{}<span class=\"about\">{}</span>", escaped(text), escaped(about))
+                (String::new(), format!("{}<span class=\"about\">{}</span>", escaped(text), escaped(about)))
             }
-            Self::Judged(is_good, text) => {
-                let (class, sign) = match is_good {
-                    Some(true) => ("good", '✓'),
-                    Some(false) => ("bad", '✗'),
-                    None => ("open", '?'),
-                };
-                format!("<span class=\"{class}\">{sign} {}</span>", escaped(text))
+            Self::Judged(true, text) => (String::new(), marked("good", '✓', text)),
+            Self::Judged(false, text) => (String::new(), marked("bad", '✗', text)),
+            Self::Open(text) => (String::new(), marked("open", '?', text)),
+            Self::Shaded(share, text) => {
+                // Ink stays readable on 55 % of the colour, in light and dark.
+                let mixed = (share.clamp(0.0, 1.0) * 55.0).round();
+                let shade = format!(
+                    " class=\"n\" style=\"background:color-mix(in srgb,var(--s1) {mixed}%,transparent);\
+                     print-color-adjust:exact;-webkit-print-color-adjust:exact\""
+                );
+                (shade, escaped(text))
             }
-        }
+        };
+        format!("<{tag}{scope}{attributes}>{inside}</{tag}>")
     }
 }
 
@@ -79,13 +95,8 @@ impl Table {
             if let Some(is_number) = self.numbers.get_mut(place) {
                 *is_number |= cell.is_number();
             }
-            let class = match cell {
-                Cell::Number(_) => " class=\"n\"",
-                Cell::Sentence(_) => " class=\"long\"",
-                _ => "",
-            };
             let (tag, scope) = if place == 0 { ("th", " scope=\"row\"") } else { ("td", "") };
-            let _ = write!(self.rows, "<{tag}{scope}{class}>{}</{tag}>", cell.html());
+            self.rows.push_str(&cell.written(tag, scope));
         }
         self.rows.push_str("</tr>\n");
     }
@@ -100,36 +111,46 @@ impl Table {
         );
     }
 
-    /// The table, or that there is nothing to be in it.
+    /// The table, or a sentence in its place when it has no rows.
+    #[must_use]
     pub fn html_or(&self, nothing: &str) -> String {
+        self.html().unwrap_or_else(|| none(nothing))
+    }
+
+    /// The table; none without rows.
+    #[must_use]
+    pub fn html(&self) -> Option<String> {
         if self.rows.is_empty() {
-            return none(nothing);
+            return None;
         }
         let head = self.head.iter().zip(&self.numbers).map(|(name, is_number)| {
             let class = if *is_number { " class=\"n\"" } else { "" };
             format!("<th scope=\"col\"{class}>{}</th>", escaped(name))
         });
         let head: String = head.collect();
-        format!(
+        Some(format!(
             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">\n<table>\n\
              <thead><tr>{head}</tr></thead>\n<tbody>\n{}</tbody>\n</table>\n</div>\n",
             escaped(&self.label),
             self.rows
-        )
+        ))
     }
 }
 
 /// That there is nothing.
+#[must_use]
 pub fn none(sentence: &str) -> String {
     format!("<p class=\"none\">{}</p>\n", escaped(sentence))
 }
 
 /// A paragraph of text.
+#[must_use]
 pub fn paragraph(text: &str) -> String {
     format!("<p class=\"lead\">{}</p>\n", escaped(text))
 }
 
 /// A list of sentences, or that there are none.
+#[must_use]
 pub fn list(sentences: &[String], nothing: &str) -> String {
     if sentences.is_empty() {
         return none(nothing);
@@ -140,11 +161,13 @@ pub fn list(sentences: &[String], nothing: &str) -> String {
 }
 
 /// Something that is opened by who wants to see it.
+#[must_use]
 pub fn folded(summary: &str, markup: &str) -> String {
     format!("<details>\n<summary>{}</summary>\n{markup}</details>\n", escaped(summary))
 }
 
 /// A section with its heading; the identifier is what the list of contents points at.
+#[must_use]
 pub fn section(identifier: &str, title: &str, markup: &str) -> String {
     format!(
         "<section id=\"{identifier}\" aria-labelledby=\"{identifier}-title\">\n\

@@ -6,6 +6,7 @@
 use super::decimate::Column;
 use super::words;
 use pagekit::page::escaped;
+use pagekit::svg::{Drawing, legend_entry, stroke, text};
 use std::fmt::Write as _;
 
 /// Width of all drawings, in user units.
@@ -218,21 +219,7 @@ pub(super) fn bars(identifier: &str, title: &str, bars: &[Bar]) -> String {
 }
 
 fn svg(identifier: &str, height: f64, title: &str, description: &str, body: &str) -> String {
-    format!(
-        "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-labelledby=\"{identifier}-t {identifier}-d\">\n\
-         <title id=\"{identifier}-t\">{}</title>\n<desc id=\"{identifier}-d\">{}</desc>\n{body}</svg>\n",
-        escaped(title),
-        escaped(description)
-    )
-}
-
-fn stroke(class: &str, from: (f64, f64), to: (f64, f64)) -> String {
-    let ((x1, y1), (x2, y2)) = (from, to);
-    format!("<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>\n")
-}
-
-fn text(class: &str, (x, y): (f64, f64), words: &str) -> String {
-    format!("<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\">{}</text>\n", escaped(words))
+    Drawing { identifier, size: (WIDTH, height), title, description }.with(body)
 }
 
 /// How an entry of a legend is drawn.
@@ -253,10 +240,7 @@ pub(super) fn figure(caption: &str, about: &str, legend: &[(Sample, &str)], draw
                 format!("<rect class=\"{class}\" x=\"1\" y=\"2\" width=\"36\" height=\"10\"/>")
             }
         };
-        format!(
-            "<li><svg viewBox=\"0 0 38 14\" aria-hidden=\"true\">{inside}</svg><span>{}</span></li>\n",
-            escaped(name)
-        )
+        legend_entry(&inside, name)
     };
     let legend: String = legend.iter().map(entry).collect();
     let legend = if legend.is_empty() { legend } else { format!("<ul class=\"legend\">\n{legend}</ul>\n") };

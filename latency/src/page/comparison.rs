@@ -54,11 +54,11 @@ pub(super) fn bounds(bounds: &[BoundResult]) -> String {
     let told = |value: Option<f64>| value.map_or_else(|| NOTHING.into(), number::compact);
     for bound in bounds {
         let value = if bound.value.is_some() { told(bound.value) } else { "not measured".into() };
-        let (is_good, verdict) = match bound.verdict() {
-            Verdict::Kept => (Some(true), "kept".into()),
-            Verdict::Broken => (Some(false), "broken".into()),
+        let verdict = match bound.verdict() {
+            Verdict::Kept => Cell::Judged(true, "kept".into()),
+            Verdict::Broken => Cell::Judged(false, "broken".into()),
             Verdict::NotResolved { pairs } => {
-                (None, format!("not resolved: {}", resolution::in_words(pairs)))
+                Cell::Open(format!("not resolved: {}", resolution::in_words(pairs)))
             }
         };
         let interval = bound.interval.map_or_else(
@@ -71,7 +71,7 @@ pub(super) fn bounds(bounds: &[BoundResult]) -> String {
             number(interval),
             number(told(bound.min)),
             number(told(bound.max)),
-            Cell::Judged(is_good, verdict),
+            verdict,
         ]);
     }
     let said = "A ratio is judged by the interval of its median. Where the interval crosses the bound, or there are fewer than six \

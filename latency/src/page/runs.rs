@@ -87,7 +87,7 @@ pub(super) fn counts(runs: &[RunPart]) -> String {
             text(&part.group),
             text(number::instant(part.started_unix_s)),
             number(number::decimal(part.duration_s, 1)),
-            Cell::Judged(Some(part.passed), verdict.into()),
+            Cell::Judged(part.passed, verdict.into()),
         ]);
     }
     format!(
