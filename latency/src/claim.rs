@@ -8,7 +8,7 @@ use super::controlled::not_controlled;
 use super::files::RunFiles;
 use super::model::{Claim, Conditions};
 use super::reference;
-use realtime::Machine;
+use realtime::{Grant, Machine};
 use std::collections::BTreeMap;
 
 /// Cycles for a p99.9 that rests on a hundred samples.
@@ -62,13 +62,15 @@ fn reasons(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
 /// What processes ran without.
 fn not_granted(runs: &[RunFiles]) -> Vec<String> {
     let mut reasons = Vec::new();
-    for (word, lack) in [
-        ("SCHED_FIFO", "real-time priority (SCHED_FIFO)"),
-        ("memory locked", "locked memory"),
-        ("pinned to CPU", "a CPU of its own"),
-    ] {
-        let without = |(process, granted): (&str, Vec<&str>)| {
-            (!granted.iter().any(|grant| grant.contains(word))).then(|| process.to_owned())
+    type Kind = fn(&Grant) -> bool;
+    let needed: [(Kind, &str); 3] = [
+        (|grant| matches!(grant, Grant::Fifo(_)), "real-time priority (SCHED_FIFO)"),
+        (|grant| *grant == Grant::LockedMemory, "locked memory"),
+        (|grant| matches!(grant, Grant::Cpu(_)), "a CPU of its own"),
+    ];
+    for (is_needed, lack) in needed {
+        let without = |(process, granted): (&str, Vec<Grant>)| {
+            (!granted.iter().any(is_needed)).then(|| process.to_owned())
         };
         let mut who: Vec<_> =
             runs.iter().flat_map(|run| run.granted().filter_map(without).collect::<Vec<_>>()).collect();
@@ -139,15 +141,11 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
     reasons
 }
 
-/// What a process was granted after these words, such as the number of its CPU.
-fn after<'a>(granted: &[&'a str], words: &str) -> Option<&'a str> {
-    granted.iter().find_map(|grant| grant.split_once(words)?.1.split_whitespace().next())
-}
-
 /// CPU of each process of a run that has one of its own.
 pub(super) fn cpus(run: &RunFiles) -> BTreeMap<&str, u64> {
-    let cpu = |granted: &[&str]| after(granted, "pinned to CPU ")?.parse().ok();
-    run.granted().filter_map(|(process, granted)| Some((process, cpu(&granted)?))).collect()
+    run.granted()
+        .filter_map(|(process, granted)| Some((process, granted.iter().find_map(Grant::cpu)? as u64)))
+        .collect()
 }
 
 /// Where the reference was not measured as the rig runs.
@@ -157,22 +155,23 @@ fn unlike_reference(run: &RunFiles) -> Vec<String> {
     let rig = run.granted().next().filter(|(process, _)| *process == "emulator");
     let granted = rig.map(|(_, granted)| granted).unwrap_or_default();
     let line = &told.command_line;
-    let mut compare = |what: &str, theirs: Option<&str>, ours: Option<&str>| {
+    let mut compare = |what: &str, theirs: Option<&str>, ours: Option<String>| {
         // What the rig lacks is a reason of its own.
-        if let Some(ours) = ours.filter(|ours| theirs != Some(ours)) {
+        if let Some(ours) = ours.filter(|ours| theirs != Some(ours.as_str())) {
             let theirs = theirs.unwrap_or("none");
             unlike.push(format!("The reference had {what} {theirs}, the rig {ours}."));
         }
     };
-    let priority = after(&granted, "SCHED_FIFO priority ");
+    let priority = granted.iter().find_map(Grant::fifo_priority);
     compare(
         "priority",
         reference::option(line, 'p', "priority").or(reference::option(line, 'p', "prio")),
-        priority,
+        priority.map(|priority| priority.to_string()),
     );
-    compare("CPU", reference::option(line, 'a', "affinity"), after(&granted, "pinned to CPU "));
+    let cpu = granted.iter().find_map(Grant::cpu);
+    compare("CPU", reference::option(line, 'a', "affinity"), cpu.map(|cpu| cpu.to_string()));
     let interval = reference::option(line, 'i', "interval").unwrap_or(INTERVAL_US);
-    compare("an interval in us of", Some(interval), Some(INTERVAL_US));
+    compare("an interval in us of", Some(interval), Some(INTERVAL_US.to_owned()));
     let length_s = told.samples.count() as f64 * interval.parse::<f64>().unwrap_or_default() * 1e-6;
     let share = length_s / run.duration_s();
     if !SAME_LENGTH.contains(&share) {
@@ -239,6 +238,8 @@ mod tests {
     use crate::made_up;
     use serde_json::json;
 
+    const LOCKED: &str = "memory locked, current and future";
+
     fn good() -> Vec<RunFiles> {
         let mut run = made_up::run(10);
         run.summary["cycles"] = json!(60_000);
@@ -265,10 +266,10 @@ mod tests {
     fn each_reason_is_told() {
         type Spoil = fn(&mut RunFiles);
         let cases: [(&str, Spoil); 18] = [
-            ("SCHED_FIFO", |run| run.run["realtime_granted"] = json!(["memory locked", "pinned to CPU 0"])),
+            ("SCHED_FIFO", |run| run.run["realtime_granted"] = json!([LOCKED, "pinned to CPU 0"])),
             ("a CPU of its own", |run| {
                 run.controllers.get_mut("controller").unwrap()["realtime_granted"] =
-                    json!(["memory locked", "SCHED_FIFO"]);
+                    json!([LOCKED, "SCHED_FIFO priority 80"]);
             }),
             ("not told by all", |run| run.controllers.clear()),
             ("did not alternate", |run| run.reference = None),

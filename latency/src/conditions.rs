@@ -2,6 +2,7 @@
 
 use super::files::RunFiles;
 use super::model::{Conditions, Fact};
+use realtime::Grant;
 use serde_json::Value;
 
 /// Values of a fact that are shown when runs differ.
@@ -128,11 +129,12 @@ fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
 fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
     let mut facts = Facts::default();
     for run in runs {
+        let lines = |granted: Vec<Grant>| granted.into_iter().map(String::from).collect::<Vec<_>>();
         let emulator = run.description();
-        let emulator = ("emulator", [emulator.realtime_granted, emulator.realtime_refused]);
+        let emulator = ("emulator", [lines(emulator.realtime_granted), emulator.realtime_refused]);
         let controllers = run.controller_reports();
-        let controllers =
-            controllers.map(|(process, told)| (process, [told.realtime_granted, told.realtime_refused]));
+        let controllers = controllers
+            .map(|(process, told)| (process, [lines(told.realtime_granted), told.realtime_refused]));
         for (process, lists) in std::iter::once(emulator).chain(controllers) {
             for (list, word) in lists.iter().zip(["granted", "refused"]).filter(|(list, _)| !list.is_empty())
             {

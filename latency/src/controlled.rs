@@ -5,7 +5,7 @@
 use super::claim::{cpus, virtual_machine};
 use super::files::RunFiles;
 use super::model::Conditions;
-use realtime::Machine;
+use realtime::{Grant, Machine};
 use std::collections::BTreeSet;
 
 /// The sentences of all runs, each once.
@@ -48,7 +48,7 @@ fn of_run(run: &RunFiles) -> Vec<String> {
     if about.starts_with("on") {
         told.push(format!("RT throttling is {about}: a loop that needs more is stopped for the rest."));
     }
-    let held = |granted: &[&str]| granted.iter().any(|grant| grant.contains("cpu_dma_latency"));
+    let held = |granted: &[Grant]| granted.contains(&Grant::DmaLatency);
     let refused: Vec<_> =
         run.granted().filter(|(_, granted)| !held(granted)).map(|(process, _)| process).collect();
     if !refused.is_empty() {

@@ -6,6 +6,7 @@ use super::kinds::PING_PONGS;
 use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
+use realtime::Grant;
 use runlog::conditions::Conditions;
 use runlog::controller_report::ControllerReport;
 use runlog::flight_dump;
@@ -276,11 +277,11 @@ impl RunFiles {
     }
 
     /// What each process was granted for real time.
-    pub fn granted(&self) -> impl Iterator<Item = (&str, Vec<&str>)> {
-        let emulator = (!self.run.is_null()).then(|| ("emulator", words_of(&self.run)));
+    pub fn granted(&self) -> impl Iterator<Item = (&str, Vec<Grant>)> {
+        let emulator = (!self.run.is_null()).then(|| ("emulator", grants_of(&self.run)));
         emulator
             .into_iter()
-            .chain(self.controllers.iter().map(|(process, told)| (process.as_str(), words_of(told))))
+            .chain(self.controllers.iter().map(|(process, told)| (process.as_str(), grants_of(told))))
     }
 }
 
@@ -289,6 +290,7 @@ fn typed<T: DeserializeOwned + Default>(value: &Value) -> T {
     T::deserialize(value).unwrap_or_default()
 }
 
-fn words_of(told: &Value) -> Vec<&str> {
-    told["realtime_granted"].as_array().into_iter().flatten().filter_map(Value::as_str).collect()
+fn grants_of(report: &Value) -> Vec<Grant> {
+    let lines = report["realtime_granted"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    lines.map(Grant::from).collect()
 }

@@ -32,7 +32,7 @@ pub(crate) fn run(cycles: u64) -> RunFiles {
             { "name": "process 2", "frames_received": 4 * cycles, "dropped_at_queue": {} },
         ] },
     });
-    let dma = "/dev/cpu_dma_latency at 0 us";
+    let dma = "/dev/cpu_dma_latency held at 0 us";
     let granted = [dma, "memory locked, current and future", "pinned to CPU 0", "SCHED_FIFO priority 80"];
     run.run = serde_json::json!({
         "started_unix_s": 1.79e9, "realtime_granted": granted, "realtime_refused": [], "counts_allocations": false,

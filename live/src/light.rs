@@ -66,7 +66,8 @@ mod tests {
 
     #[test]
     fn what_speaks_against_a_claim_puts_it_out_and_what_is_missing_makes_it_doubtful() {
-        let granted = json!(["SCHED_FIFO priority 80", "memory locked", "pinned to CPU 0"]);
+        let granted =
+            json!(["SCHED_FIFO priority 80", "memory locked, current and future", "pinned to CPU 0"]);
         let run = json!({ "realtime_granted": granted, "machine": { "build": { "profile": "release" } } });
         assert_eq!(judged(&run, 10)["supported"], "doubtful");
         let missed = judged(&run, 11);

@@ -70,7 +70,7 @@ pub use machine::Machine;
 pub use periodic::{
     ConfigError, Cycle, LoopStatistics, Overrun, OverrunPolicy, PeriodicConfig, PeriodicLoop, UnknownPolicy,
 };
-pub use privileges::{Grants, Refusal, Request, acquire};
+pub use privileges::{Grant, Grants, Refusal, Request, acquire};
 pub use signals::{Continued, Freeze, Interrupt};
 pub use stages::{CycleStages, StageAccount, StageFigures};
 pub use vitals::{VitalCounts, VitalTotals, VitalsReader};

@@ -14,6 +14,7 @@
 //! `man 7 sched`, `man 2 mlockall`, `man 2 prctl` (`PR_SET_TIMERSLACK`), and in the kernel's tree
 //! `Documentation/power/pm_qos_interface.rst`.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
@@ -63,17 +64,89 @@ impl Request {
     }
 }
 
+/// Something that the system gave. Its text is the line in the records of a run, from which it is read again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "String", into = "String")]
+pub enum Grant {
+    /// All memory of the process, now and later, stays in RAM.
+    LockedMemory,
+    /// No CPU goes into a sleep that takes time to leave.
+    DmaLatency,
+    /// The kernel wakes the thread at most this much late without FIFO, ns.
+    TimerSlack(u64),
+    /// The only CPU that the thread may run on.
+    Cpu(usize),
+    /// SCHED_FIFO with this priority.
+    Fifo(u8),
+    /// A line that this version does not write.
+    Other(String),
+}
+
+impl Grant {
+    /// The only CPU that the thread may run on.
+    #[must_use]
+    pub fn cpu(&self) -> Option<usize> {
+        if let Self::Cpu(cpu) = self { Some(*cpu) } else { None }
+    }
+
+    /// The priority under SCHED_FIFO.
+    #[must_use]
+    pub fn fifo_priority(&self) -> Option<u8> {
+        if let Self::Fifo(priority) = self { Some(*priority) } else { None }
+    }
+}
+
+impl fmt::Display for Grant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LockedMemory => write!(f, "memory locked, current and future"),
+            Self::DmaLatency => write!(f, "{DMA_LATENCY_FILE} held at 0 us"),
+            Self::TimerSlack(slack_ns) => write!(f, "timer slack {slack_ns} ns"),
+            Self::Cpu(cpu) => write!(f, "pinned to CPU {cpu}"),
+            Self::Fifo(priority) => write!(f, "SCHED_FIFO priority {priority}"),
+            Self::Other(line) => write!(f, "{line}"),
+        }
+    }
+}
+
+impl From<&str> for Grant {
+    fn from(line: &str) -> Self {
+        let slack_ns = || line.strip_prefix("timer slack ")?.strip_suffix(" ns")?.parse().ok();
+        let cpu = || line.strip_prefix("pinned to CPU ")?.parse().ok();
+        let priority = || line.strip_prefix("SCHED_FIFO priority ")?.parse().ok();
+        let fixed =
+            [Self::LockedMemory, Self::DmaLatency].into_iter().find(|grant| grant.to_string() == line);
+        fixed
+            .or_else(|| slack_ns().map(Self::TimerSlack))
+            .or_else(|| cpu().map(Self::Cpu))
+            .or_else(|| priority().map(Self::Fifo))
+            .unwrap_or_else(|| Self::Other(line.to_owned()))
+    }
+}
+
+impl From<String> for Grant {
+    fn from(line: String) -> Self {
+        Self::from(line.as_str())
+    }
+}
+
+impl From<Grant> for String {
+    fn from(grant: Grant) -> Self {
+        grant.to_string()
+    }
+}
+
 /// What the system gave, and what it refused. Dropping it gives the DMA latency back; the rest stays.
 #[derive(Debug, Default)]
 pub struct Grants {
     dma_latency: Option<File>,
-    granted: Vec<String>,
+    granted: Vec<Grant>,
     refusals: Vec<Refusal>,
 }
 
 impl Grants {
-    /// What was given, a line for each, for the run's record.
-    pub fn granted(&self) -> &[String] {
+    /// What was given, for the run's record.
+    pub fn granted(&self) -> &[Grant] {
         &self.granted
     }
 
@@ -87,9 +160,9 @@ impl Grants {
         self.dma_latency.is_some()
     }
 
-    fn note(&mut self, outcome: Result<String, Refusal>) {
+    fn note(&mut self, outcome: Result<Grant, Refusal>) {
         match outcome {
-            Ok(line) => self.granted.push(line),
+            Ok(grant) => self.granted.push(grant),
             Err(refusal) => self.refusals.push(refusal),
         }
     }
@@ -123,7 +196,7 @@ pub fn acquire(request: &Request) -> Grants {
     if request.dma_latency {
         let outcome = hold_dma_latency().map(|file| {
             grants.dma_latency = Some(file);
-            format!("{DMA_LATENCY_FILE} held at 0 us")
+            Grant::DmaLatency
         });
         grants.note(outcome);
     }
@@ -139,7 +212,7 @@ pub fn acquire(request: &Request) -> Grants {
     grants
 }
 
-fn lock_memory() -> Result<String, Refusal> {
+fn lock_memory() -> Result<Grant, Refusal> {
     const REMEDY: &str = "run as root, or: setcap cap_ipc_lock+ep PROGRAM, or 'memlock unlimited' for this user in \
                           /etc/security/limits.d and a new login";
     let refusal = |reason| Refusal { what: "locked memory", reason, remedy: REMEDY };
@@ -154,7 +227,7 @@ fn lock_memory() -> Result<String, Refusal> {
         )));
     }
     mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|errno| refusal(errno.to_string()))?;
-    Ok("memory locked, current and future".to_owned())
+    Ok(Grant::LockedMemory)
 }
 
 fn hold_dma_latency() -> Result<File, Refusal> {
@@ -172,7 +245,7 @@ fn hold_dma_latency() -> Result<File, Refusal> {
     })
 }
 
-fn shorten_timer_slack() -> Result<String, Refusal> {
+fn shorten_timer_slack() -> Result<Grant, Refusal> {
     let refusal = |reason| Refusal {
         what: "timer slack of 1 ns",
         reason,
@@ -182,13 +255,13 @@ fn shorten_timer_slack() -> Result<String, Refusal> {
         .map_err(|errno| refusal(errno.to_string()))?;
     match rustix::thread::current_timer_slack() {
         // A thread that is real-time already has 0.
-        Ok(slack_ns @ 0..=1) => Ok(format!("timer slack {slack_ns} ns")),
+        Ok(slack_ns @ 0..=1) => Ok(Grant::TimerSlack(slack_ns)),
         Ok(slack_ns) => Err(refusal(format!("it stayed at {slack_ns} ns"))),
         Err(errno) => Err(refusal(errno.to_string())),
     }
 }
 
-fn pin(cpu: usize) -> Result<String, Refusal> {
+fn pin(cpu: usize) -> Result<Grant, Refusal> {
     let refusal = |reason| Refusal {
         what: "CPU of its own",
         reason,
@@ -202,7 +275,7 @@ fn pin(cpu: usize) -> Result<String, Refusal> {
     let accepted = core_affinity::set_for_current(core_affinity::CoreId { id: cpu });
     // It says only yes or no, so the mask is read back: it must hold this CPU and no other.
     match rustix::thread::sched_getaffinity(None) {
-        Ok(mask) if accepted && mask.count() == 1 && mask.is_set(cpu) => Ok(format!("pinned to CPU {cpu}")),
+        Ok(mask) if accepted && mask.count() == 1 && mask.is_set(cpu) => Ok(Grant::Cpu(cpu)),
         Ok(mask) => {
             let allowed: Vec<usize> = (0..CpuSet::MAX_CPU).filter(|&cpu| mask.is_set(cpu)).collect();
             Err(refusal(format!(
@@ -240,7 +313,7 @@ fn listed(cpus: &[usize]) -> String {
     cpus.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
 }
 
-fn set_fifo(priority: u8) -> Result<String, Refusal> {
+fn set_fifo(priority: u8) -> Result<Grant, Refusal> {
     let refusal = |reason: String, remedy| Refusal { what: "FIFO priority", reason, remedy };
     let (lowest, highest) = (FIFO_PRIORITIES.start(), FIFO_PRIORITIES.end());
     if !FIFO_PRIORITIES.contains(&priority) {
@@ -256,7 +329,7 @@ fn set_fifo(priority: u8) -> Result<String, Refusal> {
     set_thread_priority_and_policy(thread, ThreadPriority::Crossplatform(value), policy).map_err(failed)?;
     match thread_schedule_policy_param(thread).map_err(failed)? {
         (got, parameters) if got == policy && parameters.sched_priority == i32::from(priority) => {
-            Ok(format!("SCHED_FIFO priority {priority}"))
+            Ok(Grant::Fifo(priority))
         }
         (got, parameters) => Err(refusal(
             format!("{priority}: the thread has {got:?} {} instead", parameters.sched_priority),
@@ -313,7 +386,9 @@ mod tests {
         let granted = std::thread::spawn(move || {
             acquire(&Request { cpu: Some(cpu), ..Request::default() }).granted().to_vec()
         });
-        assert_eq!(granted.join().expect("no panic"), [format!("pinned to CPU {cpu}")]);
+        let granted = granted.join().expect("no panic");
+        assert_eq!(granted, [Grant::Cpu(cpu)]);
+        assert_eq!(granted[0].to_string(), format!("pinned to CPU {cpu}"));
     }
 
     #[test]
@@ -332,6 +407,23 @@ mod tests {
         let (granted, refusals) = outcome.join().expect("no panic");
         assert_eq!(granted + refusals.len(), 5);
         assert!(refusals.iter().all(|refusal| !refusal.reason.is_empty() && !refusal.remedy.is_empty()));
+    }
+
+    #[test]
+    fn a_grant_is_read_from_the_line_that_a_record_holds() {
+        let lines = [
+            (Grant::LockedMemory, "memory locked, current and future"),
+            (Grant::DmaLatency, "/dev/cpu_dma_latency held at 0 us"),
+            (Grant::TimerSlack(1), "timer slack 1 ns"),
+            (Grant::Cpu(3), "pinned to CPU 3"),
+            (Grant::Fifo(80), "SCHED_FIFO priority 80"),
+            (Grant::Other("pinned to CPU 0 and 1".into()), "pinned to CPU 0 and 1"),
+        ];
+        for (grant, line) in lines {
+            let json = serde_json::to_string(&grant).unwrap();
+            assert_eq!(json, format!("\"{line}\""));
+            assert_eq!(serde_json::from_str::<Grant>(&json).unwrap(), grant);
+        }
     }
 
     #[test]

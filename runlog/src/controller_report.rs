@@ -53,7 +53,7 @@ pub struct ControllerReport<N = Value, X = Value> {
     /// Stamps and frames lost to a full queue: histograms, timing table and flight recorder lack them.
     pub timing_dropped: u64,
     /// What the system granted for real time.
-    pub realtime_granted: Vec<String>,
+    pub realtime_granted: Vec<realtime::Grant>,
     /// What it refused, with the remedy.
     pub realtime_refused: Vec<String>,
     /// Each axis of the process.

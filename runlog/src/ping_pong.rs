@@ -45,7 +45,7 @@ pub struct PingPongFigures {
     /// The bus by its URL; null on a bare pair of sockets.
     pub bus: Option<String>,
     /// What the system granted for real time.
-    pub granted: Vec<String>,
+    pub granted: Vec<realtime::Grant>,
     /// What it refused, with the remedy.
     pub refused: Vec<String>,
 }

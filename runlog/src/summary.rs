@@ -43,7 +43,7 @@ pub struct RunDescription<S = Value, M = Machine> {
     /// alone.
     pub sealed: bool,
     /// What the system granted for real time.
-    pub realtime_granted: Vec<String>,
+    pub realtime_granted: Vec<realtime::Grant>,
     /// What it refused, with the remedy.
     pub realtime_refused: Vec<String>,
     /// The machine.
