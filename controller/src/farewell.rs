@@ -13,7 +13,7 @@ const LONGEST: Duration = Duration::from_millis(300);
 
 /// Takes what is still said on the bus when `rig_ended`, then takes leave and what had arrived by then. The frames are
 /// counted by the bus and have no other effect.
-pub fn hear_out(bus: &mut dyn Bus, rig_ended: bool) {
+pub(crate) fn hear_out(bus: &mut dyn Bus, rig_ended: bool) {
     let began = Instant::now();
     let mut last_heard = began;
     while rig_ended && bus.is_up() && last_heard.elapsed() < QUIET && began.elapsed() < LONGEST {

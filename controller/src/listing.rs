@@ -16,7 +16,7 @@ use xcp::a2l::{self, Described};
 
 /// Prints the list.
 #[must_use]
-pub fn print() -> Exit {
+pub(crate) fn print() -> Exit {
     // A closed pipe is the reader's wish.
     let _ = write(&mut io::stdout().lock());
     Exit::Good
@@ -26,7 +26,7 @@ pub fn print() -> Exit {
 ///
 /// # Errors
 /// [`RunError::Input`] for files that cannot be used.
-pub fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> {
+pub(crate) fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(files)?;
     let mut texts = Vec::new();
     for axis in Axis::ALL.into_iter().filter(|axis| inputs.programs[axis.index()].is_some()) {
@@ -43,7 +43,7 @@ pub fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> {
 ///
 /// # Errors
 /// [`RunError::Input`] for files that cannot be used.
-pub fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
+pub(crate) fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(&arguments.files)?;
     let axis = match arguments.axis {
         OneAxis::Drive => Axis::Drive,

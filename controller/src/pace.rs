@@ -23,7 +23,7 @@ const WARM_UP: u64 = 1000;
 
 /// Why the controllers ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
+pub(crate) enum End {
     /// The rig said that it ends, or fell silent after Done.
     RigEnded,
     /// Ctrl-C or SIGTERM.
@@ -37,29 +37,29 @@ pub enum End {
 }
 
 /// The node of a run, its bus and what may end it.
-pub struct RunContext<'a> {
+pub(crate) struct RunContext<'a> {
     /// The controllers.
-    pub node: &'a mut Node,
+    pub(crate) node: &'a mut Node,
     /// Their peer on the bus.
-    pub bus: &'a mut dyn Bus,
+    pub(crate) bus: &'a mut dyn Bus,
     /// How long the rig may be silent.
-    pub grace: Duration,
+    pub(crate) grace: Duration,
     /// Set by a signal.
-    pub interrupt: &'a Interrupt,
+    pub(crate) interrupt: &'a Interrupt,
 }
 
 /// How a run ended and what was measured meanwhile.
-pub struct RunOutcome {
+pub(crate) struct RunOutcome {
     /// Why it ended.
-    pub end: End,
+    pub(crate) end: End,
     /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
-    pub allocations: Option<u64>,
+    pub(crate) allocations: Option<u64>,
     /// What the stopwatch counted.
-    pub stopwatch: StopwatchAccount,
+    pub(crate) stopwatch: StopwatchAccount,
 }
 
 /// Answers frames as they arrive, under a stopwatch.
-pub fn run_real(
+pub(crate) fn run_real(
     context: RunContext<'_>,
     mut stopwatch: Stopwatch<impl Clock + Send>,
     continued: Continued,
@@ -160,7 +160,7 @@ impl RigLife {
 ///
 /// # Errors
 /// [`BusError::NoBarrier`] on a bus without one.
-pub fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOutcome, BusError> {
+pub(crate) fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOutcome, BusError> {
     let RunContext { node, bus, grace, interrupt } = context;
     bus.join_lockstep(Role::Member, name)?;
     let mut waiting_since = None;

@@ -25,7 +25,7 @@ const HEAD: &str = "time_s,main_chain,force_chain,matching_chain,emergency_stop_
 set_velocity_m_per_s,set_force_N,position_m,velocity_m_per_s,force_N,wanted_velocity_m_per_s,opening,enabled,moving";
 
 /// The tables of the axes of a process.
-pub struct Tables {
+pub(crate) struct Tables {
     tables: Vec<(Axis, LineFile)>,
 }
 
@@ -34,7 +34,7 @@ impl Tables {
     ///
     /// # Errors
     /// What the system says, with the file's name.
-    pub fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
+    pub(crate) fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
         let tables = axes.iter().map(|axis| {
             let mut table = LineFile::create(&folder.join(format!("controller-{}.csv", axis.name())))?;
             writeln!(table.lines(), "{HEAD}")?;
@@ -47,7 +47,7 @@ impl Tables {
     ///
     /// # Errors
     /// What the system says, with the file's name.
-    pub fn write(&mut self, record: &AxisRecord) -> io::Result<()> {
+    pub(crate) fn write(&mut self, record: &AxisRecord) -> io::Result<()> {
         let Some((_, table)) = self.tables.iter_mut().find(|(axis, _)| *axis == record.axis) else {
             return Ok(());
         };
@@ -86,41 +86,41 @@ impl Tables {
     ///
     /// # Errors
     /// What the system says, with the file's name.
-    pub fn write_out(&mut self) -> io::Result<()> {
+    pub(crate) fn write_out(&mut self) -> io::Result<()> {
         self.tables.iter_mut().try_for_each(|(_, table)| table.write_out())
     }
 }
 
 /// The thread that empties the queues.
-pub struct Writer {
+pub(crate) struct Writer {
     /// The files.
-    pub tables: Tables,
+    pub(crate) tables: Tables,
     /// Their rows.
-    pub records: Receiver<AxisRecord>,
+    pub(crate) records: Receiver<AxisRecord>,
     /// What a person is told.
-    pub news: Receiver<News>,
+    pub(crate) news: Receiver<News>,
     /// Who looks at the program files, if anybody does.
-    pub reloader: Option<Reloader>,
+    pub(crate) reloader: Option<Reloader>,
     /// Who does what XCP asks for, if it may.
-    pub clerk: Option<Clerk>,
+    pub(crate) clerk: Option<Clerk>,
     /// Stamps of the stopwatch and their recorder, where time is real.
-    pub timing: Option<TimingQueues>,
+    pub(crate) timing: Option<TimingQueues>,
 }
 
 /// What is left when the queues' senders are gone.
-pub struct Written {
+pub(crate) struct Written {
     /// What a person was told.
-    pub told: Vec<News>,
+    pub(crate) told: Vec<News>,
     /// Why writing stopped, if it did.
-    pub failure: Option<String>,
+    pub(crate) failure: Option<String>,
     /// Figures of the timing, where time is real.
-    pub timing: Option<TimingFigures>,
+    pub(crate) timing: Option<TimingFigures>,
 }
 
 impl Writer {
     /// Writes rows and tells news until the senders are gone; `failed` is called when nothing can be written any more, `stuck`,
     /// which does not return, when an algorithm never does, with everything written.
-    pub fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
+    pub(crate) fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
         let Self { mut tables, records, news, mut reloader, mut clerk, mut timing } = self;
         let mut told = Vec::new();
         let mut last_flush = Instant::now();

@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 ///
 /// # Errors
 /// [`RunError`] when it cannot start or be saved; how it went is the exit code.
-pub fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
+pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(&arguments.files)?;
     let file = arguments.files.experiment.display().to_string();
     let scene = rehearsal::scene(&inputs, &file).map_err(RunError::input)?;

@@ -27,7 +27,7 @@ struct ProgramFile {
 }
 
 /// Looks for changes in the program files of a process.
-pub struct Reloader {
+pub(crate) struct Reloader {
     rig: RigParameters,
     files: Vec<ProgramFile>,
     changes: Sender<Change>,
@@ -37,7 +37,7 @@ pub struct Reloader {
 impl Reloader {
     /// Looks at the programs of `axes` from now on.
     #[must_use]
-    pub fn new(inputs: &Inputs, axes: &[Axis], changes: Sender<Change>) -> Self {
+    pub(crate) fn new(inputs: &Inputs, axes: &[Axis], changes: Sender<Change>) -> Self {
         let watched = |axis: &Axis| {
             let source = inputs.programs[axis.index()].as_ref()?;
             ProgramFile::new(source, *axis, &inputs.rig).ok()
@@ -47,7 +47,7 @@ impl Reloader {
     }
 
     /// Looks at the files when it is time to.
-    pub fn look(&mut self) {
+    pub(crate) fn look(&mut self) {
         if self.looked.elapsed() < LOOK_PERIOD {
             return;
         }

@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use xcp::port::PortCounters;
 
 /// The report of a process.
-pub type Report = ControllerReport<News, PortCounters>;
+pub(crate) type Report = ControllerReport<News, PortCounters>;
 /// The report of an axis.
-pub type AxisReport = controller_report::AxisReport<PortCounters>;
+pub(crate) type AxisReport = controller_report::AxisReport<PortCounters>;
 
 fn of_axis<P: CalibrationPort>(
     controller: &AxisController,
@@ -52,7 +52,7 @@ fn of_axis<P: CalibrationPort>(
 
 /// Of every controller of a node, without what XCP did.
 #[must_use]
-pub fn of_node<P: CalibrationPort>(
+pub(crate) fn of_node<P: CalibrationPort>(
     node: &ControllerNode<P>,
     inputs: &Inputs,
 ) -> BTreeMap<String, AxisReport> {
@@ -63,13 +63,13 @@ pub fn of_node<P: CalibrationPort>(
 
 /// Whether the axis ended what it was asked for.
 #[must_use]
-pub fn is_done(axis: &AxisReport) -> bool {
+pub(crate) fn is_done(axis: &AxisReport) -> bool {
     axis.chain_state == MainChainState::Done.name()
 }
 
 /// The axis that was stopped, the one with the fault before one that only followed it.
 #[must_use]
-pub fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &AxisReport)> {
+pub(crate) fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &AxisReport)> {
     [MainChainState::Fault, MainChainState::Aborted].iter().find_map(|state| {
         let (name, axis) = axes.iter().find(|(_, axis)| axis.chain_state == state.name())?;
         Some((name.as_str(), axis))
@@ -78,7 +78,7 @@ pub fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &AxisReport
 
 /// Name of the report of a process with these axes, without its ending.
 #[must_use]
-pub fn name(axes: &[Axis]) -> String {
+pub(crate) fn name(axes: &[Axis]) -> String {
     match axes {
         [axis] => format!("controller-{}", axis.name()),
         _ => "controller".into(),

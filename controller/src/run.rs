@@ -41,7 +41,7 @@ const RETURNED_QUEUE: usize = 2;
 
 /// What keeps the controllers from running.
 #[derive(Debug, thiserror::Error)]
-pub enum RunError {
+pub(crate) enum RunError {
     /// A file cannot be read, or says something that is not allowed.
     #[error("{0}")]
     Input(String),
@@ -62,7 +62,7 @@ pub enum RunError {
 impl RunError {
     /// The exit code that the error leads to.
     #[must_use]
-    pub fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(BusError::NoBarrier { .. }) => Exit::BadInput,
             Self::Bus(_) => Exit::BusFailed,
@@ -83,7 +83,7 @@ impl RunError {
 ///
 /// # Errors
 /// [`RunError`] when the run cannot start or be saved; how it went is the exit code.
-pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
+pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     if arguments.pace == Pace::Lockstep && matches!(arguments.bus, BusUrl::Can { .. }) {
         return Err(BusError::NoBarrier { url: arguments.bus.to_string() }.into());
     }

@@ -20,8 +20,8 @@
 //! This side stamps and hands over; the recorder's thread ([`queues`]) does the rest. Nothing here allocates, locks, prints or
 //! blocks.
 
-pub mod queues;
-pub mod setup;
+pub(crate) mod queues;
+pub(crate) mod setup;
 mod timed_bus;
 
 use crossbeam_channel::Sender;
@@ -30,14 +30,14 @@ use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use realtime::{Clock, VitalCounts};
 use runlog::timing::{CycleTiming, Exchange};
-pub use timed_bus::TimedBus;
+pub(crate) use timed_bus::TimedBus;
 
 /// Cycles that an answer may be older than the newest one and still belong to the same rig; below, the rig began anew.
 const SAME_RIG: u64 = 16;
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Measured {
+pub(crate) enum Measured {
     /// Sensors of the axis that wakes us that begin no row.
     Waited {
         /// When they arrived at our queue, ns.
@@ -51,30 +51,30 @@ pub enum Measured {
 
 /// A frame that came or went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Passed {
+pub(crate) struct Passed {
     /// When it arrived or was handed over, ns.
-    pub stamp_ns: u64,
+    pub(crate) stamp_ns: u64,
     /// The frame.
-    pub frame: CanFrame,
+    pub(crate) frame: CanFrame,
     /// Whether it is one of ours.
-    pub sent: bool,
+    pub(crate) sent: bool,
 }
 
 /// The queues to the recorder's thread.
-pub struct Outlets {
+pub(crate) struct Outlets {
     /// Rows and waits.
-    pub measured: Sender<Measured>,
+    pub(crate) measured: Sender<Measured>,
     /// Frames.
-    pub frames: Sender<Passed>,
+    pub(crate) frames: Sender<Passed>,
 }
 
 /// What a stopwatch counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StopwatchAccount {
+pub(crate) struct StopwatchAccount {
     /// Stamps and frames that found no room in a queue.
-    pub dropped: u64,
+    pub(crate) dropped: u64,
     /// Sensors of the axis that wakes us that had arrived before the loop began, and that no row answers.
-    pub before_start: u64,
+    pub(crate) before_start: u64,
 }
 
 /// What of a wake-up is not in a row yet.
@@ -89,7 +89,7 @@ struct WakeUp {
 }
 
 /// Stamps wake-ups and puts the rows together.
-pub struct Stopwatch<C> {
+pub(crate) struct Stopwatch<C> {
     clock: C,
     own: [bool; 2],
     wakes: Axis,
@@ -112,7 +112,7 @@ impl<C: Clock + Send> Stopwatch<C> {
     /// # Panics
     /// Without axes: no process has none.
     #[must_use]
-    pub fn new(clock: C, axes: &[Axis], outlets: Outlets) -> Self {
+    pub(crate) fn new(clock: C, axes: &[Axis], outlets: Outlets) -> Self {
         let wakes = *axes.first().expect("a process controls an axis");
         let own = Axis::ALL.map(|axis| axes.contains(&axis));
         Self {
@@ -131,17 +131,17 @@ impl<C: Clock + Send> Stopwatch<C> {
     }
 
     /// The loop begins to wait for frames.
-    pub fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.began_ns = self.now_ns();
     }
 
     /// The thread woke.
-    pub fn woke(&mut self) {
+    pub(crate) fn woke(&mut self) {
         self.wake_up = WakeUp { woke_ns: self.now_ns(), ..WakeUp::default() };
     }
 
     /// A frame was taken that had arrived at `stamp_ns`; `sensors` tells whose sensors it was.
-    pub fn took(&mut self, frame: &CanFrame, stamp_ns: u64, sensors: Option<Axis>) {
+    pub(crate) fn took(&mut self, frame: &CanFrame, stamp_ns: u64, sensors: Option<Axis>) {
         self.hand_over_frame(Passed { stamp_ns, frame: *frame, sent: false });
         let Some(axis) = sensors.filter(|axis| self.own[axis.index()]) else { return };
         self.arrived_ns[axis.index()] = stamp_ns;
@@ -156,18 +156,18 @@ impl<C: Clock + Send> Stopwatch<C> {
     }
 
     /// All frames were taken.
-    pub fn took_all(&mut self) {
+    pub(crate) fn took_all(&mut self) {
         self.wake_up.received_ns = self.now_ns();
     }
 
     /// The bus to answer on.
-    pub fn bus<'a>(&'a mut self, bus: &'a mut dyn Bus) -> TimedBus<'a, C> {
+    pub(crate) fn bus<'a>(&'a mut self, bus: &'a mut dyn Bus) -> TimedBus<'a, C> {
         TimedBus::new(self, bus)
     }
 
     /// The axes answered these cycles. When that made a row whole, `vitals` is asked what the kernel counted since it was asked
     /// last.
-    pub fn answered(&mut self, cycles: [Option<u64>; 2], vitals: impl FnOnce() -> VitalCounts) {
+    pub(crate) fn answered(&mut self, cycles: [Option<u64>; 2], vitals: impl FnOnce() -> VitalCounts) {
         if cycles == [None; 2] {
             return;
         }
@@ -234,7 +234,7 @@ impl<C: Clock + Send> Stopwatch<C> {
     }
 
     /// Hands what is left over; nothing is measured any more.
-    pub fn finish(mut self) -> StopwatchAccount {
+    pub(crate) fn finish(mut self) -> StopwatchAccount {
         self.flush();
         if let Some(waited) = self.waiting.take() {
             self.hand_over(waited);

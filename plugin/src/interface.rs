@@ -162,7 +162,7 @@ mod tests {
             text += &prints;
         }
         std::fs::write(&source, text + "return 0; }\n").expect("writes");
-        let include = concat!("-I", env!("CARGO_MANIFEST_DIR"), "/include");
+        let include = concat!("-I", env!("CARGO_MANIFEST_DIR"), "/../controller/include");
         let mut compiler = Command::new("cc");
         let compiled = compiler.args(["-std=c11", "-Wall", "-Wextra", "-Werror", include, "-o"]);
         assert!(compiled.arg(&program).arg(&source).status().expect("a C compiler").success());

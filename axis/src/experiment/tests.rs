@@ -168,7 +168,7 @@ fn nothing_moves_without_an_axis() {
 
 #[test]
 fn the_shipped_experiments_are_read() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/experiments");
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let file = entry.unwrap().path();
@@ -192,7 +192,7 @@ fn the_shipped_experiments_are_read() {
 
 /// The experiments that come with airbench: name of the file, text, what was read.
 fn shipped() -> Vec<(String, String, Experiment)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/experiments");
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let shipped = files.filter(|path| path.extension().is_some_and(|ending| ending == "toml")).map(|path| {
         let text = std::fs::read_to_string(&path).unwrap();
@@ -226,7 +226,7 @@ fn a_shipped_experiment_has_a_number_that_no_other_has_and_bounds_to_pass() {
 
 #[test]
 fn the_programs_of_the_shipped_experiments_are_shipped() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/experiments");
     for (name, _, experiment) in shipped() {
         for axis in [&experiment.drive, &experiment.load].into_iter().flatten() {
             let path = axis.program_path(&folder.join("e.toml"));

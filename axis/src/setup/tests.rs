@@ -64,7 +64,7 @@ fn an_axis_that_presses_needs_an_algorithm_to_give_way() {
 
 #[test]
 fn every_shipped_program_of_forces_gives_way() {
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/programs"));
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../controller/programs"));
     let mut seen = 0;
     for file in std::fs::read_dir(folder).unwrap() {
         let source = Source::read(&file.unwrap().path()).unwrap();

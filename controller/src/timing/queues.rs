@@ -9,15 +9,15 @@ use runlog::timing_recorder::{TimingFigures, TimingRecorder};
 use std::io;
 
 /// The receiving ends of the stopwatch, and the recorder of what comes by them.
-pub struct TimingQueues {
+pub(crate) struct TimingQueues {
     /// Rows and waits.
-    pub measured: Receiver<Measured>,
+    pub(crate) measured: Receiver<Measured>,
     /// Frames.
-    pub frames: Receiver<Passed>,
+    pub(crate) frames: Receiver<Passed>,
     /// Set by SIGUSR1.
-    pub freeze: Freeze,
+    pub(crate) freeze: Freeze,
     /// Records all of it.
-    pub recorder: TimingRecorder,
+    pub(crate) recorder: TimingRecorder,
 }
 
 impl TimingQueues {
@@ -25,7 +25,7 @@ impl TimingQueues {
     ///
     /// # Errors
     /// What the system says, with the file's name.
-    pub fn poll(&mut self) -> io::Result<()> {
+    pub(crate) fn poll(&mut self) -> io::Result<()> {
         self.empty()?;
         let now = MonotonicClock.now();
         if self.freeze.take() {
@@ -51,7 +51,7 @@ impl TimingQueues {
     }
 
     /// An axis is in fault since `cycle`.
-    pub fn fault(&mut self, cycle: u64) {
+    pub(crate) fn fault(&mut self, cycle: u64) {
         self.recorder.fault(cycle, MonotonicClock.now());
     }
 
@@ -59,7 +59,7 @@ impl TimingQueues {
     ///
     /// # Errors
     /// What the system says, with the file's name.
-    pub fn write_out(&mut self) -> io::Result<()> {
+    pub(crate) fn write_out(&mut self) -> io::Result<()> {
         self.recorder.write_out()
     }
 
@@ -67,7 +67,7 @@ impl TimingQueues {
     ///
     /// # Errors
     /// What the system says, with the file's name.
-    pub fn finish(&mut self) -> io::Result<()> {
+    pub(crate) fn finish(&mut self) -> io::Result<()> {
         let mut written = self.empty();
         keep_first(&mut written, self.recorder.finish(MonotonicClock.now()));
         written
@@ -75,7 +75,7 @@ impl TimingQueues {
 
     /// The figures so far.
     #[must_use]
-    pub fn figures(&self) -> TimingFigures {
+    pub(crate) fn figures(&self) -> TimingFigures {
         self.recorder.figures()
     }
 }

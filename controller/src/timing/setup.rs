@@ -21,19 +21,19 @@ const EMBEDDED_INTERFACE: &str = "bus0";
 
 /// When a run started, on the clocks that its files speak.
 #[derive(Clone, Copy, Debug)]
-pub struct RunStart {
+pub(crate) struct RunStart {
     /// Seconds since 1970.
-    pub unix_s: f64,
+    pub(crate) unix_s: f64,
     /// The same on the monotonic clock.
-    pub at: Instant,
+    pub(crate) at: Instant,
     /// What turns stamps of the monotonic clock into ns since 1970.
-    pub epoch_offset_ns: u64,
+    pub(crate) epoch_offset_ns: u64,
 }
 
 impl RunStart {
     /// Now.
     #[must_use]
-    pub fn now() -> Self {
+    pub(crate) fn now() -> Self {
         let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let at = MonotonicClock.now();
         let epoch_offset_ns = (unix.as_nanos() as u64).saturating_sub(at.as_nanos());
@@ -45,7 +45,7 @@ impl RunStart {
 ///
 /// # Errors
 /// [`RunError::Output`] when a file cannot be made.
-pub fn begin(
+pub(crate) fn begin(
     arguments: &RunArguments,
     started: &RunStart,
     freeze: Freeze,

@@ -9,7 +9,7 @@ use realtime::Clock;
 use std::time::Duration;
 
 /// A bus under a stopwatch.
-pub struct TimedBus<'a, C> {
+pub(crate) struct TimedBus<'a, C> {
     stopwatch: &'a mut Stopwatch<C>,
     bus: &'a mut dyn Bus,
 }

@@ -2,8 +2,6 @@
 
 use axis_control::axis::{Answer, AxisController};
 use axis_control::setup::{Inputs, Mode};
-use clap::Parser;
-use controller::cli::{Cli, Command};
 use plant::Axis;
 use protocol::frames::{ChainStatus, Frame, MainChainState, RigStatus, Sensors};
 use std::path::Path;
@@ -15,13 +13,10 @@ const NUMBER: u8 = 9;
 fn drive() -> AxisController {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = |name: &str| root.join(name).display().to_string();
-    let [rig, experiment] = [path("../plant/rig.toml"), path("experiments/load-step.toml")];
-    let line = ["controller", "rehearse", "--rig", &rig, "--experiment", &experiment];
-    let Command::Rehearse(arguments) = Cli::parse_from(line).command else {
-        unreachable!("the line above asks for a rehearsal")
-    };
+    let [rig, experiment] = [path("../plant/rig.toml"), path("../controller/experiments/load-step.toml")];
+    let line = ["--rig", &rig, "--experiment", &experiment];
     let mode = Mode { partner_needed: true, real_time: false, forever: false };
-    Inputs::read(&arguments.files).unwrap().controller(Axis::Drive, mode).unwrap()
+    Inputs::read(&crate::files(&line)).unwrap().controller(Axis::Drive, mode).unwrap()
 }
 
 fn answer(drive: &mut AxisController, cycle: u64) -> Answer {

@@ -5,8 +5,6 @@
 
 use axis_control::axis::{Answer, AxisController};
 use axis_control::setup::{Inputs, Mode};
-use clap::Parser;
-use controller::cli::{Cli, Command};
 use plant::Axis;
 use proptest::prelude::*;
 use protocol::frames::{
@@ -23,20 +21,15 @@ fn controller(axis: Axis, program: &str) -> AxisController {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = |name: &str| root.join(name).display().to_string();
     let arguments = [
-        "controller",
-        "rehearse",
         "--rig",
         &path("../plant/rig.toml"),
         "--experiment",
-        &path("experiments/load-step.toml"),
+        &path("../controller/experiments/load-step.toml"),
         &format!("--{}-program", axis.name()),
-        &path(&format!("programs/{program}.toml")),
+        &path(&format!("../controller/programs/{program}.toml")),
     ];
-    let Command::Rehearse(arguments) = Cli::parse_from(arguments).command else {
-        unreachable!("the line above asks for a rehearsal")
-    };
     let mode = Mode { partner_needed: true, real_time: false, forever: false };
-    Inputs::read(&arguments.files).unwrap().controller(axis, mode).unwrap()
+    Inputs::read(&crate::files(&arguments)).unwrap().controller(axis, mode).unwrap()
 }
 
 /// What happens in a cycle besides the sensors.

@@ -5,8 +5,6 @@ use axis_control::axis::{Answer, AxisController};
 use axis_control::chains::Fault;
 use axis_control::chains::main::MainCause;
 use axis_control::setup::{Inputs, Mode};
-use clap::Parser;
-use controller::cli::{Cli, Command};
 use plant::Axis;
 use protocol::frames::{
     ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, EmergencyStopReason, Frame,
@@ -40,7 +38,8 @@ const NOTHING: RigStatus = RigStatus {
 fn controller(axis: Axis, experiment: &str, partner_needed: bool) -> AxisController {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(root.join(format!("experiments/{experiment}.toml"))).unwrap();
+    let text =
+        std::fs::read_to_string(root.join(format!("../controller/experiments/{experiment}.toml"))).unwrap();
     let restart = "[run]\nafter_emergency_stop = \"restart\"\n";
     let place = if text.contains("[run]\n") { "[run]\n" } else { "[rig]\n" };
     let restart = if place == "[rig]\n" { format!("{restart}[rig]\n") } else { restart.into() };
@@ -48,20 +47,15 @@ fn controller(axis: Axis, experiment: &str, partner_needed: bool) -> AxisControl
     std::fs::write(&restarts, text.replacen(place, &restart, 1)).unwrap();
     let path = |name: &str| root.join(name).display().to_string();
     let arguments = [
-        "controller",
-        "rehearse",
         "--rig",
         &path("../plant/rig.toml"),
         "--programs",
-        &path("programs"),
+        &path("../controller/programs"),
         "--experiment",
         &restarts.display().to_string(),
     ];
-    let Command::Rehearse(arguments) = Cli::parse_from(arguments).command else {
-        unreachable!("the line above asks for a rehearsal")
-    };
     let mode = Mode { partner_needed, real_time: false, forever: false };
-    Inputs::read(&arguments.files).unwrap().controller(axis, mode).unwrap()
+    Inputs::read(&crate::files(&arguments)).unwrap().controller(axis, mode).unwrap()
 }
 
 /// An axis at rest, 0.1 m from the drive's end; the noise is a few steps of the wire.
