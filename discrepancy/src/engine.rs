@@ -36,7 +36,7 @@ pub struct Engine<'a> {
     rig: RigParameters,
     rows: usize,
     freedom: Vec<f64>,
-    /// Noise level by the quietest windows, as a factor on its power.
+    /// Common variance factor of the noise, by the quietest windows.
     level: f64,
     /// Cache of sensitivities, latest last.
     kept: Mutex<Vec<Sensitivities>>,
@@ -98,7 +98,7 @@ impl<'a> Engine<'a> {
         self.rows
     }
 
-    /// Degrees of freedom of each window times the noise level.
+    /// Degrees of freedom of each window times the common variance factor.
     #[must_use]
     pub fn freedom(&self) -> &[f64] {
         &self.freedom

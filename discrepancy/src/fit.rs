@@ -4,8 +4,9 @@
 //!   minimise  sum_k f_k ln(|e_k - C_k a|^2 / f_k) + sum_j (a_j / tolerance_j)^2         window k, f_k degrees of freedom
 //! ```
 //!
-//! The logarithm bounds the influence of a window, so that a few windows around a break-away do not dominate; within the noise it
-//! is least squares. It is minimised by iterative reweighting: the weight of a window is f_k / |e_k - C_k a|^2.
+//! It is minus twice the profile log-likelihood of Gaussian windows of unknown variance. The contribution of a window grows only
+//! logarithmically, so that a few windows around a break-away do not dominate; within the noise it is least squares. It is
+//! minimised by iterative reweighting: the weight of a window is f_k / |e_k - C_k a|^2.
 //!
 //! Normal equations are kept for each window, so that any selection of columns is solved without the samples.
 //!

@@ -43,7 +43,7 @@ const STEPS: usize = 5;
 /// Maximum number of relinearisations of the parameter sensitivities, and the fall of the loss that ends them.
 const RELINEARISATIONS: usize = 4;
 const CONVERGED: f64 = 1.0;
-/// Mean log ratio of a window's chi2 to its degrees of freedom above which a model is inadequate.
+/// Mean log ratio of a window's chi2 to its degrees of freedom above which a model shows lack of fit (is inadequate).
 const EXCESS: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
 const EXCESS_LINKED: f64 = 0.3;
@@ -61,8 +61,8 @@ const TAKES: f64 = 0.3;
 const FLOOR: f64 = 0.6;
 /// Share of the loss after calibration that an explanation may leave.
 const STAYS: f64 = 0.3;
-/// Mean log reduction of chi2 that makes a model adequate whatever it leaves (1.8: to a sixth). A law of a slightly different
-/// form leaves more than noise and is still this effect.
+/// Fall of the loss per degree of freedom that makes a model adequate whatever it leaves (1.8: chi2 to a sixth). A law of a
+/// slightly different form leaves more than noise and is still this effect.
 const REDUCES: f64 = 1.8;
 /// Effects defined by their first number alone: a check valve without cracking pressure is a line resistance, and on linked rods
 /// damping alone absorbs the errors of the start states.
@@ -95,7 +95,7 @@ pub struct Found {
     pub(crate) screened: Vec<Screened>,
     /// All fits, each with its candidate as the last effect.
     pub fitted: Vec<Refit>,
-    /// 99th percentile of the gain under the null distribution.
+    /// 99th percentile of the largest gain of any candidate under the null distribution.
     pub(crate) threshold: f64,
     /// Columns of the screening.
     pub columns: Columns,
@@ -252,7 +252,7 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
     }
 }
 
-/// Detection limits: the amplitude at which a candidate would exceed the null threshold, the gain worth a fit and the floor.
+/// Detection limits: the amplitude whose expected gain reaches the null threshold and the gain worth a fit, at least the floor.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
     let limits = null.limits(columns.candidates.len(), (SAFETY * threshold).max(WORTH_A_FIT));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {

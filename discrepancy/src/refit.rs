@@ -57,7 +57,7 @@ pub struct Refit {
     pub(crate) squares: Vec<f64>,
     /// Standard errors of all coordinates, in the order of the effects and their keys, then of the factors; clustered by windows.
     pub errors: Vec<f64>,
-    /// How many times larger the clustered variance is than the plain one, for the first amplitude; at least 1.
+    /// Design effect: cluster-robust over model-based variance of the first amplitude; at least 1.
     pub(crate) inflation: f64,
 }
 

@@ -55,7 +55,7 @@ pub struct Report {
     pub candidates: Vec<Candidate>,
     /// Effects that the training records do not excite.
     pub(crate) not_excited: Vec<EffectPlace>,
-    /// Smallest amplitude of each other effect that would have been named.
+    /// Smallest amplitude of each other effect whose expected gain reaches the threshold.
     pub(crate) detection_limits: Vec<DetectionLimit>,
     /// Where model and records disagree.
     pub location: Option<Location>,
@@ -158,7 +158,8 @@ pub struct Candidate {
     /// Where.
     #[serde(rename = "where")]
     pub place: Where,
-    /// Screened gain over the null threshold; above 1 it is significant.
+    /// Screened gain over the null threshold of the final model; above 1 it exceeds what chance gives the best candidate; no test
+    /// of this effect.
     pub(crate) score: f64,
     /// Share of the excess that it removes alone, after its refit; null when it was not refitted.
     pub share_explained: Option<f64>,

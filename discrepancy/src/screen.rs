@@ -1,7 +1,8 @@
 //! Linear screening: gain and starting point of each candidate, from one simulation at each of its probes.
 //!
 //! Each probe is one column. Fitted jointly with the parameters' columns, its coefficient is the amplitude of an effect whose
-//! traces were proportional to it. Screening only ranks; the refit decides.
+//! responses were proportional to it. Screening ranks, and ends the search where no gain exceeds [`crate::name::WORTH_A_FIT`]
+//! and a share of the last threshold; the refit decides.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;

@@ -1,8 +1,8 @@
 //! The whole workflow, from records and rig file to report, page and extended rig file.
 //!
 //! ```text
-//!   records ─► check ─► grid ─► parameters alone ─► locate ─► name ─► extend ─┬─► report, page, rig.toml
-//!                 └─ cannot be used: bad-data                   next ◄── alike  └─► verify: opens the held-out record, alone
+//!   records ─► check ─► grid ─► name (with calibration) ─► locate ─► extend ─┬─► report, page, rig.toml
+//!                 └─ cannot be used: bad-data     alike ──► next             └─► verify: opens the held-out record, alone
 //! ```
 //!
 //! All but [`Report::gap`] and [`Report::verification`] is computed before the held-out record is opened.

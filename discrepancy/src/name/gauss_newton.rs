@@ -30,11 +30,11 @@ const BROKEN: f64 = 6.0;
 /// Fall of the loss below which a fit has converged.
 const CONVERGED: f64 = 0.3;
 
-/// Step fractions of the backtracking line search on the linearised parameter step.
+/// Grid of fractions by which the deviations of the parameters are scaled.
 const WAYS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
-/// Backtracking line search on the linearised parameter step: the step fraction with the smallest simulated loss. While an effect
-/// is missing, the linearised step may lead far off.
+/// Scales all deviations of the parameters from the rig file by the fraction with the smallest simulated loss. While an effect is
+/// missing, the linearised step may lead far off.
 pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
     let tried = WAYS.map(|way| model.factors.map(|factor| 1.0 + way * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {

@@ -1,4 +1,4 @@
-//! Sign-flip null distribution of the gain: the acceptance threshold and the detection limits.
+//! Sign-flip null distribution of the gain: the elimination threshold and the detection limits.
 //!
 //! Source: discrepancy-notes.md, 4 (thresholds from this very record) and pipeline 1.
 

@@ -29,7 +29,7 @@ const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 const REFINED: usize = 3;
 /// Fits are close when their losses differ by less than this share of the best gain.
 const CLOSE: f64 = 0.02;
-/// The gap of the linkage. Screening underrates it, since the start states were estimated without it.
+/// The backlash of the linkage. Screening underrates it, since the start states were estimated without it.
 const BACKLASH: &str = "coupling-backlash";
 
 /// Candidates to refit.
@@ -38,7 +38,7 @@ pub(super) struct Contenders {
     null_loss: f64,
     /// Best first.
     best: Vec<Screened>,
-    /// The gap of linked rods, whatever its screened gain.
+    /// The backlash of linked rods, whatever its screened gain.
     gap: Option<Screened>,
 }
 
@@ -137,7 +137,7 @@ impl<'a> Round<'a> {
         sort(&mut self.fits);
     }
 
-    /// Fits the gap from other starting widths than the screened one.
+    /// Fits the backlash from other starting widths than the screened one.
     fn with_gap(&mut self, engine: &Engine<'a>, point: &Around, model: &Refit, gap: &Screened) {
         let start = gap_start(engine, point, &model.placed, &gap.start);
         let Some(fit) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };

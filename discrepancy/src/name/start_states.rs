@@ -5,7 +5,7 @@ use crate::engine::Engine;
 use crate::refit::{Around, Placed, Refit, loss_at, refit, rig_of};
 use rayon::prelude::*;
 
-/// Starting amplitudes of a gap.
+/// Starting amplitudes of the backlash.
 const AMPLITUDES: [f64; 5] = [0.12, 0.25, 0.45, 0.7, 1.0];
 /// Maximum number of alternations between start states and model, and the relative fall of the loss that ends them.
 const MOVES: usize = 3;
@@ -38,8 +38,8 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty:
     best
 }
 
-/// Start of the fit of a gap: the amplitude with the smallest loss, each under its own start states. Under the start states of
-/// another gap even the true one fits badly.
+/// Start of the fit of a backlash: the amplitude with the smallest loss, each under its own start states. Under the start states
+/// of another backlash even the true one fits badly.
 pub(super) fn gap_start(
     engine: &Engine<'_>,
     point: &Around,

@@ -23,8 +23,8 @@ pub(super) fn candidates(report: &Report) -> String {
     let rows: Vec<Bar> = report.candidates.iter().take(DRAWN).map(bar).collect();
     let drawn = figure(
         "How much each would explain",
-        "Over what pure noise would reach, logarithmic: beyond 1 a candidate stands out. It is named only when its refit in the \
-         simulator holds too.",
+        "Over what pure noise would reach, logarithmic: above 1 it exceeds what chance gives the best candidate; no test \
+         of this effect. It is named only when its refit in the simulator holds too.",
         &[],
         &bars("ranking", "Candidates by score", &rows),
     );

@@ -42,7 +42,7 @@ impl Windows<'_> {
         noise
     }
 
-    /// Whitens a window: jitter, common to all readings of an instant, by (1 + d d')^(-1/2) with d their rates times the jitter
+    /// Whitens a window: jitter, common to all readings of an instant, by (I + d d')^(-1/2) with d their rates times the jitter
     /// over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
         let width = self.lanes.len();
@@ -72,7 +72,7 @@ impl Windows<'_> {
         }
     }
 
-    /// Replaces force readings that differ from the median of their neighbours by more than `limit` with that median.
+    /// Hampel-type filter: force readings that differ from the median of their neighbours by more than `limit` become it.
     pub(super) fn flatten(&self, values: &mut [f64], limit: f64) {
         let width = self.lanes.len();
         for lane in (0..width).filter(|lane| self.lanes[*lane].1 == FORCE) {
