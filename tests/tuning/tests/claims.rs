@@ -95,7 +95,7 @@ fn twice_the_loop_leaves_the_map_still() {
 
 #[test]
 fn twice_the_loop_leaves_the_cascade_still() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/programs/position-cascade.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../controller/programs/position-cascade.toml");
     let source = Source::read(&path).unwrap();
     for (added_mass_kg, supply_bar) in CORNERS {
         let trial = Trial { added_mass_kg, supply_bar, loop_factor: 2.0, ..Trial::default() };
