@@ -62,7 +62,8 @@ pub trait Algorithm: Send {
     fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64;
 }
 
-/// A control algorithm whose parameters are declared by [`settings::parameters!`]: it reads them as fields, and is an [`Algorithm`]
+/// A control algorithm whose parameters are declared by [`settings::parameters!`]: it reads them as fields, and is an
+/// [`Algorithm`]
 /// by that.
 pub trait ControlLaw: Send {
     /// Its parameters.

@@ -36,7 +36,8 @@ settings::parameters! {
         velocity_feed_forward: declare("", [0.0, 1.0], 0.5, "share of the own rod's velocity that is fed forward while it moves"),
         dead_zone_n: declare("N", [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
         moving: declare("", [0.0, 1.0], 0.0, "from 0.5 on the rod counts as moving; in [giving-way] the force chain decides it"),
-        limit_m_per_s: declare("m/s", [0.0, 5.0], 1.0, "largest velocity either way; in [giving-way] the force chain may lower it"),
+        limit_m_per_s: declare("m/s", [0.0, 5.0], 1.0,
+            "largest velocity either way; in [giving-way] the force chain may lower it"),
     }
 }
 

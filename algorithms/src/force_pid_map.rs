@@ -50,13 +50,16 @@ settings::parameters! {
         derivative_time_s: declare("s", [0.0, 0.05], 0.0, "time over which the error is extrapolated by its rate"),
         derivative_filter_hz: declare("Hz", [1.0, 400.0], 100.0, "cut-off of the measured force's rate"),
         reference_time_s: declare("s", [0.001, 1.0], 0.032, "time constant with which a step is followed"),
-        reference_speed_m_per_s: declare("m/s", [0.01, 10.0], 2.0, "fastest rate of the reference, as the velocity that it stands for"),
+        reference_speed_m_per_s: declare("m/s", [0.01, 10.0], 2.0,
+            "fastest rate of the reference, as the velocity that it stands for"),
         valve_time_s: declare("s", [0.0, 0.1], 0.012, "how much later the force comes than asked for"),
         rate_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the reference's rate that is fed forward"),
         velocity_feed_forward: declare("", [0.0, 2.0], 1.0, "share of the own rod's velocity that is fed forward while it moves"),
-        friction_feed_forward: declare("", [0.0, 1.0], 0.8, "share of the nominal viscous friction's rate that is fed forward while it moves"),
+        friction_feed_forward: declare("", [0.0, 1.0], 0.8,
+            "share of the nominal viscous friction's rate that is fed forward while it moves"),
         dead_zone_n: declare("N", [0.0, 100.0], 5.0, "error that is let be while the rod stands"),
-        standstill_m_per_s: declare("m/s", [0.001, 0.2], 0.04, "velocity from which on the rod moves; up to half of it, it stands"),
+        standstill_m_per_s: declare("m/s", [0.001, 0.2], 0.04,
+            "velocity from which on the rod moves; up to half of it, it stands"),
     }
 }
 /// Time in which the integral part fades while the rod stands, s.

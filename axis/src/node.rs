@@ -5,9 +5,8 @@
 //!                            every ten cycles, and on change, status and values of its chains; its emergency stop
 //! ```
 //!
-//! Only the newest sensors of an axis are answered: after a stall, the backlog is read and not replayed. An axis hears its
-//! partner as it would over the bus, a cycle after the partner spoke, also when both live in this process: one
-//! process or two give the same log. Nothing here allocates, locks, prints or blocks.
+//! Only the newest sensors of an axis are answered: a backlog is read, not replayed. An axis hears its partner a cycle after it
+//! spoke, also in one process: one or two give the same log. Nothing here allocates, locks, prints or blocks.
 
 use crate::axis::{Answer, AxisController, AxisRecord};
 use crate::chains::main::MainCause;
@@ -15,19 +14,15 @@ use crate::program::Program;
 use crate::rig_view::{RigView, TickNews};
 use crossbeam_channel::{Receiver, Sender};
 use plant::Axis;
-use protocol::bus::Bus;
-use protocol::can::CanFrame;
 use protocol::frames::{
     ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand,
 };
+use protocol::{bus::Bus, can::CanFrame, periods::TICK_CYCLES};
 use runlog::controller_report::IgnoredFrames;
 use std::collections::VecDeque;
 
-/// Ticks of the rig, one every ten cycles, without sensors of an axis in between, after which they count as lost: 50 ms. Sooner
-/// than its partner gives it up for its silence, so that the cause is named.
+/// Ticks of the rig without sensors of an axis after which these count as lost: 50 ms, before its partner gives it up.
 const SILENT_TICKS: u64 = 5;
-/// Cycles from tick to tick.
-const TICK_PERIOD: u64 = protocol::periods::TICK_CYCLES;
 /// Cycles after an abort or a fault during which the valve is still commanded shut and the record goes on.
 pub const STOPPED_CYCLES: u64 = 2000;
 /// Frames of a partner that wait for their cycle; a cycle has three at most.
@@ -313,7 +308,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         }
         let axis = member.controller.axis();
         let stop = member.controller.without_sensors(cycle);
-        member.stopped_for += if member.controller.may_restart() { 0 } else { TICK_PERIOD };
+        member.stopped_for += if member.controller.may_restart() { 0 } else { TICK_CYCLES };
         member.silent_ticks = SILENT_TICKS - 1;
         if let Some(stop) = stop {
             self.send_to_all(place, cycle, &emergency_stop_frame(axis, stop), bus);

@@ -3,7 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`cli`], [`listing`] | command line, and the commands that print |
-//! | [`run`], [`pace`] | a run: threads, and what moves the node: the rig's frames, or the barrier; [`farewell`]: how it leaves the bus |
+//! | [`run`], [`pace`] | a run: threads; the node goes on frames or the barrier; [`farewell`]: how it leaves the bus |
 //! | [`rehearse`] | the command of a rehearsal |
 //! | [`timing`] | when everything of a cycle happened; histograms, timing tables, flight recorder |
 //! | [`recording`], [`report`] | tables and report of a run |

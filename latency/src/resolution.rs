@@ -124,7 +124,8 @@ mod tests {
 
     #[test]
     fn an_interval_that_crosses_its_bound_decides_nothing() {
-        // Both were printed once, as kept and as broken. n' = 10 (ln(4.95/1.05) / ln(1.1/1.05))² and 10 (ln(0.62/1.24) / ln(1.1/1.24))².
+        // Both were printed once, as kept and as broken. n' = 10 (ln(4.95/1.05) / ln(1.1/1.05))² and 10 (ln(0.62/1.24) /
+        // ln(1.1/1.24))².
         assert_eq!(pairs(at_most(1.05, (0.27, 4.95), 1.1)), Some(11_111));
         assert_eq!(pairs(at_most(1.24, (0.62, 1.37), 1.1)), Some(335));
         // The same below: m, b and the interval inverted.

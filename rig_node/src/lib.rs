@@ -1,4 +1,4 @@
-//! The simulated rig as a node of its bus: sensors, frames and commands of a cycle, whatever carries the frames and paces the cycle.
+//! The simulated rig as a node of its bus: sensors, frames and commands of a cycle, whatever carries and paces them.
 //!
 //! ```text
 //!   begin(k) ──────────► publish(k) ─────────► take(frame)* ──────────► latch, step(k) ──► t_k+1
@@ -6,8 +6,10 @@
 //!   sampled              status                                         over [t_k, t_k+1)
 //! ```
 //!
-//! A command that arrived before t_k acts over [t_k, t_k+1) (bus.md, Time). What is simulated is a [`SimulatedRig`]: the plant with
-//! people around it ([`PeopledPlant`]), the emulator's with faults, the record maker's own. Nothing here allocates after the start,
+//! A command that arrived before t_k acts over [t_k, t_k+1) (bus.md, Time). What is simulated is a [`SimulatedRig`]: the plant
+//! with
+//! people around it ([`PeopledPlant`]), the emulator's with faults, the record maker's own. Nothing here allocates after the
+//! start,
 //! locks, prints or blocks.
 
 mod rig;

@@ -372,9 +372,8 @@ impl SimulatedRig for Made {
         }
     }
 
-    fn step(&mut self, _cycle: u64, valve: [f64; 2]) -> Row {
-        let row = self.row.take().expect("sampled before");
-        assert_eq!(row.valve, valve, "commands act as was expected when the cycle was sampled");
-        row
+    /// The rig has moved on the commands that were sent, when its sensors were sampled.
+    fn step(&mut self, _cycle: u64, _valve: [f64; 2]) -> Row {
+        self.row.take().expect("sampled before")
     }
 }

@@ -49,7 +49,8 @@ impl Point {
         })
     }
 
-    /// The same with one of its numbers a little larger: by less than the sensors' noise, so that the trajectory stays what it is.
+    /// The same with one of its numbers a little larger: by less than the sensors' noise, so that the trajectory stays what it
+    /// is.
     #[must_use]
     pub fn nudged(mut self, number: usize) -> Self {
         match number {

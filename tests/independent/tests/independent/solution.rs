@@ -106,7 +106,8 @@ fn through(system: &System<'_>, from: &Y, begin: f64, times: &[f64]) -> Vec<Y> {
     let (mut t, mut y) = (begin, *from);
     let step_to = |&end: &f64| {
         let scaled = DVector::from_iterator(STATES, (0..STATES).map(|i| y[i] / units[i]));
-        // Safety factor, beta, smallest and largest change of the step, and limits of steps are the solver's defaults; h = 0 is chosen.
+        // Safety factor, beta, smallest and largest change of the step, and limits of steps are the solver's defaults; h = 0
+        // is chosen.
         let mut solver = Dopri5::from_param(
             Scaled { system, units },
             t,
