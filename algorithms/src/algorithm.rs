@@ -62,11 +62,9 @@ pub trait Algorithm: Send {
     fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64;
 }
 
-/// A control algorithm whose parameters are declared by [`settings::parameters!`]: it reads them as fields, and is an
-/// [`Algorithm`]
-/// by that.
+/// A control algorithm whose parameters are declared by [`settings::parameters!`] and read as fields; each is an [`Algorithm`].
 pub trait ControlLaw: Send {
-    /// Its parameters.
+    /// Fields that are read from the values of the program, each by its place in the table.
     type Parameters: Declared;
 
     /// Resets integral and memory. The axis has been without control before.
@@ -90,7 +88,7 @@ impl<L: ControlLaw> Algorithm for L {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
-    /// The extension.
+    /// Extension of the rod, m.
     Position,
     /// The force between rod and carriage.
     Force,

@@ -8,6 +8,8 @@
 //! | [`rest_zone`] | when a rod is left alone |
 //! | the others | one algorithm each |
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod algorithm;
 mod force_manual;
 mod force_p;

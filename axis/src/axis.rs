@@ -45,7 +45,6 @@ use work::{Asked, Seen, Work};
 pub struct AxisParts {
     /// Which axis.
     pub axis: Axis,
-    /// Its program.
     pub program: Program,
     /// What it does in the experiment.
     pub plan: Plan,
@@ -287,7 +286,6 @@ impl AxisController {
         &mut self.program
     }
 
-    /// Its program.
     #[must_use]
     pub fn program(&self) -> &Program {
         &self.program

@@ -103,7 +103,6 @@ pub enum AfterStop {
 pub struct Entered<State, Cause> {
     /// The rig's cycle.
     pub cycle: u64,
-    /// The state.
     pub state: State,
     /// Why.
     pub cause: Cause,

@@ -34,9 +34,7 @@ const MAIL_ROOM: usize = 16;
 pub enum News {
     /// The main chain of an axis went to this state in this cycle, because of this.
     State {
-        /// The axis.
         axis: Axis,
-        /// Its state.
         #[serde(serialize_with = "state_name")]
         state: MainChainState,
         /// The rig's cycle.
@@ -70,7 +68,6 @@ pub struct Change {
     pub axis: Axis,
     /// Place in the list of variables.
     pub place: usize,
-    /// Its value.
     pub value: f64,
 }
 

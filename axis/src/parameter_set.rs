@@ -26,7 +26,6 @@ pub struct ParameterSetError(String);
 /// A value of a set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// Its axis.
     pub axis: Axis,
     /// Name of the variable, such as `algorithm.gain_per_s`.
     pub name: String,

@@ -40,12 +40,10 @@ const GAP_S: f64 = 0.05;
 /// Mean width of a letter by the height of its font.
 const LETTER: f64 = 0.53;
 
-/// A line.
 #[derive(Clone, Debug)]
 pub struct Curve {
     /// What the legend says.
     pub name: String,
-    /// Its colour.
     pub colour: RGBColor,
     /// Its width in pixels.
     pub width: u32,

@@ -36,7 +36,6 @@ pub enum ExportError {
     /// The file cannot be written.
     #[error("cannot write {file}: {reason}")]
     Write {
-        /// The file.
         file: PathBuf,
         /// Why not.
         reason: String,
@@ -47,7 +46,6 @@ pub enum ExportError {
          'VENV/bin/pip install python-can==4.6.1'): name it with --python VENV/bin/python, or in AIRBENCH_PYTHON"
     )]
     Python {
-        /// The program.
         python: PathBuf,
         /// What it said.
         reason: String,

@@ -6,7 +6,6 @@
 use crate::soak::model::CheckResult;
 use std::fmt::Write;
 
-/// A check.
 pub(crate) struct Case {
     /// What it belongs to.
     pub(crate) class: String,

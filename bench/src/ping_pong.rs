@@ -57,7 +57,6 @@ pub enum PingPongError {
     /// A file cannot be written, or is something else.
     #[error("cannot write {file}: {reason}")]
     Write {
-        /// The file.
         file: String,
         /// Why not.
         reason: String,

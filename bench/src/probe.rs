@@ -60,7 +60,6 @@ pub enum ProbeError {
     /// A thread does not get its CPU, or no idle priority: its gaps would say nothing.
     #[error("CPU {cpu}: {reason}")]
     Thread {
-        /// The CPU.
         cpu: usize,
         /// What was refused, and what to do.
         reason: String,

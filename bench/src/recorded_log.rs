@@ -24,7 +24,6 @@ pub enum RecordedLogError {
     /// The file cannot be opened.
     #[error("cannot read {file}: {reason}; give a run's folder, or a log of 'candump -L'")]
     Open {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         reason: String,
@@ -32,7 +31,6 @@ pub enum RecordedLogError {
     /// A line that is none.
     #[error("{file}:{error}")]
     Line {
-        /// The file.
         file: PathBuf,
         /// Line, column and what is wrong.
         error: LogError,
@@ -40,7 +38,6 @@ pub enum RecordedLogError {
     /// Names of interfaces without end.
     #[error("{file}:{line}: more than {MOST_INTERFACES} interfaces: is this a log of 'candump -L'?")]
     ManyInterfaces {
-        /// The file.
         file: PathBuf,
         /// Line of the first that is too many.
         line: u64,
@@ -53,7 +50,6 @@ pub enum RecordedLogError {
 /// A log that was read.
 #[derive(Clone, Debug)]
 pub struct RecordedLog {
-    /// The file.
     pub file: PathBuf,
     /// Its frames in the order of the file; at least one.
     pub frames: Vec<LogLine>,

@@ -39,20 +39,10 @@ pub enum ReplayError {
     Log(#[from] RecordedLogError),
     /// The log has several interfaces.
     #[error("{file} holds frames of {names}: choose one with --interface NAME")]
-    Interfaces {
-        /// The log.
-        file: PathBuf,
-        /// The interfaces.
-        names: String,
-    },
+    Interfaces { file: PathBuf, names: String },
     /// The log lasts too long.
     #[error("{file}:{line}: this frame is more than {} days after the first one: cut the log", LONGEST.as_secs() / 86400)]
-    TooLong {
-        /// The log.
-        file: PathBuf,
-        /// The line.
-        line: u64,
-    },
+    TooLong { file: PathBuf, line: u64 },
     /// Everything was left out.
     #[error("nothing of {0} is left to be sent")]
     Nothing(PathBuf),
@@ -62,7 +52,6 @@ pub enum ReplayError {
          {of_the_rig} frames of a rig, all of the past: leave them out with --leave-out commands,rig, or take another bus"
     )]
     LiveRig {
-        /// The bus.
         bus: String,
         /// Frames of the live rig.
         heard: u64,
@@ -85,7 +74,6 @@ pub enum ReplayError {
     /// A file cannot be written.
     #[error("cannot write {file}: {reason}")]
     Write {
-        /// The file.
         file: PathBuf,
         /// Why not.
         reason: String,

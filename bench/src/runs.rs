@@ -29,11 +29,9 @@ pub enum RunsError {
     DifferentExperiments {
         /// The first run.
         one: PathBuf,
-        /// Its experiment.
         title_one: String,
         /// The run that differs.
         other: PathBuf,
-        /// Its experiment.
         title_other: String,
     },
 }
@@ -41,11 +39,9 @@ pub enum RunsError {
 /// A run as it is compared.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Its folder.
     pub folder: PathBuf,
     /// What it is called in tables and legends.
     pub name: String,
-    /// Its tables.
     pub record: Record,
     /// Its figures in the order of [`rows`], those that are known.
     figures: Vec<(&'static str, f64)>,

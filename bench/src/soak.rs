@@ -60,7 +60,6 @@ pub enum SoakError {
     /// A file that cannot be read, or says what is not allowed.
     #[error("cannot read {file}: {reason}")]
     Input {
-        /// The file.
         file: PathBuf,
         /// What is wrong.
         reason: String,
@@ -68,7 +67,6 @@ pub enum SoakError {
     /// A file that cannot be written.
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
     Output {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         reason: String,
@@ -76,7 +74,6 @@ pub enum SoakError {
     /// A program that does not start.
     #[error("cannot start {program}: {reason}; build it, or say where it is with --bin-dir")]
     Program {
-        /// The program.
         program: PathBuf,
         /// What the system said.
         reason: String,
@@ -89,7 +86,6 @@ pub enum SoakError {
         "{out} holds a soak with other settings: {differences}; choose another --out, or go on with --anyway"
     )]
     OtherSettings {
-        /// The folder.
         out: PathBuf,
         /// What differs.
         differences: String,

@@ -19,12 +19,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// A campaign.
 #[derive(Debug)]
 pub struct Campaign {
-    /// Its file.
     pub file: CampaignFile,
-    /// Its runs.
     pub points: Points,
     /// How they are shared out.
     pub parts: Parts,
@@ -45,7 +42,6 @@ pub struct Places {
 /// Why a campaign cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// Its file.
     #[error(transparent)]
     File(#[from] FileError),
     /// A file that it names.
@@ -57,7 +53,6 @@ pub enum CampaignError {
     /// A run's values go into no file.
     #[error("{0}: {1}")]
     Condition(String, ConditionError),
-    /// A program.
     #[error("{0}: {1}")]
     Program(String, io::Error),
     /// A run of a program that is no result: program, run, reason.

@@ -42,7 +42,6 @@ impl Own {
         command.process_group(0).spawn().map(|child| Self { child })
     }
 
-    /// The process.
     pub fn child(&mut self) -> &mut Child {
         &mut self.child
     }

@@ -22,19 +22,14 @@ use std::time::Instant;
 /// Why a command did not do what it was asked for.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
-    /// The campaign.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
-    /// Its runs.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// Its shard.
     #[error(transparent)]
     Shard(#[from] ShardError),
-    /// Its results.
     #[error(transparent)]
     Merge(#[from] MergeError),
-    /// A file.
     #[error("{0}: {1}")]
     File(String, io::Error),
     /// A run that there is not.

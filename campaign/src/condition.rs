@@ -20,7 +20,6 @@ pub struct Condition<'s> {
     pub nominal: &'s RigFile,
     /// The rig that is simulated.
     pub rig: RigParameters,
-    /// Its file.
     pub rig_toml: String,
     /// The experiment, with its path.
     pub experiment: &'s Text,

@@ -41,14 +41,12 @@ pub enum EngineError {
     /// A part that cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The threads.
     #[error("no threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
 /// What a start does.
 pub struct Start<'a> {
-    /// The campaign.
     pub campaign: &'a Campaign,
     /// Where its parts are.
     pub out: &'a Path,

@@ -28,7 +28,6 @@ pub struct Factor {
     pub name: String,
     /// What it changes.
     pub changes: Changes,
-    /// Its values.
     pub values: Values,
 }
 

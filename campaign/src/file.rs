@@ -33,9 +33,7 @@ use toml::Spanned;
 /// A campaign as its file asks for it; paths are from the file's folder.
 #[derive(Clone, Debug)]
 pub struct CampaignFile {
-    /// Its path.
     pub path: PathBuf,
-    /// Its text.
     pub text: String,
     /// What it is about.
     pub title: String,
@@ -96,7 +94,6 @@ pub enum Pace {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{file}:{line}: {message}")]
 pub struct FileError {
-    /// The file.
     pub file: String,
     /// Line, from 1.
     pub line: usize,

@@ -44,16 +44,12 @@ pub enum PartError {
     #[error(
         "{path}: is of another campaign, or the file or one that it names has changed since; give another --out"
     )]
-    OtherCampaign {
-        /// The part.
-        path: String,
-    },
+    OtherCampaign { path: String },
     /// Another version made it.
     #[error(
         "{path}: was made by another version of the programs ({theirs}, this is {ours}); use that version, or another --out"
     )]
     OtherProgram {
-        /// The part.
         path: String,
         /// Who made it.
         theirs: String,
@@ -63,7 +59,6 @@ pub enum PartError {
     /// It cannot be read, or is not whole.
     #[error("{path}: {what}; delete it, and run the campaign again: it does only what is missing")]
     Unreadable {
-        /// The part.
         path: String,
         /// What is wrong.
         what: String,
@@ -102,7 +97,6 @@ impl Parts {
         part * self.runs_per_part..((part + 1) * self.runs_per_part).min(self.runs)
     }
 
-    /// Its file.
     #[must_use]
     pub fn path(&self, out: &Path, part: u64) -> PathBuf {
         out.join("parts").join(format!("{part:06}.csv"))

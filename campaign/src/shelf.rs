@@ -64,10 +64,8 @@ impl Folders {
     }
 }
 
-/// A file.
 #[derive(Clone, Debug)]
 pub struct Text {
-    /// Its path.
     pub path: PathBuf,
     /// What it holds.
     pub text: String,
@@ -76,7 +74,6 @@ pub struct Text {
 /// A rig file and what it says.
 #[derive(Debug)]
 pub struct RigFile {
-    /// The file.
     pub file: Text,
     /// Its numbers: those that controllers know.
     pub nominal: RigParameters,

@@ -38,7 +38,6 @@ pub(crate) enum End {
 
 /// The node of a run, its bus and what may end it.
 pub(crate) struct RunContext<'a> {
-    /// The controllers.
     pub(crate) node: &'a mut Node,
     /// Their peer on the bus.
     pub(crate) bus: &'a mut dyn Bus,

@@ -93,7 +93,6 @@ impl Tables {
 
 /// The thread that empties the queues.
 pub(crate) struct Writer {
-    /// The files.
     pub(crate) tables: Tables,
     /// Their rows.
     pub(crate) records: Receiver<AxisRecord>,

@@ -51,7 +51,6 @@ pub(crate) enum RunError {
     /// A library that is no algorithm.
     #[error(transparent)]
     Plugin(#[from] PluginError),
-    /// The bus.
     #[error(transparent)]
     Bus(#[from] BusError),
     /// The output folder.

@@ -54,7 +54,6 @@ pub(crate) enum Measured {
 pub(crate) struct Passed {
     /// When it arrived or was handed over, ns.
     pub(crate) stamp_ns: u64,
-    /// The frame.
     pub(crate) frame: CanFrame,
     /// Whether it is one of ours.
     pub(crate) sent: bool,

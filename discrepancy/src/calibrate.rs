@@ -26,7 +26,6 @@ const UNRESOLVED: f64 = 0.7;
 /// Fitted parameters without effects.
 #[derive(Clone, Debug)]
 pub struct Calibrated {
-    /// The fit.
     pub fit: Refit,
 }
 

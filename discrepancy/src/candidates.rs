@@ -40,7 +40,6 @@ const MOST_KEYS: usize = 6;
 /// An effect at a place.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
-    /// Its sheet.
     pub sheet: &'static Sheet,
     /// Where.
     pub place: Place,

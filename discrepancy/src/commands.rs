@@ -41,7 +41,6 @@ pub enum CommandError {
     /// A file that cannot be read, or standard output that cannot be written.
     #[error("{file}: {why}")]
     File {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         why: io::Error,
@@ -49,7 +48,6 @@ pub enum CommandError {
     /// A report that is none.
     #[error("{file}: {why}: give the report.json of a close")]
     Report {
-        /// The file.
         file: PathBuf,
         /// What is wrong.
         why: serde_json::Error,

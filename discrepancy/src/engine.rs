@@ -80,7 +80,6 @@ impl<'a> Engine<'a> {
         self.windows.iter().any(|windows| windows.record().linked)
     }
 
-    /// The baseline.
     #[must_use]
     pub fn rig(&self) -> &RigParameters {
         &self.rig

@@ -47,27 +47,22 @@ pub enum ExtendError {
     UnknownEffect {
         /// As given.
         effect: String,
-        /// The catalogue.
         known: String,
     },
     /// The effect cannot be there.
     #[error("{effect} cannot be at {place}; it can be at {known}")]
     UnknownPlace {
-        /// The effect.
         effect: String,
         /// As given.
         place: String,
-        /// Its places.
         known: String,
     },
     /// The effect has no such number.
     #[error("{effect} has no number {key}; it has {known}")]
     UnknownKey {
-        /// The effect.
         effect: String,
         /// As given.
         key: String,
-        /// Its keys.
         known: String,
     },
     /// Reported twice.
@@ -87,7 +82,6 @@ pub enum ExtendError {
     /// The parameter's number is in another unit than the rig file's.
     #[error("{name} is in {unit:?}; the rig file has it in {wanted:?}, and a factor has no unit")]
     Unit {
-        /// The parameter.
         name: String,
         /// As given.
         unit: String,

@@ -14,17 +14,13 @@ pub enum FolderError {
     /// The system does not let it be written.
     #[error("{}: {why}: choose another folder, or make room", file.display())]
     Write {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         why: io::Error,
     },
     /// A result would take the place of a file that is read.
     #[error("{} is read here and would be written over: choose another --out", file.display())]
-    Input {
-        /// The file.
-        file: PathBuf,
-    },
+    Input { file: PathBuf },
 }
 
 /// A folder that takes the results of one run.

@@ -106,24 +106,14 @@ pub enum GriddingError {
     #[error(
         "{file}: no column {column}: the simulation of an axis needs valve, position, force and both pressures"
     )]
-    Missing {
-        /// The record.
-        file: String,
-        /// The column.
-        column: String,
-    },
+    Missing { file: String, column: String },
     /// No axis is measured.
     #[error("{file}: no axis is measured: a record needs the columns of drive or load")]
-    NoAxis {
-        /// The record.
-        file: String,
-    },
+    NoAxis { file: String },
     /// The record is too short.
     #[error("{file}: {length_ms} ms: a record needs at least {least_ms} ms")]
     Short {
-        /// The record.
         file: String,
-        /// Its length.
         length_ms: usize,
         /// What is needed.
         least_ms: usize,

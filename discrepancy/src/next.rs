@@ -57,7 +57,6 @@ impl Explanation {
 /// Divergences of an entry of the menu.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judged {
-    /// The entry.
     pub name: &'static str,
     /// For each ordered pair: the true explanation, its rival, their divergence.
     pub pairs: Vec<(usize, usize, Divergence)>,

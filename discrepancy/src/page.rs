@@ -59,15 +59,12 @@ pub(crate) struct Trace {
 /// What the pictures are made of.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pictures {
-    /// The record.
     pub(crate) record: String,
     /// Whether it is a held-out record.
     pub(crate) held_out: bool,
-    /// Its signals.
     pub(crate) traces: Vec<Trace>,
 }
 
-/// The page.
 #[must_use]
 pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
     let bad = report.verdict == Verdict::BadData;

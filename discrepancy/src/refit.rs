@@ -47,7 +47,6 @@ pub struct Placed {
 /// A fitted model: effects and parameters.
 #[derive(Clone, Debug)]
 pub struct Refit {
-    /// The effects.
     pub placed: Vec<Placed>,
     /// Factors of the parameters.
     pub factors: [f64; COUNT],

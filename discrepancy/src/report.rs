@@ -33,7 +33,6 @@ pub enum Verdict {
 pub struct Report {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// The verdict.
     pub verdict: Verdict,
     /// The verdict in a sentence or two.
     pub summary: String,
@@ -217,7 +216,6 @@ pub struct TableTerm {
     pub balance: String,
     /// x, v, |v|, sign(v), u, p_a, p_b, p_a-p_b or x sign(v).
     pub variable: String,
-    /// Its unit.
     pub(crate) variable_unit: String,
     /// Unit of the term, N or Nl/min.
     pub unit: String,
@@ -258,7 +256,6 @@ pub struct Curve {
 /// A surface over two variables with a band; null where too few points are.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Surface {
-    /// The variables.
     pub variables: [String; 2],
     /// Their units.
     pub(crate) variable_units: [String; 2],
@@ -289,7 +286,6 @@ pub struct Gap {
 /// Figures of both models on the held-out record.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verification {
-    /// The record.
     pub record: String,
     /// Windowed chi2 per degree of freedom of the baseline.
     pub(crate) chi2_before: f64,
@@ -375,7 +371,6 @@ pub struct UnknownInput {
 /// Check of a record.
 #[derive(Clone, Debug, Serialize)]
 pub struct RecordCheck {
-    /// The file.
     pub file: String,
     /// Whether the workflow can use it.
     pub usable: bool,

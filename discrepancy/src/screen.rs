@@ -14,7 +14,6 @@ use rayon::prelude::*;
 /// Columns of a screening.
 #[derive(Debug)]
 pub struct Columns {
-    /// The candidates.
     pub candidates: Vec<Candidate>,
     /// Probes of each candidate, with the indices of their columns.
     pub(crate) probes: Vec<Vec<(Vec<f64>, usize)>>,

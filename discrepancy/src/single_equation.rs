@@ -56,7 +56,6 @@ pub enum BalanceError {
     /// The model file is missing or not readable.
     #[error("cannot read the model {}: {reason}", file.display())]
     Open {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         reason: String,
@@ -64,7 +63,6 @@ pub enum BalanceError {
     /// Not TOML, a key that is unknown or missing.
     #[error("{}: {reason}", file.display())]
     Syntax {
-        /// The file.
         file: PathBuf,
         /// What the parser said, with line and column.
         reason: String,
@@ -72,23 +70,16 @@ pub enum BalanceError {
     /// A value that makes no sense.
     #[error("{}: {key} = {value}; allowed is {allowed}", file.display())]
     Value {
-        /// The file.
         file: PathBuf,
         /// The key with its table.
         key: String,
-        /// Its value.
         value: String,
         /// What may stand there.
         allowed: String,
     },
     /// A term that no balance of this kind has.
     #[error("this kind of model has no term '{effect}' of form '{form}', or its shape lacks a number")]
-    Term {
-        /// The effect.
-        effect: String,
-        /// The form.
-        form: String,
-    },
+    Term { effect: String, form: String },
     /// A chamber without a rig file.
     #[error("{name}: a chamber needs rig = \"…/rig.toml\" for its area, volume, valve tables and lags")]
     NoRig {
@@ -106,16 +97,10 @@ pub enum BalanceError {
     Read(#[from] ReadError),
     /// A column that a record lacks.
     #[error("{file}: no values of {column}, which the model's balance needs: see [channels] of the model")]
-    Missing {
-        /// The record.
-        file: String,
-        /// The channel.
-        column: String,
-    },
+    Missing { file: String, column: String },
     /// Time that stands or jumps back.
     #[error("{file}:{line}: time does not grow: sort the rows, or split the record there")]
     Time {
-        /// The record.
         file: String,
         /// Line from 1.
         line: u64,
@@ -125,7 +110,6 @@ pub enum BalanceError {
         "{file}: {rows} rows pass the model's [processing], {FEWEST_ROWS} are needed: are position_mm, speed_above_mm_per_s right?"
     )]
     Few {
-        /// The record.
         file: String,
         /// How many there are.
         rows: usize,
@@ -142,7 +126,6 @@ pub enum BalanceError {
              processing.period_s of the model"
     )]
     Far {
-        /// The record.
         file: String,
         /// Line from 1.
         line: u64,

@@ -47,7 +47,6 @@ const TAKES_MORE: f64 = 0.15;
 /// Tables and parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Tables {
-    /// The tables.
     pub(crate) terms: Vec<TableTerm>,
     /// Parameters that are off beside them.
     pub(crate) parameters: Vec<Quantity>,

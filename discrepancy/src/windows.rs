@@ -104,7 +104,6 @@ impl<'a> Windows<'a> {
         &self.rig
     }
 
-    /// The record.
     #[must_use]
     pub fn record(&self) -> &'a GriddedRecord {
         self.record

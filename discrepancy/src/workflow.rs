@@ -50,7 +50,6 @@ pub struct Task {
 /// Outputs of the workflow.
 #[derive(Debug)]
 pub struct Outcome {
-    /// The report.
     pub report: Report,
     /// The extended rig file; `None` when a record cannot be used.
     pub extended: Option<String>,
@@ -68,7 +67,6 @@ pub enum WorkflowError {
     /// The rig file cannot be read.
     #[error("{file}: {why}")]
     Rig {
-        /// The file.
         file: String,
         /// What the system said.
         why: std::io::Error,
@@ -80,17 +78,13 @@ pub enum WorkflowError {
     #[error(
         "{file}: a model of one balance (it has a kind): only close, name and extend take one; give a rig file here"
     )]
-    OneBalance {
-        /// The file.
-        file: String,
-    },
+    OneBalance { file: String },
     /// A record cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The held-out record cannot be used.
     #[error("{file}: cannot be used: {why}")]
     Unusable {
-        /// The record.
         file: String,
         /// Its fatal findings.
         why: String,
@@ -116,7 +110,6 @@ pub enum WorkflowError {
 pub struct RigFile {
     /// As given.
     pub file: String,
-    /// Its text.
     pub text: String,
     /// What it says.
     pub rig: RigParameters,
@@ -142,7 +135,6 @@ impl RigFile {
 /// A checked record, gridded when it can be used.
 #[derive(Debug)]
 pub struct Opened {
-    /// The check.
     pub checked: Checked,
     /// The gridded record; `None` when it cannot be used.
     pub gridded: Option<GriddedRecord>,

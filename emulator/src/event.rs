@@ -66,10 +66,7 @@ pub enum EventKind {
         raw_id: u32,
     },
     /// A frame arrived that only a rig sends: there is a second rig on the bus.
-    SecondRig {
-        /// Its identifier.
-        id: u16,
-    },
+    SecondRig { id: u16 },
     /// A fault was put into the run, ended, or could not be.
     Fault(Mark),
     /// The plant's state is no longer finite: the run ends in silence.

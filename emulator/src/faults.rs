@@ -45,7 +45,6 @@ pub enum FaultError {
     /// Not at this place.
     #[error("at = '{at}': {fault} is at {allowed}")]
     Place {
-        /// The fault.
         fault: &'static str,
         /// The place as written.
         at: String,
@@ -55,7 +54,6 @@ pub enum FaultError {
     /// No number of this fault.
     #[error("unknown key {key} = {value}; {fault} has {known}")]
     Key {
-        /// The fault.
         fault: &'static str,
         /// The key as written.
         key: String,
@@ -67,9 +65,7 @@ pub enum FaultError {
     /// A number that has no default is not there.
     #[error("{fault} needs {key}; allowed: {range}")]
     Missing {
-        /// The fault.
         fault: &'static str,
-        /// The key.
         key: &'static str,
         /// Allowed values.
         range: String,
@@ -77,7 +73,6 @@ pub enum FaultError {
     /// Out of range, not finite, or no number.
     #[error("{key} = {value}: allowed: {range}")]
     Value {
-        /// The key.
         key: String,
         /// The value as written.
         value: String,

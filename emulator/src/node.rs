@@ -37,7 +37,6 @@ const LONGEST_WAIT_MS: u32 = 2000;
 pub struct NodeParts {
     /// The plant in its initial state.
     pub plant: Plant,
-    /// Its sensors.
     pub sensors: Sensors,
     /// Who does what to it by hand.
     pub people: People,

@@ -105,7 +105,6 @@ pub struct Limits {
 
 /// A rig on its bus, and what may end its run.
 pub struct RunContext<'a> {
-    /// The rig.
     pub node: &'a mut EmulatorNode,
     /// Its peer on the bus.
     pub bus: &'a mut dyn Bus,

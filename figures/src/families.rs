@@ -25,9 +25,7 @@ use std::collections::BTreeMap;
 /// Which repetition's value is the run's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Worst {
-    /// The largest.
     Largest,
-    /// The smallest.
     Smallest,
     /// The one farthest from zero.
     Farthest,
@@ -71,7 +69,6 @@ pub struct Definition {
 pub struct Family {
     /// What they are about.
     pub title: &'static str,
-    /// Its figures.
     pub definitions: &'static [Definition],
     /// Computes those that the record has.
     compute: fn(&Record, &mut Figures),

@@ -35,7 +35,6 @@ pub struct Joined {
     pub summary: Map<String, Value>,
     /// `run.json` as written.
     pub run: Map<String, Value>,
-    /// The tables.
     pub record: Record,
 }
 

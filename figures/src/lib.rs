@@ -33,7 +33,6 @@ pub enum SummaryError {
     /// A file is missing or cannot be read.
     #[error("cannot read {file}: {reason}")]
     Read {
-        /// The file.
         file: PathBuf,
         /// What the system or the parser said.
         reason: String,
@@ -41,7 +40,6 @@ pub enum SummaryError {
     /// A file cannot be written.
     #[error("cannot write {file}: {reason}")]
     Write {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         reason: String,
@@ -56,7 +54,6 @@ pub enum SummaryError {
     Threshold {
         /// Key in the experiment file.
         key: String,
-        /// Its value.
         value: String,
         /// What is wrong, and what would be right.
         problem: String,

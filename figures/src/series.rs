@@ -26,7 +26,6 @@ pub struct Span {
 }
 
 impl Span {
-    /// Its length.
     #[must_use]
     pub fn length_s(&self) -> f64 {
         self.to_s - self.from_s

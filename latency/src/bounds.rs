@@ -35,10 +35,7 @@ pub enum BoundsError {
     NoTable,
     /// A bound that is none.
     #[error("[bounds] {figure}: write it as {{ max = 50000 }}, {{ min = 1 }} or with both")]
-    Shape {
-        /// Its figure.
-        figure: String,
-    },
+    Shape { figure: String },
     /// No such figure.
     #[error("[bounds] {figure}: no such figure; there are {known}")]
     Unknown {

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 /// A run's folder and the group it was put in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chosen {
-    /// The folder.
     pub folder: PathBuf,
     /// Its group; nothing when its conditions.json says which.
     pub group: Option<String>,

@@ -29,7 +29,6 @@ const LONGEST_SECOND_S: f64 = 1.5;
 /// One run as it was read.
 #[derive(Clone, Debug, Default)]
 pub struct RunFiles {
-    /// Its folder.
     pub folder: PathBuf,
     /// `summary.json` as it stands, since the report lists every count in it; null when missing.
     pub summary: Value,

@@ -28,7 +28,6 @@ pub struct Interval {
     pub start_s: f64,
     /// Length, s.
     pub duration_s: f64,
-    /// The samples.
     pub samples: Samples,
 }
 
@@ -51,7 +50,6 @@ pub struct Passing<'a> {
     pub start_s: f64,
     /// Length, s.
     pub duration_s: f64,
-    /// The samples.
     pub histogram: &'a Histogram<u64>,
 }
 

@@ -19,7 +19,6 @@ pub const PERIOD_NS: u64 = 1_000_000;
 /// Samples, and the largest of each second.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
-    /// The samples.
     pub samples: Samples,
     /// Largest of each second of the run, ns.
     pub maxima_ns: BTreeMap<u64, u64>,

@@ -43,7 +43,6 @@ const PROCESSES: [(&str, Source, &str); 4] = [
 /// One kind of distribution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kind {
-    /// Its tag.
     pub tag: String,
     /// Where it comes from.
     pub source: Source,

@@ -94,7 +94,6 @@ pub enum ReportError {
     /// A file cannot be read.
     #[error("cannot read {file}: {reason}")]
     Read {
-        /// The file.
         file: PathBuf,
         /// What the system or the parser said.
         reason: String,
@@ -102,7 +101,6 @@ pub enum ReportError {
     /// A file cannot be written.
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
     Write {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         reason: String,

@@ -80,7 +80,6 @@ pub struct Conditions {
 pub struct Fact {
     /// What it is.
     pub name: String,
-    /// Its value.
     pub value: String,
 }
 
@@ -107,7 +106,6 @@ pub struct Distribution {
     pub source: Source,
     /// What it is, for a person.
     pub about: String,
-    /// Its percentiles.
     pub percentiles_ns: PercentilesNs,
     /// Bins on a logarithmic axis, those that are not empty, rising.
     pub bins: Vec<Bin>,
@@ -134,7 +132,6 @@ pub struct PercentilesNs {
     pub count: u64,
 }
 
-/// A bin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bin {
     /// Lower end, ns, included.
@@ -295,7 +292,6 @@ pub struct Finding {
 /// One run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RunPart {
-    /// Its folder.
     pub folder: String,
     /// Group, for comparisons.
     pub group: String,

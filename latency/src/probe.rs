@@ -7,7 +7,6 @@
 /// Columns of the table.
 const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
 
-/// A gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
     /// CPU on which the probe was.

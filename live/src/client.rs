@@ -39,7 +39,6 @@ enum Stage {
     Closing,
 }
 
-/// A connection.
 pub(super) struct Client {
     /// Tells it from all that came before.
     pub(super) number: u64,

@@ -37,7 +37,6 @@ pub enum Said {
     Error,
 }
 
-/// A column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// Name, ending in its unit where it has one.

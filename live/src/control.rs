@@ -59,7 +59,6 @@ enum AskedAxis {
 pub enum Order {
     /// A stop by the console, repeated on the bus until it is released.
     Stop,
-    /// Its release.
     Release,
     /// A frame on the bus, once.
     Frame(Frame),

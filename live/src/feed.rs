@@ -12,7 +12,6 @@ const RETRY_PERIOD: Duration = Duration::from_millis(100);
 /// Bytes taken in one turn: more than the emulator tells in 100 ms.
 const READ_A_TURN: usize = 256 << 10;
 
-/// The connection.
 pub(super) struct Feed {
     path: PathBuf,
     stream: Option<UnixStream>,

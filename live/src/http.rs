@@ -33,7 +33,6 @@ pub struct Request {
     pub origin: Option<String>,
     /// The token, if one was shown.
     pub token: Option<String>,
-    /// Its body.
     pub body: Vec<u8>,
 }
 

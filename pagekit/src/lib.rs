@@ -8,6 +8,8 @@
 //! | [`svg`] | scales, lines, markers, drawings |
 //! | [`number`] | numbers, lengths of time and dates as a person reads them |
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod grid;
 pub mod markup;
 pub mod number;

@@ -27,7 +27,7 @@ pub fn words(text: impl Into<String>) -> Cell {
     Cell::Words(text.into())
 }
 
-/// A number.
+/// Right-aligned cell of a number that is already rounded.
 #[must_use]
 pub fn number(text: impl Into<String>) -> Cell {
     Cell::Number(text.into())
@@ -67,7 +67,7 @@ impl Cell {
     }
 }
 
-/// A table.
+/// Rows of cells under one head, written as HTML.
 pub struct Table {
     label: String,
     head: Vec<String>,

@@ -18,7 +18,7 @@ fn in_threes(digits: &str) -> String {
     grouped
 }
 
-/// A count.
+/// Whole number with its thousands set apart.
 #[must_use]
 pub fn count(count: u64) -> String {
     in_threes(&count.to_string())

@@ -149,7 +149,7 @@ pub fn text(class: &str, place: Place, words: &str) -> String {
     format!("<text class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\">{}</text>\n", place.0, place.1, escaped(words))
 }
 
-/// A box.
+/// Rectangle between two corners; empty where they are the wrong way round.
 pub fn bar(class: &str, from: Place, to: Place) -> String {
     format!(
         "<rect class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>\n",

@@ -46,7 +46,7 @@ pub struct Faults {
 /// What is broken in one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisFaults {
-    /// Its valve.
+    /// Faults of the proportional valve.
     pub valve: ValveFault,
     /// All its friction times this, 0 to 1000.
     pub friction_factor: f64,

@@ -42,6 +42,8 @@
 //! Source of the model: rig-model.md, after Neugebauer, Quellmalz, Schönherr, Schlegel, "Control of a servo-pneumatic
 //! experimental rig", The Archive of Mechanical Engineering LVIII (2011) no. 2, DOI 10.2478/v10180-011-0014-6.
 
+#![warn(missing_docs)] // an interface of other crates
+
 mod batch;
 mod chamber;
 pub mod effects;

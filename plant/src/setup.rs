@@ -54,7 +54,7 @@ pub enum SetupError {
     State {
         /// Name of the field, with its axis.
         name: String,
-        /// Its value.
+        /// Refused value, in the unit of the field.
         value: f64,
         /// Smallest allowed value.
         min: f64,

@@ -78,7 +78,6 @@ pub enum Wrong {
         "parameter '{name}' has the range {least} to {most}; both must be finite, the first below the second"
     )]
     Range {
-        /// The parameter.
         name: String,
         /// Its smallest value.
         least: f64,

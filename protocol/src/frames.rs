@@ -194,9 +194,9 @@ pub enum EncodeError {
     NotFinite {
         /// The message that was to be sent.
         message: &'static MessageSpec,
-        /// The signal.
+        /// Signal whose value is refused.
         signal: &'static SignalSpec,
-        /// Its value.
+        /// Refused value, in the signal's unit.
         value: f64,
     },
     /// Beyond the range of the signal.
@@ -204,7 +204,7 @@ pub enum EncodeError {
     OutOfRange {
         /// The message that was to be sent.
         message: &'static MessageSpec,
-        /// The signal.
+        /// Signal whose value is refused.
         signal: &'static SignalSpec,
         /// Its value in the signal's unit.
         value: f64,
@@ -223,7 +223,7 @@ pub enum DecodeError {
     /// No message has this identifier.
     #[error("identifier {id:#05x} is unknown")]
     UnknownIdentifier {
-        /// The identifier.
+        /// Identifier as received, 11 bits.
         id: u16,
     },
     /// Shorter or longer than the message.

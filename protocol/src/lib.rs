@@ -1,5 +1,7 @@
 //! What crosses the wire: rig.dbc, typed frames, buses.
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod bus;
 pub mod bus_load;
 pub mod can;

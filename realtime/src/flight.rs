@@ -217,7 +217,7 @@ enum Room {
     None,
 }
 
-/// The ring.
+/// Rows of the last seconds, from which the window around an event is taken.
 #[derive(Debug)]
 pub struct FlightRecorder<R, F> {
     rows: VecDeque<R>,

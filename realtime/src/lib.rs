@@ -45,6 +45,8 @@
 //! assert_eq!(periodic.statistics().wakeup_ns.percentiles().max, Some(0));
 //! ```
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod allocations;
 pub mod arrivals;
 pub mod clock;

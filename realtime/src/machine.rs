@@ -37,7 +37,7 @@ use std::path::Path;
 pub struct Machine {
     /// The kernel: release, build, compiler.
     pub kernel: String,
-    /// Its release.
+    /// Release of the kernel, as `uname -r` prints it.
     pub kernel_release: String,
     /// How the kernel lets an urgent thread take the CPU.
     pub preemption: Preemption,

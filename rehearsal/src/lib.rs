@@ -92,7 +92,6 @@ impl Rehearsal {
         self.rig.rig_mut().act(action, |_| {});
     }
 
-    /// The plant.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         self.rig.rig().plant()
@@ -158,13 +157,11 @@ impl<R: SimulatedRig> Rehearsal<R> {
         self.listener = Some(listener);
     }
 
-    /// The rig.
     #[must_use]
     pub fn rig(&self) -> &R {
         self.rig.rig()
     }
 
-    /// The controllers.
     #[must_use]
     pub fn node(&self) -> &ControllerNode {
         &self.node

@@ -12,6 +12,8 @@
 //! start,
 //! locks, prints or blocks.
 
+#![warn(missing_docs)] // an interface of other crates
+
 mod rig;
 mod telegrams;
 
@@ -181,7 +183,7 @@ impl<R: SimulatedRig> RigNode<R> {
         })
     }
 
-    /// The rig.
+    /// Simulated rig that the node moves.
     #[must_use]
     pub fn rig(&self) -> &R {
         &self.rig

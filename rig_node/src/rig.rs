@@ -77,7 +77,7 @@ impl PeopledPlant {
         Self { plant, people, sensors, inputs, hands: Default::default(), readings }
     }
 
-    /// The plant.
+    /// Plant that people act on.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant

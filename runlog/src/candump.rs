@@ -15,7 +15,7 @@ pub use reader::{LogError, LogLine, LogProblem, LogReader, MOST_LINE_BYTES};
 pub struct FrameRecord {
     /// When it was sent or arrived, in ns of the run's clock.
     pub stamp_ns: u64,
-    /// The frame.
+    /// Identifier and data as on the wire.
     pub frame: CanFrame,
 }
 

@@ -18,7 +18,7 @@ pub struct ControllerReport<N = Value, X = Value> {
     pub schema_version: u32,
     /// How it was called.
     pub command_line: Vec<String>,
-    /// Its version.
+    /// Version of the controller.
     pub version: String,
     /// Title of the experiment.
     pub title: String,
@@ -97,7 +97,7 @@ pub struct AxisReport<X = Value> {
     pub matched_offset_m: f64,
     /// The program file as it stands; null for an axis that held its valve shut.
     pub program_toml: Option<String>,
-    /// Its path.
+    /// Path that the program was read from.
     pub program_file: Option<String>,
     /// Values of all variables at the end.
     pub variables: BTreeMap<String, f64>,

@@ -38,7 +38,7 @@ pub struct Event {
     pub slow_ns: u64,
     /// Start of the window, CLOCK_MONOTONIC, ns.
     pub window_from_ns: u64,
-    /// Its end.
+    /// End of the window, CLOCK_MONOTONIC, ns.
     pub window_to_ns: u64,
 }
 

@@ -1,5 +1,7 @@
 //! The files and records of a run: each is written and read by one type.
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod candump;
 pub mod conditions;
 pub mod controller_report;

@@ -46,7 +46,7 @@ pub struct RunDescription<S = Value, M = Machine> {
     pub realtime_granted: Vec<realtime::Grant>,
     /// What it refused, with the remedy.
     pub realtime_refused: Vec<String>,
-    /// The machine.
+    /// Kernel, processors and clock source.
     pub machine: M,
 }
 

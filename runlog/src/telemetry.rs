@@ -35,9 +35,9 @@ const WORD: usize = 8;
 pub enum Kind {
     /// What the run is, and what the columns of its cycles are.
     Description,
-    /// A cycle.
+    /// Values of one cycle, in the order of the description's columns.
     Cycle,
-    /// An event.
+    /// One event of the run, JSON.
     Event,
     /// A second of a stage.
     Histogram,

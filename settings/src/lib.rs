@@ -2,6 +2,8 @@
 //!
 //! Texts become types here; callers read the files. A message names file, line, key, value and what is allowed.
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod parameters;
 mod section;
 

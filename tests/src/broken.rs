@@ -33,7 +33,6 @@ impl Default for Plan<'_> {
 
 /// What a run left.
 pub struct Left {
-    /// Its folder.
     pub scene: Scene,
     /// `measurement.csv`.
     pub measurement: Table,
@@ -58,7 +57,6 @@ pub struct Row {
     pub what: String,
     /// Name of the fault.
     pub fault: String,
-    /// Its place.
     pub at: String,
     /// Its numbers, as `key=value;key=value`.
     pub numbers: String,

@@ -10,7 +10,6 @@ use std::path::Path;
 pub struct Logged {
     /// The rig's cycle; in real time without those that it skipped.
     pub cycle: u64,
-    /// The frame.
     pub frame: Frame,
 }
 

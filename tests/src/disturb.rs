@@ -90,7 +90,6 @@ impl Disturbance {
 pub struct Named {
     /// The cause that `bench cause` named.
     pub cause: String,
-    /// Its sentence.
     pub sentence: String,
 }
 

@@ -74,7 +74,6 @@ impl Door {
 
 /// A client that does what it is told.
 pub struct DoorClient {
-    /// Its connection.
     pub stream: TcpStream,
     text: String,
 }

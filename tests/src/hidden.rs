@@ -120,15 +120,12 @@ pub struct Live {
     pub overworked: u64,
     /// Stage that computes: the step of the plant, its truth and its terms.
     pub step_ns_p50: u64,
-    /// The same.
     pub step_ns_p99: u64,
     /// Stage that samples the sensors and sends.
     pub send_ns_p50: u64,
-    /// The same.
     pub send_ns_p99: u64,
     /// Everything of a cycle.
     pub execution_ns_p50: u64,
-    /// The same.
     pub execution_ns_p99: u64,
 }
 

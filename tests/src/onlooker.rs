@@ -24,7 +24,6 @@ pub type ToldCycle = (u64, Vec<f64>);
 /// Everything that a viewer was told.
 #[derive(Debug, Default)]
 pub struct Told {
-    /// The description.
     pub description: Value,
     /// Cycles.
     pub cycles: Vec<ToldCycle>,
@@ -124,7 +123,6 @@ pub struct Answer {
     pub status: u16,
     /// Header fields, as they came.
     pub head: String,
-    /// The body.
     pub body: String,
 }
 
@@ -167,7 +165,6 @@ impl LivePage {
         Self { running, address: address.parse().expect("an address"), token }
     }
 
-    /// The program.
     pub fn running(&mut self) -> &mut Running {
         &mut self.running
     }
@@ -205,7 +202,6 @@ impl LivePage {
         self.send(&format!("GET {path} HTTP/1.1\r\nHost: {}\r\n\r\n", self.address))
     }
 
-    /// The state.
     #[must_use]
     pub fn state(&self) -> Value {
         self.get("/api/state").json()

@@ -17,7 +17,6 @@ use std::time::{Duration, Instant};
 /// What came from the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Packet {
-    /// A frame.
     Frame(CanFrame),
     /// A packet of the barrier.
     Control(Control),

@@ -27,7 +27,6 @@ use settings::parameters::Parameter;
 
 /// What the file describes.
 pub struct Described<'a> {
-    /// The axis.
     pub axis: Axis,
     /// Title of its program.
     pub title: &'a str,

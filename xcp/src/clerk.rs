@@ -21,7 +21,6 @@ pub enum Note {
         cycle: u64,
         /// Place in the list of variables.
         place: usize,
-        /// The value.
         value: f64,
     },
     /// Somebody had the right key.
@@ -63,9 +62,7 @@ pub struct Returned {
 
 /// An axis of the clerk.
 pub struct Book {
-    /// The axis.
     pub axis: Axis,
-    /// Its variables.
     pub variables: Vec<Variable>,
     /// Their values at the start.
     pub values: Vec<f64>,

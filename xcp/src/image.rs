@@ -73,7 +73,6 @@ struct Begun {
     count: usize,
 }
 
-/// The memory.
 #[derive(Clone)]
 pub struct Image {
     description: Vec<u8>,

@@ -167,7 +167,6 @@ pub fn response(bytes: &[u8]) -> Packet {
     packet
 }
 
-/// A refusal.
 #[must_use]
 pub fn refusal(why: Refusal) -> Packet {
     [ERROR, why as u8, 0, 0, 0, 0, 0, 0]

@@ -153,7 +153,6 @@ impl Port {
         })
     }
 
-    /// The axis.
     #[must_use]
     pub fn axis(&self) -> Axis {
         self.axis

@@ -62,7 +62,6 @@ pub struct Texts {
 
 /// What a slave is made of.
 pub struct SlaveParts {
-    /// Its memory.
     pub image: Image,
     /// Where the texts lie in its description.
     pub texts: Texts,
@@ -133,7 +132,6 @@ impl Slave {
         }
     }
 
-    /// Its memory.
     #[must_use]
     pub fn image(&self) -> &Image {
         &self.image

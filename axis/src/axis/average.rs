@@ -3,7 +3,6 @@
 /// Samples of the window.
 const WINDOW: usize = 200;
 
-/// The window.
 #[derive(Clone, Debug)]
 pub(super) struct Average {
     samples: [f64; WINDOW],

@@ -29,7 +29,6 @@ pub struct Answer {
 /// A row of `controller-drive.csv` or `controller-load.csv`; rig coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisRecord {
-    /// The axis.
     pub axis: Axis,
     /// The rig's cycle whose sensors are answered.
     pub cycle: u64,

@@ -41,7 +41,6 @@ pub enum Plan {
 /// What an axis that is positioned does in an experiment.
 #[derive(Clone, Debug)]
 pub struct PositionPlan {
-    /// Its positions.
     pub motion: Motion,
     /// What positions given by hand keep to; `None`: none are followed.
     pub by_hand: Option<ByHandLimits>,

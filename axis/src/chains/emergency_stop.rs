@@ -158,7 +158,6 @@ enum Frames {
     Release,
 }
 
-/// The chain.
 #[derive(Clone, Debug)]
 pub struct EmergencyStopChain {
     config: StopConfig,
@@ -213,7 +212,6 @@ impl EmergencyStopChain {
         }
     }
 
-    /// The state.
     #[must_use]
     pub fn state(&self) -> EmergencyStopChainState {
         match self.state {

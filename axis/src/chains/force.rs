@@ -89,7 +89,6 @@ pub struct ForceInputs {
 /// What the force control must do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceOutput {
-    /// The state.
     pub state: ForceChainState,
     /// Limit of the rod's velocity, m/s.
     pub limit_m_per_s: Option<f64>,
@@ -161,7 +160,6 @@ enum State {
 /// An edge: where to, and why.
 type Edge = (ForceChainState, ForceCause);
 
-/// The chain.
 #[derive(Clone, Debug)]
 pub struct ForceChain {
     state: State,

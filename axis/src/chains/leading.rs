@@ -26,7 +26,6 @@ pub struct LeadingInputs {
     pub own: Option<OwnAxis>,
     /// The steps of preparing are done.
     pub prepared: bool,
-    /// The partner.
     pub partner: Partner,
     /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
     pub frame: Option<EmergencyStopReason>,

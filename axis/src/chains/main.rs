@@ -118,7 +118,6 @@ enum State {
 /// An edge: where to, and why.
 type Edge = (MainChainState, MainCause);
 
-/// The chain.
 #[derive(Clone, Debug)]
 pub struct MainChain {
     config: MainConfig,

@@ -54,14 +54,12 @@ pub struct MatchingInputs {
     pub still: bool,
     /// Own position sensor, without any offset, m.
     pub position_m: f64,
-    /// The partner.
     pub partner: Partner,
 }
 
 /// What the chain says each cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MatchingOutput {
-    /// The state.
     pub state: MatchingChainState,
     /// The last matched offset, to be taken from the own sensor, m; 0 before.
     pub offset_m: f64,
@@ -90,7 +88,6 @@ pub enum MatchingCause {
     Moved,
     /// Averaged.
     Averaged,
-    /// The fault.
     Fault(Fault),
 }
 
@@ -151,7 +148,6 @@ enum State {
 /// An edge: where to, and why.
 type Edge = (MatchingChainState, MatchingCause);
 
-/// The chain.
 #[derive(Clone, Debug)]
 pub struct MatchingChain {
     state: State,

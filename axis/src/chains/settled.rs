@@ -63,7 +63,6 @@ struct Bucket {
     samples: f64,
 }
 
-/// The detector.
 #[derive(Clone, Debug)]
 pub struct Settled {
     bounds: Bounds,

@@ -31,7 +31,6 @@ use std::path::{Path, PathBuf};
 /// What one axis does.
 #[derive(Clone, Debug)]
 pub struct AxisExperiment {
-    /// Its program.
     pub program: ProgramReference,
     /// Where initial positioning goes, m; `None`: it stays where it is.
     pub start_m: Option<f64>,

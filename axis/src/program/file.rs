@@ -70,11 +70,8 @@ struct File {
 /// A program file as it was read, for records.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Source {
-    /// The file.
     pub path: PathBuf,
-    /// Its title.
     pub title: String,
-    /// Its text.
     pub text: String,
 }
 

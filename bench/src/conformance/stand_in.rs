@@ -39,7 +39,6 @@ pub(super) struct Disturbance {
     pub(super) skipped: u64,
 }
 
-/// The rig.
 pub(super) struct StandIn {
     axis: CheckedAxis,
     lockstep: bool,

@@ -9,7 +9,6 @@ use protocol::frames::{DecodeError, Frame, MESSAGES, MessageSpec, SignalKind, Si
 /// All frames of one message.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
-    /// The message.
     pub(super) spec: &'static MessageSpec,
     /// Stamps and data (byte 0 lowest), in the order of the log; at least one.
     pub(super) frames: Vec<(u64, u64)>,

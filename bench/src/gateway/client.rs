@@ -59,7 +59,6 @@ pub(super) struct ClientReport {
     pub(super) ended: Option<Ended>,
 }
 
-/// A connection.
 pub(super) struct Client {
     stream: TcpStream,
     session: Session,

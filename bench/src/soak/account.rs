@@ -125,7 +125,6 @@ impl Gaps {
 /// A process on the bus, as it and the host tell.
 #[derive(Clone, Debug, Default)]
 pub struct Party {
-    /// Its name.
     pub name: String,
     /// Frames that it handed to the bus.
     pub sent: Counts,

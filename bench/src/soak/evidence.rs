@@ -19,7 +19,6 @@ pub struct Evidence {
     pub summary: Summary,
     /// `run.json`; the machine as it stands, which goes into `soak.json`.
     pub run: RunDescription,
-    /// The machine.
     pub machine: Value,
     /// `controller*.json` by its name.
     pub controllers: BTreeMap<String, ControllerReport>,

@@ -21,7 +21,6 @@ pub struct Judged {
     pub checks: Vec<Check>,
     /// Figures of the run.
     pub figures: Figures,
-    /// The account.
     pub account: Account,
     /// Memory by process.
     pub memory: BTreeMap<String, Memory>,

@@ -34,7 +34,6 @@ pub struct Kept {
     pub p999_ns: u64,
     /// 99.99 %.
     pub p9999_ns: u64,
-    /// The largest.
     pub max_ns: u64,
     /// Samples.
     pub count: u64,

@@ -112,7 +112,6 @@ pub struct Totals {
     pub not_there: u64,
 }
 
-/// A segment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// As it was planned.
@@ -150,7 +149,6 @@ pub struct Segment {
 /// A check of a segment.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Check {
-    /// Its name.
     pub name: String,
     /// How it went.
     pub result: CheckResult,

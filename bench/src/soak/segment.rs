@@ -29,7 +29,6 @@ const SAVE: Duration = Duration::from_secs(20);
 
 /// What all segments of a soak have in common.
 pub struct Common {
-    /// The bus.
     pub bus: BusUrl,
     /// The rig file.
     pub rig: PathBuf,

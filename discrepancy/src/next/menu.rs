@@ -10,7 +10,6 @@ pub struct Entry {
     pub name: &'static str,
     /// What it tells apart, as the end of "to tell ... apart".
     pub serves: &'static str,
-    /// Its file.
     pub toml: &'static str,
 }
 

@@ -5,7 +5,6 @@ use super::words;
 use crate::report::{ChannelCheck, Finding, RecordCheck, Report};
 use pagekit::page::escaped;
 
-/// The section.
 pub(super) fn checks(report: &Report) -> String {
     report.checks.iter().map(record).collect()
 }

@@ -166,7 +166,6 @@ impl Plot {
         }
     }
 
-    /// The drawing.
     pub(super) fn drawn(self, identifier: &str, title: &str, description: &str) -> String {
         svg(identifier, TOP + BODY + FOOT, title, description, &self.body)
     }

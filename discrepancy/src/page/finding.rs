@@ -20,7 +20,6 @@ pub(super) fn title(report: &Report) -> &'static str {
     }
 }
 
-/// The section.
 pub(super) fn finding(report: &Report) -> String {
     let mut text = String::new();
     if report.verdict == Verdict::NothingMissing {

@@ -11,7 +11,6 @@ use crate::report::{Location, Report, UnknownInput};
 /// Over this many times its noise a balance stands out to the eye.
 const CLEAR: f64 = 1.5;
 
-/// The section.
 pub(super) fn location(report: &Report) -> String {
     let Some(location) = &report.location else { return String::new() };
     let mut figures = vec![balances(location)];

@@ -9,25 +9,19 @@ pub enum ReadError {
     /// The file is missing or not readable.
     #[error("cannot read {}: {reason}", file.display())]
     Open {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         reason: String,
     },
     /// A head, but no rows; or not even a head.
     #[error("{} has no rows: a record needs a head with column names, and one row for each sample", file.display())]
-    Empty {
-        /// The file.
-        file: PathBuf,
-    },
+    Empty { file: PathBuf },
     /// A column that the record cannot do without.
     #[error("{}:{line}: column {column} is missing; the file has {found}", file.display())]
     MissingColumn {
-        /// The file.
         file: PathBuf,
         /// Line of the head, from 1.
         line: u64,
-        /// The column.
         column: String,
         /// The columns that are there.
         found: String,
@@ -35,17 +29,14 @@ pub enum ReadError {
     /// The same column twice.
     #[error("{}:{line}: column {column} stands twice: delete or rename one", file.display())]
     RepeatedColumn {
-        /// The file.
         file: PathBuf,
         /// Line of the head, from 1.
         line: u64,
-        /// The column.
         column: String,
     },
     /// A column or comment that a blind record must not have.
     #[error("{}:{line}: '{text}' is refused in a blind record; allowed are {allowed}", file.display())]
     NotBlind {
-        /// The file.
         file: PathBuf,
         /// Line, from 1.
         line: u64,
@@ -57,7 +48,6 @@ pub enum ReadError {
     /// A row with more or fewer cells than the head.
     #[error("{}:{line}: {cells} cells, but the head has {expected}", file.display())]
     Width {
-        /// The file.
         file: PathBuf,
         /// Line, from 1.
         line: u64,
@@ -69,7 +59,6 @@ pub enum ReadError {
     /// A cell that is not what its column holds.
     #[error("{}:{line}: {column} = '{value}'; allowed is {allowed}", file.display())]
     Cell {
-        /// The file.
         file: PathBuf,
         /// Line, from 1.
         line: u64,
@@ -83,17 +72,14 @@ pub enum ReadError {
     /// A line that a log of a bus does not have.
     #[error("{}:{line}: '{text}' is no line of candump -L, such as (1700000000.123456) can0 120#0011AABB", file.display())]
     LogLine {
-        /// The file.
         file: PathBuf,
         /// Line, from 1.
         line: u64,
-        /// The line.
         text: String,
     },
     /// A log without a frame of sensors.
     #[error("{}: no frame of sensors (0x120, 0x121) in {frames} frames: was the rig on this bus?", file.display())]
     NoSensors {
-        /// The file.
         file: PathBuf,
         /// Frames that are there.
         frames: usize,
@@ -104,7 +90,6 @@ pub enum ReadError {
         file.display()
     )]
     LongHole {
-        /// The file.
         file: PathBuf,
         /// Line of the first frame after it, from 1.
         line: u64,
@@ -116,7 +101,6 @@ pub enum ReadError {
     /// A log over two runs of the rig.
     #[error("{}:{line}: the rig starts anew (cycle {cycle} after {before}): split the log there", file.display())]
     Restarted {
-        /// The file.
         file: PathBuf,
         /// Line, from 1.
         line: u64,
@@ -128,11 +112,9 @@ pub enum ReadError {
     /// Two different frames of sensors for one cycle.
     #[error("{}:{line}: other sensors of cycle {cycle} than before: two rigs on one bus? Record each alone", file.display())]
     TwoRigs {
-        /// The file.
         file: PathBuf,
         /// Line, from 1.
         line: u64,
-        /// The cycle.
         cycle: u64,
     },
     /// The mapping of a foreign file.

@@ -18,7 +18,6 @@ pub enum MappingError {
     /// The file is missing or not readable.
     #[error("cannot read the mapping {}: {reason}", file.display())]
     Open {
-        /// The file.
         file: PathBuf,
         /// What the system said.
         reason: String,
@@ -26,7 +25,6 @@ pub enum MappingError {
     /// Not TOML, a key that is unknown or missing, a value of another kind.
     #[error("{}: {reason}", file.display())]
     Syntax {
-        /// The file.
         file: PathBuf,
         /// What the parser said, with line and column.
         reason: String,
@@ -34,11 +32,9 @@ pub enum MappingError {
     /// A value that makes no sense.
     #[error("{}: {key} = {value}; allowed is {allowed}", file.display())]
     Value {
-        /// The file.
         file: PathBuf,
         /// The key with its table.
         key: String,
-        /// Its value.
         value: String,
         /// What may stand there.
         allowed: String,

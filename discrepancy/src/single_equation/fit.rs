@@ -19,7 +19,6 @@ const LEAST_PIVOT: f64 = 1e-9;
 /// Columns of the same length.
 pub(super) type Columns = Vec<Vec<f64>>;
 
-/// A fit.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub(super) numbers: Vec<f64>,

@@ -51,13 +51,11 @@ pub(crate) struct Processing {
     pub(crate) period_s: f64,
     /// Edge of the position's (and pressure's) zero-phase Butterworth, Hz; 0 for none.
     pub(crate) low_pass_hz: f64,
-    /// Its order.
     pub(crate) low_pass_order: usize,
     /// Samples of a moving average of the position before its speed is taken; 1 for none.
     pub(crate) moving_average: usize,
     /// Every how many samples there is a row; more than 1 goes through a zero-phase Chebyshev I.
     pub(crate) decimate: usize,
-    /// Its order.
     pub(crate) decimate_order: usize,
     /// Its ripple, dB.
     pub(super) decimate_ripple_decibel: f64,

@@ -42,7 +42,6 @@ pub struct Mark {
     pub number: u16,
     /// What happened.
     pub what: What,
-    /// The fault.
     pub fault: Fault,
     /// Who asked for it.
     pub cause: Cause,

@@ -56,7 +56,6 @@ pub struct FaultSchedule {
 pub struct Broken<'a> {
     /// The plant at the cycle's start.
     pub plant: &'a mut Plant,
-    /// Its sensors.
     pub sensors: &'a mut Sensors,
     /// What acted on it so far.
     pub inputs: &'a Inputs,

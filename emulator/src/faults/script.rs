@@ -129,7 +129,6 @@ pub enum Problem {
     /// A key that no script has, or a value of the wrong type or out of range.
     #[error("{key} = {value}: allowed: {allowed}")]
     Value {
-        /// The key.
         key: String,
         /// The value as written.
         value: String,

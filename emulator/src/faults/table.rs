@@ -21,7 +21,6 @@ pub struct FaultSpec {
     pub group: Group,
     /// Where it can be.
     pub places: Places,
-    /// Its numbers.
     pub keys: &'static [FaultKey],
     /// What happens, in a sentence.
     pub about: &'static str,
@@ -51,9 +50,7 @@ pub struct FaultKey {
 /// What a fault concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// A sensor.
     Sensor,
-    /// A valve.
     Valve,
     /// The supply of air.
     Supply,
@@ -141,7 +138,6 @@ pub enum SensorKind {
     Drift,
     /// A constant error.
     Offset,
-    /// A factor.
     Gain,
     /// Random errors.
     Noise,

@@ -67,7 +67,6 @@ pub struct WriterReport {
     pub events: Vec<Event>,
     /// Events in all.
     pub event_count: u64,
-    /// The timing.
     pub timing: RigTimingReport,
     /// Why writing stopped, if it did.
     pub failure: Option<String>,

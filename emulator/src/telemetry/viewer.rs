@@ -14,7 +14,6 @@ const ANSWERS: usize = 64 << 10;
 /// Bytes that are taken of a viewer in one turn, so that one that floods does not keep the others waiting.
 const READ_A_TURN: usize = 4096;
 
-/// A connection.
 pub(super) struct Viewer {
     stream: UnixStream,
     outgoing: VecDeque<u8>,

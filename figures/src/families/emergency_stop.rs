@@ -20,7 +20,6 @@ const RESTART_S: f64 = 0.2;
 const CHAMBERS: [&str; 4] =
     ["drive_stored_air_a_J", "drive_stored_air_b_J", "load_stored_air_a_J", "load_stored_air_b_J"];
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "emergency stop (the first of the run, from truth.csv)",
     definitions: &[

@@ -16,7 +16,6 @@ const JUMP_N: f64 = 5.0;
 /// The last part of the waiting before the experiment, over which the initial force is averaged.
 const INITIAL_S: f64 = 0.2;
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "force, over the whole experiment (load sensor smoothed over 5 ms)",
     definitions: &[

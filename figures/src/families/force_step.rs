@@ -36,7 +36,6 @@ const RECOVERED_M: f64 = 0.005;
 /// Before the step, the position's error is taken over so long.
 const BEFORE_S: f64 = 0.05;
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "step of the force (the largest in the experiment, 10 N at least; load sensor smoothed over 5 ms)",
     definitions: &[

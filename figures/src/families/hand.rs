@@ -22,7 +22,6 @@ const END_S: f64 = 0.3;
 /// States of the force chain in which a hand may move the axis.
 const BY_HAND: &[&str] = &["limited", "standstill", "moving"];
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "hand (manual mode in the experiment; load sensor smoothed over 5 ms)",
     definitions: &[

@@ -7,7 +7,6 @@ use crate::series::Span;
 /// How long after matching the rest is averaged: the axes are still linked then.
 const AFTER_S: f64 = 0.5;
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "matching of positions",
     definitions: &[

@@ -20,7 +20,6 @@ const MAXIMUM_S: f64 = 0.02;
 const MAXIMUM_SHARE: f64 = 0.5;
 const FALL_SHARE: f64 = 0.25;
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "position, over the whole experiment",
     definitions: &[

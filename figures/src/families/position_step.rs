@@ -19,7 +19,6 @@ const ANSWER_S: f64 = 0.02;
 const CALM_S: f64 = 0.2;
 const NOISE_S: f64 = 0.01;
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "step of the position (the largest in the experiment, 2 mm at least)",
     definitions: &[

@@ -18,7 +18,6 @@ const RELIEVED_N: f64 = 10.0;
 const AT_WORK: &[&str] = &["limited", "standstill", "moving"];
 const BEFORE_EXPERIMENT: &[&str] = &["initial-positioning", "preparing"];
 
-/// The family.
 pub(super) const FAMILY: Family = Family {
     title: "relieving (force chain at work before an experiment; the relief that begins with the highest force)",
     definitions: &[

@@ -8,7 +8,6 @@ pub enum Refusal {
     /// The call belongs into another mode.
     #[error("{call} belongs after {after}")]
     Mode {
-        /// The call.
         call: &'static str,
         /// What must have been called before.
         after: &'static str,
@@ -22,7 +21,6 @@ pub enum Refusal {
     /// The value is out of range, or none.
     #[error("{name} = {value}: allowed are {least} to {most}{}", spaced(unit))]
     OutOfRange {
-        /// The variable.
         name: String,
         /// What was to be set, in the variable's unit.
         value: f64,

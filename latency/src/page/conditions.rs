@@ -99,7 +99,6 @@ const HOW_TO_READ: [(&str, &str); 9] = [
     ),
 ];
 
-/// The explanations.
 pub(super) fn how_to_read() -> String {
     let entries =
         HOW_TO_READ.iter().map(|(term, said)| format!("<dt><strong>{term}</strong></dt>\n<dd>{said}</dd>\n"));

@@ -367,7 +367,6 @@ fn conditions() -> Conditions {
     }
 }
 
-/// The report.
 pub(crate) fn rich() -> Report {
     let sentence = |text: &str| text.to_owned();
     Report {

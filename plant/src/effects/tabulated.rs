@@ -181,7 +181,7 @@ fn direction(velocity_m_per_s: f64) -> f64 {
 /// A table as a rig file has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tabulated {
-    /// The axis.
+    /// Axis whose balance the table is added to.
     pub axis: Axis,
     /// What it adds to.
     pub balance: Balance,

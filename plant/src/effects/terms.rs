@@ -33,7 +33,7 @@ impl Default for Terms {
 }
 
 impl Terms {
-    /// The values.
+    /// Terms in the order of their columns.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values[..self.count]

@@ -35,7 +35,7 @@ pub const DEFAULT_MOST_N: f64 = 150.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
-    /// The carriage.
+    /// Carriage on the rod of the drive.
     Carriage,
     /// The eye at the end of the load's rod.
     LoadEye,
@@ -44,7 +44,7 @@ pub enum Part {
 /// A hand that is on a part for a while.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Hand {
-    /// The part.
+    /// Part that is pushed or guided.
     pub on: Part,
     /// When it is put on, s of the rig's time.
     pub from_s: f64,

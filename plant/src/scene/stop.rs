@@ -15,7 +15,7 @@ pub const REPEAT_CYCLES: u64 = 100;
 /// Who can hold the emergency stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Holder {
-    /// The console.
+    /// Sender of the console's frame on the bus.
     Console,
     /// The rig's own button.
     Rig,

@@ -52,7 +52,7 @@ pub enum WireOrder {
     },
     /// The fault of this number ends; what it holds back goes on.
     End {
-        /// Its number.
+        /// Number that the order to begin gave it.
         number: u16,
     },
 }

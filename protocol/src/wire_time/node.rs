@@ -78,7 +78,6 @@ pub(super) enum Change {
     Restarted,
 }
 
-/// A node.
 #[derive(Default)]
 pub(super) struct Node {
     /// By [`Queued::key`].

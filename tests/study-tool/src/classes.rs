@@ -50,7 +50,6 @@ pub struct Member {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HiddenClass {
-    /// Its name.
     pub effect: String,
     /// Where it is.
     #[serde(rename = "where")]

@@ -25,7 +25,6 @@ pub enum CompareError {
         "'{left}' and '{right}' are of different modes, one without the hidden effects: compare them apart"
     )]
     Modes {
-        /// A label.
         left: String,
         /// Another one.
         right: String,

@@ -31,7 +31,6 @@ pub enum ComputeError {
     /// A file of the study.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The threads.
     #[error("no threads: {0}")]
     Threads(#[from] ThreadPoolBuildError),
     /// Draws have no classes.

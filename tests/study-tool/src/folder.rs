@@ -33,7 +33,6 @@ pub struct Study {
     pub root: PathBuf,
     /// What defines it.
     pub plan: Plan,
-    /// Its draws.
     pub draws: Vec<Draw>,
 }
 
@@ -55,7 +54,6 @@ impl Plan {
         Plan { schema_version: SCHEMA_VERSION, seed, shape }
     }
 
-    /// Its draws.
     #[must_use]
     pub fn draws(&self) -> Vec<Draw> {
         draws(self.seed, &self.shape)

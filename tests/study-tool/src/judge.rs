@@ -53,7 +53,6 @@ pub struct Judgement {
 /// What became of one hidden effect.
 #[derive(Debug, Clone, Serialize)]
 pub struct HiddenJudged {
-    /// Its name.
     pub effect: &'static str,
     /// Where it was.
     #[serde(rename = "where", serialize_with = "as_text")]

@@ -33,7 +33,6 @@ pub enum Verdict {
 /// A good report.
 #[derive(Debug, Clone)]
 pub struct Report {
-    /// The verdict.
     pub verdict: Verdict,
     /// What is missing, the best first.
     pub named: Vec<Named>,
@@ -61,11 +60,9 @@ pub struct Next {
 /// An effect at a place.
 #[derive(Debug, Clone)]
 pub struct Named {
-    /// Its sheet.
     pub sheet: &'static Sheet,
     /// Where it is.
     pub place: Place,
-    /// Its numbers.
     pub parameters: Vec<Parameter>,
     /// What explains the record as well.
     pub alternatives: Vec<Named>,
@@ -78,7 +75,6 @@ pub struct Parameter {
     pub name: String,
     /// In its unit.
     pub value: f64,
-    /// The unit.
     pub unit: String,
     /// Its standard error, in its unit; some programs have none.
     #[serde(rename = "standard_error")]

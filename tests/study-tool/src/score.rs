@@ -41,7 +41,6 @@ pub struct Score {
     /// What they say when the hidden effects were left out of the program's catalogue.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leave_out: Option<leave_out::Tables>,
-    /// The cases.
     pub cases: Vec<Case>,
 }
 
@@ -52,7 +51,6 @@ pub struct Case {
     pub number: usize,
     /// What it is about.
     pub kind: Kind,
-    /// Its recipe.
     pub recipe: Value,
     /// For each hidden effect its amplitude over the committed limit, or its strength in this record where it has no limit.
     pub over_limit: Vec<Option<f64>>,
@@ -125,7 +123,6 @@ pub enum ScoreError {
     Programs {
         /// Number of the draw.
         number: usize,
-        /// Its program.
         other: Box<Identity>,
         /// That of the first draw.
         program: Box<Identity>,

@@ -24,7 +24,6 @@ pub struct Case {
 /// What a case is made of: names of the shipped files.
 #[derive(Clone, Copy, Default)]
 pub struct Made<'a> {
-    /// The experiment.
     pub experiment: &'a str,
     /// The drive's program, if not the experiment's.
     pub drive: Option<&'a str>,

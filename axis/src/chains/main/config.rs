@@ -14,7 +14,6 @@ pub struct Lengths {
     pub prepare_s: f64,
     /// Ramp to the initial force; 0 when there is none.
     pub initial_force_s: f64,
-    /// The experiment.
     pub experiment_s: f64,
 }
 

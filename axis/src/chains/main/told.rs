@@ -23,7 +23,6 @@ pub struct MainInputs {
     pub own: Option<OwnAxis>,
     /// The steps of preparing are done.
     pub prepared: bool,
-    /// The partner.
     pub partner: Partner,
     /// State of the own emergency stop chain in this cycle.
     pub emergency_stop: EmergencyStopChainState,
@@ -72,7 +71,6 @@ pub enum Phase {
 /// What the chain says each cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MainOutput {
-    /// The state.
     pub state: MainChainState,
     /// Repetitions before this one; the bus has its low 8 bits.
     pub repetition: u32,

@@ -26,7 +26,6 @@ enum Direction {
 const DIRECTIONS: [(&str, Direction); 3] =
     [("any", Direction::Any), ("positive", Direction::Positive), ("negative", Direction::Negative)];
 
-/// The step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::set_point) struct AtPosition {
     from_n: f64,

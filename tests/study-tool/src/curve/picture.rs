@@ -33,7 +33,6 @@ const LEGEND: i32 = 18;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Failure = Box<dyn std::error::Error>;
 
-/// The picture.
 pub(super) fn svg(panels: [Panel<'_>; 2]) -> Result<String, String> {
     let mut text = String::new();
     draw(&mut text, &panels).map_err(|error| error.to_string())?;

@@ -43,7 +43,6 @@ pub struct Tables {
 pub struct Line {
     /// What is counted.
     pub name: String,
-    /// The rate.
     pub rate: Rate,
     /// What is wanted, in words.
     pub wanted: &'static str,
