@@ -32,6 +32,7 @@ pub mod candidates;
 pub mod check;
 pub mod cli;
 pub mod commands;
+pub mod description_error;
 pub mod engine;
 pub mod extend;
 pub(crate) mod fit;

@@ -37,6 +37,7 @@ pub use extended::extended_model_text;
 pub(crate) use model::Model;
 
 use crate::check::FEWEST_ROWS;
+use crate::description_error::DescriptionError;
 use crate::page::Pictures;
 use crate::records::{self, ReadError, ReadOptions, Record};
 use crate::report::{Report, Verdict};
@@ -53,30 +54,9 @@ const SPEEDS_APART: f64 = 3.0;
 /// Why a balance cannot be closed.
 #[derive(Debug, thiserror::Error)]
 pub enum BalanceError {
-    /// The model file is missing or not readable.
-    #[error("cannot read the model {}: {reason}", file.display())]
-    Open {
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
-    /// Not TOML, a key that is unknown or missing.
-    #[error("{}: {reason}", file.display())]
-    Syntax {
-        file: PathBuf,
-        /// What the parser said, with line and column.
-        reason: String,
-    },
-    /// A value that makes no sense.
-    #[error("{}: {key} = {value}; allowed is {allowed}", file.display())]
-    Value {
-        file: PathBuf,
-        /// The key with its table.
-        key: String,
-        value: String,
-        /// What may stand there.
-        allowed: String,
-    },
+    /// The model file, or the rig file that it names.
+    #[error(transparent)]
+    File(#[from] DescriptionError),
     /// A term that no balance of this kind has.
     #[error("this kind of model has no term '{effect}' of form '{form}', or its shape lacks a number")]
     Term { effect: String, form: String },
@@ -391,8 +371,11 @@ fn read(model: &Model, rig: Option<&RigParameters>, file: &Path) -> Result<(Reco
 }
 
 fn read_rig(file: &Path) -> Result<RigParameters, BalanceError> {
-    let text = std::fs::read_to_string(file)
-        .map_err(|error| BalanceError::Open { file: file.into(), reason: error.to_string() })?;
+    let text = std::fs::read_to_string(file).map_err(|error| DescriptionError::Open {
+        what: "model",
+        file: file.into(),
+        reason: error.to_string(),
+    })?;
     RigParameters::from_toml(&text, &file.display().to_string())
         .map_err(|error| BalanceError::Rig { reason: error.to_string() })
 }

@@ -1,6 +1,6 @@
 //! Errors of reading a record, with file, line, column, value and what is allowed.
 
-use super::mapping::MappingError;
+use crate::description_error::DescriptionError;
 use std::path::PathBuf;
 
 /// Why a record cannot be read.
@@ -119,5 +119,5 @@ pub enum ReadError {
     },
     /// The mapping of a foreign file.
     #[error(transparent)]
-    Mapping(#[from] MappingError),
+    Mapping(#[from] DescriptionError),
 }

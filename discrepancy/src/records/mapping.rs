@@ -8,38 +8,10 @@
 
 use super::table::{Layout, Separator};
 use super::{Channel, Quantity, RigSetup};
+use crate::description_error::DescriptionError;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-
-/// Why a mapping file is refused.
-#[derive(Debug, thiserror::Error)]
-pub enum MappingError {
-    /// The file is missing or not readable.
-    #[error("cannot read the mapping {}: {reason}", file.display())]
-    Open {
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
-    /// Not TOML, a key that is unknown or missing, a value of another kind.
-    #[error("{}: {reason}", file.display())]
-    Syntax {
-        file: PathBuf,
-        /// What the parser said, with line and column.
-        reason: String,
-    },
-    /// A value that makes no sense.
-    #[error("{}: {key} = {value}; allowed is {allowed}", file.display())]
-    Value {
-        file: PathBuf,
-        /// The key with its table.
-        key: String,
-        value: String,
-        /// What may stand there.
-        allowed: String,
-    },
-}
+use std::path::Path;
 
 /// A checked mapping.
 #[derive(Clone, Debug)]
@@ -182,10 +154,13 @@ impl Mapping {
     /// Reads a mapping file.
     ///
     /// # Errors
-    /// [`MappingError`] with file, key, value and what is allowed.
-    pub fn read(file: &Path) -> Result<Self, MappingError> {
-        let text = std::fs::read_to_string(file)
-            .map_err(|error| MappingError::Open { file: file.into(), reason: error.to_string() })?;
+    /// [`DescriptionError`] with file, key, value and what is allowed.
+    pub fn read(file: &Path) -> Result<Self, DescriptionError> {
+        let text = std::fs::read_to_string(file).map_err(|error| DescriptionError::Open {
+            what: "mapping",
+            file: file.into(),
+            reason: error.to_string(),
+        })?;
         Self::from_toml(&text, file)
     }
 
@@ -193,9 +168,11 @@ impl Mapping {
     ///
     /// # Errors
     /// As [`Mapping::read`].
-    pub fn from_toml(text: &str, file: &Path) -> Result<Self, MappingError> {
-        let syntax =
-            |error: toml::de::Error| MappingError::Syntax { file: file.into(), reason: error.to_string() };
+    pub fn from_toml(text: &str, file: &Path) -> Result<Self, DescriptionError> {
+        let syntax = |error: toml::de::Error| DescriptionError::Syntax {
+            file: file.into(),
+            reason: error.to_string(),
+        };
         let read: File = toml::from_str(text).map_err(syntax)?;
         let check = Check { file };
         let layout = check.layout(&read)?;
@@ -229,16 +206,16 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn refuse(&self, key: &str, value: &dyn std::fmt::Debug, allowed: &str) -> MappingError {
+    fn refuse(&self, key: &str, value: &dyn std::fmt::Debug, allowed: &str) -> DescriptionError {
         let (key, value, allowed) = (key.into(), format!("{value:?}"), allowed.into());
-        MappingError::Value { file: self.file.into(), key, value, allowed }
+        DescriptionError::Value { file: self.file.into(), key, value, allowed }
     }
 
-    fn above(&self, key: &str, value: f64, least: f64, allowed: &str) -> Result<f64, MappingError> {
+    fn above(&self, key: &str, value: f64, least: f64, allowed: &str) -> Result<f64, DescriptionError> {
         if value.is_finite() && value > least { Ok(value) } else { Err(self.refuse(key, &value, allowed)) }
     }
 
-    fn layout(&self, read: &File) -> Result<Layout, MappingError> {
+    fn layout(&self, read: &File) -> Result<Layout, DescriptionError> {
         let separator = match read.separator.as_bytes() {
             [character] if character.is_ascii() && *character != b' ' => Separator::Character(*character),
             _ if read.separator == "whitespace" => Separator::Whitespace,
@@ -251,7 +228,7 @@ impl Check<'_> {
         Ok(Layout { separator, comment, skip_lines, head })
     }
 
-    fn decimal_comma(&self, read: &File, separator: Separator) -> Result<bool, MappingError> {
+    fn decimal_comma(&self, read: &File, separator: Separator) -> Result<bool, DescriptionError> {
         match read.decimal.as_str() {
             "." => Ok(false),
             "," if separator != Separator::Character(b',') => Ok(true),
@@ -260,7 +237,7 @@ impl Check<'_> {
     }
 
     /// Where the time comes from, and the period that was meant.
-    fn time(&self, read: FileTime) -> Result<(Time, Option<f64>), MappingError> {
+    fn time(&self, read: FileTime) -> Result<(Time, Option<f64>), DescriptionError> {
         let nominal_period_s = read.nominal_period_s;
         let nominal_period_s = nominal_period_s
             .map(|period_s| self.above("time.nominal_period_s", period_s, 0.0, "more than 0"))
@@ -288,7 +265,7 @@ impl Check<'_> {
         name: &str,
         read: FileChannel,
         atmosphere_pa: f64,
-    ) -> Result<MappedChannel, MappingError> {
+    ) -> Result<MappedChannel, DescriptionError> {
         let key = |field: &str| format!("channels.{name}{field}");
         let channel = Channel::of_mapping(name).ok_or_else(|| {
             let known: Vec<_> = Channel::ALL.into_iter().map(Channel::column).collect();

@@ -6,6 +6,7 @@
 use super::BalanceError;
 use super::model::TermEntry;
 use super::terms::{shown, term};
+use crate::description_error::DescriptionError;
 use crate::report::Quantity;
 use crate::workflow::Reported;
 use std::path::Path;
@@ -16,10 +17,10 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, val
 /// # Errors
 /// [`BalanceError`] when the model file cannot be read.
 pub fn extended_model_text(model_file: &Path, reported: &Reported) -> Result<String, BalanceError> {
-    let open = |reason: String| BalanceError::Open { file: model_file.into(), reason };
+    let open = |reason: String| DescriptionError::Open { what: "model", file: model_file.into(), reason };
     let text = std::fs::read_to_string(model_file).map_err(|error| open(error.to_string()))?;
     let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| {
-        BalanceError::Syntax { file: model_file.into(), reason: error.to_string() }
+        DescriptionError::Syntax { file: model_file.into(), reason: error.to_string() }
     })?;
     let folder = model_file.parent().unwrap_or(Path::new(""));
     for key in ["mapping", "rig"] {
@@ -32,7 +33,7 @@ pub fn extended_model_text(model_file: &Path, reported: &Reported) -> Result<Str
     let terms = document.entry("terms").or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
     let Some(terms) = terms.as_array_of_tables_mut() else {
         let reason = "terms are written as [[terms]]".into();
-        return Err(BalanceError::Syntax { file: model_file.into(), reason });
+        return Err(DescriptionError::Syntax { file: model_file.into(), reason }.into());
     };
     let records = reported.inputs.train.join(", ");
     for effect in &reported.named {

@@ -3,6 +3,7 @@
 //! Keys with defaults, and two examples that run: `discrepancy/docs/one-balance.md`, `discrepancy/models/`.
 
 use super::BalanceError;
+use crate::description_error::DescriptionError;
 use crate::records::{Channel, Mapping};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -195,8 +196,11 @@ impl Model {
     /// # Errors
     /// [`BalanceError`] with the key, its value and what is allowed.
     pub(crate) fn read(file: &Path) -> Result<Self, BalanceError> {
-        let text = std::fs::read_to_string(file)
-            .map_err(|error| BalanceError::Open { file: file.into(), reason: error.to_string() })?;
+        let text = std::fs::read_to_string(file).map_err(|error| DescriptionError::Open {
+            what: "model",
+            file: file.into(),
+            reason: error.to_string(),
+        })?;
         Self::from_toml(&text, file)
     }
 
@@ -206,12 +210,10 @@ impl Model {
     /// As [`Model::read`].
     pub(crate) fn from_toml(text: &str, file: &Path) -> Result<Self, BalanceError> {
         let read: File = toml::from_str(text)
-            .map_err(|error| BalanceError::Syntax { file: file.into(), reason: error.to_string() })?;
-        let refuse = |key: &str, value: String, allowed: &str| BalanceError::Value {
-            file: file.into(),
-            key: key.into(),
-            value,
-            allowed: allowed.into(),
+            .map_err(|error| DescriptionError::Syntax { file: file.into(), reason: error.to_string() })?;
+        let refuse = |key: &str, value: String, allowed: &str| {
+            let (key, allowed) = (key.into(), allowed.into());
+            BalanceError::from(DescriptionError::Value { file: file.into(), key, value, allowed })
         };
         let Processing { period_s, low_pass_hz, low_pass_order, moving_average, .. } = read.processing;
         let Processing { decimate, decimate_order, decimate_ripple_decibel, decimate_edge, .. } =
