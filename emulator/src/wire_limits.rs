@@ -88,7 +88,7 @@ fn at_most(
 fn signal(message: &'static MessageSpec, name: &str) -> &'static SignalSpec {
     let found = message.signals.iter().find(|signal| signal.name == name);
     found.unwrap_or_else(|| {
-        unreachable!("{}.{name} is in rig.dbc, which is checked when protocol is built", message.name)
+        unreachable!("{}.{name} is in rig.dbc, from which the frames are generated", message.name)
     })
 }
 

@@ -33,7 +33,7 @@ impl CanFrame {
     /// A data frame with an 11-bit identifier.
     ///
     /// # Panics
-    /// If `id` exceeds 11 bits or `data` 8 bytes: both come from `rig.dbc`, which is checked when the crate is built.
+    /// If `id` exceeds 11 bits or `data` 8 bytes: both come from `rig.dbc`, which the generator of the frames checks.
     #[must_use]
     pub fn new(id: u16, data: &[u8]) -> Self {
         assert!(id < 0x800, "identifier {id:#x} exceeds 11 bits");

@@ -1,4 +1,4 @@
-//! The typed frames of the wire, generated from `rig.dbc` when the crate is built.
+//! The typed frames of the wire, generated from `rig.dbc`.
 //!
 //! ```text
 //! Frame::DriveValveCommand(ValveCommand { opening, .. })  --encode-->  CanFrame 110#...
@@ -10,7 +10,7 @@
 //! range and unit; only a millionth of a count is forgiven, so that rounding errors at the ends of a range are not.
 //! Bits that no signal covers are reserved: 0 when sent, refused when received.
 //!
-//! `rig.dbc` is the only place where a range, a factor, a bit or an identifier is written. `build.rs` turns it into
+//! `rig.dbc` is the only place where a range, a factor, a bit or an identifier is written. `generator/` makes of it, in `frames/generated.rs`,
 //!
 //! - a payload struct for each layout, shared by messages that differ by a leading node or axis word,
 //! - [`Frame`], one variant for each identifier, with [`Frame::encode`] and [`Frame::decode`],
@@ -25,7 +25,7 @@ use std::time::Duration;
 use crate::can::{CanFrame, ERROR_FLAG, REMOTE_FLAG};
 use crate::checksum;
 
-include!(concat!(env!("OUT_DIR"), "/rig_frames.rs"));
+include!("frames/generated.rs");
 
 /// Values of the counter `alive` in commands and sensors: it counts modulo this.
 pub const ALIVE_RANGE: u64 = 16;

@@ -1,4 +1,5 @@
-//! A `rig.dbc` that is broken, or says what the generator does not know, fails the build with file and line.
+//! A `rig.dbc` that is broken, or says what the generator does not know, is refused with file and line; `src/frames/generated.rs` is what the
+//! generator makes of the file itself.
 
 use crate::emit;
 use crate::model;
@@ -24,6 +25,17 @@ fn the_file_itself_builds_the_same_text_twice() {
     let text = build(RIG).unwrap();
     assert!(text.contains("pub enum Frame"));
     assert_eq!(build(RIG).unwrap(), text);
+}
+
+/// The file is written when it is out of date, so that a second run passes with the new frames compiled in.
+#[test]
+fn the_committed_frames_are_generated_from_rig_dbc() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/frames/generated.rs");
+    let fresh = build(RIG).unwrap_or_else(|problem| panic!("protocol/{problem}"));
+    if std::fs::read_to_string(path).ok().as_deref() != Some(&fresh) {
+        std::fs::write(path, fresh).unwrap();
+        panic!("{path} was out of date: it is written anew, build and test again");
+    }
 }
 
 #[test]

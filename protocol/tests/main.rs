@@ -1,10 +1,10 @@
 //! The integration tests of `protocol`, one executable; `descriptors.rs` needs a process of its own.
 
-#[path = "../build/emit.rs"]
+#[path = "../generator/emit.rs"]
 mod emit;
-#[path = "../build/model.rs"]
+#[path = "../generator/model.rs"]
 mod model;
-#[path = "../build/source.rs"]
+#[path = "../generator/source.rs"]
 mod source;
 
 mod codec_build;

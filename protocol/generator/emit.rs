@@ -7,9 +7,11 @@ use std::fmt::Write;
 
 use crate::model::{Catalogue, Kind, Message, Payload, Signal, Table, camel_case};
 
-/// The whole of `rig_frames.rs`.
+/// The whole of `src/frames/generated.rs`.
 pub(crate) fn catalogue(catalogue: &Catalogue) -> String {
-    let mut out = String::from("// Generated from rig.dbc by build.rs.\n\n");
+    let mut out = String::from(
+        "// @generated from rig.dbc by the tests of this crate (generator/): cargo test -p protocol generated\n\n",
+    );
     let rate = catalogue.bit_rate_per_s;
     out += &format!("/// Bit rate of the bus, in bit/s.\npub const BIT_RATE_PER_S: u32 = {rate};\n\n");
     for table in &catalogue.tables {
