@@ -26,10 +26,17 @@ pub struct Evidence {
     pub reports: BTreeMap<String, ProcessReport>,
     /// `bus.log`, or why it cannot be read.
     pub log: Result<FrameLog, String>,
+    /// Files that are there and not as their types have them, each with the reason: what they would have said is not known.
+    pub damaged: Vec<String>,
 }
 
-fn read_json<T: DeserializeOwned + Default>(path: &Path) -> T {
-    std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
+/// A file as its type; the type's default where there is no file, and where it is `damaged`.
+fn read_json<T: DeserializeOwned + Default>(path: &Path, damaged: &mut Vec<String>) -> T {
+    let Ok(bytes) = std::fs::read(path) else { return T::default() };
+    serde_json::from_slice(&bytes).unwrap_or_else(|error| {
+        damaged.push(format!("{}: {error}", path.display()));
+        T::default()
+    })
 }
 
 /// Counts by the names of identifiers, unknown ones together.
@@ -50,12 +57,16 @@ impl Evidence {
         let (summary, run) = (folder.join("summary.json"), folder.join("run.json"));
         let reports = controllers.clone().chain([("emulator", summary.clone())]);
         let log = folder.join("bus.log");
+        let mut damaged = Vec::new();
         Self {
-            summary: read_json(&summary),
-            machine: read_json::<RunDescription<Value, Value>>(&run).machine,
-            run: read_json(&run),
-            reports: reports.map(|(name, path)| (name.to_owned(), read_json(&path))).collect(),
-            controllers: controllers.map(|(name, path)| (name.to_owned(), read_json(&path))).collect(),
+            summary: read_json(&summary, &mut damaged),
+            machine: read_json::<RunDescription<Value, Value>>(&run, &mut damaged).machine,
+            run: read_json(&run, &mut damaged),
+            reports: reports.map(|(name, path)| (name.to_owned(), read_json(&path, &mut damaged))).collect(),
+            controllers: controllers
+                .map(|(name, path)| (name.to_owned(), read_json(&path, &mut damaged)))
+                .collect(),
+            damaged,
             log: frame_log::read(&log).map_err(|error| format!("{}: {error}", log.display())),
         }
     }
@@ -63,8 +74,11 @@ impl Evidence {
     /// The account, or why there is none.
     ///
     /// # Errors
-    /// A sentence that says who left no report, or was on the bus twice.
+    /// A sentence that says which file is damaged, who left no report, or was on the bus twice.
     pub fn account(&self, outcome: &Outcome) -> Result<Account, String> {
+        if let Some(damaged) = self.damaged.first() {
+            return Err(format!("no account: {damaged}"));
+        }
         // The controllers first.
         let mut names = self.reports.iter().filter(|(_, report)| report.bus.is_none()).map(|(name, _)| name);
         if let Some(name) = names.next() {
@@ -175,5 +189,24 @@ impl Evidence {
             Some(((*id).to_owned(), Gaps::Sensors { lost, before }))
         });
         Party { gaps: gaps.collect(), ..self.party(name) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_damaged_report_is_named_and_a_missing_one_is_not_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let spec =
+            Spec { number: 1, experiment: "soak".into(), two_processes: false, load: false, loss: None };
+        std::fs::write(folder.path().join("controller.json"), "{}").unwrap();
+        assert!(Evidence::read(&spec, folder.path()).damaged.is_empty());
+
+        // A number where a text belongs: bounds would come from a run that nobody has read.
+        std::fs::write(folder.path().join("run.json"), r#"{"experiment_toml": 5}"#).unwrap();
+        let damaged = Evidence::read(&spec, folder.path()).damaged;
+        assert!(!damaged.is_empty() && damaged.iter().all(|why| why.contains("run.json")), "{damaged:?}");
     }
 }

@@ -257,6 +257,7 @@ mod tests {
             ]
             .into(),
             log: Err("none is needed".into()),
+            damaged: Vec::new(),
         }
     }
 
