@@ -62,11 +62,16 @@ install_stress_ng() {
     need_program stress-ng stress-ng $(apt-cache depends stress-ng 2>/dev/null | sed -n 's/^ *Depends: \(lib[a-z0-9.+-]*\)$/\1/p')
 }
 
+# cargo_install CRATE VERSION: unoptimised, since what takes time is what these programs start; they share what they depend on.
+cargo_install() {
+    CARGO_PROFILE_DEV_DEBUG=0 cargo install --quiet --locked --debug "$1" --version "$2" --root "$tools" --target-dir "$tools/build"
+}
+
 # Builds the targets of fuzz/.
 install_cargo_fuzz() {
     install_compiler || return 1
     [ -x "$tools/bin/cargo-fuzz" ] && "$tools/bin/cargo-fuzz" --version | grep -q "$cargo_fuzz_version" && return
-    cargo install --quiet --locked --debug cargo-fuzz --version "$cargo_fuzz_version" --root "$tools" # it starts others
+    cargo_install cargo-fuzz "$cargo_fuzz_version" # it starts others
 }
 
 # The benchmark's floor is C, libFuzzer is C++; a Rust toolchain links with a C compiler anyway.
@@ -135,7 +140,7 @@ install_book() { install_requirements book "$(dirname "${BASH_SOURCE[0]}")/../do
 
 install_gungraun() {
     [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return
-    cargo install --quiet --locked --debug gungraun-runner --version "$gungraun_version" --root "$tools" # it starts valgrind
+    cargo_install gungraun-runner "$gungraun_version" # it starts valgrind
 }
 
 # The browser of the live page's tests: Debian's chromium, Node, and what drives the one from the other, as its lock file pins it.

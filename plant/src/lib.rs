@@ -19,6 +19,7 @@
 //! | `truth.rs` | the list of all terms at an instant |
 //! | `sensors.rs` | noise, rounding, saturation |
 //! | `faults.rs` | what is broken, over all of these |
+//! | `effects.rs` | what the baseline leaves out; friction with effects: `effects/friction.rs` |
 //! | `tables.rs` | rows of the measurement file and of the true states |
 //!
 //! [`scene`] is what people do to it: setup, hands, emergency stop, linkage and weights, as an experiment file tells.

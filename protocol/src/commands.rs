@@ -85,7 +85,7 @@ impl CommandIntake {
         true
     }
 
-    /// Latches what acts over the cycle that was sent last, the last command taken being the one that counts.
+    /// Decides whether the command that `take` stored last acts over the cycle that was sent last: a stale or disputed one is withdrawn.
     pub fn latch(&mut self, live: &LiveCycles) -> Option<Change> {
         let too_old =
             |command: &ValveCommand| live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES);

@@ -146,7 +146,7 @@ pub(super) const CRATE_EDGES: Rule = Rule {
 
 fn edge(room: &str, other: &str) -> String {
     format!(
-        "{room} must not know {other} (house-style, The house): move what both need, or assemble them elsewhere"
+        "{room} must not know {other} (ARCHITECTURE.md, Crates): move what both need, or assemble them elsewhere"
     )
 }
 
@@ -240,7 +240,7 @@ pub(super) const PURE_PLANT: Rule = Rule {
             let code = line.split("//").next().unwrap_or_default();
             let found = IMPURE.iter().find(|word| code.contains(*word))?;
             Some(format!(
-                "plant has no {found} (house-style, The house): hand it the value, or do it in the emulator"
+                "plant has no {found} (ARCHITECTURE.md, Crates): hand it the value, or do it in the emulator"
             ))
         })
     },
