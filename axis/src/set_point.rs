@@ -8,17 +8,14 @@
 //! Nothing here changes while it runs, allocates or blocks; the little that a force remembers is in [`ForceSource`].
 
 pub mod bestehorn;
-pub mod chirp;
 pub mod force;
 pub mod law;
 pub mod modified_sine;
-mod oscillation;
+pub mod oscillation;
 pub mod pseudo_random_steps;
 pub mod ramp;
 pub(crate) mod reading;
-pub mod rest;
 mod row;
-pub mod sine;
 pub mod step;
 pub mod table;
 pub mod trapezoidal;
@@ -33,18 +30,14 @@ use std::sync::Arc;
 /// A position set-point with its derivatives, in rig coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetPoint {
-    /// Position, m.
     pub position_m: f64,
-    /// Its rate, m/s.
     pub velocity_m_per_s: f64,
-    /// The rate of that, m/s^2.
     pub acceleration_m_per_s2: f64,
     /// Whether the set-point changes; at rest both error figures are judged otherwise.
     pub moving: bool,
 }
 
 impl SetPoint {
-    /// A set-point that stays.
     #[must_use]
     pub const fn at_rest(position_m: f64) -> Self {
         Self { position_m, velocity_m_per_s: 0.0, acceleration_m_per_s2: 0.0, moving: false }
@@ -68,16 +61,12 @@ impl From<SetPoint> for Moment {
 /// A force set-point with its rate, compression positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceSetPoint {
-    /// Force, N.
     pub force_n: f64,
-    /// Its rate, N/s.
     pub rate_n_per_s: f64,
-    /// Whether the set-point changes.
     pub moving: bool,
 }
 
 impl ForceSetPoint {
-    /// A set-point that stays.
     #[must_use]
     pub const fn at_rest(force_n: f64) -> Self {
         Self { force_n, rate_n_per_s: 0.0, moving: false }
@@ -99,11 +88,8 @@ impl From<ForceSetPoint> for Moment {
 /// What the axis does, measured and filtered, in rig coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Actual {
-    /// Position, m.
     pub position_m: f64,
-    /// Its rate, m/s.
     pub velocity_m_per_s: f64,
-    /// The rate of that, m/s^2.
     pub acceleration_m_per_s2: f64,
 }
 
@@ -118,26 +104,6 @@ impl Motion {
         Self { row: Row::new(start_m, laws) }
     }
 
-    /// A motion that stays, and lasts no time.
-    #[must_use]
-    pub fn at_rest(position_m: f64) -> Self {
-        Self::new(position_m, Vec::new())
-    }
-
-    /// A motion along a Bestehorn sinoid.
-    #[must_use]
-    pub fn along(way: SmoothWay) -> Self {
-        Self::new(way.start(), vec![Arc::new(way)])
-    }
-
-    /// The same with a rest behind it.
-    #[must_use]
-    pub fn then_rest(mut self, duration_s: f64) -> Self {
-        let end_m = self.end_m();
-        self.row.push(rest::law(end_m, duration_s));
-        self
-    }
-
     /// The set-point `time_s` after the start: the start before it, the end from the end on.
     #[must_use]
     pub fn at(&self, time_s: f64) -> SetPoint {
@@ -149,19 +115,16 @@ impl Motion {
         moment.into()
     }
 
-    /// How long it takes, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.row.duration_s()
     }
 
-    /// Where it starts, m.
     #[must_use]
     pub fn start_m(&self) -> f64 {
         self.row.start()
     }
 
-    /// Where it ends, m.
     #[must_use]
     pub fn end_m(&self) -> f64 {
         self.row.end()

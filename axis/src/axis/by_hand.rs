@@ -8,7 +8,7 @@
 use crate::chains::main::Phase;
 use crate::experiment::ByHandLimits;
 use crate::set_point::SmoothWay;
-use crate::set_point::law::{Law, Moment};
+use crate::set_point::law::Moment;
 
 /// Largest over mean speed of a sinoid.
 const PEAK: f64 = 2.0;

@@ -8,17 +8,13 @@
 use super::law::{BOTH, Kind, Law, Moment, Shaped};
 use super::{ForceSetPoint, SetPoint};
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 /// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "bestehorn",
     about: "Bestehorn sinoid to a place",
     serves: BOTH,
-    read: |given| {
-        let to = given.place("to", "where it ends")?;
-        Ok(Arc::new(Shaped { from: given.from, to, duration_s: given.duration_s(0.01)?, shape: at }))
-    },
+    read: |given| Shaped::read(given, 0.01, at),
 };
 
 /// s(z), s'(z) and s''(z) for z in 0 to 1.
@@ -54,15 +50,8 @@ impl SmoothWay {
         self.at(time_s).into()
     }
 
-    /// Its start value.
-    #[must_use]
-    pub fn start(&self) -> f64 {
-        self.from
-    }
-}
-
-impl Law for SmoothWay {
-    fn at(&self, time_s: f64) -> Moment {
+    /// The set-point `time_s` after its start, in the unit of its values.
+    pub(crate) fn at(&self, time_s: f64) -> Moment {
         let Self { from, to, duration_s } = *self;
         if time_s < 0.0 {
             return Moment::at_rest(from);
@@ -71,18 +60,6 @@ impl Law for SmoothWay {
             return Moment::at_rest(to);
         }
         Shaped { from, to, duration_s, shape: at }.at(time_s)
-    }
-
-    fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    fn end(&self) -> f64 {
-        self.to
-    }
-
-    fn reach(&self) -> [f64; 2] {
-        [self.from.min(self.to), self.from.max(self.to)]
     }
 }
 

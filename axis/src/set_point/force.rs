@@ -56,19 +56,11 @@ pub(super) enum Segment {
 }
 
 impl Lasting for Segment {
-    fn duration_s(&self) -> f64 {
+    fn duration_and_end(&self) -> (f64, f64) {
         match self {
-            Self::Timed(law) => law.duration_s(),
-            Self::AtPosition(step) => step.duration_s,
-            Self::Load { duration_s, .. } => *duration_s,
-        }
-    }
-
-    fn end(&self) -> f64 {
-        match self {
-            Self::Timed(law) => law.end(),
-            Self::AtPosition(step) => step.to_n,
-            Self::Load { base_n, .. } => *base_n,
+            Self::Timed(law) => law.duration_and_end(),
+            Self::AtPosition(step) => (step.duration_s, step.to_n),
+            Self::Load { base_n, duration_s, .. } => (*duration_s, *base_n),
         }
     }
 }
@@ -100,12 +92,6 @@ impl ForceProfile {
         Self { row: Row::new(initial_force_n, segments), limit_n }
     }
 
-    /// A force that stays, and lasts no time.
-    #[must_use]
-    pub fn at_rest(force_n: f64) -> Self {
-        Self::new(force_n, force_n, Vec::new())
-    }
-
     /// How long it takes, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
@@ -116,12 +102,6 @@ impl ForceProfile {
     #[must_use]
     pub fn initial_force_n(&self) -> f64 {
         self.row.start()
-    }
-
-    /// Largest force that it asks for, N; the least is 0.
-    #[must_use]
-    pub fn limit_n(&self) -> f64 {
-        self.limit_n
     }
 
     /// The force at the end, N: of a load that depends on the axis its base force.
@@ -177,12 +157,6 @@ impl ForceSource {
     #[must_use]
     pub fn profile(&self) -> &ForceProfile {
         &self.profile
-    }
-
-    /// How long it takes, s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
-        self.profile.duration_s()
     }
 
     /// The set-point `time_s` after the start: the initial force before it, [`Self::end`] from the end on.

@@ -4,9 +4,7 @@
 //! row's, m or N: the same law moves an axis and leads a force, and only its keys differ (`to_m`, `to_n`).
 //! A new law is a file beside this one and a line in [`KINDS`].
 
-use super::{
-    bestehorn, chirp, modified_sine, pseudo_random_steps, ramp, rest, sine, step, table, trapezoidal,
-};
+use super::{bestehorn, modified_sine, oscillation, pseudo_random_steps, ramp, step, table, trapezoidal};
 use algorithms::algorithm::Quantity;
 use settings::parameters::Parameter;
 use settings::{Section, SettingsError};
@@ -20,10 +18,10 @@ pub const KINDS: &[Kind] = &[
     trapezoidal::KIND,
     step::KIND,
     ramp::KIND,
-    rest::KIND,
-    rest::CONSTANT,
-    sine::KIND,
-    chirp::KIND,
+    step::REST,
+    step::CONSTANT,
+    oscillation::SINE,
+    oscillation::CHIRP,
     pseudo_random_steps::KIND,
     table::KIND,
 ];
@@ -47,12 +45,30 @@ pub(super) const BOTH: &[Quantity] = &[Quantity::Position, Quantity::Force];
 pub trait Law: fmt::Debug + Send + Sync {
     /// Value and derivatives `time_s` after the beginning, 0 to the duration.
     fn at(&self, time_s: f64) -> Moment;
-    /// How long it takes, s.
-    fn duration_s(&self) -> f64;
+    /// What it takes and where it goes; asked when it is read, not while it runs.
+    fn extent(&self) -> Extent;
+}
+
+/// How long a law takes, where it ends and how far it goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    pub(super) duration_s: f64,
     /// The value from its end on.
-    fn end(&self) -> f64;
+    pub(super) end: f64,
     /// Least and largest value on the way.
-    fn reach(&self) -> [f64; 2];
+    pub(super) reach: [f64; 2],
+}
+
+impl Extent {
+    /// Of a way from one value to another.
+    pub(super) fn between(from: f64, to: f64, duration_s: f64) -> Self {
+        Self { duration_s, end: to, reach: [from.min(to), from.max(to)] }
+    }
+
+    /// Of deviations to either side that end in the middle, also when they are over before they have been to both.
+    pub(super) fn around(middle: f64, amplitude: f64, duration_s: f64) -> Self {
+        Self { duration_s, end: middle, reach: [middle - amplitude, middle + amplitude] }
+    }
 }
 
 /// Value and derivatives at a time, in the unit of the row.
@@ -79,6 +95,18 @@ pub(super) struct Shaped {
     pub(super) shape: fn(f64) -> [f64; 3],
 }
 
+impl Shaped {
+    /// Reads the way to a place, which takes `least_s` or longer.
+    pub(super) fn read(
+        given: &mut Given<'_, '_>,
+        least_s: f64,
+        shape: fn(f64) -> [f64; 3],
+    ) -> Result<Arc<dyn Law>, SettingsError> {
+        let to = given.place("to", "where it ends")?;
+        Ok(Arc::new(Self { from: given.from, to, duration_s: given.duration_s(least_s)?, shape }))
+    }
+}
+
 impl Law for Shaped {
     fn at(&self, time_s: f64) -> Moment {
         let [s, ds_dz, d2s_dz2] = (self.shape)((time_s / self.duration_s).clamp(0.0, 1.0));
@@ -91,16 +119,8 @@ impl Law for Shaped {
         }
     }
 
-    fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    fn end(&self) -> f64 {
-        self.to
-    }
-
-    fn reach(&self) -> [f64; 2] {
-        [self.from.min(self.to), self.from.max(self.to)]
+    fn extent(&self) -> Extent {
+        Extent::between(self.from, self.to, self.duration_s)
     }
 }
 

@@ -15,17 +15,13 @@
 
 use super::law::{BOTH, Kind, Shaped};
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 /// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "modified-sine",
     about: "modified sine to a place: slower at its fastest than the sinoid",
     serves: BOTH,
-    read: |given| {
-        let to = given.place("to", "where it ends")?;
-        Ok(Arc::new(Shaped { from: given.from, to, duration_s: given.duration_s(0.01)?, shape: at }))
-    },
+    read: |given| Shaped::read(given, 0.01, at),
 };
 
 const K: f64 = PI / (4.0 + PI);

@@ -1,4 +1,5 @@
-//! What sine and chirp share: a deviation to either side whose frequency is constant or sweeps, faded in and out if asked.
+//! Sine and chirp: a deviation to either side of where the row stands, at one frequency or at one that sweeps linearly over time,
+//! faded in and out if asked. It starts upwards and ends where it started.
 //!
 //! ```text
 //!   x  = x_0 + A w sin(phi)                          phi = 2 pi (f_0 t + (f_1 - f_0) t^2 / (2 T))
@@ -6,16 +7,43 @@
 //!   x" = A (w" sin(phi) + (2 w' phi' + w phi") cos(phi) - w phi'^2 sin(phi))
 //! ```
 //!
-//! w: fade, 1 except along a Bestehorn sinoid at either end for fade_s. Without a fade the rate jumps at either end, and the
-//! phase must end at a multiple of pi, so that the row goes on where it stood; with one it begins and ends at rest.
+//! A: amplitude_m or amplitude_n. f_0, f_1: from_hz, to_hz; of the sine both are frequency_hz. T: duration_s. w: fade, 1 except
+//! along a Bestehorn sinoid at either end for fade_s. Without a fade the rate jumps at either end, and the phase must end at a
+//! multiple of pi, so that the row goes on where it stood; with one it begins and ends at rest.
 
 use super::bestehorn;
-use super::law::{Given, Law, Moment};
+use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
 use settings::SettingsError;
 use settings::parameters::Parameter;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+/// In the list of laws.
+pub const SINE: Kind = Kind {
+    name: "sine",
+    about: "to either side at one frequency",
+    serves: BOTH,
+    read: |given| {
+        let frequency_hz = given.number(&FREQUENCY)?;
+        Oscillation::read(given, [frequency_hz; 2])
+    },
+};
+
+/// In the list of laws.
+pub const CHIRP: Kind = Kind {
+    name: "chirp",
+    about: "to either side at a frequency that sweeps",
+    serves: BOTH,
+    read: |given| {
+        let frequencies_hz = [given.number(&FROM)?, given.number(&TO)?];
+        Oscillation::read(given, frequencies_hz)
+    },
+};
+
+static FREQUENCY: Parameter =
+    Parameter::new(("frequency_hz", "Hz"), [0.001, 200.0], 1.0, "periods in a second");
+static FROM: Parameter = Parameter::new(("from_hz", "Hz"), [0.001, 200.0], 0.1, "frequency at the start");
+static TO: Parameter = Parameter::new(("to_hz", "Hz"), [0.001, 200.0], 10.0, "frequency at the end");
 static FADE: Parameter = Parameter::new(("fade_s", "s"), [0.0, 3600.0], 0.0, "how long it fades in, and out");
 /// How far the last phase may be off a multiple of pi, as share of pi.
 const PHASE_TOLERANCE: f64 = 1e-6;
@@ -89,17 +117,8 @@ impl Law for Oscillation {
         }
     }
 
-    fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    fn end(&self) -> f64 {
-        self.from
-    }
-
-    /// Both sides, also when it is over before it has been to both.
-    fn reach(&self) -> [f64; 2] {
-        [self.from - self.amplitude, self.from + self.amplitude]
+    fn extent(&self) -> Extent {
+        Extent::around(self.from, self.amplitude, self.duration_s)
     }
 }
 

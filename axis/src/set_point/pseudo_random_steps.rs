@@ -8,7 +8,7 @@
 //!
 //! Source: O'Neill, PCG, 2014 (generator).
 
-use super::law::{BOTH, Given, Kind, Law, Moment};
+use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
 use super::step::JUMP_S;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -89,16 +89,8 @@ impl Law for PseudoRandomSteps {
         Moment { moving: since_s < JUMP_S && value != before, ..Moment::at_rest(value) }
     }
 
-    fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    fn end(&self) -> f64 {
-        self.from
-    }
-
-    fn reach(&self) -> [f64; 2] {
-        [self.from - self.amplitude, self.from + self.amplitude]
+    fn extent(&self) -> Extent {
+        Extent::around(self.from, self.amplitude, self.duration_s)
     }
 }
 

@@ -23,10 +23,9 @@ pub(crate) fn quantity(segments: &[Section<'_>]) -> Result<Option<Quantity>, Set
         let Some(own) = own_quantity(segment) else { continue };
         let (quantity, line) = *first.get_or_insert((own, segment.line()));
         if own != quantity {
-            let words = |quantity| if quantity == Quantity::Force { "forces" } else { "positions" };
-            let (own, other) = (words(own), words(quantity));
+            let (own, other) = (own.name(), quantity.name());
             let said =
-                format!("law is of {own}, line {line} of {other}: a row mixes no positions and forces");
+                format!("law is of {own}s, line {line} of {other}s: a row mixes no positions and forces");
             return Err(segment.wrong_at("law", &said));
         }
     }
@@ -62,7 +61,7 @@ pub(crate) fn motion(
         let mut given = Given { section: &mut section, from, scale };
         let law = timed(&name, &mut given)?;
         section.finish()?;
-        from = law.end();
+        from = law.extent().end;
         laws.push(law);
     }
     Ok(Motion::new(start_m, laws))
@@ -88,7 +87,7 @@ pub(crate) fn forces(
             None => Segment::Timed(timed(&name, &mut given)?),
         };
         section.finish()?;
-        from = segment.end();
+        (_, from) = segment.duration_and_end();
         segments.push(segment);
     }
     Ok(ForceProfile::new(initial_n, limit_n, segments))
@@ -103,7 +102,7 @@ fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, Settings
         return Err(given.section.wrong_at("law", &said));
     };
     let law = (kind.read)(given)?;
-    let ([least, most], unit) = (law.reach(), given.scale.unit());
+    let ([least, most], unit) = (law.extent().reach, given.scale.unit());
     if least >= 0.0 && most <= given.scale.most() {
         return Ok(law);
     }

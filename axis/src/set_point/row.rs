@@ -8,19 +8,14 @@ pub(super) const ROUNDING_S: f64 = 1e-9;
 
 /// What a row is made of.
 pub(super) trait Lasting {
-    /// How long it takes, s.
-    fn duration_s(&self) -> f64;
-    /// The value from its end on.
-    fn end(&self) -> f64;
+    /// How long it takes, s, and the value from its end on.
+    fn duration_and_end(&self) -> (f64, f64);
 }
 
 impl Lasting for Arc<dyn Law> {
-    fn duration_s(&self) -> f64 {
-        self.as_ref().duration_s()
-    }
-
-    fn end(&self) -> f64 {
-        self.as_ref().end()
+    fn duration_and_end(&self) -> (f64, f64) {
+        let extent = self.extent();
+        (extent.duration_s, extent.end)
     }
 }
 
@@ -31,22 +26,21 @@ pub(super) struct Row<S> {
     segments: Vec<S>,
     /// When each segment ends, s after the row's start.
     until_s: Vec<f64>,
+    /// The value from the last one's end on.
+    end: f64,
 }
 
 impl<S: Lasting> Row<S> {
     pub(super) fn new(start: f64, segments: Vec<S>) -> Self {
-        let mut end_s = 0.0;
+        let (mut end_s, mut end) = (0.0, start);
         let mut ends = |segment: &S| {
-            end_s += segment.duration_s();
+            let duration_s;
+            (duration_s, end) = segment.duration_and_end();
+            end_s += duration_s;
             end_s
         };
         let until_s = segments.iter().map(&mut ends).collect();
-        Self { start, segments, until_s }
-    }
-
-    pub(super) fn push(&mut self, segment: S) {
-        self.until_s.push(self.duration_s() + segment.duration_s());
-        self.segments.push(segment);
+        Self { start, segments, until_s, end }
     }
 
     /// Which segment `time_s` lies in.
@@ -77,7 +71,7 @@ impl<S: Lasting> Row<S> {
     }
 
     pub(super) fn end(&self) -> f64 {
-        self.segments.last().map_or(self.start, Lasting::end)
+        self.end
     }
 }
 

@@ -1,9 +1,12 @@
-//! Step: at once to a place, which is then held.
+//! Step: at once to a place, which is then held; the rest is one to where the row stands, the constant force one to a value of its
+//! own.
 //!
 //! The set-point counts as moving in the basic cycle in which it jumps, so that the rest behind is one of its own; its rate is 0,
 //! since a jump has none.
 
-use super::law::{BOTH, Kind, Law, Moment};
+use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
+use algorithms::algorithm::Quantity;
+use settings::SettingsError;
 use std::sync::Arc;
 
 /// How long a jump counts as moving: a basic cycle.
@@ -16,16 +19,41 @@ pub const KIND: Kind = Kind {
     serves: BOTH,
     read: |given| {
         let to = given.place("to", "where it jumps to")?;
-        Ok(Arc::new(Step { from: given.from, to, duration_s: given.duration_s(0.001)? }))
+        Step::read(given, to, 0.001)
+    },
+};
+
+/// In the list of laws.
+pub const REST: Kind = Kind {
+    name: "rest",
+    about: "stays where it is",
+    serves: BOTH,
+    read: |given| Step::read(given, given.from, 0.0),
+};
+
+/// In the list of laws.
+pub const CONSTANT: Kind = Kind {
+    name: "constant",
+    about: "a constant force",
+    serves: &[Quantity::Force],
+    read: |given| {
+        let to = given.place("force", "the force that is held")?;
+        Step::read(given, to, 0.001)
     },
 };
 
 /// A jump and the hold after it.
 #[derive(Debug)]
-pub(super) struct Step {
-    pub(super) from: f64,
-    pub(super) to: f64,
-    pub(super) duration_s: f64,
+struct Step {
+    from: f64,
+    to: f64,
+    duration_s: f64,
+}
+
+impl Step {
+    fn read(given: &mut Given<'_, '_>, to: f64, least_s: f64) -> Result<Arc<dyn Law>, SettingsError> {
+        Ok(Arc::new(Self { from: given.from, to, duration_s: given.duration_s(least_s)? }))
+    }
 }
 
 impl Law for Step {
@@ -33,15 +61,7 @@ impl Law for Step {
         Moment { moving: time_s < JUMP_S && self.to != self.from, ..Moment::at_rest(self.to) }
     }
 
-    fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    fn end(&self) -> f64 {
-        self.to
-    }
-
-    fn reach(&self) -> [f64; 2] {
-        [self.to; 2]
+    fn extent(&self) -> Extent {
+        Extent::between(self.from, self.to, self.duration_s)
     }
 }

@@ -12,7 +12,7 @@
 //!
 //! Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300 (the mean, here unweighted).
 
-use super::law::{BOTH, Given, Kind, Law, Moment};
+use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
 use algorithms::algorithm::Quantity;
 use settings::SettingsError;
 use std::path::Path;
@@ -148,17 +148,11 @@ impl Law for Table {
         Moment { value, rate: rate / length_s, acceleration: acceleration / (length_s * length_s), moving }
     }
 
-    fn duration_s(&self) -> f64 {
-        self.times_s[self.times_s.len() - 1]
-    }
-
-    fn end(&self) -> f64 {
-        self.values[self.values.len() - 1]
-    }
-
-    fn reach(&self) -> [f64; 2] {
+    fn extent(&self) -> Extent {
+        let last = self.values.len() - 1;
         let least = self.values.iter().copied().fold(f64::INFINITY, f64::min);
-        [least, self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+        let reach = [least, self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)];
+        Extent { duration_s: self.times_s[last], end: self.values[last], reach }
     }
 }
 

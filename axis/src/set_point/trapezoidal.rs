@@ -9,7 +9,7 @@
 //!
 //! d: way, m. v: velocity_m_per_s. a: acceleration_m_per_s2. Acceleration jumps at the four corners.
 
-use super::law::{Kind, Law, Moment};
+use super::law::{Extent, Kind, Law, Moment};
 use algorithms::algorithm::Quantity;
 use settings::parameters::Parameter;
 use std::sync::Arc;
@@ -69,16 +69,8 @@ impl Law for Trapezoidal {
         moment(from + rate * (time_s - 0.5 * ramp_s), rate, 0.0)
     }
 
-    fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    fn end(&self) -> f64 {
-        self.to
-    }
-
-    fn reach(&self) -> [f64; 2] {
-        [self.from.min(self.to), self.from.max(self.to)]
+    fn extent(&self) -> Extent {
+        Extent::between(self.from, self.to, self.duration_s)
     }
 }
 
