@@ -11,8 +11,8 @@
 //! the states of the chains and a few values. What the partner sends in a cycle is seen in the next one.
 //!
 //! Every chain has the same form: `advance` notes what it is told, asks the pure `decide` for at most one edge, and goes it
-//! through the `enter_…` of the new state, the only writer of that state, which notes its cause. So every state lasts for at
-//! least one cycle and shows in the record. Nothing here allocates, sleeps, reads or prints.
+//! through `enter`, the only writer of its state, which notes the cause. So every state lasts for at least one cycle and shows
+//! in the record. Nothing here allocates, sleeps, reads or prints.
 //!
 //! Time is the rig's: cycles of 1 ms by number. Cycles may be skipped, so all times are differences of numbers, never counts of
 //! calls.
@@ -101,10 +101,8 @@ pub enum AfterStop {
 /// A state that was entered: when and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entered<State, Cause> {
-    /// The rig's cycle.
     pub cycle: u64,
     pub state: State,
-    /// Why.
     pub cause: Cause,
 }
 
@@ -116,6 +114,15 @@ fn elapsed_s(since: u64, cycle: u64) -> f64 {
 /// Whole cycles of a time; 0 for what is no time.
 fn cycles(seconds: f64) -> u64 {
     (seconds / CYCLE_S).round() as u64
+}
+
+/// Cycles until another state than `before`, and that state; after 100 s the same one.
+#[cfg(test)]
+fn until_another<S: Copy + PartialEq>(before: S, mut step: impl FnMut() -> S) -> (u64, S) {
+    (1..=100_000)
+        .map(|cycles| (cycles, step()))
+        .find(|(_, state)| *state != before)
+        .unwrap_or((100_000, before))
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl One {
     }
 
     pub(super) fn state(&self) -> MainChainState {
-        self.leading.entered().state
+        self.leading.main.entered().state
     }
 
     pub(super) fn fault(&self) -> Option<Fault> {
@@ -64,14 +64,14 @@ impl One {
     }
 
     pub(super) fn stop_state(&self) -> EmergencyStopChainState {
-        self.leading.emergency_stop()
+        self.leading.stop.state()
     }
 
     fn status(&self) -> Option<ChainStatus> {
         let output = self.output?;
         Some(ChainStatus {
             main_chain: output.state,
-            emergency_stop_chain: self.leading.emergency_stop(),
+            emergency_stop_chain: self.leading.stop.state(),
             ok: output.ok,
             experiment: self.experiment,
             repetition: output.repetition as u8,
@@ -112,7 +112,7 @@ impl One {
             self.seen.push((cycle, output.state));
         }
         self.output = Some(output);
-        let sent = self.leading.frame_due(cycle)?;
+        let sent = self.leading.stop.frame_due(cycle)?;
         self.holds = !sent.release;
         (!sent.release).then_some(sent.reason)
     }

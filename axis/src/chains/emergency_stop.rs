@@ -34,7 +34,6 @@
 
 use super::{AfterStop, Console, Entered, Fault, cycles, elapsed_s};
 use protocol::frames::{EmergencyStop, EmergencyStopChainState, EmergencyStopReason, RigStatus};
-use std::fmt;
 
 /// Cycles between two frames of a stop that is held.
 const REPEAT_CYCLES: u64 = protocol::periods::EMERGENCY_STOP_CYCLES;
@@ -50,7 +49,6 @@ const RECOVERED_S: f64 = 0.2;
 /// What the chain is told once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopConfig {
-    /// What follows the recovery.
     pub after_emergency_stop: AfterStop,
     /// Nominal supply pressure, absolute, Pa.
     pub supply_pressure_pa: f64,
@@ -59,7 +57,6 @@ pub struct StopConfig {
 /// What the chain is told each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StopInputs {
-    /// The rig's cycle.
     pub cycle: u64,
     /// The rig's last status; `None` before the first, and best when it is older than 100 cycles too.
     pub rig: Option<RigStatus>,
@@ -67,7 +64,6 @@ pub struct StopInputs {
     pub frame: Option<EmergencyStopReason>,
     /// What the console said since the last cycle.
     pub console: Console,
-    /// The own axis stands still.
     pub at_standstill: bool,
     /// A status of the partner came lately, or none is needed.
     pub partner_fresh: bool,
@@ -78,9 +74,7 @@ pub struct StopInputs {
 /// Why a state was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopCause {
-    /// The controller began.
     Began,
-    /// The rig's time began anew.
     RigRestarted,
     /// The rig says that it is tripped.
     Rig,
@@ -94,27 +88,9 @@ pub enum StopCause {
     NoStandstill,
     /// Everybody has released.
     Released,
-    /// Supply and check valves are back.
     Recovered,
     /// The console said start.
     Started,
-}
-
-impl fmt::Display for StopCause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Began => "the controller began",
-            Self::RigRestarted => "the rig began anew",
-            Self::Rig => "the rig says that it is tripped",
-            Self::Frame(reason) => return write!(f, "tripped over the bus: {reason}"),
-            Self::Own(fault) => return write!(f, "{fault}"),
-            Self::Standstill => "the axis stands still",
-            Self::NoStandstill => "the axis did not stand still within 1 s",
-            Self::Released => "everybody has released",
-            Self::Recovered => "supply and check valves are back",
-            Self::Started => "the console said start",
-        })
-    }
 }
 
 /// A stop that this controller holds.
@@ -124,21 +100,13 @@ struct Own {
     acknowledged: bool,
 }
 
-/// State of the chain; each holds what it needs and nothing else.
+/// State of the chain; each holds what it needs and nothing else. `up_since`: since when supply and check valves are back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     Ready,
-    Tripped {
-        since: u64,
-        own: Option<Own>,
-    },
-    WaitingForRelease {
-        own: Option<Own>,
-    },
-    /// `up_since`: since when supply and check valves are back.
-    Recovering {
-        up_since: Option<u64>,
-    },
+    Tripped { own: Option<Own> },
+    WaitingForRelease { own: Option<Own> },
+    Recovering { up_since: Option<u64> },
     WaitingForStart,
 }
 
@@ -186,13 +154,13 @@ impl EmergencyStopChain {
     /// Trips the emergency stop for a fault of this controller; the first one is kept until it is released.
     pub fn trip(&mut self, fault: Fault, cycle: u64) {
         if self.holds().is_none() {
-            self.enter_tripped(StopCause::Own(fault), cycle);
+            self.enter(EmergencyStopChainState::Tripped, StopCause::Own(fault), cycle);
         }
     }
 
     /// The rig's time begins anew at `cycle`: so does the chain, and what it held is the old rig's.
     pub fn restart(&mut self, cycle: u64) {
-        self.enter_ready(StopCause::RigRestarted, cycle);
+        self.enter(EmergencyStopChainState::Ready, StopCause::RigRestarted, cycle);
         self.frames = Frames::None;
     }
 
@@ -214,13 +182,7 @@ impl EmergencyStopChain {
 
     #[must_use]
     pub fn state(&self) -> EmergencyStopChainState {
-        match self.state {
-            State::Ready => EmergencyStopChainState::Ready,
-            State::Tripped { .. } => EmergencyStopChainState::Tripped,
-            State::WaitingForRelease { .. } => EmergencyStopChainState::WaitingForRelease,
-            State::Recovering { .. } => EmergencyStopChainState::Recovering,
-            State::WaitingForStart => EmergencyStopChainState::WaitingForStart,
-        }
+        self.entered.state
     }
 
     /// The fault for which this controller holds the emergency stop.
@@ -237,7 +199,7 @@ impl EmergencyStopChain {
 
     fn own(&self) -> Option<Own> {
         match self.state {
-            State::Tripped { own, .. } | State::WaitingForRelease { own } => own,
+            State::Tripped { own } | State::WaitingForRelease { own } => own,
             _ => None,
         }
     }
@@ -246,7 +208,7 @@ impl EmergencyStopChain {
     fn note(&mut self, inputs: &StopInputs) {
         let up = self.is_up(inputs);
         match &mut self.state {
-            State::Tripped { own: Some(own), .. } | State::WaitingForRelease { own: Some(own) } => {
+            State::Tripped { own: Some(own) } | State::WaitingForRelease { own: Some(own) } => {
                 let over = own.fault.is_over(inputs.partner_fresh, inputs.sensors_fresh);
                 if inputs.console.release && over {
                     own.acknowledged = true;
@@ -277,9 +239,9 @@ impl EmergencyStopChain {
         };
         match self.state {
             State::Ready => tripped(),
-            State::Tripped { since, .. } => {
+            State::Tripped { .. } => {
                 let [shortest, longest] = [TRIPPED_SHORTEST_S, TRIPPED_LONGEST_S].map(cycles);
-                match inputs.cycle.saturating_sub(since) {
+                match inputs.cycle.saturating_sub(self.entered.cycle) {
                     passed if passed >= longest => Some((S::WaitingForRelease, StopCause::NoStandstill)),
                     passed if passed >= shortest && inputs.at_standstill => {
                         Some((S::WaitingForRelease, StopCause::Standstill))
@@ -305,47 +267,27 @@ impl EmergencyStopChain {
         }
     }
 
+    /// The only writer of the state.
     fn enter(&mut self, state: EmergencyStopChainState, cause: StopCause, now: u64) {
-        match state {
-            EmergencyStopChainState::Ready => self.enter_ready(cause, now),
-            EmergencyStopChainState::Tripped => self.enter_tripped(cause, now),
-            EmergencyStopChainState::WaitingForRelease => self.enter_waiting_for_release(cause, now),
-            EmergencyStopChainState::Recovering => self.enter_recovering(cause, now),
-            EmergencyStopChainState::WaitingForStart => self.enter_waiting_for_start(cause, now),
-        }
-    }
-
-    fn enter_ready(&mut self, cause: StopCause, now: u64) {
-        self.set(State::Ready, cause, now);
-    }
-
-    fn enter_tripped(&mut self, cause: StopCause, now: u64) {
-        let own = match cause {
-            StopCause::Own(fault) => {
-                self.frames = Frames::Hold { next: now, reason: fault.reason() };
-                Some(Own { fault, acknowledged: false })
+        use EmergencyStopChainState as S;
+        self.state = match state {
+            S::Ready => State::Ready,
+            S::Tripped => {
+                let own = match cause {
+                    StopCause::Own(fault) => Some(Own { fault, acknowledged: false }),
+                    // Nothing is held where the rig or a frame can trip from.
+                    _ => None,
+                };
+                if let Some(Own { fault, .. }) = own {
+                    self.frames = Frames::Hold { next: now, reason: fault.reason() };
+                }
+                State::Tripped { own }
             }
-            // Nothing is held where the rig or a frame can trip from.
-            _ => None,
+            S::WaitingForRelease => State::WaitingForRelease { own: self.own() },
+            S::Recovering => State::Recovering { up_since: None },
+            S::WaitingForStart => State::WaitingForStart,
         };
-        self.set(State::Tripped { since: now, own }, cause, now);
-    }
-
-    fn enter_waiting_for_release(&mut self, cause: StopCause, now: u64) {
-        self.set(State::WaitingForRelease { own: self.own() }, cause, now);
-    }
-
-    fn enter_recovering(&mut self, cause: StopCause, now: u64) {
-        self.set(State::Recovering { up_since: None }, cause, now);
-    }
-
-    fn enter_waiting_for_start(&mut self, cause: StopCause, now: u64) {
-        self.set(State::WaitingForStart, cause, now);
-    }
-
-    fn set(&mut self, state: State, cause: StopCause, now: u64) {
-        self.state = state;
-        self.entered = Entered { cycle: now, state: self.state(), cause };
+        self.entered = Entered { cycle: now, state, cause };
     }
 }
 

@@ -8,38 +8,23 @@ use std::fmt;
 /// A named fault of one axis controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Fault {
-    /// The partner was not heard waiting for the rig.
     PartnerMissing,
-    /// The partner runs another experiment.
     PartnerOtherExperiment,
-    /// The partner fell silent.
     PartnerLost,
-    /// The partner began anew.
     PartnerRestarted,
-    /// The partner did not become ready for the next state.
     PartnerNotOk,
-    /// The own axis did not become still.
     SettlingTimeout,
-    /// The steps before the initial force took too long.
     PreparationTimeout,
-    /// The stress could not be relieved.
     RelieveTimeout,
-    /// The axes did not come to rest together.
     MatchingTimeout,
-    /// The matched offset is no sensor's offset.
     OffsetImplausible,
-    /// An axis that presses has nothing to press against.
     NotLinked,
-    /// The own sensors are silent.
     SensorLoss,
-    /// An own force or pressure sensor was saturated for half a second.
     LimitExceeded,
-    /// The algorithm gave no number, or did not come back in time.
     ControllerFault,
 }
 
 impl Fault {
-    /// All of them.
     pub const ALL: [Self; 14] = [
         Self::PartnerMissing,
         Self::PartnerOtherExperiment,

@@ -76,9 +76,7 @@ pub enum ForceAsked {
 /// What the chain is told each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ForceInputs {
-    /// The rig's cycle.
     pub cycle: u64,
-    /// What is asked.
     pub asked: ForceAsked,
     /// Own force sensor, N.
     pub force_n: f64,
@@ -92,7 +90,6 @@ pub struct ForceOutput {
     pub state: ForceChainState,
     /// Limit of the rod's velocity, m/s.
     pub limit_m_per_s: Option<f64>,
-    /// Velocity feed-forward acts.
     pub feed_forward: bool,
     /// The control error has its dead zone.
     pub dead_zone: bool,
@@ -100,7 +97,6 @@ pub struct ForceOutput {
     pub set_force_n: Option<f64>,
     /// The system is relieved of stress.
     pub relieved: bool,
-    /// The fault, while in fault.
     pub fault: Option<Fault>,
 }
 
@@ -109,17 +105,11 @@ pub struct ForceOutput {
 pub enum ForceCause {
     /// The controller or the rig began.
     Began,
-    /// The axis is asked so.
     Asked(ForceAsked),
-    /// The force is low.
     LowForce,
-    /// The axis moves.
     Moves,
-    /// It does not.
     Still,
-    /// The mean force is low.
     Relieved,
-    /// It took too long.
     TooLong,
 }
 
@@ -194,7 +184,7 @@ impl ForceChain {
     /// The rig's time begins anew at `cycle`: so does the chain.
     pub fn restart(&mut self, cycle: u64) {
         *self = Self::default();
-        self.enter_idle(ForceCause::Began, cycle);
+        self.entered.cycle = cycle;
     }
 
     /// The state entered last, when and why.
@@ -282,7 +272,7 @@ impl ForceChain {
         let limited = matches!(self.state, State::Limited { .. });
         let still = matches!(self.state, State::Standstill { .. }) || relieved;
         ForceOutput {
-            state: self.name(),
+            state: self.entered.state,
             limit_m_per_s: limited.then_some(numbers.limited_m_per_s),
             feed_forward: !(limited || still),
             dead_zone: still,
@@ -302,69 +292,20 @@ impl ForceChain {
         }
     }
 
+    /// The only writer of the state.
     fn enter(&mut self, state: ForceChainState, cause: ForceCause, now: u64) {
-        match state {
-            ForceChainState::Idle => self.enter_idle(cause, now),
-            ForceChainState::Limited => self.enter_limited(cause, now),
-            ForceChainState::Standstill => self.enter_standstill(cause, now),
-            ForceChainState::Moving => self.enter_moving(cause, now),
-            ForceChainState::InitialRamp => self.enter_initial_ramp(cause, now),
-            ForceChainState::LoadProfile => self.enter_load_profile(cause, now),
-            ForceChainState::Done => self.enter_done(cause, now),
-            ForceChainState::Fault => self.enter_fault(cause, now),
-        }
-    }
-
-    fn enter_idle(&mut self, cause: ForceCause, now: u64) {
-        self.set(State::Idle, cause, now);
-    }
-
-    fn enter_limited(&mut self, cause: ForceCause, now: u64) {
-        self.set(State::Limited { began: now, low_since: None }, cause, now);
-    }
-
-    fn enter_standstill(&mut self, cause: ForceCause, now: u64) {
-        let state = State::Standstill { began: self.began(now), moves_since: None, low_since: None };
-        self.set(state, cause, now);
-    }
-
-    fn enter_moving(&mut self, cause: ForceCause, now: u64) {
-        self.set(State::Moving { began: self.began(now), still_since: None }, cause, now);
-    }
-
-    fn enter_initial_ramp(&mut self, cause: ForceCause, now: u64) {
-        self.set(State::InitialRamp, cause, now);
-    }
-
-    fn enter_load_profile(&mut self, cause: ForceCause, now: u64) {
-        self.set(State::LoadProfile, cause, now);
-    }
-
-    fn enter_done(&mut self, cause: ForceCause, now: u64) {
-        self.set(State::Done, cause, now);
-    }
-
-    fn enter_fault(&mut self, cause: ForceCause, now: u64) {
-        self.set(State::Fault, cause, now);
-    }
-
-    fn set(&mut self, state: State, cause: ForceCause, now: u64) {
-        self.state = state;
-        self.entered = Entered { cycle: now, state: self.name(), cause };
-    }
-
-    /// The state as the bus names it.
-    fn name(&self) -> ForceChainState {
-        match self.state {
-            State::Idle => ForceChainState::Idle,
-            State::Limited { .. } => ForceChainState::Limited,
-            State::Standstill { .. } => ForceChainState::Standstill,
-            State::Moving { .. } => ForceChainState::Moving,
-            State::InitialRamp => ForceChainState::InitialRamp,
-            State::LoadProfile => ForceChainState::LoadProfile,
-            State::Done => ForceChainState::Done,
-            State::Fault => ForceChainState::Fault,
-        }
+        use ForceChainState as S;
+        self.state = match state {
+            S::Idle => State::Idle,
+            S::Limited => State::Limited { began: now, low_since: None },
+            S::Standstill => State::Standstill { began: self.began(now), moves_since: None, low_since: None },
+            S::Moving => State::Moving { began: self.began(now), still_since: None },
+            S::InitialRamp => State::InitialRamp,
+            S::LoadProfile => State::LoadProfile,
+            S::Done => State::Done,
+            S::Fault => State::Fault,
+        };
+        self.entered = Entered { cycle: now, state, cause };
     }
 }
 

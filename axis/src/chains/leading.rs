@@ -9,16 +9,13 @@
 //! A fault trips once, when it comes: what was released since stays released, unless its cause comes again.
 
 use super::emergency_stop::{EmergencyStopChain, StopConfig, StopInputs};
-use super::main::{MainCause, MainChain, MainConfig, MainInputs, MainOutput, OwnAxis};
-use super::{Console, Entered, Fault, Partner};
-use protocol::frames::{
-    EmergencyStop, EmergencyStopChainState, EmergencyStopReason, MainChainState, RigStatus,
-};
+use super::main::{MainChain, MainConfig, MainInputs, MainOutput, OwnAxis};
+use super::{Console, Fault, Partner};
+use protocol::frames::{EmergencyStopReason, RigStatus};
 
 /// What both are told each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LeadingInputs {
-    /// The rig's cycle.
     pub cycle: u64,
     /// The rig's status if it is fresh.
     pub rig: Option<RigStatus>,
@@ -38,10 +35,11 @@ pub struct LeadingInputs {
 /// Both chains.
 #[derive(Clone, Debug)]
 pub struct Leading {
-    pub(super) main: MainChain,
-    pub(super) stop: EmergencyStopChain,
+    pub(crate) main: MainChain,
+    pub(crate) stop: EmergencyStopChain,
     partner_needed: bool,
-    output: Option<MainOutput>,
+    /// What the main chain said last.
+    pub(crate) output: Option<MainOutput>,
 }
 
 impl Leading {
@@ -81,51 +79,11 @@ impl Leading {
         output
     }
 
-    /// Trips for a fault that was found after [`advance`](Self::advance), which is to be told of it in the next cycle.
-    pub fn trip(&mut self, fault: Fault, cycle: u64) {
-        self.stop.trip(fault, cycle);
-    }
-
-    /// The frame to send in this cycle, if any; to be asked last.
-    pub fn frame_due(&mut self, cycle: u64) -> Option<EmergencyStop> {
-        self.stop.frame_due(cycle)
-    }
-
     /// The rig's time begins anew at `cycle`: so do both.
     pub fn restart(&mut self, cycle: u64) {
         self.main.restart(cycle);
         self.stop.restart(cycle);
         self.output = None;
-    }
-
-    /// What the main chain said last.
-    #[must_use]
-    pub fn output(&self) -> Option<&MainOutput> {
-        self.output.as_ref()
-    }
-
-    /// The state that the main chain entered last, when and why.
-    #[must_use]
-    pub fn entered(&self) -> Entered<MainChainState, MainCause> {
-        self.main.entered()
-    }
-
-    /// State of the emergency stop chain.
-    #[must_use]
-    pub fn emergency_stop(&self) -> EmergencyStopChainState {
-        self.stop.state()
-    }
-
-    /// The fault for which this controller holds the emergency stop.
-    #[must_use]
-    pub fn holds(&self) -> Option<Fault> {
-        self.stop.holds()
-    }
-
-    /// Whether the own axis keeps still.
-    #[must_use]
-    pub fn still(&self) -> bool {
-        self.main.still()
     }
 }
 
@@ -134,8 +92,7 @@ mod tests {
     use super::*;
     use crate::chains::duo::{Duo, short};
     use crate::chains::settled::ControlError;
-    use EmergencyStopChainState as E;
-    use MainChainState as S;
+    use protocol::frames::{EmergencyStopChainState as E, MainChainState as S};
 
     const FAR: ControlError = ControlError::Position { error_m: 0.1 };
 
@@ -176,6 +133,6 @@ mod tests {
         duo.axes[0].fault = Some(Fault::SensorLoss);
         duo.step();
         assert_eq!(duo.axes[0].stop_state(), E::Tripped);
-        assert_eq!(duo.axes[0].leading.holds(), Some(Fault::SensorLoss));
+        assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::SensorLoss));
     }
 }

@@ -26,7 +26,7 @@
 //! | partner began anew | initial positioning to final settling | in the cycle that tells |
 //! | own condition not met | preparing, settling, final settling | `settling_timeout_s` beyond the state's own length |
 //! | partner not OK, own condition met | initial positioning to final settling | the same beyond the longer length, and 0.1 s |
-//! | partner never heard at the start | waiting for the rig | `partner_timeout_s` after the own sensors |
+//! | partner never heard at the start | waiting for the rig | 10 s after the own sensors |
 //!
 //! From aborted and fault the chain goes on when the emergency stop chain has been through and is ready again, or, when there was
 //! no emergency stop, on `RunControl` start; both not with [`AfterStop::End`](super::AfterStop::End). It begins with the
@@ -41,7 +41,7 @@ mod decide;
 mod tests;
 mod told;
 
-pub use config::{Lengths, MainConfig, PARTNER_TIMEOUT_S, Start, approach_s};
+pub use config::{Lengths, MainConfig, Start, approach_s};
 pub use told::{MainCause, MainInputs, MainOutput, OwnAxis, Phase};
 
 use super::settled::Settled;
@@ -56,10 +56,9 @@ const APPROACH_SHORTEST_S: f64 = 0.5;
 /// For so long after a (re)start a partner that is still aborted or in fault is waited for: ten periods of its status.
 const GRACE_CYCLES: u64 = PARTNER_LOST_CYCLES;
 
-/// How long a state has been waited in.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How a state is waited in.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Wait {
-    since: u64,
     /// Last cycle in which nothing but the console's start was missing.
     for_console: Option<u64>,
     /// First cycle of an OK that has lasted.
@@ -69,50 +68,21 @@ struct Wait {
 /// What must be known to go on after an end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Ended {
-    since: u64,
     /// The emergency stop chain was seen at work.
     stopped: bool,
     /// A person ended the run, so only a person starts it anew.
     by_person: bool,
 }
 
-/// State of the chain; each holds what it needs and nothing else.
+/// What a state needs to know besides since when it lasts, which is noted as it is entered. Initial positioning to final settling
+/// are running; `since` is when the first own sensors came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
-    /// `since`: the first own sensors.
-    WaitingForRig {
-        since: Option<u64>,
-    },
-    InitialPositioning {
-        wait: Wait,
-        from_m: f64,
-        duration_s: f64,
-    },
-    Preparing {
-        wait: Wait,
-    },
-    InitialForce {
-        wait: Wait,
-    },
-    Settling {
-        wait: Wait,
-    },
-    Experiment {
-        wait: Wait,
-    },
-    FinalSettling {
-        wait: Wait,
-    },
-    Done {
-        since: u64,
-    },
-    Aborted {
-        ended: Ended,
-    },
-    Fault {
-        ended: Ended,
-        fault: Fault,
-    },
+    WaitingForRig { since: Option<u64> },
+    Running { wait: Wait },
+    Done,
+    Aborted { ended: Ended },
+    Fault { ended: Ended, fault: Fault },
 }
 
 /// An edge: where to, and why.
@@ -123,6 +93,9 @@ pub struct MainChain {
     config: MainConfig,
     settled: Settled,
     state: State,
+    /// Where the initial positioning began, m, and how long it takes, s.
+    from_m: f64,
+    approach_s: f64,
     repetition: u32,
     /// The console's start was heard, here or by the partner.
     started: bool,
@@ -136,7 +109,7 @@ impl MainChain {
         let entered = Entered { cycle: 0, state: MainChainState::WaitingForRig, cause: MainCause::Began };
         let settled = Settled::new(config.settled);
         let state = State::WaitingForRig { since: None };
-        Self { config, settled, state, repetition: 0, started: false, entered }
+        Self { config, settled, state, from_m: 0.0, approach_s: 0.0, repetition: 0, started: false, entered }
     }
 
     /// Moves on by one edge at most, and says what is asked.
@@ -151,7 +124,8 @@ impl MainChain {
     /// The rig's time begins anew at `cycle`: so does the chain.
     pub fn restart(&mut self, cycle: u64) {
         self.settled.clear();
-        self.enter_waiting_for_rig(MainCause::RigRestarted, cycle);
+        let inputs = MainInputs { cycle, ..MainInputs::default() };
+        self.enter(MainChainState::WaitingForRig, MainCause::RigRestarted, &inputs);
     }
 
     /// The state entered last, when and why.
@@ -173,7 +147,7 @@ impl MainChain {
             self.settled.take(cycle, own.position_m, own.error);
         }
         let partner_started = self.config.partner_needed && self.relation(inputs).ok();
-        let in_settling = matches!(self.state, State::Settling { .. });
+        let in_settling = self.entered.state == MainChainState::Settling;
         self.started |= in_settling && (inputs.console.start || partner_started);
         let (held, ok) = (self.held(inputs), self.ok(inputs));
         match &mut self.state {
@@ -182,99 +156,44 @@ impl MainChain {
                 ended.stopped |= inputs.emergency_stop != EmergencyStopChainState::Ready;
                 ended.by_person |= inputs.console.abort;
             }
+            State::Running { wait } => {
+                wait.for_console = if held && !ok { Some(cycle) } else { wait.for_console };
+                wait.ok_since = if ok { wait.ok_since.or(Some(cycle)) } else { None };
+            }
             _ => {}
         }
-        if let Some(wait) = self.wait_mut() {
-            wait.for_console = if held && !ok { Some(cycle) } else { wait.for_console };
-            wait.ok_since = if ok { wait.ok_since.or(Some(cycle)) } else { None };
-        }
     }
 
-    fn wait_mut(&mut self) -> Option<&mut Wait> {
-        match &mut self.state {
-            State::InitialPositioning { wait, .. }
-            | State::Preparing { wait }
-            | State::InitialForce { wait }
-            | State::Settling { wait }
-            | State::Experiment { wait }
-            | State::FinalSettling { wait } => Some(wait),
-            _ => None,
-        }
-    }
-
+    /// The only writer of the state.
     fn enter(&mut self, state: MainChainState, cause: MainCause, inputs: &MainInputs) {
         use MainChainState as S;
-        let now = inputs.cycle;
+        let stopped = inputs.emergency_stop != EmergencyStopChainState::Ready;
+        let ended = Ended { stopped, by_person: inputs.console.abort };
         match state {
-            S::WaitingForRig => self.enter_waiting_for_rig(cause, now),
-            S::InitialPositioning => self.enter_initial_positioning(cause, inputs),
-            S::Preparing => self.enter_preparing(cause, now),
-            S::InitialForce => self.enter_initial_force(cause, now),
-            S::Settling => self.enter_settling(cause, now),
-            S::Experiment => self.enter_experiment(cause, now),
-            S::FinalSettling => self.enter_final_settling(cause, now),
-            S::Done => self.enter_done(cause, now),
-            S::Aborted => self.enter_aborted(cause, inputs),
-            S::Fault => self.enter_fault(cause, inputs),
+            S::WaitingForRig => (self.repetition, self.started) = (0, false),
+            S::InitialPositioning => self.begin_approach(cause, inputs),
+            S::Aborted | S::Fault => self.started = false,
+            _ => {}
         }
+        self.state = match (state, cause) {
+            (S::WaitingForRig, _) => State::WaitingForRig { since: None },
+            (S::Done, _) => State::Done,
+            (S::Aborted, _) => State::Aborted { ended },
+            (S::Fault, MainCause::Fault(fault)) => State::Fault { ended, fault },
+            (S::Fault, _) => unreachable!("only a fault leads to fault"),
+            _ => State::Running { wait: Wait::default() },
+        };
+        self.entered = Entered { cycle: inputs.cycle, state, cause };
     }
 
-    fn enter_waiting_for_rig(&mut self, cause: MainCause, now: u64) {
-        self.repetition = 0;
-        self.started = false;
-        self.set(State::WaitingForRig { since: None }, cause, now);
-    }
-
-    fn enter_initial_positioning(&mut self, cause: MainCause, inputs: &MainInputs) {
-        match cause {
-            MainCause::NextRepetition => self.repetition = self.repetition.saturating_add(1),
-            MainCause::Recovered | MainCause::Started => self.repetition = self.later_repetition(inputs),
-            _ => self.repetition = 0,
-        }
-        let from_m = inputs.own.map_or(0.0, |own| own.position_m);
-        let duration_s = self.config.start_m.map_or(0.0, |start_m| approach_s(from_m, start_m));
-        let state = State::InitialPositioning { wait: Wait::since(inputs.cycle), from_m, duration_s };
-        self.set(state, cause, inputs.cycle);
-    }
-
-    fn enter_preparing(&mut self, cause: MainCause, now: u64) {
-        self.set(State::Preparing { wait: Wait::since(now) }, cause, now);
-    }
-
-    fn enter_initial_force(&mut self, cause: MainCause, now: u64) {
-        self.set(State::InitialForce { wait: Wait::since(now) }, cause, now);
-    }
-
-    fn enter_settling(&mut self, cause: MainCause, now: u64) {
-        self.set(State::Settling { wait: Wait::since(now) }, cause, now);
-    }
-
-    fn enter_experiment(&mut self, cause: MainCause, now: u64) {
-        self.set(State::Experiment { wait: Wait::since(now) }, cause, now);
-    }
-
-    fn enter_final_settling(&mut self, cause: MainCause, now: u64) {
-        self.set(State::FinalSettling { wait: Wait::since(now) }, cause, now);
-    }
-
-    fn enter_done(&mut self, cause: MainCause, now: u64) {
-        self.set(State::Done { since: now }, cause, now);
-    }
-
-    fn enter_aborted(&mut self, cause: MainCause, inputs: &MainInputs) {
-        self.started = false;
-        self.set(State::Aborted { ended: Ended::now(inputs) }, cause, inputs.cycle);
-    }
-
-    fn enter_fault(&mut self, cause: MainCause, inputs: &MainInputs) {
-        self.started = false;
-        let MainCause::Fault(fault) = cause else { unreachable!("only a fault leads to fault") };
-        self.set(State::Fault { ended: Ended::now(inputs), fault }, cause, inputs.cycle);
-    }
-
-    fn set(&mut self, state: State, cause: MainCause, now: u64) {
-        self.state = state;
-        self.entered = Entered { cycle: now, state: self.name(), cause };
+    fn begin_approach(&mut self, cause: MainCause, inputs: &MainInputs) {
+        self.repetition = match cause {
+            MainCause::NextRepetition => self.repetition.saturating_add(1),
+            MainCause::Recovered | MainCause::Started => self.later_repetition(inputs),
+            _ => 0,
+        };
+        self.from_m = inputs.own.map_or(0.0, |own| own.position_m);
+        self.approach_s = self.config.start_m.map_or(0.0, |start_m| approach_s(self.from_m, start_m));
     }
 
     /// The later of the own repetition and the partner's.
@@ -285,66 +204,24 @@ impl MainChain {
     }
 
     fn output(&self, inputs: &MainInputs) -> MainOutput {
-        let elapsed_s = elapsed_s(self.since().unwrap_or(inputs.cycle), inputs.cycle);
+        use MainChainState as S;
+        let elapsed_s = elapsed_s(self.entered.cycle, inputs.cycle);
         let fault = match self.state {
             State::Fault { fault, .. } => Some(fault),
             _ => None,
         };
-        let phase = match self.state {
-            State::WaitingForRig { .. } | State::Aborted { .. } | State::Fault { .. } => Phase::Shut,
-            State::InitialPositioning { from_m, duration_s, .. } => {
-                Phase::Approach { elapsed_s, from_m, duration_s }
+        let (state, repetition) = (self.entered.state, self.repetition);
+        let phase = match state {
+            S::WaitingForRig | S::Aborted | S::Fault => Phase::Shut,
+            S::InitialPositioning => {
+                Phase::Approach { elapsed_s, from_m: self.from_m, duration_s: self.approach_s }
             }
-            State::Preparing { .. } => Phase::Prepare { elapsed_s },
-            State::InitialForce { .. } => Phase::RampForce { elapsed_s },
-            State::Settling { .. } => Phase::HoldStart,
-            State::Experiment { .. } => Phase::Experiment { elapsed_s },
-            State::FinalSettling { .. } | State::Done { .. } => Phase::HoldEnd,
+            S::Preparing => Phase::Prepare,
+            S::InitialForce => Phase::RampForce { elapsed_s },
+            S::Settling => Phase::HoldStart,
+            S::Experiment => Phase::Experiment { elapsed_s },
+            S::FinalSettling | S::Done => Phase::HoldEnd,
         };
-        let (state, repetition) = (self.name(), self.repetition);
-        MainOutput { state, repetition, ok: self.ok(inputs), elapsed_s, phase, fault }
-    }
-
-    fn since(&self) -> Option<u64> {
-        match self.state {
-            State::WaitingForRig { since } => since,
-            State::InitialPositioning { wait, .. }
-            | State::Preparing { wait }
-            | State::InitialForce { wait }
-            | State::Settling { wait }
-            | State::Experiment { wait }
-            | State::FinalSettling { wait } => Some(wait.since),
-            State::Done { since } => Some(since),
-            State::Aborted { ended } | State::Fault { ended, .. } => Some(ended.since),
-        }
-    }
-
-    /// The state as the bus names it.
-    fn name(&self) -> MainChainState {
-        match self.state {
-            State::WaitingForRig { .. } => MainChainState::WaitingForRig,
-            State::InitialPositioning { .. } => MainChainState::InitialPositioning,
-            State::Preparing { .. } => MainChainState::Preparing,
-            State::InitialForce { .. } => MainChainState::InitialForce,
-            State::Settling { .. } => MainChainState::Settling,
-            State::Experiment { .. } => MainChainState::Experiment,
-            State::FinalSettling { .. } => MainChainState::FinalSettling,
-            State::Done { .. } => MainChainState::Done,
-            State::Aborted { .. } => MainChainState::Aborted,
-            State::Fault { .. } => MainChainState::Fault,
-        }
-    }
-}
-
-impl Wait {
-    fn since(since: u64) -> Self {
-        Self { since, for_console: None, ok_since: None }
-    }
-}
-
-impl Ended {
-    fn now(inputs: &MainInputs) -> Self {
-        let stopped = inputs.emergency_stop != EmergencyStopChainState::Ready;
-        Self { since: inputs.cycle, stopped, by_person: inputs.console.abort }
+        MainOutput { state, repetition, ok: self.ok(inputs), phase, fault }
     }
 }

@@ -14,7 +14,7 @@
 //!
 //! offset = mean of the load's position sensor - mean of the drive's `averaged_position`, in rig coordinates; the load's
 //! position is its sensor less the offset. The load eye may lie anywhere in the gap of the linkage, so ±0.1 mm
-//! ([`UNCERTAINTY_M`]) remain, besides the drive sensor's own error: the offset makes both axes agree, not either of them true.
+//! remain, besides the drive sensor's own error: the offset makes both axes agree, not either of them true.
 //! A matched offset holds until the next one, or until the rig restarts.
 
 use super::{Entered, Fault, Partner, cycles};
@@ -35,16 +35,12 @@ settings::parameters! {
     }
 }
 
-/// What the linkage's gap leaves open in a matched offset, to each side, m.
-pub const UNCERTAINTY_M: f64 = 0.1e-3;
-
 /// The partner's averaged position is taken each so many cycles, its period.
 const SAMPLE_CYCLES: u64 = 10;
 
 /// What the chain is told each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MatchingInputs {
-    /// The rig's cycle.
     pub cycle: u64,
     /// Matching is wanted.
     pub asked: bool,
@@ -63,9 +59,7 @@ pub struct MatchingOutput {
     pub state: MatchingChainState,
     /// The last matched offset, to be taken from the own sensor, m; 0 before.
     pub offset_m: f64,
-    /// Matching is done.
     pub matched: bool,
-    /// The fault, while in fault.
     pub fault: Option<Fault>,
 }
 
@@ -74,19 +68,12 @@ pub struct MatchingOutput {
 pub enum MatchingCause {
     /// The controller or the rig began.
     Began,
-    /// Matching is asked for.
     Asked,
-    /// It no longer is.
     NotAsked,
-    /// Linked, and both at rest.
     AtRest,
-    /// Not linked.
     NotLinked,
-    /// The partner is silent.
     Silent,
-    /// An axis moved.
     Moved,
-    /// Averaged.
     Averaged,
     Fault(Fault),
 }
@@ -121,28 +108,15 @@ impl Positions {
     }
 }
 
-/// State of the chain; each holds what it needs and nothing else. `began` is when matching was asked for.
+/// State of the chain; each holds what it needs and nothing else. `began` is when matching was asked for. The
+/// partner has not moved since `rest_since`; its position was taken last when it was `sampled`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     Idle,
-    /// `partner` has not moved since `rest_since`.
-    WaitingForRest {
-        began: u64,
-        partner: Positions,
-        rest_since: u64,
-    },
-    /// `sampled`: when the partner's position was taken last.
-    Averaging {
-        began: u64,
-        since: u64,
-        own: Positions,
-        partner: Positions,
-        sampled: Option<u64>,
-    },
+    WaitingForRest { began: u64, partner: Positions, rest_since: u64 },
+    Averaging { began: u64, own: Positions, partner: Positions, sampled: Option<u64> },
     Matched,
-    Fault {
-        fault: Fault,
-    },
+    Fault { fault: Fault },
 }
 
 /// An edge: where to, and why.
@@ -181,7 +155,7 @@ impl MatchingChain {
     /// The rig's time begins anew at `cycle`: so does the chain, without an offset.
     pub fn restart(&mut self, cycle: u64) {
         *self = Self::default();
-        self.enter_idle(MatchingCause::Began, cycle);
+        self.entered.cycle = cycle;
     }
 
     /// The state entered last, when and why.
@@ -224,8 +198,7 @@ impl MatchingChain {
             late.then_some((S::Fault, MatchingCause::Fault(Fault::MatchingTimeout)))
         };
         match &self.state {
-            State::Matched if !inputs.asked => None,
-            State::Idle if !inputs.asked => None,
+            State::Matched | State::Idle if !inputs.asked => None,
             _ if !inputs.asked => Some((S::Idle, MatchingCause::NotAsked)),
             State::Idle => Some((S::WaitingForRest, MatchingCause::Asked)),
             State::Matched => (!self.asked).then_some((S::WaitingForRest, MatchingCause::Asked)),
@@ -235,10 +208,10 @@ impl MatchingChain {
                 let go = at_rest && inputs.linked && partner_position_m(inputs).is_some();
                 go.then_some((S::Averaging, MatchingCause::AtRest)).or_else(|| too_long(*began))
             }
-            State::Averaging { began, since, own, partner, .. } => {
+            State::Averaging { began, own, partner, .. } => {
                 let moved = own.moved(numbers.moved_m) || partner.moved(numbers.moved_m);
                 let back = |cause| Some((S::WaitingForRest, cause));
-                let over = passed(*since) >= cycles(numbers.average_s);
+                let over = passed(self.entered.cycle) >= cycles(numbers.average_s);
                 match partner_position_m(inputs) {
                     _ if !inputs.linked => back(MatchingCause::NotLinked),
                     None => back(MatchingCause::Silent),
@@ -263,49 +236,28 @@ impl MatchingChain {
             _ => None,
         };
         let matched = self.state == State::Matched;
-        MatchingOutput { state: self.name(), offset_m: self.offset_m, matched, fault }
+        MatchingOutput { state: self.entered.state, offset_m: self.offset_m, matched, fault }
     }
 
+    /// The only writer of the state.
     fn enter(&mut self, state: MatchingChainState, cause: MatchingCause, now: u64) {
-        match state {
-            MatchingChainState::Idle => self.enter_idle(cause, now),
-            MatchingChainState::WaitingForRest => self.enter_waiting_for_rest(cause, now),
-            MatchingChainState::Averaging => self.enter_averaging(cause, now),
-            MatchingChainState::Matched => self.enter_matched(cause, now),
-            MatchingChainState::Fault => self.enter_fault(cause, now),
-        }
-    }
-
-    fn enter_idle(&mut self, cause: MatchingCause, now: u64) {
-        self.set(State::Idle, cause, now);
-    }
-
-    fn enter_waiting_for_rest(&mut self, cause: MatchingCause, now: u64) {
-        let began = self.began(now);
-        self.set(State::WaitingForRest { began, partner: Positions::NONE, rest_since: now }, cause, now);
-    }
-
-    fn enter_averaging(&mut self, cause: MatchingCause, now: u64) {
+        use MatchingChainState as S;
         let [own, partner] = [Positions::NONE; 2];
-        let state = State::Averaging { began: self.began(now), since: now, own, partner, sampled: None };
-        self.set(state, cause, now);
-    }
-
-    fn enter_matched(&mut self, cause: MatchingCause, now: u64) {
-        if let State::Averaging { own, partner, .. } = &self.state {
-            self.offset_m = own.mean_m() - partner.mean_m();
-        }
-        self.set(State::Matched, cause, now);
-    }
-
-    fn enter_fault(&mut self, cause: MatchingCause, now: u64) {
-        let MatchingCause::Fault(fault) = cause else { unreachable!("only a fault leads to fault") };
-        self.set(State::Fault { fault }, cause, now);
-    }
-
-    fn set(&mut self, state: State, cause: MatchingCause, now: u64) {
-        self.state = state;
-        self.entered = Entered { cycle: now, state: self.name(), cause };
+        let began = self.began(now);
+        self.state = match (state, cause) {
+            (S::Idle, _) => State::Idle,
+            (S::WaitingForRest, _) => State::WaitingForRest { began, partner, rest_since: now },
+            (S::Averaging, _) => State::Averaging { began, own, partner, sampled: None },
+            (S::Matched, _) => {
+                if let State::Averaging { own, partner, .. } = &self.state {
+                    self.offset_m = own.mean_m() - partner.mean_m();
+                }
+                State::Matched
+            }
+            (S::Fault, MatchingCause::Fault(fault)) => State::Fault { fault },
+            (S::Fault, _) => unreachable!("only a fault leads to fault"),
+        };
+        self.entered = Entered { cycle: now, state, cause };
     }
 
     /// When matching was asked for; `now` when it was not.
@@ -313,17 +265,6 @@ impl MatchingChain {
         match self.state {
             State::WaitingForRest { began, .. } | State::Averaging { began, .. } => began,
             State::Idle | State::Matched | State::Fault { .. } => now,
-        }
-    }
-
-    /// The state as the bus names it.
-    fn name(&self) -> MatchingChainState {
-        match self.state {
-            State::Idle => MatchingChainState::Idle,
-            State::WaitingForRest { .. } => MatchingChainState::WaitingForRest,
-            State::Averaging { .. } => MatchingChainState::Averaging,
-            State::Matched => MatchingChainState::Matched,
-            State::Fault { .. } => MatchingChainState::Fault,
         }
     }
 }

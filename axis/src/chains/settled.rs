@@ -39,17 +39,9 @@ pub enum ControlError {
     /// It has no set-point: only stillness counts.
     None,
     /// Set-point less position, m.
-    Position {
-        /// The error, m.
-        error_m: f64,
-    },
-    /// Set-point less force, N.
-    Force {
-        /// The error, N.
-        error_n: f64,
-        /// The set-point, N.
-        set_force_n: f64,
-    },
+    Position { error_m: f64 },
+    /// Set-point less force, N, and the set-point.
+    Force { error_n: f64, set_force_n: f64 },
 }
 
 /// What is known of 20 ms.

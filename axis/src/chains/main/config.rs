@@ -5,7 +5,7 @@ use crate::chains::AfterStop;
 use crate::chains::settled::Bounds;
 
 /// Seconds after which a partner that was never heard is missing.
-pub const PARTNER_TIMEOUT_S: f64 = 10.0;
+pub(super) const PARTNER_TIMEOUT_S: f64 = 10.0;
 
 /// How long the states are meant to last, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,8 +51,6 @@ pub struct MainConfig {
     pub settling_s: f64,
     /// How long each state may take beyond what it is meant to, s.
     pub settling_timeout_s: f64,
-    /// How long a partner that was never heard is waited for, s.
-    pub partner_timeout_s: f64,
     /// What begins the experiment.
     pub start: Start,
     /// What follows an emergency stop.
@@ -74,7 +72,6 @@ impl Default for MainConfig {
             repetitions: Some(1),
             settling_s: 0.5,
             settling_timeout_s: 10.0,
-            partner_timeout_s: PARTNER_TIMEOUT_S,
             start: Start::default(),
             after_emergency_stop: AfterStop::default(),
             settled: Bounds::default(),

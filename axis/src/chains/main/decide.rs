@@ -1,5 +1,6 @@
 //! Which edge of the main chain is to be gone: pure functions of state and inputs.
 
+use super::config::PARTNER_TIMEOUT_S;
 use super::{Edge, Ended, GRACE_CYCLES, MainCause, MainChain, MainConfig, MainInputs, Start, State, Wait};
 use crate::chains::sync::{Relation, relation};
 use crate::chains::{AfterStop, Fault, cycles};
@@ -17,14 +18,9 @@ impl MainChain {
             }
             _ if inputs.console.abort => Some((MainChainState::Aborted, MainCause::Console)),
             State::WaitingForRig { since } => self.decide_waiting_for_rig((*since)?, inputs),
-            State::Done { .. } => self.decide_partner_ended(inputs),
-            State::InitialPositioning { wait, .. }
-            | State::Preparing { wait }
-            | State::InitialForce { wait }
-            | State::Settling { wait }
-            | State::Experiment { wait }
-            | State::FinalSettling { wait } => self
-                .decide_partner_gone(wait, inputs)
+            State::Done => self.decide_partner_ended(inputs),
+            State::Running { wait } => self
+                .decide_partner_gone(inputs)
                 .or_else(|| self.decide_ready(inputs))
                 .or_else(|| self.decide_late(wait, inputs)),
         }
@@ -49,7 +45,7 @@ impl MainChain {
             }
             _ => {}
         }
-        let late = passed(since, cycles(self.config.partner_timeout_s), inputs.cycle);
+        let late = passed(since, cycles(PARTNER_TIMEOUT_S), inputs.cycle);
         late.then(|| match status {
             Some(other) if !same(&other) => fault(Fault::PartnerOtherExperiment),
             Some(status) if status.main_chain == MainChainState::WaitingForRig => fault(Fault::PartnerNotOk),
@@ -58,12 +54,12 @@ impl MainChain {
     }
 
     /// The partner ended, fell silent or began anew.
-    fn decide_partner_gone(&self, wait: &Wait, inputs: &MainInputs) -> Option<Edge> {
+    fn decide_partner_gone(&self, inputs: &MainInputs) -> Option<Edge> {
         if !self.config.partner_needed {
             return None;
         }
-        let restarted = matches!(self.state, State::InitialPositioning { .. });
-        let in_grace = restarted && !passed(wait.since, GRACE_CYCLES, inputs.cycle);
+        let restarted = self.entered.state == MainChainState::InitialPositioning;
+        let in_grace = restarted && !passed(self.entered.cycle, GRACE_CYCLES, inputs.cycle);
         match self.relation(inputs) {
             Relation::Silent => Some(fault(Fault::PartnerLost)),
             Relation::Restarted => Some(fault(Fault::PartnerRestarted)),
@@ -72,7 +68,7 @@ impl MainChain {
         }
     }
 
-    pub(super) fn decide_partner_ended(&self, inputs: &MainInputs) -> Option<Edge> {
+    fn decide_partner_ended(&self, inputs: &MainInputs) -> Option<Edge> {
         let status = inputs.partner.fresh(inputs.cycle).filter(|_| self.config.partner_needed)?;
         partner_ended(status.main_chain)
     }
@@ -85,22 +81,15 @@ impl MainChain {
             return None;
         }
         let again = self.config.repetitions.is_none_or(|most| self.repetition.saturating_add(1) < most);
-        let next = match self.state {
-            State::InitialPositioning { .. } => S::Preparing,
-            State::Preparing { .. } => S::InitialForce,
-            State::InitialForce { .. } => S::Settling,
-            State::Settling { .. } => S::Experiment,
-            State::Experiment { .. } => S::FinalSettling,
-            State::FinalSettling { .. } if again => {
-                return Some((S::InitialPositioning, MainCause::NextRepetition));
-            }
-            State::FinalSettling { .. } => S::Done,
-            State::WaitingForRig { .. }
-            | State::Done { .. }
-            | State::Aborted { .. }
-            | State::Fault { .. } => {
-                return None;
-            }
+        let next = match self.entered.state {
+            S::InitialPositioning => S::Preparing,
+            S::Preparing => S::InitialForce,
+            S::InitialForce => S::Settling,
+            S::Settling => S::Experiment,
+            S::Experiment => S::FinalSettling,
+            S::FinalSettling if again => return Some((S::InitialPositioning, MainCause::NextRepetition)),
+            S::FinalSettling => S::Done,
+            S::WaitingForRig | S::Done | S::Aborted | S::Fault => return None,
         };
         Some((next, MainCause::Ready))
     }
@@ -110,15 +99,15 @@ impl MainChain {
         let timeout = cycles(self.config.settling_timeout_s);
         let [own, either] = self.expected_cycles();
         if let Some(ok_since) = wait.ok_since {
-            let from = ok_since.max(wait.since + either);
+            let from = ok_since.max(self.entered.cycle + either);
             // The partner's own time-out, which names the cause, comes first.
             return passed(from, timeout + GRACE_CYCLES, inputs.cycle).then_some(fault(Fault::PartnerNotOk));
         }
-        let from = wait.for_console.unwrap_or(0).max(wait.since + own);
+        let from = wait.for_console.unwrap_or(0).max(self.entered.cycle + own);
         // Settled and waiting for the console is not late.
         let late = passed(from, timeout, inputs.cycle) && !self.held(inputs);
-        let cause = match self.state {
-            State::Settling { .. } | State::FinalSettling { .. } => Fault::SettlingTimeout,
+        let cause = match self.entered.state {
+            MainChainState::Settling | MainChainState::FinalSettling => Fault::SettlingTimeout,
             _ => Fault::PreparationTimeout,
         };
         late.then_some(fault(cause))
@@ -148,41 +137,44 @@ impl MainChain {
     }
 
     pub(super) fn relation(&self, inputs: &MainInputs) -> Relation {
-        relation(self.name(), self.repetition, &inputs.partner, inputs.cycle)
+        relation(self.entered.state, self.repetition, &inputs.partner, inputs.cycle)
     }
 
     /// Whether the own axis is done with the state, whoever must start what follows.
     pub(super) fn held(&self, inputs: &MainInputs) -> bool {
-        let over = |wait: &Wait, length_s| passed(wait.since, cycles(length_s), inputs.cycle + 1);
-        let settled =
-            |wait: &Wait| self.settled.settled_for(self.config.settling_s, wait.since, inputs.cycle);
-        match &self.state {
-            State::WaitingForRig { .. } => inputs.own.is_some(),
-            State::InitialPositioning { wait, duration_s, .. } => over(wait, *duration_s),
-            State::Preparing { .. } => inputs.prepared || !self.config.prepares,
-            State::InitialForce { wait } => over(wait, self.config.own.initial_force_s),
-            State::Settling { wait } | State::FinalSettling { wait } => settled(wait),
-            State::Experiment { wait } => over(wait, self.config.own.experiment_s),
-            State::Done { .. } => true,
-            State::Aborted { .. } | State::Fault { .. } => false,
+        use MainChainState as S;
+        let (config, since) = (&self.config, self.entered.cycle);
+        let over = |length_s| passed(since, cycles(length_s), inputs.cycle + 1);
+        match self.entered.state {
+            S::WaitingForRig => inputs.own.is_some(),
+            S::InitialPositioning => over(self.approach_s),
+            S::Preparing => inputs.prepared || !config.prepares,
+            S::InitialForce => over(config.own.initial_force_s),
+            S::Settling | S::FinalSettling => {
+                self.settled.settled_for(config.settling_s, since, inputs.cycle)
+            }
+            S::Experiment => over(config.own.experiment_s),
+            S::Done => true,
+            S::Aborted | S::Fault => false,
         }
     }
 
     /// The OK flag.
     pub(super) fn ok(&self, inputs: &MainInputs) -> bool {
-        let waits = matches!(self.state, State::Settling { .. }) && self.config.start == Start::OnStart;
+        let waits = self.entered.state == MainChainState::Settling && self.config.start == Start::OnStart;
         self.held(inputs) && (self.started || !waits)
     }
 
     /// How long the state is meant to last, for this axis and for the slower of both.
     fn expected_cycles(&self) -> [u64; 2] {
         let MainConfig { own, either, settling_s, approach_longest_s, .. } = &self.config;
-        let seconds = match &self.state {
-            State::InitialPositioning { duration_s, .. } => [*duration_s, *approach_longest_s],
-            State::Preparing { .. } => [own.prepare_s, either.prepare_s],
-            State::InitialForce { .. } => [own.initial_force_s, either.initial_force_s],
-            State::Settling { .. } | State::FinalSettling { .. } => [*settling_s; 2],
-            State::Experiment { .. } => [own.experiment_s, either.experiment_s],
+        use MainChainState as S;
+        let seconds = match self.entered.state {
+            S::InitialPositioning => [self.approach_s, *approach_longest_s],
+            S::Preparing => [own.prepare_s, either.prepare_s],
+            S::InitialForce => [own.initial_force_s, either.initial_force_s],
+            S::Settling | S::FinalSettling => [*settling_s; 2],
+            S::Experiment => [own.experiment_s, either.experiment_s],
             _ => [0.0; 2],
         };
         [cycles(seconds[0]), cycles(seconds[0].max(seconds[1]))]

@@ -23,6 +23,16 @@ fn order(one: &One) -> Vec<S> {
     one.seen.iter().map(|(_, state)| *state).collect()
 }
 
+/// What an axis at the start is told in a cycle in which its partner says this.
+fn told(cycle: u64, status: ChainStatus) -> MainInputs {
+    MainInputs {
+        cycle,
+        own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
+        partner: Partner { status: Some(status), values: None, heard: Some(cycle) },
+        ..MainInputs::default()
+    }
+}
+
 /// Two in `state`, on the way through one repetition.
 fn both_in(state: S) -> Duo {
     let mut duo = Duo::new(&short());
@@ -93,7 +103,7 @@ fn each_phase_belongs_to_its_state() {
         let expected = match output.phase {
             Phase::Shut => [S::WaitingForRig; 2],
             Phase::Approach { .. } => [S::InitialPositioning; 2],
-            Phase::Prepare { .. } => [S::Preparing; 2],
+            Phase::Prepare => [S::Preparing; 2],
             Phase::RampForce { .. } => [S::InitialForce; 2],
             Phase::HoldStart => [S::Settling; 2],
             Phase::Experiment { .. } => [S::Experiment; 2],
@@ -169,17 +179,9 @@ fn a_start_before_settling_is_none() {
 fn a_start_that_only_one_heard_travels_by_the_ok_flag() {
     let mut duo = Duo::new(&MainConfig { start: Start::OnStart, ..short() });
     duo.run(3000);
-    duo.axes[1].leading.main.advance(&MainInputs {
-        cycle: duo.cycle,
-        own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
-        partner: Partner {
-            status: Some(ChainStatus { main_chain: S::Settling, ..ChainStatus::default() }),
-            values: None,
-            heard: Some(duo.cycle),
-        },
-        console: Console { start: true, ..Console::default() },
-        ..MainInputs::default()
-    });
+    let status = ChainStatus { main_chain: S::Settling, ..ChainStatus::default() };
+    let console = Console { start: true, ..Console::default() };
+    duo.axes[1].leading.main.advance(&MainInputs { console, ..told(duo.cycle, status) });
     duo.run(10);
     assert_eq!(duo.states(), [S::Experiment; 2]);
 }
@@ -207,10 +209,11 @@ fn an_abort_ends_every_state_and_does_not_trip() {
 fn an_abort_that_only_one_heard_ends_both() {
     for state in RUNNING {
         let mut duo = both_in(state);
-        duo.axes[1]
-            .leading
-            .main
-            .enter_aborted(MainCause::Console, &MainInputs { cycle: duo.cycle, ..Default::default() });
+        duo.axes[1].leading.main.enter(
+            S::Aborted,
+            MainCause::Console,
+            &MainInputs { cycle: duo.cycle, ..Default::default() },
+        );
         // Within the grace of a start it waits for a partner that is still aborted.
         duo.run(if state == S::InitialPositioning { 100 } else { 2 });
         assert_eq!(duo.states(), [S::Aborted; 2], "{state}");

@@ -17,7 +17,6 @@ pub struct OwnAxis {
 /// What the chain is told each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MainInputs {
-    /// The rig's cycle.
     pub cycle: u64,
     /// Own sensors; `None` before the first.
     pub own: Option<OwnAxis>,
@@ -32,38 +31,22 @@ pub struct MainInputs {
     pub fault: Option<Fault>,
 }
 
-/// What is asked of the axis.
+/// What is asked of the axis. `elapsed_s` is the time since the phase began, s, and may go on beyond its duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Phase {
     /// Hold the valve shut.
     Shut,
     /// Move from `from_m`, where the carriage was, to the start along a Bestehorn sinoid. An axis that is not
     /// positioned holds still; its `duration_s` is 0.
-    Approach {
-        /// Time since the way began, s; may go on beyond its duration.
-        elapsed_s: f64,
-        /// Beginning of the way, m.
-        from_m: f64,
-        /// Duration of the way, s.
-        duration_s: f64,
-    },
+    Approach { elapsed_s: f64, from_m: f64, duration_s: f64 },
     /// Take the steps before the initial force.
-    Prepare {
-        /// Time since the first of them, s.
-        elapsed_s: f64,
-    },
+    Prepare,
     /// Ramp to the initial force; the position stays at the start.
-    RampForce {
-        /// Time since the ramp began, s; may go on beyond its duration.
-        elapsed_s: f64,
-    },
+    RampForce { elapsed_s: f64 },
     /// Stay at the start with the initial force.
     HoldStart,
     /// Run the experiment.
-    Experiment {
-        /// Time since it began, s; may go on beyond its duration.
-        elapsed_s: f64,
-    },
+    Experiment { elapsed_s: f64 },
     /// Stay at the end.
     HoldEnd,
 }
@@ -76,9 +59,6 @@ pub struct MainOutput {
     pub repetition: u32,
     /// The condition for leaving the state is fulfilled on this side.
     pub ok: bool,
-    /// Time in the state, s.
-    pub elapsed_s: f64,
-    /// What is asked of the axis.
     pub phase: Phase,
     /// The fault, while in fault.
     pub fault: Option<Fault>,
@@ -87,27 +67,16 @@ pub struct MainOutput {
 /// Why a state was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MainCause {
-    /// The controller began.
     Began,
-    /// The rig's time began anew.
     RigRestarted,
-    /// Own condition and partner.
     Ready,
-    /// The same, with another repetition to go.
     NextRepetition,
-    /// The emergency stop was tripped.
     EmergencyStop,
-    /// The console ended the run.
     Console,
-    /// The partner ended the run.
     PartnerAborted,
-    /// The partner has a fault.
     PartnerFault,
-    /// A fault of this controller.
     Fault(Fault),
-    /// The rig recovered from an emergency stop.
     Recovered,
-    /// The console started an aborted run anew.
     Started,
 }
 

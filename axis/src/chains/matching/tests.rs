@@ -1,6 +1,7 @@
 //! Tests of the matching chain: its edges, its average, and what breaks it off.
 
 use super::*;
+use crate::chains::until_another;
 use MatchingChainState as S;
 use proptest::prelude::*;
 use protocol::frames::{ChainStatus, ChainValues};
@@ -42,13 +43,7 @@ impl Play {
 
     /// Cycles until another state, and that state; after 100 s the same one.
     fn next(&mut self) -> (u64, S) {
-        let before = self.chain.entered().state;
-        for cycles in 1..=100_000 {
-            if self.step().state != before {
-                return (cycles, self.chain.entered().state);
-            }
-        }
-        (100_000, before)
+        until_another(self.chain.entered().state, || self.step().state)
     }
 
     fn to(state: S) -> Self {
