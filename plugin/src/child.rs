@@ -161,17 +161,15 @@ fn judge(trier: &Trier, status: Option<ExitStatus>, text: &str) -> Result<(), Wr
         }
     }
     let said = if last.is_empty() { String::new() } else { format!(" (it said: {last})") };
-    let place = || stage.clone().unwrap_or_else(|| "an unknown step".to_owned());
+    let during = format!("{}{said}", stage.as_deref().unwrap_or("an unknown step"));
     match (status, verdict) {
-        (None, _) => Err(Wrong::Hung { limit: trier.limit, stage: place(), said }),
-        (Some(status), _) if status.signal().is_some() => {
-            Err(Wrong::Crashed { status, stage: place(), said })
-        }
+        (None, _) => Err(Wrong::Hung { limit: trier.limit, during }),
+        (Some(status), _) if status.signal().is_some() => Err(Wrong::Crashed { status, during }),
         // It told no stage: another program, or an older one.
         _ if stage.is_none() => Err(Wrong::ForeignTrier(trier.program.clone())),
         (Some(status), Some(("good", _))) if status.success() => Ok(()),
         (Some(_), Some(("refused", why))) => Err(Wrong::Told(why.to_owned())),
-        (Some(status), _) => Err(Wrong::Ended { status, stage: place(), said }),
+        (Some(status), _) => Err(Wrong::Ended { status, during }),
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::child::{self, Trier};
 use crate::{Description, PluginError, describe};
-use algorithms::algorithm::Quantity;
 use protocol::exit::Exit;
 use settings::parameters::Parameter;
 use std::fmt;
@@ -10,9 +9,6 @@ use std::io::{self, Write};
 use std::path::Path;
 
 /// Prints what the library offers.
-///
-/// # Errors
-/// [`PluginError`]: why it is refused.
 pub fn check_library(library: &Path) -> Result<Exit, PluginError> {
     let description = Trier::find()
         .map_err(|wrong| PluginError { library: library.to_owned(), wrong })
@@ -30,21 +26,11 @@ pub fn probe_library(library: &Path) -> Exit {
 
 impl fmt::Display for Description {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let controls = match self.controls {
-            Quantity::Position => "position",
-            Quantity::Force => "force",
-        };
+        let controls = self.controls.name();
         writeln!(f, "name      {}\nabout     {}\ncontrols  {controls}\n", self.name, self.about)?;
         let row = |p: &Parameter| {
-            let number = |value: f64| format!("{value}");
-            [
-                p.name.to_string(),
-                p.unit.to_string(),
-                number(p.least),
-                number(p.most),
-                number(p.default),
-                p.meaning.to_string(),
-            ]
+            let [least, most, default] = [p.least, p.most, p.default].map(|value| value.to_string());
+            [p.name.to_string(), p.unit.to_string(), least, most, default, p.meaning.to_string()]
         };
         let head = ["parameter", "unit", "least", "most", "default", "meaning"].map(str::to_owned);
         let rows: Vec<_> = [head].into_iter().chain(self.parameters.iter().map(row)).collect();

@@ -70,32 +70,22 @@ impl Plugin {
 }
 
 impl Algorithm for Plugin {
-    /// # Panics
-    /// When `parameters` are not as many as its table has.
     fn reset(&mut self, ready: &Ready, parameters: &[f64]) {
         self.instance.reset(ready, parameters);
     }
 
-    /// # Panics
-    /// When `parameters` are not as many as its table has.
     fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
         self.instance.step(ready, parameters)
     }
 }
 
 /// Loads the library of `path` for a rig of these nominal numbers, after a trial in a child process.
-///
-/// # Errors
-/// [`PluginError`] with the library, what is wrong and what to do.
 pub fn load(path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
     let trier = Trier::find().map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
     load_tried_by(&trier, path, rig)
 }
 
 /// [`load`] with a trier that is named.
-///
-/// # Errors
-/// [`PluginError`] with the library, what is wrong and what to do.
 pub fn load_tried_by(trier: &Trier, path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
     let made = || {
         let file = absolute(path)?;
@@ -108,9 +98,6 @@ pub fn load_tried_by(trier: &Trier, path: &Path, rig: &RigParameters) -> Result<
 }
 
 /// What the library of `path` offers, after a trial in a child process.
-///
-/// # Errors
-/// [`PluginError`] with the library, what is wrong and what to do.
 pub fn describe(trier: &Trier, path: &Path) -> Result<Description, PluginError> {
     let told = || {
         let file = absolute(path)?;
@@ -122,9 +109,6 @@ pub fn describe(trier: &Trier, path: &Path) -> Result<Description, PluginError> 
 
 /// The trial itself, in this process: opens, asks and runs the library with the shipped rig's numbers, every parameter
 /// at its default. A bad library may end the process.
-///
-/// # Errors
-/// [`PluginError`] with the library, what is wrong and what to do.
 pub fn probe(path: &Path) -> Result<Description, PluginError> {
     probe_telling(path, &mut |_| ())
 }

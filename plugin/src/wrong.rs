@@ -108,40 +108,34 @@ pub enum Wrong {
     },
     /// The child died of a signal.
     #[error(
-        "it crashed the process that tried it, {status}, during: {stage}{said}; \
+        "it crashed the process that tried it, {status}, during: {during}; \
          look with: gdb --args controller probe-library FILE"
     )]
     Crashed {
         /// The signal by number and name.
         status: ExitStatus,
-        /// What it was doing.
-        stage: String,
-        /// Its last line, if it printed one.
-        said: String,
+        /// What it was doing, and its last line, if it printed one.
+        during: String,
     },
     /// The child ended without a verdict.
     #[error(
-        "it ended the process that tried it, {status}, during: {stage}{said}; a library must return from every function"
+        "it ended the process that tried it, {status}, during: {during}; a library must return from every function"
     )]
     Ended {
         /// The exit status.
         status: ExitStatus,
-        /// What it was doing.
-        stage: String,
-        /// Its last line, if it printed one.
-        said: String,
+        /// What it was doing, and its last line, if it printed one.
+        during: String,
     },
     /// The child did not come to an end.
     #[error(
-        "it did not return within {limit:?}, during: {stage}{said}; a library must neither wait nor loop without end"
+        "it did not return within {limit:?}, during: {during}; a library must neither wait nor loop without end"
     )]
     Hung {
         /// How long it was given.
         limit: Duration,
-        /// What it was doing.
-        stage: String,
-        /// Its last line, if it printed one.
-        said: String,
+        /// What it was doing, and its last line, if it printed one.
+        during: String,
     },
     /// The child's own refusal, in its words.
     #[error("{0}")]

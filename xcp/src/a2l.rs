@@ -73,9 +73,6 @@ pub fn file_name(axis: Axis) -> String {
 }
 
 /// The texts that a slave hands out, the A2L file among them.
-///
-/// # Errors
-/// [`A2lError`].
 pub fn description(described: &Described<'_>) -> Result<Description, A2lError> {
     let mut bytes = Vec::new();
     let mut place = |text: &str| {
@@ -93,9 +90,6 @@ pub fn description(described: &Described<'_>) -> Result<Description, A2lError> {
 }
 
 /// The A2L file.
-///
-/// # Errors
-/// [`A2lError`].
 pub fn text(described: &Described<'_>) -> Result<String, A2lError> {
     let error = |reason: String| A2lError { axis: described.axis.name(), reason };
     let (mut file, warnings) =

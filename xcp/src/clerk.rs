@@ -10,45 +10,19 @@ use crossbeam_channel::{Receiver, Sender};
 use plant::Axis;
 use std::path::{Path, PathBuf};
 
-/// What a port tells.
+/// What a port tells of its axis, with the rig's cycle that was answered last.
 #[derive(Debug)]
 pub enum Note {
-    /// A parameter has another value.
-    Changed {
-        /// Of this axis.
-        axis: Axis,
-        /// The rig's cycle that was answered last.
-        cycle: u64,
-        /// Place in the list of variables.
-        place: usize,
-        value: f64,
-    },
+    /// The parameter at a place in the list of variables has another value.
+    Changed { axis: Axis, cycle: u64, place: usize, value: f64 },
     /// Somebody had the right key.
-    Unlocked {
-        /// Of this axis.
-        axis: Axis,
-        /// The rig's cycle that was answered last.
-        cycle: u64,
-    },
+    Unlocked { axis: Axis, cycle: u64 },
     /// Somebody had a wrong key.
-    WrongKey {
-        /// Of this axis.
-        axis: Axis,
-        /// The rig's cycle that was answered last.
-        cycle: u64,
-    },
-    /// These values are to be stored.
-    Store {
-        /// Of this axis.
-        axis: Axis,
-        /// In the order of its variables.
-        values: Vec<f64>,
-    },
+    WrongKey { axis: Axis, cycle: u64 },
+    /// These values are to be stored, in the order of the variables.
+    Store { axis: Axis, values: Vec<f64> },
     /// The stored values are to be loaded.
-    Load {
-        /// Of this axis.
-        axis: Axis,
-    },
+    Load { axis: Axis },
 }
 
 /// A copy of the parameters that comes back.

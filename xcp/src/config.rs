@@ -49,9 +49,6 @@ struct File {
 
 impl XcpConfig {
     /// What the command line asks for: `None` without `--xcp`, the defaults without a file.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
     pub fn asked(asked: Option<&Option<PathBuf>>) -> Result<Option<Self>, ConfigError> {
         match asked {
             None => Ok(None),

@@ -15,6 +15,7 @@
 
 use crate::image::Image;
 use crate::packet::{BYTES, LAST_PID, Packet, Refusal};
+use std::collections::VecDeque;
 
 /// Most lists.
 pub const LISTS: usize = 8;
@@ -66,8 +67,9 @@ struct List {
 }
 
 /// How far the lists are made, since they are made in this order.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 enum Made {
+    #[default]
     Nothing,
     Freed,
     Lists,
@@ -76,21 +78,19 @@ enum Made {
 }
 
 /// All lists, and the packets that wait to leave.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Daq {
     /// Packets that may leave in a cycle.
-    per_cycle: u32,
+    pub(crate) per_cycle: u32,
     made: Made,
     lists: [List; LISTS],
     count: usize,
     odts: [Odt; ODTS],
     used: usize,
     pointer: Option<(usize, usize)>,
-    waiting: [Packet; ROOM],
-    head: usize,
-    queued: usize,
+    waiting: VecDeque<Packet>,
     /// Packets for which there was no room; the admission at the start keeps it 0.
-    dropped: u64,
+    pub(crate) dropped: u64,
 }
 
 /// How a list is run.
@@ -108,19 +108,7 @@ impl Daq {
     /// No lists; so many packets may leave in a cycle.
     #[must_use]
     pub fn new(per_cycle: u32) -> Self {
-        Self {
-            per_cycle,
-            made: Made::Nothing,
-            lists: [List::default(); LISTS],
-            count: 0,
-            odts: [Odt::default(); ODTS],
-            used: 0,
-            pointer: None,
-            waiting: [[0; BYTES]; ROOM],
-            head: 0,
-            queued: 0,
-            dropped: 0,
-        }
+        Self { per_cycle, waiting: VecDeque::with_capacity(ROOM), ..Self::default() }
     }
 
     /// Whether a list runs.
@@ -129,19 +117,16 @@ impl Daq {
         self.lists[..self.count].iter().any(|list| list.running)
     }
 
-    /// Packets for which there was no room.
-    #[must_use]
-    pub fn dropped(&self) -> u64 {
-        self.dropped
-    }
-
     fn idle(&self) -> Result<(), Refusal> {
         if self.runs() { Err(Refusal::DaqActive) } else { Ok(()) }
     }
 
     /// Gives all lists back; those that run stop.
     pub fn free(&mut self) {
-        *self = Self { made: Made::Freed, dropped: self.dropped, ..Self::new(self.per_cycle) };
+        let mut waiting = std::mem::take(&mut self.waiting);
+        waiting.clear();
+        let Self { per_cycle, dropped, .. } = *self;
+        *self = Self { per_cycle, made: Made::Freed, waiting, dropped, ..Self::default() };
     }
 
     /// Makes so many lists.
@@ -212,9 +197,6 @@ impl Daq {
     }
 
     /// Empties the entries of a list; it stops.
-    ///
-    /// # Errors
-    /// [`Refusal::OutOfRange`] for no such list.
     pub fn clear(&mut self, list: u16) -> Result<(), Refusal> {
         let place = self.list(list)?;
         let List { first, odts, .. } = self.lists[place];
@@ -292,9 +274,6 @@ impl Daq {
     }
 
     /// How a list is run.
-    ///
-    /// # Errors
-    /// [`Refusal::OutOfRange`] for no such list.
     pub fn mode(&self, list: u16) -> Result<ListMode, Refusal> {
         let List { mode, prescaler, priority, selected, running, .. } = self.lists[self.list(list)?];
         let bit = |is: bool, bit: u8| if is { bit } else { 0 };
@@ -432,29 +411,16 @@ impl Daq {
     }
 
     fn queue(&mut self, packet: Packet) {
-        if self.queued == ROOM {
+        if self.waiting.len() == ROOM {
             self.dropped += 1;
-            return;
+        } else {
+            self.waiting.push_back(packet);
         }
-        self.waiting[(self.head + self.queued) % ROOM] = packet;
-        self.queued += 1;
     }
 
     /// The next packet to leave.
     pub fn next_packet(&mut self) -> Option<Packet> {
-        if self.queued == 0 {
-            return None;
-        }
-        let packet = self.waiting[self.head];
-        self.head = (self.head + 1) % ROOM;
-        self.queued -= 1;
-        Some(packet)
-    }
-
-    /// Packets that may leave in a cycle.
-    #[must_use]
-    pub fn per_cycle(&self) -> u32 {
-        self.per_cycle
+        self.waiting.pop_front()
     }
 }
 

@@ -19,21 +19,15 @@ use crate::signals::{COUNT, Format, SIGNALS};
 use crate::trace::{self, ARM, CAPACITY, CHANNELS, CONTROLS, LOAD_SET, TOLD, Trace};
 use axis_control::program::Variable;
 
-/// First address of the description.
+/// First addresses of the regions.
 pub const DESCRIPTION: u32 = 0x0001_0000;
-/// First address of the parameters.
 pub const PARAMETERS: u32 = 0x1000_0000;
-/// First address of the controls.
 pub const CONTROL: u32 = 0x2000_0000;
-/// First address of the signals.
 pub const SIGNAL: u32 = 0x3000_0000;
-/// First address of what the trigger buffer tells.
 pub const TRACE_TOLD: u32 = 0x4000_0000;
-/// First address of the samples' cycles.
 pub const TRACE_CYCLES: u32 = 0x5000_0000;
-/// First address of the first channel; from channel to channel it is [`CHANNEL_STEP`].
+/// That of the first channel; from channel to channel it is [`CHANNEL_STEP`].
 pub const TRACE_CHANNELS: u32 = 0x5100_0000;
-/// From channel to channel.
 pub const CHANNEL_STEP: u32 = 0x0100_0000;
 
 /// Bytes from parameter to parameter, and from control to control.
@@ -153,9 +147,6 @@ impl Image {
     }
 
     /// Whether so many bytes can be read from `address` on.
-    ///
-    /// # Errors
-    /// As [`Image::read`].
     pub fn check_readable(&self, address: u32, count: u32) -> Result<(), Refusal> {
         self.reach(address, count).map(|_| ())
     }

@@ -22,7 +22,7 @@ pub const IN_PACKET: usize = 6;
 pub const PAUSE: u64 = 1000;
 
 /// The lock in front of all writing.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Lock {
     secret: Option<Vec<u8>>,
     start: [u8; 16],
@@ -52,17 +52,7 @@ impl Lock {
     /// A shut lock. `start` is random; in simulated time it is not, and seeds come again in the next run.
     #[must_use]
     pub fn new(secret: Option<Vec<u8>>, start: [u8; 16]) -> Self {
-        Self {
-            secret,
-            start,
-            seeds: 0,
-            open: false,
-            seed: [0; BYTES],
-            given: None,
-            key: [0; BYTES],
-            had: 0,
-            pause: 0,
-        }
+        Self { secret, start, ..Self::default() }
     }
 
     /// Whether writing is allowed.

@@ -20,69 +20,38 @@ pub const EVENT_STORED: u8 = 0x03;
 /// Highest first byte of a DAQ packet.
 pub const LAST_PID: u8 = 0xFB;
 
-/// Commands by their first byte.
+/// Commands by their first byte, under the names of the standard.
 pub mod command {
-    /// Begins a session.
     pub const CONNECT: u8 = 0xFF;
-    /// Ends it.
     pub const DISCONNECT: u8 = 0xFE;
-    /// Tells the session's state.
     pub const GET_STATUS: u8 = 0xFD;
-    /// Begins anew after a time-out.
     pub const SYNCH: u8 = 0xFC;
-    /// Tells how to talk to the slave.
     pub const GET_COMM_MODE_INFO: u8 = 0xFB;
-    /// Tells who the slave is.
     pub const GET_ID: u8 = 0xFA;
-    /// Asks for the parameter set to be stored.
     pub const SET_REQUEST: u8 = 0xF9;
-    /// Asks for a seed.
     pub const GET_SEED: u8 = 0xF8;
-    /// Hands over the key to it.
     pub const UNLOCK: u8 = 0xF7;
-    /// Sets the address that the next transfers begin at.
     pub const SET_MTA: u8 = 0xF6;
-    /// Reads from there.
     pub const UPLOAD: u8 = 0xF5;
-    /// Reads from an address of its own.
     pub const SHORT_UPLOAD: u8 = 0xF4;
-    /// Checksum over memory.
     pub const BUILD_CHECKSUM: u8 = 0xF3;
-    /// Writes.
     pub const DOWNLOAD: u8 = 0xF0;
-    /// Goes on with a block.
     pub const DOWNLOAD_NEXT: u8 = 0xEF;
-    /// Empties a DAQ list.
     pub const CLEAR_DAQ_LIST: u8 = 0xE3;
-    /// Sets where the next entry is written.
     pub const SET_DAQ_PTR: u8 = 0xE2;
-    /// Writes an entry.
     pub const WRITE_DAQ: u8 = 0xE1;
-    /// Sets event, prescaler and mode of a list.
     pub const SET_DAQ_LIST_MODE: u8 = 0xE0;
-    /// Tells them.
     pub const GET_DAQ_LIST_MODE: u8 = 0xDF;
-    /// Starts, stops or selects a list.
     pub const START_STOP_DAQ_LIST: u8 = 0xDE;
-    /// Starts or stops the selected ones.
     pub const START_STOP_SYNCH: u8 = 0xDD;
-    /// Tells the time.
     pub const GET_DAQ_CLOCK: u8 = 0xDC;
-    /// Reads an entry.
     pub const READ_DAQ: u8 = 0xDB;
-    /// What DAQ can do.
     pub const GET_DAQ_PROCESSOR_INFO: u8 = 0xDA;
-    /// Sizes and time stamps of DAQ.
     pub const GET_DAQ_RESOLUTION_INFO: u8 = 0xD9;
-    /// What an event is.
     pub const GET_DAQ_EVENT_INFO: u8 = 0xD7;
-    /// Gives all lists back.
     pub const FREE_DAQ: u8 = 0xD6;
-    /// Makes lists.
     pub const ALLOC_DAQ: u8 = 0xD5;
-    /// Makes ODTs of a list.
     pub const ALLOC_ODT: u8 = 0xD4;
-    /// Makes entries of an ODT.
     pub const ALLOC_ODT_ENTRY: u8 = 0xD3;
 }
 
@@ -130,26 +99,17 @@ impl<'a> Fields<'a> {
     }
 
     /// The two bytes from `at` on.
-    ///
-    /// # Errors
-    /// As [`Fields::byte`].
     pub fn word(self, at: usize) -> Result<u16, Refusal> {
         Ok(u16::from_le_bytes([self.byte(at)?, self.byte(at + 1)?]))
     }
 
     /// The four bytes from `at` on.
-    ///
-    /// # Errors
-    /// As [`Fields::byte`].
     pub fn long(self, at: usize) -> Result<u32, Refusal> {
         let [low, high] = [self.word(at)?, self.word(at + 2)?];
         Ok(u32::from(low) | u32::from(high) << 16)
     }
 
     /// So many bytes from `at` on.
-    ///
-    /// # Errors
-    /// As [`Fields::byte`].
     pub fn bytes(self, at: usize, count: usize) -> Result<&'a [u8], Refusal> {
         self.0.get(at..at + count).ok_or(Refusal::Syntax)
     }

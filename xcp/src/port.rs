@@ -22,6 +22,7 @@ use plant::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use protocol::frames::{Sensors, ValveCommand};
+use std::collections::VecDeque;
 
 /// Commands that wait at most: more than the longest block has packets.
 pub const INBOX: usize = 64;
@@ -106,9 +107,7 @@ pub struct Port {
     queues: Queues,
     /// Room for a copy of the parameters; gone while the clerk has it.
     spare: Option<Vec<f64>>,
-    inbox: [CanFrame; INBOX],
-    head: usize,
-    waiting: usize,
+    inbox: VecDeque<CanFrame>,
     cycle: u64,
     /// DAQ packets that may still leave in this cycle.
     may_leave: u32,
@@ -117,9 +116,6 @@ pub struct Port {
 
 impl Port {
     /// A port for this controller; `random` begins its seeds.
-    ///
-    /// # Errors
-    /// [`A2lError`]: a bug.
     pub fn new(
         controller: &AxisController,
         title: &str,
@@ -144,9 +140,7 @@ impl Port {
             slave,
             queues,
             spare: Some(Vec::with_capacity(variables.len())),
-            inbox: [CanFrame::new(0, &[]); INBOX],
-            head: 0,
-            waiting: 0,
+            inbox: VecDeque::with_capacity(INBOX),
             cycle: 0,
             may_leave: 0,
             counters: PortCounters::default(),
@@ -161,7 +155,7 @@ impl Port {
     /// What it counted.
     #[must_use]
     pub fn counters(&self) -> PortCounters {
-        let daq_dropped = self.counters.daq_dropped + self.slave.daq_dropped();
+        let daq_dropped = self.counters.daq_dropped + self.slave.daq.dropped;
         PortCounters { slave: *self.slave.counters(), daq_dropped, ..self.counters }
     }
 
@@ -195,11 +189,10 @@ impl CalibrationPort for Port {
         if frame.standard_id() != Some(self.command_id) {
             return false;
         }
-        if self.waiting == INBOX {
+        if self.inbox.len() == INBOX {
             self.counters.commands_dropped += 1;
         } else {
-            self.inbox[(self.head + self.waiting) % INBOX] = *frame;
-            self.waiting += 1;
+            self.inbox.push_back(*frame);
         }
         true
     }
@@ -215,10 +208,14 @@ impl CalibrationPort for Port {
         sensors: &Sensors,
         command: &ValveCommand,
     ) {
-        let signals = signals::sample(&View::new(controller, cycle, sensors, command));
+        let signals = signals::sample(&View {
+            controller,
+            sensors,
+            record: controller.record(cycle, sensors, command),
+        });
         self.slave.cycle(cycle, &signals, controller.program().values());
         self.cycle = cycle;
-        self.may_leave = self.slave.daq_per_cycle();
+        self.may_leave = self.slave.daq.per_cycle;
     }
 
     fn serve(&mut self, program: &mut Program, bus: &mut dyn Bus) {
@@ -227,9 +224,8 @@ impl CalibrationPort for Port {
             let event = self.slave.stored().filter(|_| stored);
             self.answer(event, bus);
         }
-        for _ in 0..COMMANDS.min(self.waiting) {
-            let frame = self.inbox[self.head];
-            (self.head, self.waiting) = ((self.head + 1) % INBOX, self.waiting - 1);
+        for _ in 0..COMMANDS {
+            let Some(frame) = self.inbox.pop_front() else { break };
             let before = *self.slave.counters();
             let mut act = Act {
                 axis: self.axis,

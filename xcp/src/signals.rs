@@ -4,7 +4,7 @@
 //! so that it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
 
 use axis_control::axis::{AxisController, AxisRecord};
-use protocol::frames::{DRIVE_CHAIN_STATUS, Sensors, SignalSpec, ValveCommand};
+use protocol::frames::{DRIVE_CHAIN_STATUS, Sensors, SignalSpec};
 use settings::parameters::Parameter;
 
 /// How a value lies in memory; Intel byte order.
@@ -65,19 +65,6 @@ pub struct View<'a> {
     pub sensors: &'a Sensors,
     /// The row of its record.
     pub record: AxisRecord,
-}
-
-impl<'a> View<'a> {
-    /// Of the answer to the sensors of `cycle`.
-    #[must_use]
-    pub fn new(
-        controller: &'a AxisController,
-        cycle: u64,
-        sensors: &'a Sensors,
-        command: &ValveCommand,
-    ) -> Self {
-        Self { controller, sensors, record: controller.record(cycle, sensors, command) }
-    }
 }
 
 /// A number that can be measured.

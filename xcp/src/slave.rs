@@ -102,7 +102,7 @@ pub struct Slave {
     image: Image,
     texts: Texts,
     lock: Lock,
-    daq: Daq,
+    pub(crate) daq: Daq,
     connected: bool,
     storing: bool,
     /// Cycles since the last command.
@@ -147,18 +147,6 @@ impl Slave {
     #[must_use]
     pub fn counters(&self) -> &SlaveCounters {
         &self.counters
-    }
-
-    /// DAQ packets for which there was no room.
-    #[must_use]
-    pub fn daq_dropped(&self) -> u64 {
-        self.daq.dropped()
-    }
-
-    /// DAQ packets that may leave in a cycle.
-    #[must_use]
-    pub fn daq_per_cycle(&self) -> u32 {
-        self.daq.per_cycle()
     }
 
     /// A cycle was answered: takes its signals and the parameters as they are now.

@@ -12,7 +12,7 @@
 //! says its own cycle. What is set counts from the next arming on. The buffer is made at the start; taking a sample allocates
 //! nothing.
 
-use crate::signals::{COUNT, Format, SIGNALS};
+use crate::signals::{COUNT, Format};
 use settings::parameters::Parameter;
 
 /// Samples that the buffer holds at most.
@@ -20,23 +20,16 @@ pub const CAPACITY: usize = 4096;
 /// Signals that it records.
 pub const CHANNELS: usize = 4;
 
-/// Places in [`CONTROLS`].
+/// Places in [`CONTROLS`], which says what each is.
 pub const SOURCE: usize = 0;
-/// Threshold.
 pub const THRESHOLD: usize = 1;
-/// Slope.
 pub const SLOPE: usize = 2;
-/// Samples before the trigger.
 pub const PRE_TRIGGER: usize = 3;
-/// Samples in all.
 pub const LENGTH: usize = 4;
-/// Cycles from sample to sample.
 pub const EVERY: usize = 5;
 /// The first of the channels.
 pub const CHANNEL: usize = 6;
-/// Arms and disarms.
 pub const ARM: usize = CHANNEL + CHANNELS;
-/// Loads the stored parameter set.
 pub const LOAD_SET: usize = ARM + 1;
 
 /// Last place of the table of signals.
@@ -207,12 +200,6 @@ impl Trace {
         matches!(self.state, State::Filling | State::Armed | State::Triggered)
     }
 
-    /// What it does.
-    #[must_use]
-    pub fn state(&self) -> State {
-        self.state
-    }
-
     /// Takes the signals of a cycle.
     pub fn take(&mut self, cycle: u64, signals: &[f64; COUNT]) {
         if !self.runs() || cycle < self.due {
@@ -295,11 +282,6 @@ impl Trace {
     fn place(&self, number: usize) -> Option<usize> {
         (number < self.samples()).then(|| (self.next + CAPACITY - self.held + number) % CAPACITY)
     }
-
-    /// The signals that it records, as they were set at arming.
-    pub fn channels(&self) -> impl Iterator<Item = &'static str> {
-        self.settings.channels.iter().map(|place| SIGNALS[*place].about.name.as_ref())
-    }
 }
 
 #[cfg(test)]
@@ -340,7 +322,7 @@ mod tests {
             let mut trace = armed(&[]);
             run(&mut trace, 0..start + 100, |cycle| cycle as f64 - start as f64);
             let trigger = (start + 50) as u32;
-            assert_eq!((trace.state(), trace.told()[2]), (State::Ready, trigger));
+            assert_eq!((trace.state, trace.told()[2]), (State::Ready, trigger));
             assert_eq!(cycles(&trace), (trigger - 3..trigger + 5).collect::<Vec<_>>());
             assert_eq!(trace.value(0, 3), 50.0);
         }
@@ -350,7 +332,7 @@ mod tests {
     fn nothing_triggers_before_the_pre_trigger_is_filled() {
         let mut trace = armed(&[]);
         run(&mut trace, 0..20, |cycle| if cycle == 2 { 60.0 } else { 0.0 });
-        assert_eq!((trace.state(), trace.samples()), (State::Armed, 0));
+        assert_eq!((trace.state, trace.samples()), (State::Armed, 0));
     }
 
     #[test]
@@ -376,7 +358,7 @@ mod tests {
         let most = CAPACITY as f64;
         let mut trace = armed(&[(LENGTH, most), (PRE_TRIGGER, most - 1.0), (THRESHOLD, 9000.0)]);
         run(&mut trace, 0..9100, |cycle| cycle as f64);
-        assert_eq!((trace.state(), trace.samples()), (State::Ready, CAPACITY));
+        assert_eq!((trace.state, trace.samples()), (State::Ready, CAPACITY));
         assert_eq!((trace.cycle(0), trace.cycle(CAPACITY - 1)), (9000 - CAPACITY as u32 + 1, 9000));
         assert_eq!(trace.cycle(CAPACITY), 0, "beyond the end there is nothing");
     }
