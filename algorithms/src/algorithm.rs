@@ -67,8 +67,8 @@ pub trait ControlLaw: Send {
     /// Fields that are read from the values of the program, each by its place in the table.
     type Parameters: Declared;
 
-    /// Resets integral and memory. The axis has been without control before.
-    fn reset(&mut self, ready: &Ready, parameters: &Self::Parameters);
+    /// Resets integral and memory, if it has any. The axis has been without control before.
+    fn reset(&mut self, _ready: &Ready, _parameters: &Self::Parameters) {}
 
     /// The velocity that the rod shall have, m/s.
     fn step(&mut self, ready: &Ready, parameters: &Self::Parameters) -> f64;
@@ -93,6 +93,20 @@ pub enum Quantity {
     /// The force between rod and carriage.
     Force,
 }
+
+impl Quantity {
+    /// Its word in texts.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Force => "force",
+        }
+    }
+}
+
+/// Largest result, m/s: several times what any valve of this rig gives.
+pub(crate) const LARGEST_M_PER_S: f64 = 5.0;
 
 /// An algorithm that can be asked for by name.
 pub struct Kind {

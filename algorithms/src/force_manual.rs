@@ -47,8 +47,6 @@ struct ForceManual;
 impl ControlLaw for ForceManual {
     type Parameters = Parameters;
 
-    fn reset(&mut self, _ready: &Ready, _: &Parameters) {}
-
     fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
         let error_n = ready.set_force_n - ready.force_n;
         let (gain, dead_n, limit) =

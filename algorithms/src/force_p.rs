@@ -10,7 +10,7 @@
 //!
 //! Source: [Neugebauer 2011, section 4].
 
-use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use settings::parameters::declare;
 
 /// In the list of algorithms.
@@ -36,17 +36,12 @@ struct ForceP;
 impl ControlLaw for ForceP {
     type Parameters = Parameters;
 
-    fn reset(&mut self, _ready: &Ready, _: &Parameters) {}
-
     fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
         let velocity = parameters.gain_m_per_n_s * (ready.set_force_n - ready.force_n)
             + parameters.velocity_feed_forward * ready.velocity_m_per_s;
         velocity.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S)
     }
 }
-
-/// Largest result, m/s: several times what any valve of this rig gives.
-const LARGEST_M_PER_S: f64 = 5.0;
 
 #[cfg(test)]
 mod tests {

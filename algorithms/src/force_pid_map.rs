@@ -26,7 +26,7 @@
 //! Source: PID in the ideal form and integrator clamping [Åström, Hägglund 1995]; the map is the outlook of
 //! [Neugebauer 2011, section 5]; c from its eqs. 1 to 4.
 
-use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use crate::linearisation::Air;
 use plant::RigParameters;
 use settings::parameters::declare;
@@ -144,9 +144,6 @@ impl ControlLaw for ForcePidMap {
         memory.result_m_per_s
     }
 }
-
-/// Largest result, m/s: several times what any valve of this rig gives.
-const LARGEST_M_PER_S: f64 = 5.0;
 
 #[cfg(test)]
 mod tests {

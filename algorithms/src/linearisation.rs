@@ -240,14 +240,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn at_rest() -> Ready {
-        let pressure = |pressure_a_pa, pressure_b_pa| Ready {
-            position_m: 0.2,
-            pressure_a_pa,
-            pressure_b_pa,
-            supply_pressure_pa: 7e5,
-            ..Ready::default()
-        };
-        pressure(3.1e5, 3.5e5)
+        let (pressure_a_pa, pressure_b_pa, supply_pressure_pa) = (3.1e5, 3.5e5, 7e5);
+        Ready { position_m: 0.2, pressure_a_pa, pressure_b_pa, supply_pressure_pa, ..Ready::default() }
     }
 
     #[test]

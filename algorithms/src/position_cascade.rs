@@ -30,7 +30,7 @@
 //! rig-model.md.
 
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
-use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use crate::linearisation::Air;
 use crate::rest_zone::{self, RestZone};
 use plant::RigParameters;
@@ -65,9 +65,6 @@ settings::parameters! {
         rest_zone_m: rest_zone::declaration(2e-4),
     }
 }
-
-/// Largest result, m/s: several times what any valve of this rig gives.
-const LARGEST_M_PER_S: f64 = 5.0;
 
 #[derive(Debug)]
 struct PositionCascade {

@@ -16,7 +16,7 @@
 //! Source: [Åström, Hägglund 1995], PID in the ideal form; the derivative filter is the pre-controller's.
 
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
-use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use crate::rest_zone::{self, RestZone};
 use settings::parameters::declare;
 
@@ -41,9 +41,6 @@ settings::parameters! {
         rest_zone_m: rest_zone::declaration(3e-4),
     }
 }
-
-/// Largest result, m/s: several times what any valve of this rig gives.
-const LARGEST_M_PER_S: f64 = 5.0;
 
 #[derive(Debug, Default)]
 struct PositionPid {
@@ -85,26 +82,17 @@ mod tests {
     use super::*;
     use crate::laws::{self, Stuck};
 
-    const AT_REST: Ready = Ready {
-        period_s: 1e-3,
-        position_m: 0.2,
-        velocity_m_per_s: 0.0,
-        acceleration_m_per_s2: 0.0,
-        force_n: 0.0,
-        pressure_a_pa: 3.1e5,
-        pressure_b_pa: 3.5e5,
-        supply_pressure_pa: 7e5,
-        set_position_m: 0.2,
-        set_velocity_m_per_s: 0.0,
-        set_acceleration_m_per_s2: 0.0,
-        set_force_n: 0.0,
-        set_force_rate_n_per_s: 0.0,
-        applied_velocity_m_per_s: 0.0,
-    };
+    fn at_rest() -> Ready {
+        let (position_m, set_position_m) = (0.2, 0.2);
+        let (pressure_a_pa, pressure_b_pa, supply_pressure_pa) = (3.1e5, 3.5e5, 7e5);
+        let air = Ready { pressure_a_pa, pressure_b_pa, supply_pressure_pa, ..Ready::default() };
+        Ready { period_s: 1e-3, position_m, set_position_m, ..air }
+    }
 
     #[test]
     fn its_parts_add_up() {
-        let ready = Ready { position_m: 0.199, velocity_m_per_s: 0.04, set_velocity_m_per_s: 0.1, ..AT_REST };
+        let ready =
+            Ready { position_m: 0.199, velocity_m_per_s: 0.04, set_velocity_m_per_s: 0.1, ..at_rest() };
         let parameters = Parameters {
             gain_per_s: 20.0,
             velocity_feed_forward: 1.0,
@@ -133,8 +121,8 @@ mod tests {
             ("integral_zone_m", 0.5),
             ("rest_zone_m", 0.0),
         ];
-        let held = Ready { set_position_m: 0.5, ..AT_REST };
-        let back = Ready { set_position_m: 0.19, ..AT_REST };
+        let held = Ready { set_position_m: 0.5, ..at_rest() };
+        let back = Ready { set_position_m: 0.19, ..at_rest() };
         laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
     }
 
@@ -142,6 +130,6 @@ mod tests {
     fn its_integral_keeps_its_limit() {
         // The integral's limit is 3 mm; 2.9 mm take it back in 2 * 3 / 2.9 s of an integral time of 1 s at most, but the
         // error itself turns the sign as soon as the integral is below it.
-        laws::keeps_its_limit(&KIND, &AT_REST, 2.1);
+        laws::keeps_its_limit(&KIND, &at_rest(), 2.1);
     }
 }

@@ -19,7 +19,7 @@ mod work;
 
 pub use changes::PlannedChange;
 pub use record::{Answer, AxisRecord};
-pub use work::{ForcePlan, Plan, PositionPlan, PrepareStep};
+pub use work::{ForcePlan, Plan};
 
 use crate::chains::leading::{Leading, LeadingInputs};
 use crate::chains::main::{MainCause, MainConfig, MainOutput, OwnAxis};
@@ -43,12 +43,9 @@ use work::{Asked, Seen, Work};
 
 /// What an axis controller is made of.
 pub struct AxisParts {
-    /// Which axis.
     pub axis: Axis,
     pub program: Program,
-    /// What it does in the experiment.
     pub plan: Plan,
-    /// Its main chain.
     pub main: MainConfig,
     /// Nominal supply pressure, absolute, Pa.
     pub supply_pressure_pa: f64,
@@ -128,7 +125,7 @@ impl AxisController {
         let output = self.advance(cycle, rig, self.rig.map(|_| self.own_axis(sensors)));
         let partner = &self.heard.partner;
         let hand = self.heard.hand.take();
-        let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.still(), hand };
+        let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.main.still(), hand };
         self.asked = self.work.ask(&output, &seen, &mut self.program);
         let beyond = self.range.take(self.axis, rig, output.phase);
         self.fault = self.work.fault().or(beyond);
@@ -138,7 +135,7 @@ impl AxisController {
         self.changes.follow(output.phase, &mut self.program);
         let command = self.command(cycle);
         if let Some(fault) = self.fault {
-            self.leading.trip(fault, cycle);
+            self.leading.stop.trip(fault, cycle);
         }
         self.take_figures(&output, sensors);
         let record = cycle.is_multiple_of(self.record_every).then(|| self.record(cycle, sensors, &command));
@@ -150,12 +147,12 @@ impl AxisController {
         self.fault = Some(Fault::SensorLoss);
         self.advance(cycle, None, None);
         self.program.shut();
-        self.leading.frame_due(cycle)
+        self.leading.stop.frame_due(cycle)
     }
 
     /// Both chains that lead, moved on.
     fn advance(&mut self, cycle: u64, rig: Option<&RigStatus>, own: Option<OwnAxis>) -> MainOutput {
-        let before = self.leading.output().map(|output| output.state);
+        let before = self.leading.output.map(|output| output.state);
         let output = self.leading.advance(&LeadingInputs {
             cycle,
             rig: rig.copied(),
@@ -228,7 +225,7 @@ impl AxisController {
         });
         Answer {
             command,
-            emergency_stop: self.leading.frame_due(cycle),
+            emergency_stop: self.leading.stop.frame_due(cycle),
             status: due.status.then_some(status),
             values: due.values.then(|| self.values()),
             news,
@@ -251,13 +248,11 @@ impl AxisController {
         (self.rig, self.fault, self.algorithm_fault, self.asked, self.alive) = (None, None, None, None, 0);
     }
 
-    /// Which axis.
     #[must_use]
     pub fn axis(&self) -> Axis {
         self.axis
     }
 
-    /// State of the main chain.
     #[must_use]
     pub fn state(&self) -> MainChainState {
         self.status().main_chain
@@ -266,7 +261,7 @@ impl AxisController {
     /// Why the main chain came to its state.
     #[must_use]
     pub fn cause(&self) -> MainCause {
-        self.leading.entered().cause
+        self.leading.main.entered().cause
     }
 
     /// Whether a stopped axis may begin anew.
@@ -275,10 +270,9 @@ impl AxisController {
         self.main_config.after_emergency_stop != AfterStop::End
     }
 
-    /// State of the emergency stop chain.
     #[must_use]
     pub fn emergency_stop(&self) -> EmergencyStopChainState {
-        self.leading.emergency_stop()
+        self.leading.stop.state()
     }
 
     /// Its program, whose variables may be changed between two cycles.
@@ -307,7 +301,7 @@ impl AxisController {
     #[must_use]
     pub fn repetitions_done(&self) -> u32 {
         self.leading
-            .output()
+            .output
             .map_or(0, |output| output.repetition + u32::from(output.state == MainChainState::Done))
     }
 }

@@ -36,7 +36,7 @@
 
 pub mod axis;
 
-pub use axis::{AxisExperiment, ByHandLimits, Change, During, Prepare, ProgramReference, SetPoints};
+pub use axis::{AxisExperiment, ByHandLimits, Change, Prepare, ProgramReference, SetPoints};
 
 use crate::chains::AfterStop;
 use crate::chains::main::Start;
@@ -47,23 +47,18 @@ use std::path::Path;
 /// An experiment, checked.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    /// What it is called.
     pub title: String,
     /// A sentence about it; may be empty.
     pub about: String,
     /// Its name on the bus, 1 to 255.
     pub number: u8,
-    /// What both axes keep to.
     pub run: RunSection,
     /// What the drive does; `None`: its valve is held shut.
     pub drive: Option<AxisExperiment>,
     /// What the load axis does; `None`: its valve is held shut.
     pub load: Option<AxisExperiment>,
-    /// What is recorded.
     pub recording: Recording,
-    /// `[rig]`, unread.
     pub rig: toml::Table,
-    /// `[passed]`, unread.
     pub passed: toml::Table,
 }
 

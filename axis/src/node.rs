@@ -14,9 +14,7 @@ use crate::program::Program;
 use crate::rig_view::{RigView, TickNews};
 use crossbeam_channel::{Receiver, Sender};
 use plant::Axis;
-use protocol::frames::{
-    ChainStatus, ChainValues, DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand,
-};
+use protocol::frames::{DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand};
 use protocol::{bus::Bus, can::CanFrame, periods::TICK_CYCLES};
 use runlog::controller_report::IgnoredFrames;
 use std::collections::VecDeque;
@@ -37,9 +35,7 @@ pub enum News {
         axis: Axis,
         #[serde(serialize_with = "state_name")]
         state: MainChainState,
-        /// The rig's cycle.
         cycle: u64,
-        /// Why.
         #[serde(serialize_with = "in_words")]
         cause: MainCause,
     },
@@ -47,7 +43,6 @@ pub enum News {
     RigRestarted,
     /// The bus went away.
     BusLost,
-    /// It is back.
     BusBack,
     /// No sensors for a while.
     SensorsSilent,
@@ -64,7 +59,6 @@ fn in_words<S: serde::Serializer>(cause: &MainCause, serializer: S) -> Result<S:
 /// A parameter that shall change, already checked against its table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
-    /// Of which axis.
     pub axis: Axis,
     /// Place in the list of variables.
     pub place: usize,
@@ -118,42 +112,29 @@ struct Member<P> {
     port: Option<P>,
 }
 
-/// Access to a controller from outside its program: signals are measured, parameters are changed between two cycles.
+/// Access to a controller from outside its program: signals are measured, parameters are changed between two cycles. A port does
+/// nothing by itself.
 pub trait CalibrationPort {
     /// Processes a frame that is a command to the port; returns whether it was one.
-    fn take(&mut self, frame: &CanFrame) -> bool;
+    fn take(&mut self, _: &CanFrame) -> bool {
+        false
+    }
 
     /// The rig's time began again.
-    fn restart(&mut self);
+    fn restart(&mut self) {}
 
-    /// Samples the signals of `controller` after it has answered the sensors of a cycle.
-    fn observe(&mut self, controller: &AxisController, cycle: u64, sensors: &Sensors, command: &ValveCommand);
+    /// Samples the signals of a controller after it has answered the sensors of a cycle.
+    fn observe(&mut self, _: &AxisController, _: u64, _: &Sensors, _: &ValveCommand) {}
 
     /// Answers waiting commands and sends what is due, once all valves have their commands.
-    fn serve(&mut self, program: &mut Program, bus: &mut dyn Bus);
+    fn serve(&mut self, _: &mut Program, _: &mut dyn Bus) {}
 }
 
 /// The port of a controller without measurement and calibration; it has no value.
 #[derive(Clone, Copy, Debug)]
 pub enum NoPort {}
 
-impl CalibrationPort for NoPort {
-    fn take(&mut self, _: &CanFrame) -> bool {
-        match *self {}
-    }
-
-    fn restart(&mut self) {
-        match *self {}
-    }
-
-    fn observe(&mut self, _: &AxisController, _: u64, _: &Sensors, _: &ValveCommand) {
-        match *self {}
-    }
-
-    fn serve(&mut self, _: &mut Program, _: &mut dyn Bus) {
-        match *self {}
-    }
-}
+impl CalibrationPort for NoPort {}
 
 /// The controllers of a process on the bus.
 pub struct ControllerNode<P = NoPort> {
@@ -322,11 +303,15 @@ impl<P: CalibrationPort> ControllerNode<P> {
 
     fn send(&mut self, place: usize, cycle: u64, answer: &Answer, bus: &mut dyn Bus) {
         let axis = self.members[place].controller.axis();
-        send(bus, &command_frame(axis, answer.command));
+        send(bus, &frame(axis, [Frame::DriveValveCommand, Frame::LoadValveCommand], answer.command));
         let frames = [
             answer.emergency_stop.map(|stop| emergency_stop_frame(axis, stop)),
-            answer.status.map(|status| status_frame(axis, status)),
-            answer.values.map(|values| values_frame(axis, values)),
+            answer
+                .status
+                .map(|status| frame(axis, [Frame::DriveChainStatus, Frame::LoadChainStatus], status)),
+            answer
+                .values
+                .map(|values| frame(axis, [Frame::DriveChainValues, Frame::LoadChainValues], values)),
         ];
         for frame in frames.into_iter().flatten() {
             self.send_to_all(place, cycle, &frame, bus);
@@ -379,12 +364,6 @@ impl<P: CalibrationPort> ControllerNode<P> {
         self.members.iter().find(|member| member.controller.axis() == axis)
     }
 
-    /// Whether `axis` is one of ours.
-    #[must_use]
-    pub fn has(&self, axis: Axis) -> bool {
-        self.controllers().any(|controller| controller.axis() == axis)
-    }
-
     /// Whether all of them are done.
     #[must_use]
     pub fn done(&self) -> bool {
@@ -428,32 +407,13 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 }
 
-fn command_frame(axis: Axis, command: ValveCommand) -> Frame {
-    match axis {
-        Axis::Drive => Frame::DriveValveCommand(command),
-        Axis::Load => Frame::LoadValveCommand(command),
-    }
+/// Content in the frame of an axis: that of the drive or that of the load.
+fn frame<T>(axis: Axis, of: [fn(T) -> Frame; 2], content: T) -> Frame {
+    of[axis.index()](content)
 }
 
 fn emergency_stop_frame(axis: Axis, stop: EmergencyStop) -> Frame {
-    match axis {
-        Axis::Drive => Frame::DriveEmergencyStop(stop),
-        Axis::Load => Frame::LoadEmergencyStop(stop),
-    }
-}
-
-fn status_frame(axis: Axis, status: ChainStatus) -> Frame {
-    match axis {
-        Axis::Drive => Frame::DriveChainStatus(status),
-        Axis::Load => Frame::LoadChainStatus(status),
-    }
-}
-
-fn values_frame(axis: Axis, values: ChainValues) -> Frame {
-    match axis {
-        Axis::Drive => Frame::DriveChainValues(values),
-        Axis::Load => Frame::LoadChainValues(values),
-    }
+    frame(axis, [Frame::DriveEmergencyStop, Frame::LoadEmergencyStop], stop)
 }
 
 fn encode(frame: &Frame) -> CanFrame {
@@ -475,6 +435,7 @@ fn send(bus: &mut dyn Bus, frame: &Frame) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol::frames::ChainStatus;
 
     #[test]
     fn mail_is_heard_in_the_cycle_after_it_was_sent() {

@@ -38,9 +38,6 @@ pub struct Setting {
 type Sections = BTreeMap<String, BTreeMap<String, BTreeMap<String, Spanned<toml::Value>>>>;
 
 /// Reads a set.
-///
-/// # Errors
-/// [`ParameterSetError`] when the file cannot be read or is no TOML of this form.
 pub fn read(path: &Path) -> Result<Vec<Setting>, ParameterSetError> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| ParameterSetError(format!("cannot read {}: {error}", path.display())))?;
@@ -48,9 +45,6 @@ pub fn read(path: &Path) -> Result<Vec<Setting>, ParameterSetError> {
 }
 
 /// The set in a text; `file` is for messages.
-///
-/// # Errors
-/// [`ParameterSetError`] for what is no TOML of this form.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, ParameterSetError> {
     let sections: Sections = toml::from_str(text).map_err(|error| {
         ParameterSetError(format!("{file}: {error}expected are tables such as [drive.algorithm]"))

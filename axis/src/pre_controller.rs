@@ -60,9 +60,7 @@ impl Geometry {
             Axis::Load => self.stroke_m - position_m,
         }
     }
-}
 
-impl Geometry {
     /// Rig coordinate at an extension of the own rod, m.
     #[must_use]
     pub fn position_m(&self, extension_m: f64) -> f64 {
@@ -120,7 +118,6 @@ impl PreController {
         Self { geometry, memory: None }
     }
 
-    /// Where the axis lies.
     #[must_use]
     pub fn geometry(&self) -> &Geometry {
         &self.geometry

@@ -37,7 +37,6 @@ const STALLED: u64 = 100;
 pub struct Variable {
     /// Task and name, such as `algorithm.gain_per_s`.
     pub name: String,
-    /// Unit, range, default, meaning.
     pub parameter: Parameter,
 }
 
@@ -53,9 +52,7 @@ pub struct Demand {
 /// Which algorithm has the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hand {
-    /// The user's.
     User,
-    /// The force chain's.
     ForceChain,
 }
 
@@ -72,13 +69,9 @@ struct Slot {
 /// A part of the program that is no algorithm and has numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
-    /// The pre-controller.
     PreController,
-    /// The post-controller.
     PostController,
-    /// The force chain.
     ForceChain,
-    /// The matching chain.
     MatchingChain,
     /// What counts as settled; read once, at the start.
     Settled,
@@ -166,10 +159,7 @@ impl Program {
 
     /// The valve is shut: whatever has the axis next begins anew.
     pub fn shut(&mut self) {
-        self.user.stepped = None;
-        if let Some(giving_way) = &mut self.giving_way {
-            giving_way.slot.stepped = None;
-        }
+        self.slots().for_each(|slot| slot.stepped = None);
         self.post_stepped = None;
         self.output = Output::default();
         self.ready.applied_velocity_m_per_s = 0.0;
@@ -179,10 +169,7 @@ impl Program {
     pub fn restart(&mut self) {
         self.restart_algorithms();
         self.shut();
-        self.user.wanted_m_per_s = 0.0;
-        if let Some(giving_way) = &mut self.giving_way {
-            giving_way.slot.wanted_m_per_s = 0.0;
-        }
+        self.slots().for_each(|slot| slot.wanted_m_per_s = 0.0);
         self.pre.restart();
         self.post.restart();
         self.ready = Ready::default();
@@ -191,10 +178,12 @@ impl Program {
 
     /// Takes latched faults away: the chain begins anew.
     pub fn restart_algorithms(&mut self) {
-        self.user.algorithm.restart();
-        if let Some(giving_way) = &mut self.giving_way {
-            giving_way.slot.algorithm.restart();
-        }
+        self.slots().for_each(|slot| slot.algorithm.restart());
+    }
+
+    fn slots(&mut self) -> impl Iterator<Item = &mut Slot> {
+        std::iter::once(&mut self.user)
+            .chain(self.giving_way.iter_mut().map(|giving_way| &mut giving_way.slot))
     }
 
     /// Tells the algorithm of the force chain what the chain has decided.
@@ -271,7 +260,6 @@ impl Program {
         &self.variables
     }
 
-    /// Values of the variables.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values

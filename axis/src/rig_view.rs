@@ -79,18 +79,25 @@ struct Account {
 #[derive(Default)]
 pub struct RigView {
     cycle: Option<u64>,
-    skipped: u64,
+    /// Cycles that the rig says it skipped.
+    pub skipped: u64,
     sensors: [Option<Sensors>; 2],
     recent: [Recent; 2],
     /// Cycle of the newest sensors of each axis.
     newest: [Option<u64>; 2],
     fresh: [bool; 2],
-    received: PerAxis,
-    late: PerAxis,
-    duplicate: PerAxis,
+    /// Sensor frames received.
+    pub received: PerAxis,
+    /// Sensor frames that came after newer ones of their axis.
+    pub late: PerAxis,
+    /// Sensor frames that came again.
+    pub duplicate: PerAxis,
     account: Option<Account>,
-    lost: PerAxis,
-    missed_before_first_tick: PerAxis,
+    /// Sensor frames that never came.
+    pub lost: PerAxis,
+    /// Sensor frames that the rig had sent by its first tick that came, and that did not come: lost ones, and those from before
+    /// the bus was joined.
+    pub missed_before_first_tick: PerAxis,
     /// With the cycle in which it came.
     status: Option<(u64, RigStatus)>,
 }
@@ -214,43 +221,6 @@ impl RigView {
         let (came, status) = self.status.as_ref()?;
         let age = self.cycle.map_or(0, |cycle| cycle.saturating_sub(*came));
         (age <= STATUS_HOLDS_CYCLES).then_some(status)
-    }
-
-    /// Sensor frames received.
-    #[must_use]
-    pub fn received(&self) -> PerAxis {
-        self.received
-    }
-
-    /// Sensor frames that never came.
-    #[must_use]
-    pub fn lost(&self) -> PerAxis {
-        self.lost
-    }
-
-    /// Sensor frames that came after newer ones of their axis.
-    #[must_use]
-    pub fn late(&self) -> PerAxis {
-        self.late
-    }
-
-    /// Sensor frames that came again.
-    #[must_use]
-    pub fn duplicate(&self) -> PerAxis {
-        self.duplicate
-    }
-
-    /// Sensor frames that the rig had sent by its first tick that came, and that did not come: lost ones, and those from before
-    /// the bus was joined.
-    #[must_use]
-    pub fn missed_before_first_tick(&self) -> PerAxis {
-        self.missed_before_first_tick
-    }
-
-    /// Cycles that the rig says it skipped.
-    #[must_use]
-    pub fn skipped(&self) -> u64 {
-        self.skipped
     }
 }
 

@@ -1,11 +1,11 @@
 //! What a run reads before it starts: rig, experiment and programs, checked; and the controllers made of them.
 
-use crate::axis::{AxisController, AxisParts, ForcePlan, Plan, PlannedChange, PositionPlan, PrepareStep};
+use crate::axis::{AxisController, AxisParts, ForcePlan, Plan, PlannedChange};
 use crate::chains::main::{Lengths, MainConfig, approach_s};
 use crate::chains::matching;
 use crate::chains::settled::Bounds;
-use crate::chains::{AfterStop, force, main};
-use crate::experiment::{AxisExperiment, During, Experiment, Prepare, SetPoints};
+use crate::chains::{AfterStop, force};
+use crate::experiment::{AxisExperiment, Experiment, Prepare, SetPoints};
 use crate::parameter_set::{self, Setting};
 use crate::program::file::Source;
 use crate::program::{Program, Task};
@@ -67,7 +67,7 @@ pub struct FileArguments {
 pub struct Inputs {
     /// Nominal numbers of the rig.
     pub rig: RigParameters,
-    /// The rig file as it stands.
+    /// The rig file as it stands; empty where there is none.
     pub rig_toml: String,
     /// The experiment.
     pub experiment: Experiment,
@@ -93,9 +93,6 @@ pub struct Mode {
 
 impl Inputs {
     /// Reads and checks the files.
-    ///
-    /// # Errors
-    /// [`InputError`] with file, line, key, value and allowed range.
     pub fn read(files: &FileArguments) -> Result<Self, InputError> {
         let rig_toml = read(&files.rig)?;
         let rig =
@@ -108,13 +105,8 @@ impl Inputs {
             )));
         }
         let experiment_toml = read(&files.experiment)?;
-        let mut experiment =
-            Experiment::from_toml(&experiment_toml, &files.experiment, stroke_m).map_err(InputError::of)?;
-        let run = &mut experiment.run;
-        run.after_emergency_stop = files.after_emergency_stop.unwrap_or(run.after_emergency_stop);
         let given = [&files.drive_program, &files.load_program];
-        let mut programs = [None, None];
-        for (axis, section) in sections(&experiment) {
+        let source_of = |axis: Axis, section: &AxisExperiment| {
             let path = match (given[axis.index()], &files.programs) {
                 (Some(path), _) => path.clone(),
                 (None, Some(folder)) if !section.program.written.ends_with(".toml") => {
@@ -122,20 +114,21 @@ impl Inputs {
                 }
                 (None, _) => section.program_path(&files.experiment),
             };
-            programs[axis.index()] = Some(Source::read(&path).map_err(|error| {
+            Source::read(&path).map_err(|error| {
                 let place = format!("{}:{}", files.experiment.display(), section.program.line);
                 InputError(format!("{place}: program of the {} axis: {error}", axis.name()))
-            })?);
-        }
-        let mut overrides = match &files.parameters {
-            Some(path) => parameter_set::read(path).map_err(InputError::of)?,
-            None => Vec::new(),
+            })
         };
-        for text in &files.set {
-            overrides.push(parse_override(text)?);
+        let mut inputs = Self::without_overrides(rig, &files.experiment, experiment_toml, source_of)?;
+        inputs.rig_toml = rig_toml;
+        let run = &mut inputs.experiment.run;
+        run.after_emergency_stop = files.after_emergency_stop.unwrap_or(run.after_emergency_stop);
+        if let Some(path) = &files.parameters {
+            inputs.overrides = parameter_set::read(path).map_err(InputError::of)?;
         }
+        inputs.set(&files.set)?;
         if let Some(Setting { axis, name, place, .. }) =
-            overrides.iter().find(|setting| programs[setting.axis.index()].is_none())
+            inputs.overrides.iter().find(|setting| inputs.programs[setting.axis.index()].is_none())
         {
             let axis = axis.name();
             return Err(InputError(format!(
@@ -143,8 +136,30 @@ impl Inputs {
                 files.experiment.display()
             )));
         }
-        let experiment_file = files.experiment.clone();
+        Ok(inputs)
+    }
+
+    fn without_overrides(
+        rig: RigParameters,
+        file: &Path,
+        experiment_toml: String,
+        source_of: impl Fn(Axis, &AxisExperiment) -> Result<Source, InputError>,
+    ) -> Result<Self, InputError> {
+        let experiment =
+            Experiment::from_toml(&experiment_toml, file, rig.cylinder().stroke_m).map_err(InputError::of)?;
+        let mut programs = [None, None];
+        for (axis, section) in sections(&experiment) {
+            programs[axis.index()] = Some(source_of(axis, section)?);
+        }
+        let (rig_toml, overrides, experiment_file) = (String::new(), Vec::new(), file.to_owned());
         Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
+    }
+
+    fn set(&mut self, texts: &[impl AsRef<str>]) -> Result<(), InputError> {
+        for text in texts {
+            self.overrides.push(parse_override(text.as_ref())?);
+        }
+        Ok(())
     }
 
     /// The same for texts that no file holds: an experiment under a name for messages, and the text of a program by its name.
@@ -174,28 +189,17 @@ impl Inputs {
         source_of: impl Fn(Axis, &str) -> Option<Source>,
         set: &[impl AsRef<str>],
     ) -> Result<Self, InputError> {
-        let experiment =
-            Experiment::from_toml(experiment_toml, file, rig.cylinder().stroke_m).map_err(InputError::of)?;
-        let mut programs = [None, None];
-        for (axis, section) in sections(&experiment) {
+        let source_of = |axis, section: &AxisExperiment| {
             let written = &section.program.written;
-            let source = source_of(axis, written).ok_or_else(|| {
-                InputError(format!("{}: no program {written} is known here", file.display()))
-            })?;
-            programs[axis.index()] = Some(source);
-        }
-        let overrides =
-            set.iter().map(|text| parse_override(text.as_ref())).collect::<Result<Vec<_>, _>>()?;
-        let (rig, experiment_toml) = (rig.clone(), experiment_toml.to_owned());
-        let rig_toml = String::new();
-        let experiment_file = file.to_owned();
-        Ok(Self { rig, rig_toml, experiment, experiment_toml, programs, overrides, experiment_file })
+            source_of(axis, written)
+                .ok_or_else(|| InputError(format!("{}: no program {written} is known here", file.display())))
+        };
+        let mut inputs = Self::without_overrides(rig.clone(), file, experiment_toml.to_owned(), source_of)?;
+        inputs.set(set)?;
+        Ok(inputs)
     }
 
     /// The controller of `axis`.
-    ///
-    /// # Errors
-    /// [`InputError`] when program and experiment do not go together.
     pub fn controller(&self, axis: Axis, mode: Mode) -> Result<AxisController, InputError> {
         let section =
             sections(&self.experiment).find(|(other, _)| *other == axis).map(|(_, section)| section);
@@ -245,17 +249,13 @@ impl Inputs {
         if asked == able {
             return self.check_gives_way(axis, section, program);
         }
-        let name = |quantity| match quantity {
-            Quantity::Position => "positions",
-            Quantity::Force => "forces",
-        };
         Err(InputError(format!(
-            "{}:{}: the {} axis has set-points of {}, and its program controls {}; choose another program",
+            "{}:{}: the {} axis has set-points of {}s, and its program controls {}s; choose another program",
             self.experiment_file.display(),
             section.program.line,
             axis.name(),
-            name(asked),
-            name(able)
+            asked.name(),
+            able.name()
         )))
     }
 
@@ -325,7 +325,6 @@ impl Inputs {
             repetitions: (!mode.forever).then_some(run.repetitions),
             settling_s: run.settling_s,
             settling_timeout_s: run.settling_timeout_s,
-            partner_timeout_s: main::PARTNER_TIMEOUT_S,
             start: run.start,
             after_emergency_stop: run.after_emergency_stop,
             settled: Bounds::of(program.task(Task::Settled)),
@@ -355,21 +354,12 @@ fn lengths(section: &AxisExperiment, program: &Program) -> Lengths {
 
 fn plan(section: &AxisExperiment) -> Plan {
     match &section.set_points {
-        SetPoints::Positions(motion) => {
-            Plan::Position(PositionPlan { motion: motion.clone(), by_hand: section.by_hand })
-        }
+        SetPoints::Positions(motion) => Plan::Position { motion: motion.clone(), by_hand: section.by_hand },
         SetPoints::Forces(profile) => Plan::Force(ForcePlan {
             source: ForceSource::new(profile.clone()),
             initial_ramp_s: section.initial_ramp_s,
-            prepare: section
-                .prepare
-                .iter()
-                .map(|step| match step {
-                    Prepare::Relieve => PrepareStep::Relieve,
-                    Prepare::Match => PrepareStep::Match,
-                })
-                .collect(),
-            manual: section.during == During::Manual,
+            prepare: section.prepare.clone(),
+            manual: section.manual,
             by_hand: section.by_hand,
         }),
     }

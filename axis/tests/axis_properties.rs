@@ -4,32 +4,21 @@
 //! Whatever comes, the opening is a number within the valve, and the valve is shut in every state that has no control.
 
 use axis_control::axis::{Answer, AxisController};
-use axis_control::setup::{Inputs, Mode};
 use plant::Axis;
 use proptest::prelude::*;
 use protocol::frames::{
     ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, EmergencyStopReason, Frame,
     MainChainState, RigStatus, RunControl, RunControlCommand, Sensors,
 };
-use std::path::Path;
 
 const POSITION_PROGRAMS: [&str; 4] = ["position-p", "position-pid", "position-cascade", "position-linked"];
 const FORCE_PROGRAMS: [&str; 3] = ["force-p", "force-pid-map", "force-manual"];
 
 /// The controller of `axis` for the shipped experiment load-step, with another program.
 fn controller(axis: Axis, program: &str) -> AxisController {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let path = |name: &str| root.join(name).display().to_string();
-    let arguments = [
-        "--rig",
-        &path("../plant/rig.toml"),
-        "--experiment",
-        &path("../controller/experiments/load-step.toml"),
-        &format!("--{}-program", axis.name()),
-        &path(&format!("../controller/programs/{program}.toml")),
-    ];
-    let mode = Mode { partner_needed: true, real_time: false, forever: false };
-    Inputs::read(&crate::files(&arguments)).unwrap().controller(axis, mode).unwrap()
+    let program = crate::shipped(&format!("controller/programs/{program}.toml"));
+    let further = [format!("--{}-program", axis.name()), program.display().to_string()];
+    crate::controller(axis, &crate::shipped("controller/experiments/load-step.toml"), true, &further)
 }
 
 /// What happens in a cycle besides the sensors.
@@ -58,19 +47,7 @@ fn sensors() -> impl Strategy<Value = Sensors> {
 }
 
 fn main_state() -> impl Strategy<Value = MainChainState> {
-    use MainChainState as S;
-    prop_oneof![
-        Just(S::WaitingForRig),
-        Just(S::InitialPositioning),
-        Just(S::Preparing),
-        Just(S::InitialForce),
-        Just(S::Settling),
-        Just(S::Experiment),
-        Just(S::FinalSettling),
-        Just(S::Done),
-        Just(S::Aborted),
-        Just(S::Fault),
-    ]
+    (0..10_u8).prop_map(|raw| MainChainState::from_raw(raw).expect("there are ten"))
 }
 
 fn happening() -> impl Strategy<Value = Happening> {

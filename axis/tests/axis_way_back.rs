@@ -4,58 +4,35 @@
 use axis_control::axis::{Answer, AxisController};
 use axis_control::chains::Fault;
 use axis_control::chains::main::MainCause;
-use axis_control::setup::{Inputs, Mode};
 use plant::Axis;
 use protocol::frames::{
     ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, EmergencyStopReason, Frame,
     MainChainState, RigStatus, Sensors,
 };
-use std::path::Path;
 
 /// Initial force of the experiment.
 const PRESSED_N: f64 = 100.0;
-const LINKED: RigStatus = RigStatus { supply_pressure_pa: 7e5, linked: true, ..NOTHING };
-const NOTHING: RigStatus = RigStatus {
-    supply_pressure_pa: 0.0,
-    linked: false,
-    emergency_stop: false,
-    check_valves_shut: false,
-    drive_position_saturated: false,
-    drive_force_saturated: false,
-    drive_pressure_a_saturated: false,
-    drive_pressure_b_saturated: false,
-    load_position_saturated: false,
-    load_force_saturated: false,
-    load_pressure_a_saturated: false,
-    load_pressure_b_saturated: false,
-    drive_stale: false,
-    load_stale: false,
-    drive_two_sources: false,
-    load_two_sources: false,
-};
+
+fn linked() -> RigStatus {
+    RigStatus { supply_pressure_pa: 7e5, linked: true, ..RigStatus::default() }
+}
+
+fn apart() -> RigStatus {
+    RigStatus { linked: false, ..linked() }
+}
 
 /// The controller of `axis` for a shipped experiment; after an emergency stop it begins anew by itself.
 fn controller(axis: Axis, experiment: &str, partner_needed: bool) -> AxisController {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().unwrap();
-    let text =
-        std::fs::read_to_string(root.join(format!("../controller/experiments/{experiment}.toml"))).unwrap();
+    let shipped = crate::shipped(&format!("controller/experiments/{experiment}.toml"));
+    let text = std::fs::read_to_string(shipped).unwrap();
     let restart = "[run]\nafter_emergency_stop = \"restart\"\n";
     let place = if text.contains("[run]\n") { "[run]\n" } else { "[rig]\n" };
     let restart = if place == "[rig]\n" { format!("{restart}[rig]\n") } else { restart.into() };
     let restarts = folder.path().join("experiment.toml");
     std::fs::write(&restarts, text.replacen(place, &restart, 1)).unwrap();
-    let path = |name: &str| root.join(name).display().to_string();
-    let arguments = [
-        "--rig",
-        &path("../plant/rig.toml"),
-        "--programs",
-        &path("../controller/programs"),
-        "--experiment",
-        &restarts.display().to_string(),
-    ];
-    let mode = Mode { partner_needed, real_time: false, forever: false };
-    Inputs::read(&crate::files(&arguments)).unwrap().controller(axis, mode).unwrap()
+    let programs = crate::shipped("controller/programs").display().to_string();
+    crate::controller(axis, &restarts, partner_needed, &["--programs".into(), programs])
 }
 
 /// An axis at rest, 0.1 m from the drive's end; the noise is a few steps of the wire.
@@ -109,7 +86,7 @@ fn a_settling_timeout_alone_is_released_by_the_console_and_the_run_begins_anew()
     let far = |cycle| Sensors { position_m: 0.4, ..sensors(cycle) };
     let mut cycle = 0;
     while drive.state() != MainChainState::Fault {
-        drive.answer(cycle, &far(cycle), Some(&RigStatus { linked: false, ..LINKED }));
+        drive.answer(cycle, &far(cycle), Some(&apart()));
         cycle += 1;
         assert!(cycle < 60_000, "{:?}", drive.state());
     }
@@ -121,7 +98,7 @@ fn a_settling_timeout_alone_is_released_by_the_console_and_the_run_begins_anew()
             let reason = EmergencyStopReason::Operator;
             drive.hear(&Frame::ConsoleEmergencyStop(EmergencyStop { reason, release: true }));
         }
-        let rig = RigStatus { emergency_stop: holds, check_valves_shut: holds, ..LINKED };
+        let rig = RigStatus { emergency_stop: holds, check_valves_shut: holds, ..linked() };
         let answer = drive.answer(cycle + passed, &far(cycle), Some(&rig));
         if let Some(stop) = answer.emergency_stop {
             withdrawn += u32::from(stop.release);
@@ -137,19 +114,19 @@ fn a_settling_timeout_alone_is_released_by_the_console_and_the_run_begins_anew()
 fn a_restarted_controller_answers_as_a_new_one() {
     for axis in Axis::ALL {
         let mut used = controller(axis, "load-step", true);
-        let cycles = run_to(&mut used, MainChainState::Experiment, &LINKED);
+        let cycles = run_to(&mut used, MainChainState::Experiment, &linked());
         if axis == Axis::Load {
             assert!((used.program().geometry().offset_m - 0.8e-3).abs() < 1e-4, "the offset was matched");
         }
         for cycle in cycles..cycles + 333 {
-            step(&mut used, cycle, &sensors(cycle), Some(&LINKED));
+            step(&mut used, cycle, &sensors(cycle), Some(&linked()));
         }
         used.restart();
         let mut new = controller(axis, "load-step", true);
         for cycle in 0..cycles + 500 {
-            let rig = (cycle > 5).then_some(&LINKED);
+            let rig = (cycle > 5).then(linked);
             let [one, other] = [&mut used, &mut new].map(|controller| {
-                let answer = step(controller, cycle, &sensors(cycle), rig);
+                let answer = step(controller, cycle, &sensors(cycle), rig.as_ref());
                 let record = answer.record.map(|record| format!("{record:?}"));
                 (answer.command, answer.emergency_stop, answer.status, answer.values, record)
             });
@@ -161,30 +138,29 @@ fn a_restarted_controller_answers_as_a_new_one() {
 
 #[test]
 fn an_axis_that_presses_needs_linked_rods_before_and_in_the_experiment() {
-    let apart = RigStatus { linked: false, ..LINKED };
     let mut load = controller(Axis::Load, "load-step", true);
-    run_to(&mut load, MainChainState::Fault, &apart);
+    run_to(&mut load, MainChainState::Fault, &apart());
     assert_eq!(load.cause(), MainCause::Fault(Fault::NotLinked));
 
     let mut load = controller(Axis::Load, "load-step", true);
-    let cycle = run_to(&mut load, MainChainState::Experiment, &LINKED);
-    let answer = step(&mut load, cycle, &sensors(cycle), Some(&apart));
+    let cycle = run_to(&mut load, MainChainState::Experiment, &linked());
+    let answer = step(&mut load, cycle, &sensors(cycle), Some(&apart()));
     assert!(!answer.command.enable, "shut in the cycle that tells");
     assert_eq!(answer.emergency_stop.map(|stop| stop.release), Some(false));
-    step(&mut load, cycle + 1, &sensors(cycle), Some(&apart));
+    step(&mut load, cycle + 1, &sensors(cycle), Some(&apart()));
     assert_eq!(load.cause(), MainCause::Fault(Fault::NotLinked));
 }
 
 #[test]
 fn a_hand_may_move_an_axis_whose_rods_are_apart() {
     let mut load = controller(Axis::Load, "manual-let-go", true);
-    run_to(&mut load, MainChainState::Done, &RigStatus { linked: false, ..LINKED });
+    run_to(&mut load, MainChainState::Done, &apart());
 }
 
 #[test]
 fn a_rig_that_says_nothing_of_itself_for_a_while_ends_no_run() {
     let mut load = controller(Axis::Load, "load-step", true);
-    let cycle = run_to(&mut load, MainChainState::Experiment, &LINKED);
+    let cycle = run_to(&mut load, MainChainState::Experiment, &linked());
     for cycle in cycle..cycle + 1000 {
         let answer = step(&mut load, cycle, &sensors(cycle), None);
         assert!(answer.command.enable, "cycle {cycle}");
@@ -195,8 +171,8 @@ fn a_rig_that_says_nothing_of_itself_for_a_while_ends_no_run() {
 #[test]
 fn a_force_beyond_the_sensors_range_ends_the_run_after_half_a_second() {
     let mut drive = controller(Axis::Drive, "load-step", true);
-    let cycle = run_to(&mut drive, MainChainState::Experiment, &LINKED);
-    let beyond = RigStatus { drive_force_saturated: true, ..LINKED };
+    let cycle = run_to(&mut drive, MainChainState::Experiment, &linked());
+    let beyond = RigStatus { drive_force_saturated: true, ..linked() };
     let ends = (cycle..cycle + 2000).find(|cycle| {
         step(&mut drive, *cycle, &sensors(*cycle), Some(&beyond));
         drive.state() == MainChainState::Fault

@@ -1,22 +1,15 @@
 //! A rig that skips cycles, or a process that misses some: nothing that was due is dropped, and nobody is blamed for silence.
 
 use axis_control::axis::{Answer, AxisController};
-use axis_control::setup::{Inputs, Mode};
 use plant::Axis;
 use protocol::frames::{ChainStatus, Frame, MainChainState, RigStatus, Sensors};
-use std::path::Path;
 
 /// Experiment number of load-step.
 const NUMBER: u8 = 9;
 
 /// The drive's controller for the shipped experiment load-step.
 fn drive() -> AxisController {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let path = |name: &str| root.join(name).display().to_string();
-    let [rig, experiment] = [path("../plant/rig.toml"), path("../controller/experiments/load-step.toml")];
-    let line = ["--rig", &rig, "--experiment", &experiment];
-    let mode = Mode { partner_needed: true, real_time: false, forever: false };
-    Inputs::read(&crate::files(&line)).unwrap().controller(Axis::Drive, mode).unwrap()
+    crate::controller(Axis::Drive, &crate::shipped("controller/experiments/load-step.toml"), true, &[])
 }
 
 fn answer(drive: &mut AxisController, cycle: u64) -> Answer {

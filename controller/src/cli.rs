@@ -85,7 +85,6 @@ pub(crate) enum Axes {
 
 impl Axes {
     /// The axes, in the order in which they are answered.
-    #[must_use]
     pub(crate) fn list(self) -> &'static [Axis] {
         match self {
             Self::Drive => &[Axis::Drive],

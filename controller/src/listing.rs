@@ -3,7 +3,6 @@
 use crate::cli::{A2lArguments, OneAxis};
 use crate::run::RunError;
 use algorithms::SHIPPED;
-use algorithms::algorithm::Quantity;
 use axis_control::axis::AxisController;
 use axis_control::chains::{force, matching, settled};
 use axis_control::setup::{FileArguments, Inputs, Mode};
@@ -15,7 +14,6 @@ use std::io::{self, Write};
 use xcp::a2l::{self, Described};
 
 /// Prints the list.
-#[must_use]
 pub(crate) fn print() -> Exit {
     // A closed pipe is the reader's wish.
     let _ = write(&mut io::stdout().lock());
@@ -23,9 +21,6 @@ pub(crate) fn print() -> Exit {
 }
 
 /// Prints the parameters of the axes that the experiment speaks of, as a parameter set.
-///
-/// # Errors
-/// [`RunError::Input`] for files that cannot be used.
 pub(crate) fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(files)?;
     let mut texts = Vec::new();
@@ -40,9 +35,6 @@ pub(crate) fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> 
 }
 
 /// Prints the A2L file of an axis.
-///
-/// # Errors
-/// [`RunError::Input`] for files that cannot be used.
 pub(crate) fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(&arguments.files)?;
     let axis = match arguments.axis {
@@ -63,10 +55,7 @@ fn controller(inputs: &Inputs, axis: Axis) -> Result<AxisController, RunError> {
 
 fn write(out: &mut impl Write) -> io::Result<()> {
     for kind in SHIPPED {
-        let controls = match kind.controls {
-            Quantity::Position => "position",
-            Quantity::Force => "force",
-        };
+        let controls = kind.controls.name();
         writeln!(out, "[algorithm] name = \"{}\"   controls {controls}\n{}", kind.name, kind.about)?;
         table(out, kind.parameters)?;
     }

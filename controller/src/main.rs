@@ -3,14 +3,13 @@
 //! | file | holds |
 //! |---|---|
 //! | [`cli`], [`listing`] | command line, and the commands that print |
-//! | [`run`], [`pace`] | a run: threads; the node goes on frames or the barrier; [`farewell`]: how it leaves the bus |
+//! | [`run`], [`pace`] | a run: threads; the node goes on frames or the barrier, and leaves the bus |
 //! | [`rehearse`] | the command of a rehearsal |
 //! | [`timing`] | when everything of a cycle happened; histograms, timing tables, flight recorder |
 //! | [`recording`], [`report`] | tables and report of a run |
 //! | [`reload`] | numbers of changed program files, taken over while running |
 
 mod cli;
-mod farewell;
 mod listing;
 mod pace;
 mod recording;

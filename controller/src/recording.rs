@@ -31,9 +31,6 @@ pub(crate) struct Tables {
 
 impl Tables {
     /// Makes a table for each axis in `folder`.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub(crate) fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
         let tables = axes.iter().map(|axis| {
             let mut table = LineFile::create(&folder.join(format!("controller-{}.csv", axis.name())))?;
@@ -44,9 +41,6 @@ impl Tables {
     }
 
     /// Appends a row to the table of its axis.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub(crate) fn write(&mut self, record: &AxisRecord) -> io::Result<()> {
         let Some((_, table)) = self.tables.iter_mut().find(|(axis, _)| *axis == record.axis) else {
             return Ok(());
@@ -83,9 +77,6 @@ impl Tables {
     }
 
     /// Writes everything out.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub(crate) fn write_out(&mut self) -> io::Result<()> {
         self.tables.iter_mut().try_for_each(|(_, table)| table.write_out())
     }

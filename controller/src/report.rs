@@ -32,11 +32,11 @@ fn of_axis<P: CalibrationPort>(
         position_error_dynamic_m: controller.figures().dynamic_m(),
         position_error_static_m: controller.figures().static_m(),
         cycles_answered: node.answered_by(controller.axis()),
-        sensors_received: view.received().get(controller.axis()),
-        sensors_lost: Some(view.lost().get(controller.axis())),
-        sensors_late: view.late().get(controller.axis()),
-        sensors_duplicate: view.duplicate().get(controller.axis()),
-        sensors_missed_before_first_tick: Some(view.missed_before_first_tick().get(controller.axis())),
+        sensors_received: view.received.get(controller.axis()),
+        sensors_lost: Some(view.lost.get(controller.axis())),
+        sensors_late: view.late.get(controller.axis()),
+        sensors_duplicate: view.duplicate.get(controller.axis()),
+        sensors_missed_before_first_tick: Some(view.missed_before_first_tick.get(controller.axis())),
         matched_offset_m: program.geometry().offset_m,
         program_toml: source.map(|source| source.text.clone()),
         program_file: source.map(|source| source.path.display().to_string()),
@@ -51,7 +51,6 @@ fn of_axis<P: CalibrationPort>(
 }
 
 /// Of every controller of a node, without what XCP did.
-#[must_use]
 pub(crate) fn of_node<P: CalibrationPort>(
     node: &ControllerNode<P>,
     inputs: &Inputs,
@@ -62,13 +61,11 @@ pub(crate) fn of_node<P: CalibrationPort>(
 }
 
 /// Whether the axis ended what it was asked for.
-#[must_use]
 pub(crate) fn is_done(axis: &AxisReport) -> bool {
     axis.chain_state == MainChainState::Done.name()
 }
 
 /// The axis that was stopped, the one with the fault before one that only followed it.
-#[must_use]
 pub(crate) fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &AxisReport)> {
     [MainChainState::Fault, MainChainState::Aborted].iter().find_map(|state| {
         let (name, axis) = axes.iter().find(|(_, axis)| axis.chain_state == state.name())?;
@@ -77,7 +74,6 @@ pub(crate) fn stopped(axes: &BTreeMap<String, AxisReport>) -> Option<(&str, &Axi
 }
 
 /// Name of the report of a process with these axes, without its ending.
-#[must_use]
 pub(crate) fn name(axes: &[Axis]) -> String {
     match axes {
         [axis] => format!("controller-{}", axis.name()),

@@ -2,7 +2,6 @@
 
 use crate::Node;
 use crate::cli::{Axes, Pace, RunArguments};
-use crate::farewell;
 use crate::pace::{self, End, RunContext, RunOutcome};
 use crate::recording::{Tables, Writer, Written};
 use crate::reload::Reloader;
@@ -60,7 +59,6 @@ pub(crate) enum RunError {
 
 impl RunError {
     /// The exit code that the error leads to.
-    #[must_use]
     pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(BusError::NoBarrier { .. }) => Exit::BadInput,
@@ -247,7 +245,7 @@ impl Work<'_> {
             None => pace::run_lockstep(context, member_name(arguments.axis))?,
         };
         if arguments.pace == Pace::Real {
-            farewell::hear_out(bus, outcome.end == End::RigEnded);
+            pace::hear_out(bus, outcome.end == End::RigEnded);
         }
         let mut axes = report::of_node(&node, inputs);
         for axis in Axis::ALL {
@@ -261,7 +259,7 @@ impl Work<'_> {
             bus: *bus.counters(),
             axes,
             answered: node.answered(),
-            skipped: node.view().skipped(),
+            skipped: node.view().skipped,
             ignored: node.ignored(),
             records_dropped: node.records_dropped(),
         })

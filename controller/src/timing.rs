@@ -110,7 +110,6 @@ impl<C: Clock + Send> Stopwatch<C> {
     ///
     /// # Panics
     /// Without axes: no process has none.
-    #[must_use]
     pub(crate) fn new(clock: C, axes: &[Axis], outlets: Outlets) -> Self {
         let wakes = *axes.first().expect("a process controls an axis");
         let own = Axis::ALL.map(|axis| axes.contains(&axis));

@@ -39,9 +39,6 @@ pub fn scene(inputs: &Inputs, file: &str) -> Result<Scene, RehearsalError> {
 }
 
 /// A rehearsal of what was read.
-///
-/// # Errors
-/// [`RehearsalError`] when rig and scene, or experiment and programs, do not go together.
 pub fn of_inputs(
     inputs: &Inputs,
     scene: &Scene,
@@ -62,9 +59,6 @@ pub struct PlantTables {
 
 impl PlantTables {
     /// Makes the tables in `folder`.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub fn create(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<Self> {
         let mut measurement = LineFile::create(&folder.join("measurement.csv"))?;
         let mut truth = LineFile::create(&folder.join("truth.csv"))?;
@@ -74,9 +68,6 @@ impl PlantTables {
     }
 
     /// Appends the rows of a cycle.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub fn write(&mut self, cycle: &CycleRecord) -> io::Result<()> {
         tables::write_measurement(self.measurement.lines(), cycle)?;
         tables::write_truth(self.truth.lines(), cycle)?;
@@ -85,9 +76,6 @@ impl PlantTables {
     }
 
     /// Writes what is still in memory.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub fn write_out(&mut self) -> io::Result<()> {
         self.measurement.write_out()?;
         self.truth.write_out()

@@ -77,9 +77,6 @@ const COMMANDS: usize = 2;
 
 impl Rehearsal {
     /// A rehearsal of the plant before its first cycle.
-    ///
-    /// # Errors
-    /// [`SetupError`] if the rig cannot be set up so.
     pub fn new(parts: RehearsalParts<'_>) -> Result<Self, SetupError> {
         let RehearsalParts { rig, scene, seed, controllers } = parts;
         let plant = Plant::new(rig, &scene.setup())?;
@@ -165,11 +162,6 @@ impl<R: SimulatedRig> Rehearsal<R> {
     #[must_use]
     pub fn node(&self) -> &ControllerNode {
         &self.node
-    }
-
-    /// The controllers, whose programs may be changed between two cycles.
-    pub fn node_mut(&mut self) -> &mut ControllerNode {
-        &mut self.node
     }
 
     /// Cycles begun.

@@ -12,7 +12,6 @@ use protocol::frames::{
 /// The answer to the sensors of a cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
-    /// To the valve.
     pub command: ValveCommand,
     /// The axis's own emergency stop, when it is due.
     pub emergency_stop: Option<EmergencyStop>,
@@ -20,9 +19,7 @@ pub struct Answer {
     pub status: Option<ChainStatus>,
     /// Values of the chains, when they are due.
     pub values: Option<ChainValues>,
-    /// What a person is told.
     pub news: Option<News>,
-    /// A row of the record.
     pub record: Option<AxisRecord>,
 }
 
@@ -32,13 +29,9 @@ pub struct AxisRecord {
     pub axis: Axis,
     /// The rig's cycle whose sensors are answered.
     pub cycle: u64,
-    /// State of the main chain.
     pub main: MainChainState,
-    /// State of the force chain.
     pub force_chain: ForceChainState,
-    /// State of the matching chain.
     pub matching: MatchingChainState,
-    /// State of the emergency stop chain.
     pub emergency_stop: EmergencyStopChainState,
     /// Position asked for; `None` where none is.
     pub set_position: Option<SetPoint>,

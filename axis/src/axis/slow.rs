@@ -53,14 +53,14 @@ impl AxisController {
     #[must_use]
     pub fn status(&self) -> ChainStatus {
         let (main_chain, ok, repetition) =
-            self.leading.output().map_or((MainChainState::WaitingForRig, false, 0), |output| {
+            self.leading.output.map_or((MainChainState::WaitingForRig, false, 0), |output| {
                 (output.state, output.ok, output.repetition)
             });
         ChainStatus {
             main_chain,
             force_chain: self.work.force_chain(main_chain),
             matching_chain: self.work.matching_chain(),
-            emergency_stop_chain: self.leading.emergency_stop(),
+            emergency_stop_chain: self.leading.stop.state(),
             ok,
             experiment: self.main_config.experiment,
             // The counter wraps as its field in rig.dbc does.

@@ -21,7 +21,7 @@ use crate::chains::main::{MainConfig, MainOutput, Phase};
 use crate::chains::matching::{MatchingChain, MatchingInputs};
 use crate::chains::settled::ControlError;
 use crate::chains::{Fault, Partner};
-use crate::experiment::ByHandLimits;
+use crate::experiment::{ByHandLimits, Prepare};
 use crate::program::{Demand, Hand, Program, Task};
 use crate::set_point::{ForceSetPoint, ForceSource, Motion, SetPoint, SmoothWay};
 use algorithms::algorithm::Ready;
@@ -33,17 +33,13 @@ pub enum Plan {
     /// Its valve is shut.
     Shut,
     /// It is positioned.
-    Position(PositionPlan),
+    Position {
+        motion: Motion,
+        /// What positions given by hand keep to; `None`: none are followed.
+        by_hand: Option<ByHandLimits>,
+    },
     /// It presses.
     Force(ForcePlan),
-}
-
-/// What an axis that is positioned does in an experiment.
-#[derive(Clone, Debug)]
-pub struct PositionPlan {
-    pub motion: Motion,
-    /// What positions given by hand keep to; `None`: none are followed.
-    pub by_hand: Option<ByHandLimits>,
 }
 
 /// What an axis that presses does in an experiment.
@@ -54,20 +50,11 @@ pub struct ForcePlan {
     /// How long the ramp to the initial force takes, s.
     pub initial_ramp_s: f64,
     /// What is done before that.
-    pub prepare: Vec<PrepareStep>,
+    pub prepare: Vec<Prepare>,
     /// It gives way to a hand during the experiment, instead of pressing.
     pub manual: bool,
     /// What forces given by hand keep to; `None`: none are followed.
     pub by_hand: Option<ByHandLimits>,
-}
-
-/// A step before the initial force.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PrepareStep {
-    /// The stress of the linked system is relieved.
-    Relieve,
-    /// Both positions are matched.
-    Match,
 }
 
 /// What is asked of the program in a cycle.
@@ -111,7 +98,7 @@ impl Work {
     pub(super) fn new(plan: Plan, main: &MainConfig) -> Self {
         match plan {
             Plan::Shut => Self::Shut,
-            Plan::Position(PositionPlan { motion, by_hand }) => {
+            Plan::Position { motion, by_hand } => {
                 let start_m = main.start_m.unwrap_or(motion.start_m());
                 Self::Position { motion, start_m, by_hand: by_hand.map(ByHand::new) }
             }
@@ -145,7 +132,7 @@ impl Work {
                     Phase::Approach { elapsed_s, from_m, duration_s } => {
                         SmoothWay::new(from_m, *start_m, duration_s).position(elapsed_s)
                     }
-                    Phase::Prepare { .. } | Phase::RampForce { .. } | Phase::HoldStart => {
+                    Phase::Prepare | Phase::RampForce { .. } | Phase::HoldStart => {
                         SetPoint::at_rest(*start_m)
                     }
                     Phase::Experiment { elapsed_s } => {
@@ -252,8 +239,8 @@ impl Pressing {
         );
         self.told.0 = chain.state;
         self.fault = self.fault.or(chain.fault);
-        let relieving = self.plan.prepare.get(self.step) == Some(&PrepareStep::Relieve);
-        if matches!(output.phase, Phase::Prepare { .. }) && relieving && chain.relieved {
+        let relieving = self.plan.prepare.get(self.step) == Some(&Prepare::Relieve);
+        if matches!(output.phase, Phase::Prepare) && relieving && chain.relieved {
             self.step += 1;
         }
         match asked {
@@ -277,7 +264,7 @@ impl Pressing {
             _ if by_hand => ForceAsked::Manual,
             _ if !linked => ForceAsked::Idle,
             Phase::Approach { .. } => ForceAsked::Manual,
-            Phase::Prepare { .. } => ForceAsked::Relieve,
+            Phase::Prepare => ForceAsked::Relieve,
             // With no force to hold, before and after a manual mode, it gives way too.
             _ if self.plan.manual => ForceAsked::Manual,
             Phase::RampForce { .. } | Phase::HoldStart => ForceAsked::InitialRamp,
@@ -298,7 +285,7 @@ impl Pressing {
 
     fn matches(&self, phase: Phase) -> bool {
         let step = self.plan.prepare.get(self.step);
-        matches!(phase, Phase::Prepare { .. }) && step == Some(&PrepareStep::Match)
+        matches!(phase, Phase::Prepare) && step == Some(&Prepare::Match)
     }
 
     fn advance_matching(&mut self, asked: bool, linked: bool, seen: &Seen<'_>, program: &mut Program) {

@@ -38,9 +38,8 @@ pub struct AxisExperiment {
     pub prepare: Vec<Prepare>,
     /// How long the initial force is ramped to, s.
     pub initial_ramp_s: f64,
-    /// Who leads the axis during the experiment.
-    pub during: During,
-    /// Its set-points.
+    /// A hand leads the axis during the experiment, under force control with set-point zero, instead of its set-points.
+    pub manual: bool,
     pub set_points: SetPoints,
     /// What set-points given by hand keep to; `None`: none are followed.
     pub by_hand: Option<ByHandLimits>,
@@ -78,15 +77,6 @@ pub enum Prepare {
     Match,
 }
 
-/// Who leads the axis during the experiment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum During {
-    /// Its set-points.
-    SetPoint,
-    /// A hand, under force control with set-point zero.
-    Manual,
-}
-
 /// What set-points given by hand keep to, in m or N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ByHandLimits {
@@ -99,14 +89,12 @@ pub struct ByHandLimits {
 /// Set-points of an axis.
 #[derive(Clone, Debug)]
 pub enum SetPoints {
-    /// Position over time.
     Positions(Motion),
     /// Force over time and over what the axis does.
     Forces(ForceProfile),
 }
 
 impl SetPoints {
-    /// What they are of.
     #[must_use]
     pub fn quantity(&self) -> Quantity {
         match self {
@@ -115,7 +103,6 @@ impl SetPoints {
         }
     }
 
-    /// How long they take, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         match self {
@@ -160,7 +147,7 @@ static AT: Parameter =
 static VALUE: Parameter = Parameter::new(("value", ""), [-1e15, 1e15], 0.0, "the parameter's new value");
 
 const PREPARE: [(&str, Prepare); 2] = [("relieve", Prepare::Relieve), ("match", Prepare::Match)];
-const DURING: [(&str, During); 2] = [("set-point", During::SetPoint), ("manual", During::Manual)];
+const DURING: [(&str, bool); 2] = [("set-point", false), ("manual", true)];
 
 impl AxisExperiment {
     /// Reads it; `usual` is what a row is of that does not say.
@@ -173,7 +160,7 @@ impl AxisExperiment {
         let start = Parameter::new(("start_m", "m"), [0.0, stroke_m], 0.0, "where initial positioning goes");
         let start_m = section.number(&start)?;
         let prepare = section.choices("prepare", &PREPARE)?;
-        let during = section.choice("during", &DURING)?;
+        let manual = section.choice("during", &DURING)?;
         let segments = section.sections("set-point")?;
         let quantity = reading::quantity(&segments)?.unwrap_or(usual);
         let mut initial_ramp_s = RAMP.default;
@@ -204,7 +191,7 @@ impl AxisExperiment {
                 SetPoints::Forces(reading::forces([initial_n, limit_n], segments, stroke_m)?)
             }
         };
-        if by_hand.is_some() && during == During::Manual {
+        if by_hand.is_some() && manual {
             let said = "during = \"manual\" leaves no set-points to be given by hand: leave one of both out";
             return Err(section.wrong_at("during", said));
         }
@@ -212,7 +199,7 @@ impl AxisExperiment {
         let mut changes = changes?;
         changes.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
         section.finish()?;
-        Ok(Self { program, start_m, prepare, initial_ramp_s, during, set_points, by_hand, changes })
+        Ok(Self { program, start_m, prepare, initial_ramp_s, manual, set_points, by_hand, changes })
     }
 
     /// The force that the axis begins with, N; 0 when it is position controlled.
@@ -224,7 +211,6 @@ impl AxisExperiment {
         }
     }
 
-    /// The program's file.
     #[must_use]
     pub fn program_path(&self, experiment_file: &Path) -> PathBuf {
         self.program.path(experiment_file)

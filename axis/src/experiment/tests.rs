@@ -62,7 +62,7 @@ fn a_good_file_is_read() {
     );
     assert_eq!((drive.start_m, load.start_m), (Some(0.1), None));
     assert_eq!(load.prepare, [Prepare::Match, Prepare::Relieve]);
-    assert_eq!((load.during, load.initial_force_n(), load.initial_ramp_s), (During::Manual, 100.0, 1.0));
+    assert_eq!((load.manual, load.initial_force_n(), load.initial_ramp_s), (true, 100.0, 1.0));
     let changes: Vec<_> =
         drive.changes.iter().map(|change| (change.at_s, change.value, change.line)).collect();
     assert_eq!(changes, [(1.0, 20.0, 22), (2.0, 30.0, 18)], "in the order of their times");
@@ -166,34 +166,13 @@ fn nothing_moves_without_an_axis() {
     assert!(message.contains("[drive] or [load] is needed"), "{message}");
 }
 
-#[test]
-fn the_shipped_experiments_are_read() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/experiments");
-    let mut count = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let file = entry.unwrap().path();
-        if file.extension().is_some_and(|extension| extension == "toml") {
-            let text = std::fs::read_to_string(&file).unwrap();
-            let experiment =
-                Experiment::from_toml(&text, &file, 0.5).unwrap_or_else(|error| panic!("{error}"));
-            for axis in [&experiment.drive, &experiment.load].into_iter().flatten() {
-                assert!(
-                    axis.program_path(&file).exists(),
-                    "{}: no program {:?}",
-                    file.display(),
-                    axis.program
-                );
-            }
-            count += 1;
-        }
-    }
-    assert!(count > 0);
+fn experiments_folder() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/experiments")
 }
 
 /// The experiments that come with airbench: name of the file, text, what was read.
 fn shipped() -> Vec<(String, String, Experiment)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/experiments");
-    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let files = std::fs::read_dir(experiments_folder()).unwrap().map(|entry| entry.unwrap().path());
     let shipped = files.filter(|path| path.extension().is_some_and(|ending| ending == "toml")).map(|path| {
         let text = std::fs::read_to_string(&path).unwrap();
         let experiment = Experiment::from_toml(&text, &path, 0.5).unwrap_or_else(|error| panic!("{error}"));
@@ -225,11 +204,22 @@ fn a_shipped_experiment_has_a_number_that_no_other_has_and_bounds_to_pass() {
 }
 
 #[test]
+fn the_shipped_experiments_are_read() {
+    let experiments = shipped();
+    for (name, _, experiment) in &experiments {
+        for axis in [&experiment.drive, &experiment.load].into_iter().flatten() {
+            let file = experiments_folder().join(format!("{name}.toml"));
+            assert!(axis.program_path(&file).exists(), "{}: no program {:?}", file.display(), axis.program);
+        }
+    }
+    assert!(!experiments.is_empty());
+}
+
+#[test]
 fn the_programs_of_the_shipped_experiments_are_shipped() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../controller/experiments");
     for (name, _, experiment) in shipped() {
         for axis in [&experiment.drive, &experiment.load].into_iter().flatten() {
-            let path = axis.program_path(&folder.join("e.toml"));
+            let path = axis.program_path(&experiments_folder().join("e.toml"));
             assert!(path.is_file(), "{name}: {}", path.display());
         }
     }

@@ -77,9 +77,6 @@ pub struct Source {
 
 impl Source {
     /// Reads the file.
-    ///
-    /// # Errors
-    /// [`ProgramError`] when it cannot be read or is no TOML of this form.
     pub fn read(path: &Path) -> Result<Self, ProgramError> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| ProgramError(format!("cannot read {}: {error}", path.display())))?;
@@ -100,9 +97,6 @@ impl Source {
     }
 
     /// What the file says besides numbers, by its full key: what a program is made of, and cannot change while it runs.
-    ///
-    /// # Errors
-    /// [`ProgramError`] when it is no TOML of this form.
     pub fn makings(&self) -> Result<Makings, ProgramError> {
         let File { algorithm, post_controller, giving_way, .. } = self.parse()?;
         let giving_way = giving_way.map(Spanned::into_inner).unwrap_or_default();
@@ -124,9 +118,6 @@ impl Source {
 
     /// The program of `axis` that the file describes, for a rig of these nominal numbers. The time that an algorithm takes is
     /// watched where it is `real_time`.
-    ///
-    /// # Errors
-    /// [`ProgramError`] with file, line, key, value and what is allowed.
     pub fn program(&self, axis: Axis, rig: &RigParameters, real_time: bool) -> Result<Program, ProgramError> {
         let file = self.parse()?;
         let mut reader = Reader { source: self, rig, real_time, variables: Vec::new(), values: Vec::new() };

@@ -11,16 +11,24 @@ fn sensors(cycle: u64) -> Sensors {
     Sensors { alive: (cycle % 16) as u8, position_m: cycle as f64, ..Sensors::default() }
 }
 
+/// The sensors of both axes.
+fn take_both(view: &mut RigView, cycle: u64) {
+    Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
+}
+
 /// Plays the rig's frames of `cycles`, without those that `lost` names.
 fn play(view: &mut RigView, cycles: std::ops::Range<u64>, lost: &[u64]) {
+    play_after(0, view, cycles, lost);
+}
+
+/// The same after so many skipped cycles.
+fn play_after(skipped: u16, view: &mut RigView, cycles: std::ops::Range<u64>, lost: &[u64]) {
     for cycle in cycles {
-        for axis in Axis::ALL {
-            if !lost.contains(&cycle) {
-                view.take_sensors(axis, sensors(cycle));
-            }
+        if !lost.contains(&cycle) {
+            take_both(view, cycle);
         }
         if cycle % 10 == 0 {
-            view.take_tick(&tick(cycle as u32, 0));
+            view.take_tick(&tick(cycle as u32, skipped));
         }
     }
 }
@@ -47,7 +55,7 @@ fn each_frame_has_its_cycle_and_is_fresh_once() {
 fn lost_frames_are_counted_exactly() {
     let mut view = RigView::default();
     play(&mut view, 0..1001, &[3, 15, 16, 17, 500]);
-    assert_eq!(view.lost(), PerAxis { drive: 5, load: 5 });
+    assert_eq!(view.lost, PerAxis { drive: 5, load: 5 });
 }
 
 #[test]
@@ -57,19 +65,19 @@ fn a_late_frame_is_counted_and_answered_by_nobody() {
     let _ = view.fresh_sensors(Axis::Drive);
     view.take_sensors(Axis::Drive, sensors(95));
     assert!(view.fresh_sensors(Axis::Drive).is_none());
-    assert_eq!((view.cycle(), view.late()), (Some(97), PerAxis { drive: 1, load: 0 }));
+    assert_eq!((view.cycle(), view.late), (Some(97), PerAxis { drive: 1, load: 0 }));
     play(&mut view, 98..201, &[]);
-    assert_eq!(view.lost(), PerAxis { drive: 0, load: 1 }, "what came late did come");
+    assert_eq!(view.lost, PerAxis { drive: 0, load: 1 }, "what came late did come");
 }
 
 #[test]
 fn a_frame_later_than_the_tick_that_missed_it_is_not_lost_in_the_end() {
     let mut view = RigView::default();
     play(&mut view, 0..101, &[99]);
-    assert_eq!(view.lost().drive, 1);
+    assert_eq!(view.lost.drive, 1);
     view.take_sensors(Axis::Drive, sensors(99));
     play(&mut view, 101..151, &[]);
-    assert_eq!((view.lost(), view.late().drive), (PerAxis { drive: 0, load: 1 }, 1));
+    assert_eq!((view.lost, view.late.drive), (PerAxis { drive: 0, load: 1 }, 1));
 }
 
 #[test]
@@ -82,8 +90,8 @@ fn a_duplicate_is_counted_and_hides_no_loss() {
     }
     assert!(view.fresh_sensors(Axis::Load).is_none());
     play(&mut view, 98..201, &[]);
-    assert_eq!((view.duplicate(), view.late()), (PerAxis { drive: 0, load: 3 }, PerAxis::default()));
-    assert_eq!(view.lost(), PerAxis { drive: 1, load: 1 });
+    assert_eq!((view.duplicate, view.late), (PerAxis { drive: 0, load: 3 }, PerAxis::default()));
+    assert_eq!(view.lost, PerAxis { drive: 1, load: 1 });
 }
 
 #[test]
@@ -92,7 +100,7 @@ fn a_gap_after_which_the_counter_is_behind_is_no_late_frame() {
         let mut view = RigView::default();
         play(&mut view, 0..100, &[]);
         view.take_sensors(Axis::Drive, sensors(99 + gap));
-        assert_eq!((view.late(), view.duplicate()), (PerAxis::default(), PerAxis::default()), "{gap}");
+        assert_eq!((view.late, view.duplicate), (PerAxis::default(), PerAxis::default()), "{gap}");
         assert!(view.fresh_sensors(Axis::Drive).is_some());
     }
 }
@@ -102,7 +110,7 @@ fn more_lost_frames_than_the_counter_can_tell_are_found_by_the_tick() {
     let mut view = RigView::default();
     let lost: Vec<u64> = (101..148).collect();
     play(&mut view, 0..201, &lost);
-    assert_eq!(view.lost().drive, 47);
+    assert_eq!(view.lost.drive, 47);
 }
 
 #[test]
@@ -110,19 +118,10 @@ fn skipped_cycles_are_not_lost() {
     let mut view = RigView::default();
     play(&mut view, 0..101, &[]);
     view.take_tick(&Tick { catch_up: true, ..tick(151, 50) });
-    play_with_skipped(&mut view, 151..201, 50);
-    assert_eq!((view.lost().drive, view.skipped()), (0, 50));
+    play_after(50, &mut view, 151..201, &[]);
+    assert_eq!((view.lost.drive, view.skipped), (0, 50));
     view.take_sensors(Axis::Drive, sensors(201));
     assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 201);
-}
-
-fn play_with_skipped(view: &mut RigView, cycles: std::ops::Range<u64>, skipped: u16) {
-    for cycle in cycles {
-        Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
-        if cycle % 10 == 0 {
-            view.take_tick(&tick(cycle as u32, skipped));
-        }
-    }
 }
 
 #[test]
@@ -131,8 +130,8 @@ fn a_stall_of_more_cycles_than_the_tick_can_count_loses_nothing() {
     play(&mut view, 0..101, &[]);
     let skipped = (100_000 % SKIPPED_RANGE) as u16;
     view.take_tick(&Tick { catch_up: true, ..tick(100_101, skipped) });
-    play_with_skipped(&mut view, 100_101..100_201, skipped);
-    assert_eq!((view.lost().drive, view.skipped()), (0, 100_000));
+    play_after(skipped, &mut view, 100_101..100_201, &[]);
+    assert_eq!((view.lost.drive, view.skipped), (0, 100_000));
 }
 
 #[test]
@@ -140,11 +139,9 @@ fn the_cycle_goes_on_when_the_ticks_counter_wraps() {
     let mut view = RigView::default();
     let last = u64::from(u32::MAX);
     view.take_tick(&tick(u32::MAX - 5, 0));
-    (last - 4..=last + 5).for_each(|cycle| {
-        Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
-    });
+    (last - 4..=last + 5).for_each(|cycle| take_both(&mut view, cycle));
     assert_eq!(view.take_tick(&tick(4, 0)), TickNews::Usual);
-    assert_eq!((view.fresh_sensors(Axis::Drive).unwrap().0, view.lost().drive), (last + 5, 0));
+    assert_eq!((view.fresh_sensors(Axis::Drive).unwrap().0, view.lost.drive), (last + 5, 0));
 }
 
 #[test]
@@ -176,7 +173,7 @@ fn the_ending_tick_settles_the_last_frames() {
     let mut view = RigView::default();
     play(&mut view, 0..98, &[95]);
     let news = view.take_tick(&Tick { ending: true, ..tick(98, 0) });
-    assert_eq!((news, view.lost().drive), (TickNews::Ending, 1));
+    assert_eq!((news, view.lost.drive), (TickNews::Ending, 1));
 }
 
 #[test]
@@ -186,7 +183,7 @@ fn a_rig_that_starts_anew_is_noticed_and_loses_nothing() {
     view.take_sensors(Axis::Drive, sensors(0));
     assert_eq!(view.take_tick(&tick(0, 0)), TickNews::Restarted);
     play(&mut view, 1..101, &[]);
-    assert_eq!(view.lost(), PerAxis::default());
+    assert_eq!(view.lost, PerAxis::default());
     assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 100);
 }
 
@@ -211,13 +208,11 @@ fn sensors_that_pass_others_at_arbitration_are_no_round_of_the_counter() {
 fn sensors_that_pass_their_tick_are_not_lost() {
     let mut view = RigView::default();
     play(&mut view, 0..100, &[]);
-    let before = view.lost();
+    let before = view.lost;
     // Cycles 100 to 104 are skipped.
-    Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(105)));
+    take_both(&mut view, 105);
     view.take_tick(&Tick { catch_up: true, ..tick(105, 5) });
-    for cycle in 106..=110 {
-        Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
-    }
+    (106..=110).for_each(|cycle| take_both(&mut view, cycle));
     view.take_tick(&tick(110, 5));
-    assert_eq!((view.lost().drive, view.lost().load), (before.drive, before.load));
+    assert_eq!((view.lost.drive, view.lost.load), (before.drive, before.load));
 }

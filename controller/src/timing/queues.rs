@@ -22,9 +22,6 @@ pub(crate) struct TimingQueues {
 
 impl TimingQueues {
     /// Empties the queues, and writes what is over.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub(crate) fn poll(&mut self) -> io::Result<()> {
         self.empty()?;
         let now = MonotonicClock.now();
@@ -56,17 +53,11 @@ impl TimingQueues {
     }
 
     /// Writes the rows of the table out.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub(crate) fn write_out(&mut self) -> io::Result<()> {
         self.recorder.write_out()
     }
 
     /// Empties the queues a last time and writes all that is left.
-    ///
-    /// # Errors
-    /// What the system says, with the file's name.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         let mut written = self.empty();
         keep_first(&mut written, self.recorder.finish(MonotonicClock.now()));
@@ -74,7 +65,6 @@ impl TimingQueues {
     }
 
     /// The figures so far.
-    #[must_use]
     pub(crate) fn figures(&self) -> TimingFigures {
         self.recorder.figures()
     }

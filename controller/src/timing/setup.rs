@@ -32,7 +32,6 @@ pub(crate) struct RunStart {
 
 impl RunStart {
     /// Now.
-    #[must_use]
     pub(crate) fn now() -> Self {
         let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let at = MonotonicClock.now();
@@ -42,9 +41,6 @@ impl RunStart {
 }
 
 /// What the controllers' thread stamps with, and what the recorder's thread records with.
-///
-/// # Errors
-/// [`RunError::Output`] when a file cannot be made.
 pub(crate) fn begin(
     arguments: &RunArguments,
     started: &RunStart,

@@ -93,7 +93,7 @@ impl Bench {
     fn wake_up(&mut self, arrived: &[(Axis, u64)], cycles: [Option<u64>; 2]) {
         self.stopwatch.woke();
         for (axis, stamp_ns) in arrived {
-            self.stopwatch.took(&sensors(*axis), *stamp_ns, Some(*axis));
+            self.stopwatch.took(&sensors(*axis, 0), *stamp_ns, Some(*axis));
         }
         self.clock.pass(5);
         self.stopwatch.took_all();
@@ -119,8 +119,8 @@ impl Bench {
     }
 }
 
-fn sensors(axis: Axis) -> CanFrame {
-    let sensors = Sensors::default();
+fn sensors(axis: Axis, alive: u8) -> CanFrame {
+    let sensors = Sensors { alive, ..Sensors::default() };
     let frame = match axis {
         Axis::Drive => Frame::DriveSensors(sensors),
         Axis::Load => Frame::LoadSensors(sensors),
@@ -377,10 +377,7 @@ fn a_cycle_that_one_axis_alone_answered_is_a_row_and_a_cycle_answered() {
     for arrived in wake_ups {
         bench.stopwatch.woke();
         for (axis, alive) in arrived {
-            let sensors = Sensors { alive: *alive, ..Sensors::default() };
-            let frame =
-                if *axis == Drive { Frame::DriveSensors(sensors) } else { Frame::LoadSensors(sensors) };
-            let frame = frame.encode().unwrap();
+            let frame = sensors(*axis, *alive);
             let whose = node.take(&frame);
             bench.stopwatch.took(&frame, bench.now(), whose);
             bench.clock.pass(1);
