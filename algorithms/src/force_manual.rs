@@ -20,7 +20,6 @@
 use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
 use settings::parameters::declare;
 
-/// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
     name: "force-manual",
     about: "force: for moving by hand and relieving stress, with the paper's distinction of standstill and motion",

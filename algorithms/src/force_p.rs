@@ -13,7 +13,6 @@
 use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use settings::parameters::declare;
 
-/// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
     name: "force-p",
     about: "force: proportional with the rod's velocity fed forward, the paper's",

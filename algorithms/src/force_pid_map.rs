@@ -32,7 +32,6 @@ use plant::RigParameters;
 use settings::parameters::declare;
 use std::f64::consts::TAU;
 
-/// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
     name: "force-pid-map",
     about: "force: PID through a map of the air's stiffness, with friction and velocity fed forward",

@@ -14,7 +14,7 @@
 //! cycles, the partner misses this controller, and another thread ends the process: see [`Stuck`].
 
 use crate::algorithm::{Algorithm, Ready};
-use realtime::{Clock, Instant};
+use realtime::Clock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant as WallInstant};
 
@@ -113,13 +113,10 @@ impl Guarded {
     /// The fault, latched before or now: the valve is to be shut.
     pub fn reset(&mut self, ready: &Ready, parameters: &[f64]) -> Result<(), AlgorithmFault> {
         self.unless_latched()?;
-        let started = self.now();
-        CALLS.fetch_add(1, Ordering::Relaxed);
-        self.algorithm.reset(ready, parameters);
-        CALLS.fetch_add(1, Ordering::Relaxed);
+        let ((), took) = self.timed(|algorithm| algorithm.reset(ready, parameters));
         // Only too slow at once: a reset may take longer than a step.
         self.slow = 0;
-        match self.took(started) {
+        match took {
             Some(took) if took > LONGEST_ONCE => Err(self.latch(AlgorithmFault::TooSlow { took })),
             _ => Ok(()),
         }
@@ -131,11 +128,7 @@ impl Guarded {
     /// The fault, latched before or now: the valve is to be shut. The algorithm is not asked again.
     pub fn step(&mut self, ready: &Ready, parameters: &[f64]) -> Result<f64, AlgorithmFault> {
         self.unless_latched()?;
-        let started = self.now();
-        CALLS.fetch_add(1, Ordering::Relaxed);
-        let result = self.algorithm.step(ready, parameters);
-        CALLS.fetch_add(1, Ordering::Relaxed);
-        let took = self.took(started);
+        let (result, took) = self.timed(|algorithm| algorithm.step(ready, parameters));
         if !result.is_finite() {
             return Err(self.latch(AlgorithmFault::NotANumber));
         }
@@ -157,12 +150,14 @@ impl Guarded {
         fault
     }
 
-    fn now(&self) -> Option<Instant> {
-        self.clock.as_ref().map(|clock| clock.now())
-    }
-
-    fn took(&self, started: Option<Instant>) -> Option<Duration> {
-        Some(self.now()?.saturating_duration_since(started?))
+    /// The result of a call, and how long it took where time is watched.
+    fn timed<T>(&mut self, call: impl FnOnce(&mut dyn Algorithm) -> T) -> (T, Option<Duration>) {
+        let started = self.clock.as_ref().map(|clock| clock.now());
+        CALLS.fetch_add(1, Ordering::Relaxed);
+        let result = call(&mut *self.algorithm);
+        CALLS.fetch_add(1, Ordering::Relaxed);
+        let took = self.clock.as_ref().zip(started);
+        (result, took.map(|(clock, started)| clock.now().saturating_duration_since(started)))
     }
 }
 
@@ -170,6 +165,7 @@ impl Guarded {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use realtime::Instant;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -36,7 +36,6 @@ use crate::rest_zone::{self, RestZone};
 use plant::RigParameters;
 use settings::parameters::declare;
 
-/// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
     name: "position-cascade",
     about: "position: cascaded loops for position, velocity and pneumatic force, with integral part",

@@ -13,7 +13,6 @@ use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
 use crate::rest_zone::{self, RestZone};
 use settings::parameters::{Declaration, declare};
 
-/// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
     name: "position-p",
     about: "position: proportional with velocity feed-forward, the paper's",

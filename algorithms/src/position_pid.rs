@@ -20,7 +20,6 @@ use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use crate::rest_zone::{self, RestZone};
 use settings::parameters::declare;
 
-/// In the list of algorithms.
 pub(crate) const KIND: Kind = Kind {
     name: "position-pid",
     about: "position: PID with velocity feed-forward",

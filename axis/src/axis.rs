@@ -8,7 +8,7 @@
 //! Drive and load are the same code; what differs is their work (a position, a force, or nothing) and their program. They
 //! know each other through what was heard alone. Nothing here allocates, locks, prints or blocks.
 
-mod average;
+pub(crate) mod average;
 mod by_hand;
 mod changes;
 mod heard;
@@ -80,7 +80,6 @@ pub struct AxisController {
 
 impl AxisController {
     /// A controller that waits for its rig.
-    #[must_use]
     pub fn new(parts: AxisParts) -> Self {
         let AxisParts { axis, program, plan, main, supply_pressure_pa, changes, record_every } = parts;
         Self {
@@ -248,29 +247,24 @@ impl AxisController {
         (self.rig, self.fault, self.algorithm_fault, self.asked, self.alive) = (None, None, None, None, 0);
     }
 
-    #[must_use]
     pub fn axis(&self) -> Axis {
         self.axis
     }
 
-    #[must_use]
     pub fn state(&self) -> MainChainState {
         self.status().main_chain
     }
 
     /// Why the main chain came to its state.
-    #[must_use]
     pub fn cause(&self) -> MainCause {
-        self.leading.main.entered().cause
+        self.leading.main.entered.cause
     }
 
     /// Whether a stopped axis may begin anew.
-    #[must_use]
     pub fn may_restart(&self) -> bool {
         self.main_config.after_emergency_stop != AfterStop::End
     }
 
-    #[must_use]
     pub fn emergency_stop(&self) -> EmergencyStopChainState {
         self.leading.stop.state()
     }
@@ -280,25 +274,21 @@ impl AxisController {
         &mut self.program
     }
 
-    #[must_use]
     pub fn program(&self) -> &Program {
         &self.program
     }
 
     /// Figures of the position control so far.
-    #[must_use]
     pub fn figures(&self) -> &PositionFigures {
         &self.figures
     }
 
     /// Why the algorithm is no longer asked.
-    #[must_use]
     pub fn algorithm_fault(&self) -> Option<AlgorithmFault> {
         self.algorithm_fault
     }
 
     /// How often the experiment has been driven through.
-    #[must_use]
     pub fn repetitions_done(&self) -> u32 {
         self.leading
             .output

@@ -54,7 +54,6 @@ impl Partner {
     /// The partner's status if it is not older than [`PARTNER_LOST_CYCLES`] at `cycle`.
     ///
     /// A status "from later" is of another rig's time and counts by its distance too.
-    #[must_use]
     pub fn fresh(&self, cycle: u64) -> Option<&ChainStatus> {
         let heard = self.heard.filter(|heard| cycle.abs_diff(*heard) <= PARTNER_LOST_CYCLES);
         heard.and(self.status.as_ref())

@@ -127,7 +127,6 @@ impl Experiment {
     }
 
     /// How long one repetition takes, s: the longer of both axes.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         let axes = [&self.drive, &self.load].into_iter().flatten();
         axes.map(|axis| axis.set_points.duration_s()).fold(0.0, f64::max)

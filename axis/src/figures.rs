@@ -4,10 +4,8 @@
 //! 0.2 s of each rest. Both over the experiment alone, not over the way to it, and over repetitions that were driven through: one
 //! that was cut off counts for nothing.
 
+use crate::axis::average::Average;
 use crate::set_point::SetPoint;
-
-/// Samples of the last 0.2 s of a rest.
-const STATIC_WINDOW: usize = 200;
 
 /// Both errors.
 #[derive(Clone, Copy, Debug, Default)]
@@ -17,20 +15,14 @@ struct Errors {
 }
 
 /// The figures so far.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct PositionFigures {
     /// Of the repetitions that were driven through.
     kept: Errors,
     /// Of the one that is being driven.
     now: Errors,
-    window_m: [f64; STATIC_WINDOW],
-    rested: usize,
-}
-
-impl Default for PositionFigures {
-    fn default() -> Self {
-        Self { kept: Errors::default(), now: Errors::default(), window_m: [0.0; STATIC_WINDOW], rested: 0 }
-    }
+    /// |error| of the rest that is going on, m.
+    resting: Average,
 }
 
 impl PositionFigures {
@@ -41,8 +33,7 @@ impl PositionFigures {
             self.end_rest();
             self.now.moving_m = larger(self.now.moving_m, Some(error_m));
         } else {
-            self.window_m[self.rested % STATIC_WINDOW] = error_m;
-            self.rested += 1;
+            self.resting.take(error_m);
         }
     }
 
@@ -56,36 +47,31 @@ impl PositionFigures {
 
     /// The repetition, if one is being driven, was cut off.
     pub fn drop_repetition(&mut self) {
-        (self.now, self.rested) = (Errors::default(), 0);
+        self.now = Errors::default();
+        self.resting.clear();
     }
 
     /// Closes the rest that is going on, if any; a rest shorter than the window says nothing.
     fn end_rest(&mut self) {
-        if self.rested >= STATIC_WINDOW {
-            let mean_m = self.window_m.iter().sum::<f64>() / STATIC_WINDOW as f64;
-            self.now.resting_m = larger(self.now.resting_m, Some(mean_m));
+        if self.resting.is_full() {
+            self.now.resting_m = larger(self.now.resting_m, Some(self.resting.value()));
         }
-        self.rested = 0;
+        self.resting.clear();
     }
 
     /// Dynamic error, m; `None` before the set-point moved.
-    #[must_use]
     pub fn dynamic_m(&self) -> Option<f64> {
         larger(self.kept.moving_m, self.now.moving_m)
     }
 
     /// Static error, m; `None` before a rest was long enough.
-    #[must_use]
     pub fn static_m(&self) -> Option<f64> {
         larger(self.kept.resting_m, self.now.resting_m)
     }
 }
 
 fn larger(one: Option<f64>, other: Option<f64>) -> Option<f64> {
-    match (one, other) {
-        (Some(one), Some(other)) => Some(one.max(other)),
-        (one, other) => one.or(other),
-    }
+    one.into_iter().chain(other).reduce(f64::max)
 }
 
 #[cfg(test)]

@@ -151,7 +151,6 @@ pub struct ControllerNode<P = NoPort> {
 
 impl ControllerNode {
     /// Puts the controllers, one or two, on the bus.
-    #[must_use]
     pub fn new(controllers: Vec<AxisController>, outlets: Outlets) -> Self {
         Self::with_ports(controllers, outlets, |_| None)
     }
@@ -159,7 +158,6 @@ impl ControllerNode {
 
 impl<P: CalibrationPort> ControllerNode<P> {
     /// Puts the controllers, one or two, on the bus, each with the port that `port_of` gives for its axis.
-    #[must_use]
     pub fn with_ports(
         controllers: Vec<AxisController>,
         outlets: Outlets,
@@ -344,7 +342,6 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// Whether the rig said that no more sensors come.
-    #[must_use]
     pub fn ending(&self) -> bool {
         self.ending
     }
@@ -355,7 +352,6 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// The port of `axis`, if it has one.
-    #[must_use]
     pub fn port(&self, axis: Axis) -> Option<&P> {
         self.member(axis)?.port.as_ref()
     }
@@ -365,43 +361,36 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// Whether all of them are done.
-    #[must_use]
     pub fn done(&self) -> bool {
         self.controllers().all(|controller| controller.state() == MainChainState::Done)
     }
 
     /// The rig as seen from here.
-    #[must_use]
     pub fn view(&self) -> &RigView {
         &self.view
     }
 
     /// Frames counted and ignored.
-    #[must_use]
     pub fn ignored(&self) -> IgnoredFrames {
         self.ignored
     }
 
     /// Cycles that an axis answered, each once.
-    #[must_use]
     pub fn answered(&self) -> u64 {
         self.answered
     }
 
     /// Cycles answered by `axis`; 0 where it is none of ours.
-    #[must_use]
     pub fn answered_by(&self, axis: Axis) -> u64 {
         self.member(axis).map_or(0, |member| member.answered)
     }
 
     /// Cycles answered since an axis was stopped for good, by an abort or a fault; 0 while none is.
-    #[must_use]
     pub fn stopped_for(&self) -> u64 {
         self.members.iter().map(|member| member.stopped_for).max().unwrap_or(0)
     }
 
     /// Rows lost to a full queue.
-    #[must_use]
     pub fn records_dropped(&self) -> u64 {
         self.records_dropped
     }

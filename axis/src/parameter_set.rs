@@ -71,7 +71,6 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, ParameterSetError> 
 }
 
 /// Writes a set: the values of an axis's variables, with unit, range and meaning.
-#[must_use]
 pub fn text(axis: Axis, variables: &[Variable], values: &[f64]) -> String {
     let mut text = String::new();
     let mut last = "";

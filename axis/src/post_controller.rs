@@ -43,7 +43,6 @@ pub struct PostController {
 
 impl PostController {
     /// A post-controller with this linearisation.
-    #[must_use]
     pub fn new(linearisation: Linearisation) -> Self {
         Self { linearisation, shut: true }
     }

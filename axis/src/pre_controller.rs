@@ -38,13 +38,11 @@ pub struct Geometry {
 
 impl Geometry {
     /// An axis of this stroke, with a sensor that is taken at its word.
-    #[must_use]
     pub fn new(axis: Axis, stroke_m: f64) -> Self {
         Self { axis, stroke_m, offset_m: 0.0 }
     }
 
     /// +1 when the own rod extends in the rig's +x, else -1.
-    #[must_use]
     pub fn direction(&self) -> f64 {
         match self.axis {
             Axis::Drive => 1.0,
@@ -53,7 +51,6 @@ impl Geometry {
     }
 
     /// Extension of the own rod at a rig coordinate, m.
-    #[must_use]
     pub fn extension_m(&self, position_m: f64) -> f64 {
         match self.axis {
             Axis::Drive => position_m,
@@ -62,7 +59,6 @@ impl Geometry {
     }
 
     /// Rig coordinate at an extension of the own rod, m.
-    #[must_use]
     pub fn position_m(&self, extension_m: f64) -> f64 {
         // Each axis's map is its own inverse.
         self.extension_m(extension_m)
@@ -113,12 +109,10 @@ pub struct PreController {
 
 impl PreController {
     /// A pre-controller that has seen nothing yet.
-    #[must_use]
     pub fn new(geometry: Geometry) -> Self {
         Self { geometry, memory: None }
     }
 
-    #[must_use]
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
     }

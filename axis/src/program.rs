@@ -194,25 +194,21 @@ impl Program {
     }
 
     /// Whether there is an algorithm for the force chain.
-    #[must_use]
     pub fn gives_way(&self) -> bool {
         self.giving_way.is_some()
     }
 
     /// Values of a task, in the order of its table.
-    #[must_use]
     pub fn task(&self, task: Task) -> &[f64] {
         &self.values[self.tasks[task as usize].clone()]
     }
 
     /// Position of the axis, less the sensor's offset, m, rig coordinates.
-    #[must_use]
     pub fn position_m(&self) -> f64 {
         self.pre.geometry().position_m(self.ready.position_m)
     }
 
     /// What the axis does, in rig coordinates.
-    #[must_use]
     pub fn actual(&self) -> Actual {
         let direction = self.pre.geometry().direction();
         Actual {
@@ -223,13 +219,11 @@ impl Program {
     }
 
     /// What was measured, in the axis's own extension.
-    #[must_use]
     pub fn ready(&self) -> &Ready {
         &self.ready
     }
 
     /// Where the axis lies.
-    #[must_use]
     pub fn geometry(&self) -> &Geometry {
         self.pre.geometry()
     }
@@ -240,7 +234,6 @@ impl Program {
     }
 
     /// The velocity that the algorithm wants, m/s, own extension.
-    #[must_use]
     pub fn wanted_m_per_s(&self, hand: Hand) -> f64 {
         match (hand, &self.giving_way) {
             (Hand::ForceChain, Some(giving_way)) => giving_way.slot.wanted_m_per_s,
@@ -249,24 +242,20 @@ impl Program {
     }
 
     /// What the user's algorithm controls.
-    #[must_use]
     pub fn controls(&self) -> Quantity {
         self.user.controls
     }
 
     /// All variables, in the order of their values.
-    #[must_use]
     pub fn variables(&self) -> &[Variable] {
         &self.variables
     }
 
-    #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
     /// Place of the variable called `name`.
-    #[must_use]
     pub fn place(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|variable| variable.name == name)
     }

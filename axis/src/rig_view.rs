@@ -35,7 +35,6 @@ pub struct PerAxis {
 
 impl PerAxis {
     /// Of one axis.
-    #[must_use]
     pub fn get(&self, axis: Axis) -> u64 {
         match axis {
             Axis::Drive => self.drive,
@@ -207,7 +206,6 @@ impl RigView {
     }
 
     /// The newest cycle that is known; `None` before the first tick.
-    #[must_use]
     pub fn cycle(&self) -> Option<u64> {
         self.cycle
     }
@@ -216,7 +214,6 @@ impl RigView {
     ///
     /// Cycles that the rig skipped make it older too: after those it is the next status that counts. What an axis does while
     /// there is none stands in [`AxisController::answer`](crate::axis::AxisController::answer).
-    #[must_use]
     pub fn status(&self) -> Option<&RigStatus> {
         let (came, status) = self.status.as_ref()?;
         let age = self.cycle.map_or(0, |cycle| cycle.saturating_sub(*came));

@@ -38,7 +38,6 @@ pub struct SetPoint {
 }
 
 impl SetPoint {
-    #[must_use]
     pub const fn at_rest(position_m: f64) -> Self {
         Self { position_m, velocity_m_per_s: 0.0, acceleration_m_per_s2: 0.0, moving: false }
     }
@@ -67,7 +66,6 @@ pub struct ForceSetPoint {
 }
 
 impl ForceSetPoint {
-    #[must_use]
     pub const fn at_rest(force_n: f64) -> Self {
         Self { force_n, rate_n_per_s: 0.0, moving: false }
     }
@@ -105,7 +103,6 @@ impl Motion {
     }
 
     /// The set-point `time_s` after the start: the start before it, the end from the end on.
-    #[must_use]
     pub fn at(&self, time_s: f64) -> SetPoint {
         let moment = match self.row.place(time_s) {
             Place::Before => Moment::at_rest(self.start_m()),
@@ -115,25 +112,16 @@ impl Motion {
         moment.into()
     }
 
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.row.duration_s()
     }
 
-    #[must_use]
     pub fn start_m(&self) -> f64 {
         self.row.start()
     }
 
-    #[must_use]
     pub fn end_m(&self) -> f64 {
         self.row.end()
-    }
-
-    /// The set-point that is held from the end on.
-    #[must_use]
-    pub fn end(&self) -> SetPoint {
-        SetPoint::at_rest(self.end_m())
     }
 }
 

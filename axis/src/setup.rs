@@ -231,7 +231,6 @@ impl Inputs {
     }
 
     /// Title of the program of an axis.
-    #[must_use]
     pub fn program_title(&self, axis: Axis) -> String {
         self.programs[axis.index()]
             .as_ref()
@@ -246,27 +245,18 @@ impl Inputs {
     ) -> Result<(), InputError> {
         let Some(section) = section else { return Ok(()) };
         let (asked, able) = (section.set_points.quantity(), program.controls());
-        if asked == able {
-            return self.check_gives_way(axis, section, program);
+        if asked != able {
+            return Err(InputError(format!(
+                "{}:{}: the {} axis has set-points of {}s, and its program controls {}s; choose another program",
+                self.experiment_file.display(),
+                section.program.line,
+                axis.name(),
+                asked.name(),
+                able.name()
+            )));
         }
-        Err(InputError(format!(
-            "{}:{}: the {} axis has set-points of {}s, and its program controls {}s; choose another program",
-            self.experiment_file.display(),
-            section.program.line,
-            axis.name(),
-            asked.name(),
-            able.name()
-        )))
-    }
-
-    /// An axis that presses gives way too: on linked rods while the drive is positioned, to relieve stress, to a hand.
-    fn check_gives_way(
-        &self,
-        axis: Axis,
-        section: &AxisExperiment,
-        program: &Program,
-    ) -> Result<(), InputError> {
-        if section.set_points.quantity() == Quantity::Position || program.gives_way() {
+        // An axis that presses gives way too: on linked rods while the drive is positioned, to relieve stress, to a hand.
+        if asked == Quantity::Position || program.gives_way() {
             return Ok(());
         }
         let source = self.programs[axis.index()].as_ref();

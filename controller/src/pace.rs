@@ -31,34 +31,28 @@ const WARM_UP: u64 = 1000;
 pub(crate) enum End {
     /// The rig said that it ends, or fell silent after Done.
     RigEnded,
-    /// Ctrl-C or SIGTERM.
     Interrupted,
     /// The bus was gone, or no sensors came, for longer than the grace time.
     BusGone,
     /// The experiment was aborted or a fault stopped it, and nothing may start it again.
     Stopped,
-    /// Lockstep: a member was not done in time.
     LockstepTimeout,
 }
 
 /// The node of a run, its bus and what may end it.
 pub(crate) struct RunContext<'a> {
     pub(crate) node: &'a mut Node,
-    /// Their peer on the bus.
     pub(crate) bus: &'a mut dyn Bus,
     /// How long the rig may be silent.
     pub(crate) grace: Duration,
-    /// Set by a signal.
     pub(crate) interrupt: &'a Interrupt,
 }
 
 /// How a run ended and what was measured meanwhile.
 pub(crate) struct RunOutcome {
-    /// Why it ended.
     pub(crate) end: End,
     /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
     pub(crate) allocations: Option<u64>,
-    /// What the stopwatch counted.
     pub(crate) stopwatch: StopwatchAccount,
 }
 

@@ -40,7 +40,6 @@ impl Tables {
         Ok(Self { tables: tables.collect::<io::Result<_>>()? })
     }
 
-    /// Appends a row to the table of its axis.
     pub(crate) fn write(&mut self, record: &AxisRecord) -> io::Result<()> {
         let Some((_, table)) = self.tables.iter_mut().find(|(axis, _)| *axis == record.axis) else {
             return Ok(());
@@ -76,7 +75,6 @@ impl Tables {
         table.write_when_full()
     }
 
-    /// Writes everything out.
     pub(crate) fn write_out(&mut self) -> io::Result<()> {
         self.tables.iter_mut().try_for_each(|(_, table)| table.write_out())
     }
@@ -85,9 +83,7 @@ impl Tables {
 /// The thread that empties the queues.
 pub(crate) struct Writer {
     pub(crate) tables: Tables,
-    /// Their rows.
     pub(crate) records: Receiver<AxisRecord>,
-    /// What a person is told.
     pub(crate) news: Receiver<News>,
     /// Who looks at the program files, if anybody does.
     pub(crate) reloader: Option<Reloader>,
@@ -99,11 +95,9 @@ pub(crate) struct Writer {
 
 /// What is left when the queues' senders are gone.
 pub(crate) struct Written {
-    /// What a person was told.
     pub(crate) told: Vec<News>,
     /// Why writing stopped, if it did.
     pub(crate) failure: Option<String>,
-    /// Figures of the timing, where time is real.
     pub(crate) timing: Option<TimingFigures>,
 }
 
@@ -128,12 +122,8 @@ impl Writer {
                     Err(gone) => finished = gone == TryRecvError::Disconnected,
                 }
             }
-            if let Some(reloader) = &mut reloader {
-                reloader.look();
-            }
-            if let Some(clerk) = &mut clerk {
-                clerk.look();
-            }
+            reloader.iter_mut().for_each(Reloader::look);
+            clerk.iter_mut().for_each(Clerk::look);
             for item in news.try_iter() {
                 eprintln!("controller: {}", sentence(item));
                 if let (News::State { state: MainChainState::Fault, cycle, .. }, Some(timing)) =

@@ -12,7 +12,7 @@ use axis_control::setup::Inputs;
 use plant::Axis;
 use protocol::bus::BusCounters;
 use protocol::exit::Exit;
-use realtime::{Interrupt, Percentiles, Recorder};
+use realtime::{Interrupt, Recorder};
 use rehearsal::{PlantTables, Rehearsal};
 use runlog::flight_dump;
 use runlog::run_folder::{SCHEMA_VERSION, clear, clear_results, controller_results, write_json};
@@ -169,13 +169,9 @@ fn save(
     Ok(exit)
 }
 
-fn no_times() -> Percentiles {
-    Recorder::new().percentiles()
-}
-
 /// The keys of `summary.json` that others read; what only a bus or a clock has is 0 or empty.
 fn summary(ended: &Ended, exit: Exit, ended_because: &str) -> serde_json::Value {
-    let none = no_times();
+    let none = Recorder::new().percentiles();
     json!({
         "schema_version": SCHEMA_VERSION,
         "position_error_dynamic_m": null,

@@ -45,7 +45,6 @@ impl Reloader {
         Self { rig: inputs.rig.clone(), files, changes, looked: Instant::now() }
     }
 
-    /// Looks at the files when it is time to.
     pub(crate) fn look(&mut self) {
         if self.looked.elapsed() < LOOK_PERIOD {
             return;

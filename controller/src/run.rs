@@ -41,24 +41,19 @@ const RETURNED_QUEUE: usize = 2;
 /// What keeps the controllers from running.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunError {
-    /// A file cannot be read, or says something that is not allowed.
     #[error("{0}")]
     Input(String),
-    /// Experiment and programs.
     #[error(transparent)]
     Files(#[from] InputError),
-    /// A library that is no algorithm.
     #[error(transparent)]
     Plugin(#[from] PluginError),
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The output folder.
     #[error("cannot write {0}; choose another folder with --out")]
     Output(String),
 }
 
 impl RunError {
-    /// The exit code that the error leads to.
     pub(crate) fn exit(&self) -> Exit {
         match self {
             Self::Bus(BusError::NoBarrier { .. }) => Exit::BadInput,

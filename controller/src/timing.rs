@@ -42,10 +42,8 @@ pub(crate) enum Measured {
     Waited {
         /// When they arrived at our queue, ns.
         arrived_ns: u64,
-        /// When we woke, ns.
         woke_ns: u64,
     },
-    /// A cycle that was answered.
     Cycle(CycleTiming),
 }
 
@@ -61,9 +59,7 @@ pub(crate) struct Passed {
 
 /// The queues to the recorder's thread.
 pub(crate) struct Outlets {
-    /// Rows and waits.
     pub(crate) measured: Sender<Measured>,
-    /// Frames.
     pub(crate) frames: Sender<Passed>,
 }
 
@@ -133,7 +129,6 @@ impl<C: Clock + Send> Stopwatch<C> {
         self.began_ns = self.now_ns();
     }
 
-    /// The thread woke.
     pub(crate) fn woke(&mut self) {
         self.wake_up = WakeUp { woke_ns: self.now_ns(), ..WakeUp::default() };
     }
@@ -153,12 +148,10 @@ impl<C: Clock + Send> Stopwatch<C> {
         }
     }
 
-    /// All frames were taken.
     pub(crate) fn took_all(&mut self) {
         self.wake_up.received_ns = self.now_ns();
     }
 
-    /// The bus to answer on.
     pub(crate) fn bus<'a>(&'a mut self, bus: &'a mut dyn Bus) -> TimedBus<'a, C> {
         TimedBus::new(self, bus)
     }

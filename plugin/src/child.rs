@@ -37,7 +37,6 @@ const MOST_TEXT: usize = 1 << 16;
 /// Who tries libraries.
 #[derive(Clone, Debug)]
 pub struct Trier {
-    /// A controller program.
     pub program: PathBuf,
     /// How long it may take.
     pub limit: Duration,
@@ -101,7 +100,6 @@ pub(super) fn run(library: &Path) -> Exit {
 
 /// What a child has printed.
 struct Said {
-    /// The end of it.
     tail: Arc<Mutex<Vec<u8>>>,
     /// Told when the pipe has ended.
     ended: Receiver<()>,

@@ -47,9 +47,7 @@ type Tell<'a> = &'a mut dyn FnMut(&str);
 pub struct Description {
     /// Its name for people and records; a program file names the library by its path.
     pub name: String,
-    /// One sentence.
     pub about: String,
-    /// What it controls.
     pub controls: Quantity,
     /// Its parameters, in the order of the slices.
     pub parameters: Vec<Parameter>,
@@ -62,7 +60,6 @@ pub struct Plugin {
 }
 
 impl Plugin {
-    /// What it is.
     #[must_use]
     pub fn description(&self) -> &Description {
         &self.description

@@ -11,9 +11,7 @@ use std::time::Duration;
 #[derive(Debug, thiserror::Error)]
 #[error("library '{}': {wrong}", library.display())]
 pub struct PluginError {
-    /// The file as it was asked for.
     pub library: PathBuf,
-    /// What is wrong.
     pub wrong: Wrong,
 }
 
@@ -22,131 +20,76 @@ const REBUILD: &str = "build it again with this airbench's airbench_algorithm.h"
 /// What is wrong with a library.
 #[derive(Debug, thiserror::Error)]
 pub enum Wrong {
-    /// It is not there, or may not be read.
     #[error("cannot be opened: {0}; give the path of a shared library")]
     File(#[source] io::Error),
-    /// dlopen's own words.
     #[error("the system does not load it: {0}; build a shared library, with -fPIC -shared")]
     NotLoaded(String),
-    /// It exports no entry.
     #[error(
         "it exports no symbol airbench_algorithm_entry; define that function as airbench_algorithm.h declares it"
     )]
     NoEntry,
-    /// Its entry gave no descriptor.
     #[error(
         "airbench_algorithm_entry({INTERFACE_VERSION}) returned NULL: it does not speak version {INTERFACE_VERSION} \
          of the interface; {REBUILD}"
     )]
     NothingOffered,
-    /// The pointer to its descriptor or its parameters cannot be one.
     #[error(
         "its {0} stands at an address that no such structure can have; return the address of a static structure"
     )]
     Misplaced(&'static str),
-    /// It speaks another version.
     #[error("it speaks version {0} of the interface, this airbench version {INTERFACE_VERSION}; {REBUILD}")]
     Version(u32),
-    /// Its descriptor has another size.
     #[error(
         "its descriptor says a struct_size of {0} bytes, {right} are right; set it to sizeof(struct airbench_algorithm) \
          and {REBUILD}", right = size_of::<Descriptor>()
     )]
     Size(u32),
-    /// A function or a text is not there.
     #[error("{0} is NULL; set it in the descriptor")]
     Null(String),
-    /// A text that cannot be used.
     #[error("{what} {why}")]
-    Text {
-        /// Which text.
-        what: String,
-        /// What is wrong with it.
-        why: &'static str,
-    },
-    /// Neither position nor force.
+    Text { what: String, why: &'static str },
     #[error("controls = {0}; set it to AIRBENCH_POSITION or AIRBENCH_FORCE")]
     Controls(u32),
-    /// More parameters than anybody sets.
     #[error("it has {0} parameters; at most {MOST_PARAMETERS} are allowed")]
     TooMany(u32),
-    /// Two parameters of one name.
     #[error("it has two parameters '{0}'; give each a name of its own")]
     Twice(String),
-    /// A range that is none.
     #[error(
         "parameter '{name}' has the range {least} to {most}; both must be finite, the first below the second"
     )]
-    Range {
-        name: String,
-        /// Its smallest value.
-        least: f64,
-        /// Its largest value.
-        most: f64,
-    },
-    /// A default outside its range.
+    Range { name: String, least: f64, most: f64 },
     #[error("a parameter's default lies outside its range: {0}; change one of them")]
     Default(#[from] OutOfRange),
-    /// It changed the processor's arithmetic.
     #[error(
         "loading it changes how the whole process rounds numbers; build it without -ffast-math and -Ofast, \
          and leave the floating-point modes alone"
     )]
     Arithmetic,
-    /// No instance.
     #[error("create returned NULL for this rig; an algorithm without state returns any other pointer")]
     NotCreated,
-    /// A result that is no number.
     #[error(
         "step {step} of the trial returned {result}; the result must be a finite number, whatever the input"
     )]
-    NotFinite {
-        /// The step, from 1.
-        step: u32,
-        /// What it returned, m/s.
-        result: f64,
-    },
-    /// The child died of a signal.
+    NotFinite { step: u32, result: f64 },
     #[error(
         "it crashed the process that tried it, {status}, during: {during}; \
          look with: gdb --args controller probe-library FILE"
     )]
-    Crashed {
-        /// The signal by number and name.
-        status: ExitStatus,
-        /// What it was doing, and its last line, if it printed one.
-        during: String,
-    },
-    /// The child ended without a verdict.
+    Crashed { status: ExitStatus, during: String },
     #[error(
         "it ended the process that tried it, {status}, during: {during}; a library must return from every function"
     )]
-    Ended {
-        /// The exit status.
-        status: ExitStatus,
-        /// What it was doing, and its last line, if it printed one.
-        during: String,
-    },
-    /// The child did not come to an end.
+    Ended { status: ExitStatus, during: String },
     #[error(
         "it did not return within {limit:?}, during: {during}; a library must neither wait nor loop without end"
     )]
-    Hung {
-        /// How long it was given.
-        limit: Duration,
-        /// What it was doing, and its last line, if it printed one.
-        during: String,
-    },
-    /// The child's own refusal, in its words.
+    Hung { limit: Duration, during: String },
     #[error("{0}")]
     Told(String),
-    /// There is no program that could try it.
     #[error("no controller program was found to try it, at {0}; build it with cargo build -p controller")]
     NoTrier(String),
-    /// The program that should try it does not know how.
     #[error("'{}' cannot try libraries; build it with cargo build -p controller", .0.display())]
     ForeignTrier(PathBuf),
-    /// The system gave no process.
     #[error("the process that tries it cannot be started: {0}")]
     NoChild(#[source] io::Error),
 }

@@ -11,13 +11,10 @@ use std::path::Path;
 /// Files of which no rehearsal can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RehearsalError {
-    /// The scene of the experiment cannot be used: file, line, key, value and what is allowed.
     #[error("{0}")]
     Scene(String),
-    /// Experiment and programs do not go together.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Rig and scene do not go together.
     #[error(transparent)]
     Setup(#[from] SetupError),
 }
@@ -58,7 +55,6 @@ pub struct PlantTables {
 }
 
 impl PlantTables {
-    /// Makes the tables in `folder`.
     pub fn create(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<Self> {
         let mut measurement = LineFile::create(&folder.join("measurement.csv"))?;
         let mut truth = LineFile::create(&folder.join("truth.csv"))?;
@@ -67,7 +63,6 @@ impl PlantTables {
         Ok(Self { measurement, truth })
     }
 
-    /// Appends the rows of a cycle.
     pub fn write(&mut self, cycle: &CycleRecord) -> io::Result<()> {
         tables::write_measurement(self.measurement.lines(), cycle)?;
         tables::write_truth(self.truth.lines(), cycle)?;

@@ -33,13 +33,10 @@ const OUTLET_ROOM: usize = 64;
 
 /// What a rehearsal is made of.
 pub struct RehearsalParts<'a> {
-    /// The rig that is simulated.
     pub rig: &'a RigParameters,
     /// How it is set up, and what people do to it.
     pub scene: &'a Scene,
-    /// Seed of the sensors' noise.
     pub seed: u64,
-    /// The controllers of both axes.
     pub controllers: Vec<AxisController>,
 }
 
@@ -116,7 +113,6 @@ impl<R: SimulatedRig> Rehearsal<R> {
         }
     }
 
-    /// Moves on by one cycle.
     pub fn step(&mut self, mut tell: impl FnMut(u64, R::Event)) -> Rehearsed<R::Cycle> {
         let cycle = self.cycle;
         self.cycle += 1;
@@ -164,7 +160,6 @@ impl<R: SimulatedRig> Rehearsal<R> {
         &self.node
     }
 
-    /// Cycles begun.
     #[must_use]
     pub fn cycles(&self) -> u64 {
         self.cycle

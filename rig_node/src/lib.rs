@@ -170,13 +170,8 @@ impl<R: SimulatedRig> RigNode<R> {
         Axis::ALL.map(|axis| {
             let opening = match coming[axis.index()] {
                 _ if stopped => 0.0,
-                Some(command) => {
-                    if command.enable {
-                        command.opening
-                    } else {
-                        0.0
-                    }
-                }
+                Some(command) if command.enable => command.opening,
+                Some(_) => 0.0,
                 None => self.commands[axis.index()].opening(),
             };
             plant::quantise_valve(opening)

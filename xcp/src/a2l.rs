@@ -28,7 +28,6 @@ use settings::parameters::Parameter;
 /// What the file describes.
 pub struct Described<'a> {
     pub axis: Axis,
-    /// Title of its program.
     pub title: &'a str,
     /// Variables of the program, in their order.
     pub variables: &'a [Variable],
@@ -36,9 +35,7 @@ pub struct Described<'a> {
 
 /// The texts that a slave hands out.
 pub struct Description {
-    /// All of them.
     pub bytes: Vec<u8>,
-    /// Where each lies.
     pub texts: Texts,
 }
 
@@ -51,7 +48,6 @@ pub struct A2lError {
 }
 
 /// Which controller, program and tables this is: an A2L file with another one does not fit.
-#[must_use]
 pub fn epk(described: &Described<'_>) -> String {
     let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
     let mut digest = crc.digest();
@@ -67,7 +63,6 @@ pub fn epk(described: &Described<'_>) -> String {
 }
 
 /// Name of the file.
-#[must_use]
 pub fn file_name(axis: Axis) -> String {
     format!("controller-{}.a2l", axis.name())
 }

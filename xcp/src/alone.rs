@@ -24,7 +24,6 @@ impl Desk for () {
 ///
 /// # Panics
 /// When that program or its A2L file cannot be made: a bug.
-#[must_use]
 pub fn slave(secret: Option<&[u8]>) -> Slave {
     let source = Source::shut();
     let program = source

@@ -14,15 +14,29 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub enum Note {
     /// The parameter at a place in the list of variables has another value.
-    Changed { axis: Axis, cycle: u64, place: usize, value: f64 },
-    /// Somebody had the right key.
-    Unlocked { axis: Axis, cycle: u64 },
-    /// Somebody had a wrong key.
-    WrongKey { axis: Axis, cycle: u64 },
+    Changed {
+        axis: Axis,
+        cycle: u64,
+        place: usize,
+        value: f64,
+    },
+    Unlocked {
+        axis: Axis,
+        cycle: u64,
+    },
+    WrongKey {
+        axis: Axis,
+        cycle: u64,
+    },
     /// These values are to be stored, in the order of the variables.
-    Store { axis: Axis, values: Vec<f64> },
+    Store {
+        axis: Axis,
+        values: Vec<f64>,
+    },
     /// The stored values are to be loaded.
-    Load { axis: Axis },
+    Load {
+        axis: Axis,
+    },
 }
 
 /// A copy of the parameters that comes back.
@@ -30,7 +44,6 @@ pub enum Note {
 pub struct Returned {
     /// The copy, whose room serves again.
     pub values: Vec<f64>,
-    /// Whether it is in the file.
     pub stored: bool,
 }
 
@@ -53,19 +66,16 @@ pub struct Clerk {
 }
 
 /// Name of the file that a set is stored in.
-#[must_use]
 pub fn file_name(axis: Axis) -> String {
     format!("controller-{}-parameters.toml", axis.name())
 }
 
 impl Clerk {
     /// A clerk for these axes, with the run's folder.
-    #[must_use]
     pub fn new(notes: Receiver<Note>, books: Vec<Book>, changes: Sender<Change>, folder: &Path) -> Self {
         Self { notes, books, changes, folder: folder.into() }
     }
 
-    /// Does what is asked for.
     pub fn look(&mut self) {
         let notes = self.notes.clone();
         for note in notes.try_iter() {

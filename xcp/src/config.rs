@@ -98,11 +98,8 @@ fn bytes(hexadecimal: &str) -> Result<Vec<u8>, String> {
     if !hexadecimal.bytes().all(|digit| digit.is_ascii_hexdigit()) {
         return Err(wrong());
     }
-    let pairs = hexadecimal.as_bytes().chunks(2);
-    let byte = |pair: &[u8]| {
-        (pair.len() == 2).then(|| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok())?
-    };
-    let bytes: Option<Vec<u8>> = pairs.map(byte).collect();
+    let byte = |at: usize| u8::from_str_radix(hexadecimal.get(at..at + 2)?, 16).ok();
+    let bytes: Option<Vec<u8>> = (0..hexadecimal.len()).step_by(2).map(byte).collect();
     bytes.filter(|bytes| KEY_BYTES.contains(&bytes.len())).ok_or_else(wrong)
 }
 

@@ -41,7 +41,6 @@ const _: () = assert!(ODTS <= LAST_PID as usize, "an ODT's number is its packet'
 /// A piece of memory.
 #[derive(Clone, Copy, Default)]
 pub struct Entry {
-    /// Its first address.
     pub address: u32,
     /// Bytes; 0 for an entry that was not written.
     pub size: u8,
@@ -80,7 +79,6 @@ enum Made {
 /// All lists, and the packets that wait to leave.
 #[derive(Clone, Default)]
 pub struct Daq {
-    /// Packets that may leave in a cycle.
     pub(crate) per_cycle: u32,
     made: Made,
     lists: [List; LISTS],
@@ -106,13 +104,10 @@ pub struct ListMode {
 
 impl Daq {
     /// No lists; so many packets may leave in a cycle.
-    #[must_use]
     pub fn new(per_cycle: u32) -> Self {
         Self { per_cycle, waiting: VecDeque::with_capacity(ROOM), ..Self::default() }
     }
 
-    /// Whether a list runs.
-    #[must_use]
     pub fn runs(&self) -> bool {
         self.lists[..self.count].iter().any(|list| list.running)
     }
@@ -273,7 +268,6 @@ impl Daq {
         Ok(())
     }
 
-    /// How a list is run.
     pub fn mode(&self, list: u16) -> Result<ListMode, Refusal> {
         let List { mode, prescaler, priority, selected, running, .. } = self.lists[self.list(list)?];
         let bit = |is: bool, bit: u8| if is { bit } else { 0 };
@@ -335,7 +329,6 @@ impl Daq {
         Ok(())
     }
 
-    /// Stops all lists.
     pub fn stop(&mut self) {
         self.lists.iter_mut().for_each(|list| (list.running, list.selected) = (false, false));
     }
@@ -418,7 +411,6 @@ impl Daq {
         }
     }
 
-    /// The next packet to leave.
     pub fn next_packet(&mut self) -> Option<Packet> {
         self.waiting.pop_front()
     }

@@ -61,7 +61,6 @@ enum Region {
 /// The beginning of a value, of which the rest is still to come.
 #[derive(Clone, Copy)]
 struct Begun {
-    /// Address of the next byte.
     next: u32,
     bytes: [u8; 8],
     count: usize,
@@ -80,7 +79,6 @@ pub struct Image {
 
 impl Image {
     /// A memory for a program with these variables and values, before its first cycle.
-    #[must_use]
     pub fn new(description: Vec<u8>, variables: Vec<Variable>, values: &[f64]) -> Self {
         Self {
             description,
@@ -100,19 +98,14 @@ impl Image {
         self.trace.take(cycle, signals);
     }
 
-    /// The rig's time began again.
     pub fn restart(&mut self) {
         self.trace.restart();
     }
 
-    /// Values of the parameters.
-    #[must_use]
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
     }
 
-    /// Bytes of the description.
-    #[must_use]
     pub fn description(&self) -> &[u8] {
         &self.description
     }
@@ -133,7 +126,7 @@ impl Image {
             into.copy_from_slice(&self.description[from..from + into.len()]);
             return Ok(());
         }
-        let width = width(region);
+        let (_, width) = self.extent(region);
         let mut rest = into;
         while !rest.is_empty() {
             let bytes = self.value(region, (offset / width) as usize);
@@ -155,19 +148,20 @@ impl Image {
         let (region, first) = region(address).ok_or(Refusal::AccessDenied)?;
         let offset = address - first;
         let end = offset.checked_add(count).ok_or(Refusal::AccessDenied)?;
-        if end <= self.size(region) { Ok((region, offset)) } else { Err(Refusal::AccessDenied) }
+        let (count, width) = self.extent(region);
+        if end <= count * width { Ok((region, offset)) } else { Err(Refusal::AccessDenied) }
     }
 
-    /// Bytes of a region.
-    fn size(&self, region: Region) -> u32 {
+    /// How many values a region has, and bytes of each.
+    fn extent(&self, region: Region) -> (u32, u32) {
         match region {
-            Region::Description => self.description.len() as u32,
-            Region::Parameters => self.parameters.len() as u32 * WIDE,
-            Region::Controls => CONTROLS.len() as u32 * WIDE,
-            Region::Signals => COUNT as u32 * NARROW,
-            Region::TraceTold => TOLD.len() as u32 * NARROW,
-            Region::TraceCycles => CAPACITY as u32 * NARROW,
-            Region::TraceChannel(_) => CAPACITY as u32 * WIDE,
+            Region::Description => (self.description.len() as u32, 1),
+            Region::Parameters => (self.parameters.len() as u32, WIDE),
+            Region::Controls => (CONTROLS.len() as u32, WIDE),
+            Region::Signals => (COUNT as u32, NARROW),
+            Region::TraceTold => (TOLD.len() as u32, NARROW),
+            Region::TraceCycles => (CAPACITY as u32, NARROW),
+            Region::TraceChannel(_) => (CAPACITY as u32, WIDE),
         }
     }
 
@@ -306,14 +300,6 @@ fn region(address: u32) -> Option<(Region, u32)> {
             let number = (high as usize).checked_sub(0x51).filter(|number| *number < CHANNELS)?;
             Some((Region::TraceChannel(number), channel(number)))
         }
-    }
-}
-
-/// Bytes from value to value in a region.
-fn width(region: Region) -> u32 {
-    match region {
-        Region::Parameters | Region::Controls | Region::TraceChannel(_) => WIDE,
-        _ => NARROW,
     }
 }
 

@@ -32,7 +32,6 @@ use protocol::frames::{DRIVE_XCP_COMMAND, DRIVE_XCP_RESPONSE, LOAD_XCP_COMMAND, 
 pub const EVENT_NAME: &str = "cycle of 1 ms";
 
 /// Identifiers of an axis: commands to it, and what comes from it.
-#[must_use]
 pub fn identifiers(axis: Axis) -> (u16, u16) {
     match axis {
         Axis::Drive => (DRIVE_XCP_COMMAND.id, DRIVE_XCP_RESPONSE.id),

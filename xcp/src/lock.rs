@@ -42,7 +42,6 @@ pub struct Lock {
 pub enum Turned {
     /// More of it is to come.
     Halfway,
-    /// It was the right one.
     Open,
     /// It was a wrong one: the session ends.
     Wrong,
@@ -50,23 +49,18 @@ pub enum Turned {
 
 impl Lock {
     /// A shut lock. `start` is random; in simulated time it is not, and seeds come again in the next run.
-    #[must_use]
     pub fn new(secret: Option<Vec<u8>>, start: [u8; 16]) -> Self {
         Self { secret, start, ..Self::default() }
     }
 
-    /// Whether writing is allowed.
-    #[must_use]
     pub fn is_open(&self) -> bool {
         self.open
     }
 
-    /// Shuts it.
     pub fn shut(&mut self) {
         (self.open, self.given, self.had) = (false, None, 0);
     }
 
-    /// A cycle has passed.
     pub fn cycle(&mut self) {
         self.pause = self.pause.saturating_sub(1);
     }
@@ -130,7 +124,6 @@ impl Lock {
 }
 
 /// The key to a seed.
-#[must_use]
 pub fn key(secret: &[u8], seed: [u8; BYTES]) -> [u8; BYTES] {
     let whole = mac(secret).chain_update(seed).finalize().into_bytes();
     std::array::from_fn(|byte| whole[byte])

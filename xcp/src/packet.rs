@@ -63,25 +63,19 @@ pub enum Refusal {
     Synch = 0x00,
     /// What was asked for before is not done yet.
     Busy = 0x10,
-    /// Not while DAQ runs.
     DaqActive = 0x11,
-    /// No such command here.
     Unknown = 0x20,
     /// Too short, or a field that means nothing.
     Syntax = 0x21,
-    /// A value or place out of range.
     OutOfRange = 0x22,
     /// Never written, or only at the start.
     WriteProtected = 0x23,
     /// Nothing there, or not now.
     AccessDenied = 0x24,
-    /// Not before UNLOCK.
     AccessLocked = 0x25,
-    /// Not in this order.
     Sequence = 0x29,
     /// Lists that cannot run so.
     DaqConfig = 0x2A,
-    /// No room.
     MemoryOverflow = 0x30,
 }
 
@@ -119,7 +113,6 @@ impl<'a> Fields<'a> {
 ///
 /// # Panics
 /// With more than 7 bytes, which no command here has.
-#[must_use]
 pub fn response(bytes: &[u8]) -> Packet {
     let mut packet = [0; BYTES];
     packet[0] = RESPONSE;
@@ -127,7 +120,6 @@ pub fn response(bytes: &[u8]) -> Packet {
     packet
 }
 
-#[must_use]
 pub fn refusal(why: Refusal) -> Packet {
     [ERROR, why as u8, 0, 0, 0, 0, 0, 0]
 }

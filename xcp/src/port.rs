@@ -32,7 +32,6 @@ pub const COMMANDS: usize = 8;
 /// What a port counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PortCounters {
-    /// What the slave counted.
     #[serde(flatten)]
     pub slave: SlaveCounters,
     /// Commands for which there was no room.
@@ -41,15 +40,12 @@ pub struct PortCounters {
     pub daq_dropped: u64,
     /// Answers that the bus did not take.
     pub answers_dropped: u64,
-    /// Parameters that were changed.
     pub changed: u64,
 }
 
 /// The queues between a port and the clerk.
 pub struct Queues {
-    /// To the clerk.
     pub notes: Sender<Note>,
-    /// From it.
     pub returned: Receiver<Returned>,
 }
 
@@ -147,13 +143,10 @@ impl Port {
         })
     }
 
-    #[must_use]
     pub fn axis(&self) -> Axis {
         self.axis
     }
 
-    /// What it counted.
-    #[must_use]
     pub fn counters(&self) -> PortCounters {
         let daq_dropped = self.counters.daq_dropped + self.slave.daq.dropped;
         PortCounters { slave: *self.slave.counters(), daq_dropped, ..self.counters }
@@ -208,11 +201,8 @@ impl CalibrationPort for Port {
         sensors: &Sensors,
         command: &ValveCommand,
     ) {
-        let signals = signals::sample(&View {
-            controller,
-            sensors,
-            record: controller.record(cycle, sensors, command),
-        });
+        let record = controller.record(cycle, sensors, command);
+        let signals = signals::sample(&View { ready: controller.program().ready(), sensors, record });
         self.slave.cycle(cycle, &signals, controller.program().values());
         self.cycle = cycle;
         self.may_leave = self.slave.daq.per_cycle;

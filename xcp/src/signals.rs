@@ -3,26 +3,22 @@
 //! A signal is a number of the cycle that was just answered, in SI. On the wire of XCP it is a float of four bytes or a count,
 //! so that it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
 
-use axis_control::axis::{AxisController, AxisRecord};
+use algorithms::algorithm::Ready;
+use axis_control::axis::AxisRecord;
 use protocol::frames::{DRIVE_CHAIN_STATUS, Sensors, SignalSpec};
 use settings::parameters::Parameter;
 
 /// How a value lies in memory; Intel byte order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// A count of one byte.
     Byte,
-    /// A count of four bytes.
     Long,
-    /// A float of four bytes.
     Float,
-    /// A float of eight bytes.
     Double,
 }
 
 impl Format {
     /// Bytes of a value.
-    #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
             Self::Byte => 1,
@@ -32,7 +28,6 @@ impl Format {
     }
 
     /// `value` as it lies in memory, in the first bytes; counts wrap, as the rig's cycle does after 49.7 days.
-    #[must_use]
     pub fn encode(self, value: f64) -> [u8; 8] {
         let mut bytes = [0; 8];
         match self {
@@ -45,7 +40,6 @@ impl Format {
     }
 
     /// The value that lies in the first bytes.
-    #[must_use]
     pub fn decode(self, bytes: [u8; 8]) -> f64 {
         let [a, b, c, d, ..] = bytes;
         match self {
@@ -59,8 +53,8 @@ impl Format {
 
 /// A cycle as the signals see it.
 pub struct View<'a> {
-    /// The controller after its answer.
-    pub controller: &'a AxisController,
+    /// What its program was given.
+    pub ready: &'a Ready,
     /// The sensors that it answered.
     pub sensors: &'a Sensors,
     /// The row of its record.
@@ -71,7 +65,6 @@ pub struct View<'a> {
 pub struct Signal {
     /// Name, unit, range and meaning; its default is that before the first cycle.
     pub about: Parameter,
-    /// How it lies in memory.
     pub format: Format,
     /// Names of its values, for one that is a state.
     pub values: &'static [&'static str],
@@ -152,22 +145,20 @@ pub static SIGNALS: [Signal; 24] = [
         ("extension_acceleration_m_per_s2", "m/s^2"),
         [-1000.0, 1000.0],
         "acceleration of the own rod, filtered, positive as it extends",
-        |view| view.controller.program().ready().acceleration_m_per_s2,
+        |view| view.ready.acceleration_m_per_s2,
     ),
-    number(("force_n", "N"), [-2000.0, 2000.0], "force, filtered", |view| {
-        view.controller.program().ready().force_n
-    }),
+    number(("force_n", "N"), [-2000.0, 2000.0], "force, filtered", |view| view.ready.force_n),
     number(("pressure_a_pa", "Pa"), [0.0, 1e6], "absolute pressure of the cap side, filtered", |view| {
-        view.controller.program().ready().pressure_a_pa
+        view.ready.pressure_a_pa
     }),
     number(("pressure_b_pa", "Pa"), [0.0, 1e6], "absolute pressure of the rod side, filtered", |view| {
-        view.controller.program().ready().pressure_b_pa
+        view.ready.pressure_b_pa
     }),
     number(
         ("supply_pressure_pa", "Pa"),
         [0.0, 1e6],
         "absolute pressure of the supply as the rig tells it",
-        |view| view.controller.program().ready().supply_pressure_pa,
+        |view| view.ready.supply_pressure_pa,
     ),
     number(("set_position_m", "m"), [-0.1, 0.6], "position asked for; 0 while none is, see asked", |view| {
         view.record.set_position.map_or(0.0, |point| point.position_m)
@@ -185,7 +176,7 @@ pub static SIGNALS: [Signal; 24] = [
         |view| view.record.wanted_velocity_m_per_s,
     ),
     number(("applied_velocity_m_per_s", "m/s"), [-100.0, 100.0], "what the valve can do of it", |view| {
-        view.controller.program().ready().applied_velocity_m_per_s
+        view.ready.applied_velocity_m_per_s
     }),
     number(("opening", ""), [-1.0, 1.0], "valve opening sent", |view| view.record.opening),
     state("enabled", NO_YES, "the valve is asked to act", |view| f64::from(u8::from(view.record.enabled))),
@@ -209,7 +200,6 @@ pub static SIGNALS: [Signal; 24] = [
 ];
 
 /// All signals of a cycle, in the order of [`SIGNALS`].
-#[must_use]
 pub fn sample(view: &View<'_>) -> [f64; COUNT] {
     std::array::from_fn(|place| (SIGNALS[place].of)(view))
 }

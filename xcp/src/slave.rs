@@ -56,16 +56,13 @@ pub struct Texts {
     pub file: (u32, u32),
     /// Which controller, program and tables this is.
     pub epk: (u32, u32),
-    /// Name of the event.
     pub event: (u32, u32),
 }
 
 /// What a slave is made of.
 pub struct SlaveParts {
     pub image: Image,
-    /// Where the texts lie in its description.
     pub texts: Texts,
-    /// What is in front of writing.
     pub lock: Lock,
     /// DAQ packets that may leave in a cycle.
     pub daq_per_cycle: u32,
@@ -74,15 +71,11 @@ pub struct SlaveParts {
 /// What a slave counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct SlaveCounters {
-    /// Sessions that were opened.
     pub sessions: u64,
     /// Commands that were answered well.
     pub answered: u64,
-    /// Commands that were refused.
     pub refused: u64,
-    /// Keys that were right.
     pub unlocked: u64,
-    /// Keys that were wrong.
     pub wrong_keys: u64,
     /// DAQ packets handed out.
     pub daq_packets: u64,
@@ -105,7 +98,6 @@ pub struct Slave {
     pub(crate) daq: Daq,
     connected: bool,
     storing: bool,
-    /// Cycles since the last command.
     idle: u64,
     /// Where the next transfer begins; `None` until it is set.
     address: Option<u32>,
@@ -115,7 +107,6 @@ pub struct Slave {
 
 impl Slave {
     /// A slave without a session.
-    #[must_use]
     pub fn new(parts: SlaveParts) -> Self {
         let SlaveParts { image, texts, lock, daq_per_cycle } = parts;
         Self {
@@ -132,19 +123,14 @@ impl Slave {
         }
     }
 
-    #[must_use]
     pub fn image(&self) -> &Image {
         &self.image
     }
 
-    /// Whether writing is allowed.
-    #[must_use]
     pub fn is_unlocked(&self) -> bool {
         self.lock.is_open()
     }
 
-    /// What it counted.
-    #[must_use]
     pub fn counters(&self) -> &SlaveCounters {
         &self.counters
     }
@@ -160,7 +146,6 @@ impl Slave {
         self.daq.cycle(cycle, &self.image);
     }
 
-    /// The rig's time began again.
     pub fn restart(&mut self) {
         self.image.restart();
     }

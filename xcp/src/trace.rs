@@ -71,7 +71,6 @@ const fn signal(name: &'static str, default: f64, meaning: &'static str) -> Para
 }
 
 /// How a control lies in memory.
-#[must_use]
 pub fn control_format(place: usize) -> Format {
     if CONTROLS[place].whole { Format::Long } else { Format::Double }
 }
@@ -87,11 +86,9 @@ pub enum State {
     Idle = 0,
     /// It takes the samples before the trigger.
     Filling = 1,
-    /// It waits for the trigger.
     Armed = 2,
     /// It takes the samples after it.
     Triggered = 3,
-    /// It holds them all.
     Ready = 4,
 }
 
@@ -122,7 +119,6 @@ pub struct Trace {
     state: State,
     cycles: Vec<u32>,
     values: [Vec<f64>; CHANNELS],
-    /// Where the next sample goes.
     next: usize,
     held: usize,
     /// Samples that are still to come after the trigger.
@@ -170,7 +166,6 @@ impl Settings {
 
 impl Trace {
     /// Whether it can be armed so: the pre-trigger leaves room for the trigger.
-    #[must_use]
     pub fn can_arm(controls: &[f64; CONTROLS.len()]) -> bool {
         controls[PRE_TRIGGER] < controls[LENGTH]
     }
@@ -194,13 +189,10 @@ impl Trace {
         }
     }
 
-    /// Whether it records.
-    #[must_use]
     pub fn runs(&self) -> bool {
         matches!(self.state, State::Filling | State::Armed | State::Triggered)
     }
 
-    /// Takes the signals of a cycle.
     pub fn take(&mut self, cycle: u64, signals: &[f64; COUNT]) {
         if !self.runs() || cycle < self.due {
             return;
@@ -251,13 +243,11 @@ impl Trace {
     }
 
     /// What it tells of itself, in the order of [`TOLD`].
-    #[must_use]
     pub fn told(&self) -> [u32; TOLD.len()] {
         [self.state as u32, self.samples() as u32, self.trigger_cycle, self.triggers]
     }
 
     /// Samples that can be read: none before the trigger.
-    #[must_use]
     pub fn samples(&self) -> usize {
         if self.trigger_cycle_known() { self.held } else { 0 }
     }
@@ -268,13 +258,11 @@ impl Trace {
     }
 
     /// Cycle of sample `number`, the oldest being 0; 0 for one that is not there.
-    #[must_use]
     pub fn cycle(&self, number: usize) -> u32 {
         self.place(number).map_or(0, |place| self.cycles[place])
     }
 
     /// Value of sample `number` of a channel; 0 for one that is not there.
-    #[must_use]
     pub fn value(&self, channel: usize, number: usize) -> f64 {
         self.place(number).map_or(0.0, |place| self.values[channel][place])
     }

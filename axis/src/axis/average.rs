@@ -1,10 +1,10 @@
-//! Moving average of the position sensor over the last 0.2 s, for the partner.
+//! Moving average over the last 0.2 s: of the position sensor for the partner, of the error at rest for the figures.
 
 /// Samples of the window.
 const WINDOW: usize = 200;
 
 #[derive(Clone, Debug)]
-pub(super) struct Average {
+pub(crate) struct Average {
     samples: [f64; WINDOW],
     taken: usize,
 }
@@ -16,19 +16,29 @@ impl Default for Average {
 }
 
 impl Average {
-    pub(super) fn take(&mut self, value: f64) {
+    pub(crate) fn take(&mut self, value: f64) {
         self.samples[self.taken % WINDOW] = value;
         self.taken += 1;
     }
 
     /// The mean; 0 before the first sample. Summed anew each time, so that roundings never pile up.
-    pub(super) fn value(&self) -> f64 {
+    pub(crate) fn value(&self) -> f64 {
         let count = self.taken.min(WINDOW);
         self.samples[..count].iter().sum::<f64>() / count.max(1) as f64
     }
 
+    /// Whether the window is full.
+    pub(crate) fn is_full(&self) -> bool {
+        self.taken >= WINDOW
+    }
+
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.taken = 0;
+    }
+
     /// The newest sample; 0 before the first.
-    pub(super) fn last(&self) -> f64 {
+    pub(crate) fn last(&self) -> f64 {
         self.taken.checked_sub(1).map_or(0.0, |newest| self.samples[newest % WINDOW])
     }
 }

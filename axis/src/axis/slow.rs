@@ -50,7 +50,6 @@ impl Slow {
 
 impl AxisController {
     /// Status for the bus.
-    #[must_use]
     pub fn status(&self) -> ChainStatus {
         let (main_chain, ok, repetition) =
             self.leading.output.map_or((MainChainState::WaitingForRig, false, 0), |output| {

@@ -87,8 +87,6 @@ pub(super) struct Pressing {
     by_hand: Option<ByHand>,
     force: ForceChain,
     matching: MatchingChain,
-    /// State of both, as told last.
-    told: (ForceChainState, MatchingChainState),
     /// Which step of the preparation is going on.
     step: usize,
     fault: Option<Fault>,
@@ -107,7 +105,6 @@ impl Work {
                 plan,
                 force: ForceChain::default(),
                 matching: MatchingChain::default(),
-                told: (ForceChainState::Idle, MatchingChainState::Idle),
                 step: 0,
                 fault: None,
             })),
@@ -188,7 +185,7 @@ impl Work {
 
     pub(super) fn force_chain(&self, main: MainChainState) -> ForceChainState {
         match self {
-            Self::Force(pressing) => pressing.told.0,
+            Self::Force(pressing) => pressing.force.entered.state,
             _ if main == MainChainState::Done => ForceChainState::Done,
             _ => ForceChainState::Idle,
         }
@@ -196,7 +193,7 @@ impl Work {
 
     pub(super) fn matching_chain(&self) -> MatchingChainState {
         match self {
-            Self::Force(pressing) => pressing.told.1,
+            Self::Force(pressing) => pressing.matching.entered.state,
             _ => MatchingChainState::Idle,
         }
     }
@@ -207,7 +204,6 @@ impl Work {
             pressing.force.restart(0);
             pressing.matching.restart(0);
             pressing.plan.source.reset();
-            pressing.told = (ForceChainState::Idle, MatchingChainState::Idle);
             (pressing.step, pressing.fault) = (0, None);
         }
     }
@@ -237,7 +233,6 @@ impl Pressing {
             },
             program.task(Task::ForceChain),
         );
-        self.told.0 = chain.state;
         self.fault = self.fault.or(chain.fault);
         let relieving = self.plan.prepare.get(self.step) == Some(&Prepare::Relieve);
         if matches!(output.phase, Phase::Prepare) && relieving && chain.relieved {
@@ -299,7 +294,6 @@ impl Pressing {
             partner: *seen.partner,
         };
         let output = self.matching.advance(&inputs, program.task(Task::MatchingChain));
-        self.told.1 = output.state;
         self.fault = self.fault.or(output.fault);
         if asked && output.matched {
             program.set_offset(output.offset_m);

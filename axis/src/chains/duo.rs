@@ -56,7 +56,7 @@ impl One {
     }
 
     pub(super) fn state(&self) -> MainChainState {
-        self.leading.main.entered().state
+        self.leading.main.entered.state
     }
 
     pub(super) fn fault(&self) -> Option<Fault> {

@@ -110,9 +110,6 @@ enum State {
     WaitingForStart,
 }
 
-/// An edge: where to, and why.
-type Edge = (EmergencyStopChainState, StopCause);
-
 /// What waits to be sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Frames {
@@ -131,12 +128,12 @@ pub struct EmergencyStopChain {
     config: StopConfig,
     state: State,
     frames: Frames,
-    entered: Entered<EmergencyStopChainState, StopCause>,
+    /// The state entered last, when and why.
+    pub(crate) entered: Entered<EmergencyStopChainState, StopCause>,
 }
 
 impl EmergencyStopChain {
     /// A chain that is ready.
-    #[must_use]
     pub fn new(config: StopConfig) -> Self {
         let entered = Entered { cycle: 0, state: EmergencyStopChainState::Ready, cause: StopCause::Began };
         Self { config, state: State::Ready, frames: Frames::None, entered }
@@ -180,21 +177,13 @@ impl EmergencyStopChain {
         }
     }
 
-    #[must_use]
     pub fn state(&self) -> EmergencyStopChainState {
         self.entered.state
     }
 
     /// The fault for which this controller holds the emergency stop.
-    #[must_use]
     pub fn holds(&self) -> Option<Fault> {
         self.own().filter(|own| !own.acknowledged).map(|own| own.fault)
-    }
-
-    /// The state entered last, when and why.
-    #[must_use]
-    pub fn entered(&self) -> Entered<EmergencyStopChainState, StopCause> {
-        self.entered
     }
 
     fn own(&self) -> Option<Own> {
@@ -229,8 +218,8 @@ impl EmergencyStopChain {
         inputs.rig.is_some_and(|rig| !rig.check_valves_shut && rig.supply_pressure_pa >= least_pa)
     }
 
-    /// The edge to go, if any.
-    fn decide(&self, inputs: &StopInputs) -> Option<Edge> {
+    /// The edge to go, if any: where to, and why.
+    fn decide(&self, inputs: &StopInputs) -> Option<(EmergencyStopChainState, StopCause)> {
         use EmergencyStopChainState as S;
         let rig_tripped = inputs.rig.is_some_and(|rig| rig.emergency_stop);
         let tripped = || match inputs.frame {

@@ -43,7 +43,6 @@ impl Fault {
     ];
 
     /// Name in files and messages.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::PartnerMissing => "partner-missing",
@@ -64,7 +63,6 @@ impl Fault {
     }
 
     /// Reason in the frame that trips the emergency stop.
-    #[must_use]
     pub const fn reason(self) -> EmergencyStopReason {
         match self {
             Self::PartnerMissing
@@ -84,7 +82,6 @@ impl Fault {
     }
 
     /// What happened and what to look at.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::PartnerMissing => {
@@ -125,7 +122,6 @@ impl Fault {
     /// Whether what caused the fault is over, so that a release may be taken.
     ///
     /// What a person must judge (time-outs, limits, the algorithm) is over when that person releases.
-    #[must_use]
     pub const fn is_over(self, partner_fresh: bool, sensors_fresh: bool) -> bool {
         match self {
             Self::PartnerMissing

@@ -147,16 +147,14 @@ enum State {
     Fault,
 }
 
-/// An edge: where to, and why.
-type Edge = (ForceChainState, ForceCause);
-
 #[derive(Clone, Debug)]
 pub struct ForceChain {
     state: State,
     asked: ForceAsked,
     /// Mean of the force, with the cycle of its last sample.
     mean: Option<Mean>,
-    entered: Entered<ForceChainState, ForceCause>,
+    /// The state entered last, when and why.
+    pub(crate) entered: Entered<ForceChainState, ForceCause>,
 }
 
 impl Default for ForceChain {
@@ -185,12 +183,6 @@ impl ForceChain {
     pub fn restart(&mut self, cycle: u64) {
         *self = Self::default();
         self.entered.cycle = cycle;
-    }
-
-    /// The state entered last, when and why.
-    #[must_use]
-    pub fn entered(&self) -> Entered<ForceChainState, ForceCause> {
-        self.entered
     }
 
     /// Keeps what the inputs tell, without a change of state.
@@ -222,8 +214,8 @@ impl ForceChain {
         }
     }
 
-    /// The edge to go, if any.
-    fn decide(&self, inputs: &ForceInputs, numbers: &Parameters) -> Option<Edge> {
+    /// The edge to go, if any: where to, and why.
+    fn decide(&self, inputs: &ForceInputs, numbers: &Parameters) -> Option<(ForceChainState, ForceCause)> {
         use ForceChainState as S;
         let asked = inputs.asked;
         if self.state == State::Fault {

@@ -44,7 +44,6 @@ pub struct Leading {
 
 impl Leading {
     /// A main chain that waits for the rig, and an emergency stop chain that is ready.
-    #[must_use]
     pub fn new(main: MainConfig, supply_pressure_pa: f64) -> Self {
         let stop = StopConfig { after_emergency_stop: main.after_emergency_stop, supply_pressure_pa };
         Self {

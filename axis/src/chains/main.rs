@@ -99,12 +99,12 @@ pub struct MainChain {
     repetition: u32,
     /// The console's start was heard, here or by the partner.
     started: bool,
-    entered: Entered<MainChainState, MainCause>,
+    /// The state entered last, when and why.
+    pub(crate) entered: Entered<MainChainState, MainCause>,
 }
 
 impl MainChain {
     /// A chain that waits for the rig.
-    #[must_use]
     pub fn new(config: MainConfig) -> Self {
         let entered = Entered { cycle: 0, state: MainChainState::WaitingForRig, cause: MainCause::Began };
         let settled = Settled::new(config.settled);
@@ -128,16 +128,9 @@ impl MainChain {
         self.enter(MainChainState::WaitingForRig, MainCause::RigRestarted, &inputs);
     }
 
-    /// The state entered last, when and why.
-    #[must_use]
-    pub fn entered(&self) -> Entered<MainChainState, MainCause> {
-        self.entered
-    }
-
     /// Whether the own axis keeps still.
-    #[must_use]
     pub fn still(&self) -> bool {
-        self.settled.still()
+        self.settled.still
     }
 
     /// Keeps what the inputs tell, without a change of state.

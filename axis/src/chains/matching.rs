@@ -119,15 +119,13 @@ enum State {
     Fault { fault: Fault },
 }
 
-/// An edge: where to, and why.
-type Edge = (MatchingChainState, MatchingCause);
-
 #[derive(Clone, Debug)]
 pub struct MatchingChain {
     state: State,
     asked: bool,
     offset_m: f64,
-    entered: Entered<MatchingChainState, MatchingCause>,
+    /// The state entered last, when and why.
+    pub(crate) entered: Entered<MatchingChainState, MatchingCause>,
 }
 
 impl Default for MatchingChain {
@@ -158,12 +156,6 @@ impl MatchingChain {
         self.entered.cycle = cycle;
     }
 
-    /// The state entered last, when and why.
-    #[must_use]
-    pub fn entered(&self) -> Entered<MatchingChainState, MatchingCause> {
-        self.entered
-    }
-
     /// Keeps what the inputs tell, without a change of state.
     fn note(&mut self, inputs: &MatchingInputs, numbers: &Parameters) {
         let cycle = inputs.cycle;
@@ -189,8 +181,12 @@ impl MatchingChain {
         }
     }
 
-    /// The edge to go, if any.
-    fn decide(&self, inputs: &MatchingInputs, numbers: &Parameters) -> Option<Edge> {
+    /// The edge to go, if any: where to, and why.
+    fn decide(
+        &self,
+        inputs: &MatchingInputs,
+        numbers: &Parameters,
+    ) -> Option<(MatchingChainState, MatchingCause)> {
         use MatchingChainState as S;
         let passed = |since: u64| inputs.cycle.saturating_sub(since);
         let too_long = |began: u64| {
@@ -223,7 +219,7 @@ impl MatchingChain {
         }
     }
 
-    fn judge(offset_m: f64, numbers: &Parameters) -> Edge {
+    fn judge(offset_m: f64, numbers: &Parameters) -> (MatchingChainState, MatchingCause) {
         if offset_m.abs() <= numbers.offset_most_m {
             return (MatchingChainState::Matched, MatchingCause::Averaged);
         }

@@ -63,12 +63,12 @@ pub struct Settled {
     seen: Option<(u64, u64)>,
     /// Since when the axis is still and at its set-point.
     since: Option<u64>,
-    still: bool,
+    /// The position keeps still, whatever the set-point.
+    pub(super) still: bool,
 }
 
 impl Settled {
     /// A detector that has seen nothing.
-    #[must_use]
     pub fn new(bounds: Bounds) -> Self {
         Self { bounds, buckets: [None; BUCKETS], seen: None, since: None, still: false }
     }
@@ -92,14 +92,7 @@ impl Settled {
         *self = Self::new(self.bounds);
     }
 
-    /// Whether the position keeps still, whatever the set-point.
-    #[must_use]
-    pub fn still(&self) -> bool {
-        self.still
-    }
-
     /// Whether the axis has been settled for `settling_s` since cycle `from`.
-    #[must_use]
     pub fn settled_for(&self, settling_s: f64, from: u64, cycle: u64) -> bool {
         self.since.is_some_and(|since| cycles(elapsed_s(since.max(from), cycle)) >= cycles(settling_s))
     }
@@ -241,7 +234,7 @@ mod tests {
             let mut settled = Settled::new(Bounds::default());
             (0..500).for_each(|cycle| settled.take(cycle, 0.1, ControlError::None));
             settled.take(499 + skipped, 0.1, ControlError::None);
-            assert_eq!(settled.still(), still);
+            assert_eq!(settled.still, still);
         }
     }
 
@@ -250,7 +243,7 @@ mod tests {
         let mut settled = Settled::new(Bounds::default());
         (0..500).for_each(|cycle| settled.take(cycle, 0.1, ControlError::None));
         settled.take(0, 0.1, ControlError::None);
-        assert!(!settled.still());
+        assert!(!settled.still);
     }
 
     #[test]

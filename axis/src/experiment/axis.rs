@@ -56,18 +56,6 @@ pub struct ProgramReference {
     pub line: usize,
 }
 
-impl ProgramReference {
-    /// The program's file: `../programs/NAME.toml` from the experiment's folder, or the path from there that ends in .toml.
-    #[must_use]
-    pub fn path(&self, experiment_file: &Path) -> PathBuf {
-        let folder = experiment_file.parent().unwrap_or(Path::new(""));
-        if self.written.ends_with(".toml") {
-            return folder.join(&self.written);
-        }
-        folder.join("..").join("programs").join(format!("{}.toml", self.written))
-    }
-}
-
 /// A step of the preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prepare {
@@ -95,7 +83,6 @@ pub enum SetPoints {
 }
 
 impl SetPoints {
-    #[must_use]
     pub fn quantity(&self) -> Quantity {
         match self {
             Self::Positions(_) => Quantity::Position,
@@ -103,7 +90,6 @@ impl SetPoints {
         }
     }
 
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         match self {
             Self::Positions(motion) => motion.duration_s(),
@@ -203,7 +189,6 @@ impl AxisExperiment {
     }
 
     /// The force that the axis begins with, N; 0 when it is position controlled.
-    #[must_use]
     pub fn initial_force_n(&self) -> f64 {
         match &self.set_points {
             SetPoints::Positions(_) => 0.0,
@@ -211,9 +196,13 @@ impl AxisExperiment {
         }
     }
 
-    #[must_use]
+    /// The program's file: `../programs/NAME.toml` from the experiment's folder, or the path from there that ends in .toml.
     pub fn program_path(&self, experiment_file: &Path) -> PathBuf {
-        self.program.path(experiment_file)
+        let (folder, written) = (experiment_file.parent().unwrap_or(Path::new("")), &self.program.written);
+        if written.ends_with(".toml") {
+            return folder.join(written);
+        }
+        folder.join("..").join("programs").join(format!("{written}.toml"))
     }
 }
 

@@ -9,7 +9,6 @@ use super::law::{BOTH, Kind, Law, Moment, Shaped};
 use super::{ForceSetPoint, SetPoint};
 use std::f64::consts::TAU;
 
-/// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "bestehorn",
     about: "Bestehorn sinoid to a place",
@@ -33,19 +32,16 @@ pub struct SmoothWay {
 
 impl SmoothWay {
     /// From one value to another in `duration_s`; no time at all is a jump.
-    #[must_use]
     pub const fn new(from: f64, to: f64, duration_s: f64) -> Self {
         Self { from, to, duration_s }
     }
 
     /// The position set-point `time_s` after its start.
-    #[must_use]
     pub fn position(&self, time_s: f64) -> SetPoint {
         self.at(time_s).into()
     }
 
     /// The force set-point `time_s` after its start.
-    #[must_use]
     pub fn force(&self, time_s: f64) -> ForceSetPoint {
         self.at(time_s).into()
     }

@@ -93,21 +93,13 @@ impl ForceProfile {
     }
 
     /// How long it takes, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.row.duration_s()
     }
 
     /// The force that it begins with, N.
-    #[must_use]
     pub fn initial_force_n(&self) -> f64 {
         self.row.start()
-    }
-
-    /// The force at the end, N: of a load that depends on the axis its base force.
-    #[must_use]
-    pub fn end_n(&self) -> f64 {
-        self.row.end()
     }
 
     fn limited(&self, moment: Moment) -> ForceSetPoint {
@@ -143,7 +135,6 @@ pub struct ForceSource {
 
 impl ForceSource {
     /// At its beginning.
-    #[must_use]
     pub fn new(profile: ForceProfile) -> Self {
         Self { profile: Arc::new(profile), memory: Memory::default() }
     }
@@ -154,7 +145,6 @@ impl ForceSource {
     }
 
     /// What is being driven.
-    #[must_use]
     pub fn profile(&self) -> &ForceProfile {
         &self.profile
     }
@@ -187,9 +177,8 @@ impl ForceSource {
 
     /// The set-point that is held from the end on. After a load that depends on the axis it is the force that it had last, so
     /// that nothing jumps.
-    #[must_use]
     pub fn end(&self) -> ForceSetPoint {
-        ForceSetPoint::at_rest(self.memory.last_n.unwrap_or(self.profile.end_n()))
+        ForceSetPoint::at_rest(self.memory.last_n.unwrap_or(self.profile.row.end()))
     }
 }
 

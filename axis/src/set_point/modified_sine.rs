@@ -16,7 +16,6 @@
 use super::law::{BOTH, Kind, Shaped};
 use std::f64::consts::PI;
 
-/// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "modified-sine",
     about: "modified sine to a place: slower at its fastest than the sinoid",

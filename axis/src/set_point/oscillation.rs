@@ -18,7 +18,6 @@ use settings::parameters::Parameter;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// In the list of laws.
 pub const SINE: Kind = Kind {
     name: "sine",
     about: "to either side at one frequency",
@@ -29,7 +28,6 @@ pub const SINE: Kind = Kind {
     },
 };
 
-/// In the list of laws.
 pub const CHIRP: Kind = Kind {
     name: "chirp",
     about: "to either side at a frequency that sweeps",

@@ -16,7 +16,6 @@ use settings::SettingsError;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-/// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "pseudo-random-steps",
     about: "every now and then at once to a random level, the same ones for the same seed",

@@ -6,7 +6,6 @@
 
 use super::law::{BOTH, Kind, Shaped};
 
-/// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "ramp",
     about: "at one rate to a place",

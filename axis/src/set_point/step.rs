@@ -1,4 +1,4 @@
-//! Step: at once to a place, which is then held; the rest is one to where the row stands, the constant force one to a value of its
+//! Step: at once to a place, which is then held. A rest is a step to where the row stands, a constant force one to a value of its
 //! own.
 //!
 //! The set-point counts as moving in the basic cycle in which it jumps, so that the rest behind is one of its own; its rate is 0,
@@ -12,7 +12,6 @@ use std::sync::Arc;
 /// How long a jump counts as moving: a basic cycle.
 pub(super) const JUMP_S: f64 = 0.000_999;
 
-/// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "step",
     about: "at once to a place, which is then held",
@@ -23,7 +22,6 @@ pub const KIND: Kind = Kind {
     },
 };
 
-/// In the list of laws.
 pub const REST: Kind = Kind {
     name: "rest",
     about: "stays where it is",
@@ -31,7 +29,6 @@ pub const REST: Kind = Kind {
     read: |given| Step::read(given, given.from, 0.0),
 };
 
-/// In the list of laws.
 pub const CONSTANT: Kind = Kind {
     name: "constant",
     about: "a constant force",

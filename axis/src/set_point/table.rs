@@ -18,7 +18,6 @@ use settings::SettingsError;
 use std::path::Path;
 use std::sync::Arc;
 
-/// In the list of laws.
 pub const KIND: Kind =
     Kind { name: "table", about: "a course of its own, from a CSV file", serves: BOTH, read };
 

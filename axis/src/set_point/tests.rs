@@ -12,16 +12,20 @@ pub(super) fn motion(segments: &str) -> Motion {
 }
 
 fn read(segments: &str) -> Result<Motion, String> {
-    let text = format!(
-        "title = \"t\"\n[drive]\nprogram = \"p\"\nstart_m = 0.2\n[[drive.set-point]]\n{}",
-        segments.replace(" + ", "\n[[drive.set-point]]\n").replace("; ", "\n")
-    );
-    let experiment = Experiment::from_toml(&text, Path::new("e.toml"), STROKE_M);
-    let drive = experiment.map_err(|error| error.to_string())?.drive.unwrap();
-    match drive.set_points {
+    match set_points("drive", "start_m = 0.2", segments)? {
         SetPoints::Positions(motion) => Ok(motion),
         SetPoints::Forces(_) => panic!("a row of forces"),
     }
+}
+
+/// The set-points of an axis with these keys and segments.
+pub(super) fn set_points(axis: &str, keys: &str, segments: &str) -> Result<SetPoints, String> {
+    let head = format!("[[{axis}.set-point]]\n");
+    let segments = segments.replace(" + ", &format!("\n{head}")).replace("; ", "\n");
+    let text = format!("title = \"t\"\n[{axis}]\nprogram = \"p\"\n{keys}\n{head}{segments}");
+    let Experiment { drive, load, .. } =
+        Experiment::from_toml(&text, Path::new("e.toml"), STROKE_M).map_err(|error| error.to_string())?;
+    Ok(drive.or(load).unwrap().set_points)
 }
 
 /// Laws whose position and velocity are continuous everywhere.
@@ -71,7 +75,7 @@ fn smooth_laws_begin_and_end_at_rest_where_they_say() {
             assert!((at.position_m - where_m).abs() < 1e-12, "{law}: {at:?}");
             assert!(at.velocity_m_per_s.abs() < 1e-6, "{law}: {at:?}");
         }
-        assert_eq!(motion.at(motion.duration_s()), motion.end(), "{law}");
+        assert_eq!(motion.at(motion.duration_s()), SetPoint::at_rest(motion.end_m()), "{law}");
         assert_eq!(motion.at(-1.0), SetPoint::at_rest(0.2), "{law}");
         assert_eq!(motion.at(1e9), SetPoint::at_rest(motion.end_m()), "{law}");
     }

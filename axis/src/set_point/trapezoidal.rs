@@ -14,7 +14,6 @@ use algorithms::algorithm::Quantity;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-/// In the list of laws.
 pub const KIND: Kind = Kind {
     name: "trapezoidal",
     about: "trapezoidal velocity to a place; the time follows from the way",

@@ -10,13 +10,10 @@ use std::io;
 
 /// The receiving ends of the stopwatch, and the recorder of what comes by them.
 pub(crate) struct TimingQueues {
-    /// Rows and waits.
     pub(crate) measured: Receiver<Measured>,
-    /// Frames.
     pub(crate) frames: Receiver<Passed>,
     /// Set by SIGUSR1.
     pub(crate) freeze: Freeze,
-    /// Records all of it.
     pub(crate) recorder: TimingRecorder,
 }
 
@@ -47,12 +44,10 @@ impl TimingQueues {
         Ok(())
     }
 
-    /// An axis is in fault since `cycle`.
     pub(crate) fn fault(&mut self, cycle: u64) {
         self.recorder.fault(cycle, MonotonicClock.now());
     }
 
-    /// Writes the rows of the table out.
     pub(crate) fn write_out(&mut self) -> io::Result<()> {
         self.recorder.write_out()
     }
@@ -64,7 +59,6 @@ impl TimingQueues {
         written
     }
 
-    /// The figures so far.
     pub(crate) fn figures(&self) -> TimingFigures {
         self.recorder.figures()
     }

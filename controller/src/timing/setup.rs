@@ -22,7 +22,6 @@ const EMBEDDED_INTERFACE: &str = "bus0";
 /// When a run started, on the clocks that its files speak.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RunStart {
-    /// Seconds since 1970.
     pub(crate) unix_s: f64,
     /// The same on the monotonic clock.
     pub(crate) at: Instant,
@@ -31,7 +30,6 @@ pub(crate) struct RunStart {
 }
 
 impl RunStart {
-    /// Now.
     pub(crate) fn now() -> Self {
         let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let at = MonotonicClock.now();

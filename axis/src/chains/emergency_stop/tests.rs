@@ -78,7 +78,7 @@ impl Play {
     }
 
     fn cause(&self) -> StopCause {
-        self.chain.entered().cause
+        self.chain.entered.cause
     }
 }
 

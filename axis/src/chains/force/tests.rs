@@ -34,7 +34,7 @@ impl Play {
 
     /// Cycles until another state, and that state; after 100 s the same one.
     fn next(&mut self) -> (u64, S) {
-        until_another(self.chain.entered().state, || self.step().state)
+        until_another(self.chain.entered.state, || self.step().state)
     }
 
     /// A chain in a state of manual mode.
@@ -42,7 +42,7 @@ impl Play {
         let mut play = Self::new(ForceAsked::Manual);
         play.inputs.force_n = 50.0;
         play.next();
-        while play.chain.entered().state != state {
+        while play.chain.entered.state != state {
             play.inputs.velocity_m_per_s = if state == S::Moving { 0.1 } else { 0.0 };
             play.next();
         }
@@ -138,7 +138,7 @@ fn a_force_that_swings_is_not_relieved() {
         play.inputs.force_n = if cycle % 200 < 100 { 70.0 } else { -70.0 };
         play.step();
     }
-    assert_eq!(play.chain.entered().state, S::Standstill);
+    assert_eq!(play.chain.entered.state, S::Standstill);
 }
 
 #[test]
@@ -156,13 +156,13 @@ fn a_relief_that_takes_too_long_is_a_fault_from_each_state() {
         let mut play = Play::new(ForceAsked::Relieve);
         (play.inputs.force_n, play.inputs.velocity_m_per_s) = (force_n, velocity_m_per_s);
         let mut before = S::Idle;
-        while play.chain.entered().state != S::Fault {
-            before = play.chain.entered().state;
+        while play.chain.entered.state != S::Fault {
+            before = play.chain.entered.state;
             play.next();
         }
         assert_eq!(before, last);
         assert_eq!(play.step().fault, Some(Fault::RelieveTimeout));
-        let cycles = play.chain.entered().cycle;
+        let cycles = play.chain.entered.cycle;
         let timeout = cycles_of("relieve_timeout_s");
         assert!((timeout..=timeout + 3).contains(&cycles), "{last}: {cycles}");
         play.inputs.asked = ForceAsked::Manual;
@@ -221,7 +221,7 @@ fn skipped_cycles_pass() {
 fn a_new_rig_makes_idle() {
     let mut play = Play::to(S::Moving);
     play.chain.restart(7);
-    assert_eq!(play.chain.entered(), Entered { cycle: 7, state: S::Idle, cause: ForceCause::Began });
+    assert_eq!(play.chain.entered, Entered { cycle: 7, state: S::Idle, cause: ForceCause::Began });
     play.inputs.cycle = 7;
     assert_eq!(play.step().state, S::Limited, "what is asked is asked anew");
 }
@@ -255,7 +255,7 @@ proptest! {
                 5 => ForceAsked::Relieve,
                 _ => play.inputs.asked,
             };
-            let before = play.chain.entered().state;
+            let before = play.chain.entered.state;
             let output = play.step();
             prop_assert!(!(output.feed_forward && output.dead_zone));
             prop_assert_eq!(output.limit_m_per_s.is_some(), output.state == S::Limited);
@@ -266,7 +266,7 @@ proptest! {
                 S::Moving => &[S::Standstill, S::Fault],
                 _ => &[],
             };
-            let cause = play.chain.entered().cause;
+            let cause = play.chain.entered.cause;
             let same = output.state == before;
             let allowed = same || by_itself.contains(&output.state) || matches!(cause, ForceCause::Asked(_));
             prop_assert!(allowed, "{before} -> {}", output.state);

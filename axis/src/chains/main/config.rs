@@ -80,7 +80,6 @@ impl Default for MainConfig {
 }
 
 /// Seconds of the way from `from_m` to `to_m`: gentle beside any experiment.
-#[must_use]
 pub fn approach_s(from_m: f64, to_m: f64) -> f64 {
     ((to_m - from_m).abs() / APPROACH_M_PER_S).max(APPROACH_SHORTEST_S)
 }

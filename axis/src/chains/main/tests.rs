@@ -194,14 +194,14 @@ fn an_abort_ends_every_state_and_does_not_trip() {
         duo.step();
         assert_eq!(duo.states(), [S::Aborted; 2], "{state}");
         assert_eq!(duo.axes[0].output.unwrap().phase, Phase::Shut);
-        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::Console);
+        assert_eq!(duo.axes[0].leading.main.entered.cause, MainCause::Console);
         duo.run(5000);
         assert_eq!(duo.states(), [S::Aborted; 2], "a person's abort is not undone by itself");
         assert_eq!(duo.axes[0].stop_state(), EmergencyStopChainState::Ready);
         duo.console.start = true;
         duo.run(10);
         assert_eq!(duo.states(), [S::InitialPositioning; 2]);
-        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::Started);
+        assert_eq!(duo.axes[0].leading.main.entered.cause, MainCause::Started);
     }
 }
 
@@ -217,7 +217,7 @@ fn an_abort_that_only_one_heard_ends_both() {
         // Within the grace of a start it waits for a partner that is still aborted.
         duo.run(if state == S::InitialPositioning { 100 } else { 2 });
         assert_eq!(duo.states(), [S::Aborted; 2], "{state}");
-        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::PartnerAborted);
+        assert_eq!(duo.axes[0].leading.main.entered.cause, MainCause::PartnerAborted);
     }
 }
 
@@ -244,14 +244,14 @@ fn an_emergency_stop_aborts_every_state_and_the_run_begins_again_by_itself() {
         duo.console_holds = true;
         duo.step();
         assert_eq!(duo.states(), [S::Aborted; 2], "{state}");
-        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::EmergencyStop);
+        assert_eq!(duo.axes[0].leading.main.entered.cause, MainCause::EmergencyStop);
         duo.axes.iter_mut().for_each(|axis| (axis.position_m, axis.prepared) = (0.15, true));
         duo.stop_and_release();
         assert_eq!(duo.states(), [S::Aborted; 2]);
         // Recovered for 0.2 s.
         duo.run(210);
         assert_eq!(duo.states(), [S::InitialPositioning; 2], "{state}");
-        assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::Recovered);
+        assert_eq!(duo.axes[0].leading.main.entered.cause, MainCause::Recovered);
         let phase = duo.axes[0].output.unwrap().phase;
         assert!(matches!(phase, Phase::Approach { from_m: 0.15, .. }), "{phase:?}");
         duo.run(6000);
@@ -342,7 +342,7 @@ fn a_restarted_rig_restarts_the_chain_from_every_state() {
             axis.fault = None;
             axis.leading.main.restart(0);
             axis.leading.stop.restart(0);
-            assert_eq!(axis.leading.main.entered().cause, MainCause::RigRestarted);
+            assert_eq!(axis.leading.main.entered.cause, MainCause::RigRestarted);
         }
         assert_eq!(duo.states(), [S::WaitingForRig; 2]);
     }

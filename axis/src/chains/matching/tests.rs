@@ -43,19 +43,19 @@ impl Play {
 
     /// Cycles until another state, and that state; after 100 s the same one.
     fn next(&mut self) -> (u64, S) {
-        until_another(self.chain.entered().state, || self.step().state)
+        until_another(self.chain.entered.state, || self.step().state)
     }
 
     fn to(state: S) -> Self {
         let mut play = Self::new();
-        while play.chain.entered().state != state {
+        while play.chain.entered.state != state {
             play.next();
         }
         play
     }
 
     fn cause(&self) -> MatchingCause {
-        self.chain.entered().cause
+        self.chain.entered.cause
     }
 }
 
@@ -98,7 +98,7 @@ fn nothing_is_averaged_before_rest_and_linkage() {
         }
         spoil(&mut play);
         assert_eq!(play.step().fault, Some(Fault::MatchingTimeout), "10 s are over");
-        assert_eq!(play.chain.entered().cycle, 10_002);
+        assert_eq!(play.chain.entered.cycle, 10_002);
     }
 }
 
@@ -181,7 +181,7 @@ fn what_is_no_longer_asked_is_given_up() {
     }
     let mut play = Play::new();
     play.inputs.linked = false;
-    while play.chain.entered().state != S::Fault {
+    while play.chain.entered.state != S::Fault {
         play.next();
     }
     assert_eq!(play.next().1, S::Fault);
@@ -221,7 +221,7 @@ proptest! {
             play.inputs.still = still || rare > 3;
             play.heard = heard;
             play.inputs.position_m = position_m;
-            let before = play.chain.entered().state;
+            let before = play.chain.entered.state;
             let output = play.step();
             let allowed = match before {
                 S::Idle => &[S::WaitingForRest][..],

@@ -12,7 +12,6 @@ use crate::set_point::Actual;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-/// In the list of loads.
 pub const KIND: Kind = Kind {
     name: "damper",
     about: "opposes the velocity in proportion",

@@ -13,7 +13,6 @@ use crate::set_point::Actual;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-/// In the list of loads.
 pub const KIND: Kind = Kind {
     name: "dry-friction",
     about: "a force of one size against the motion",

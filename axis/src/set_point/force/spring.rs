@@ -12,7 +12,6 @@ use crate::set_point::Actual;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-/// In the list of loads.
 pub const KIND: Kind = Kind {
     name: "spring",
     about: "grows with the way from a position of rest",

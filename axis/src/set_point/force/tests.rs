@@ -1,16 +1,11 @@
 //! Forces: steps at a position, loads in a row, the limits, what is remembered.
 
 use super::*;
-use crate::experiment::{Experiment, SetPoints};
-use std::path::Path;
+use crate::experiment::SetPoints;
+use crate::set_point::tests::set_points;
 
 fn read(segments: &str) -> Result<ForceSource, String> {
-    let text = format!(
-        "title = \"t\"\n[load]\nprogram = \"p\"\nforce_limit_n = 500\ninitial_force_n = 100\n[[load.set-point]]\n{}",
-        segments.replace(" + ", "\n[[load.set-point]]\n").replace("; ", "\n")
-    );
-    let experiment = Experiment::from_toml(&text, Path::new("e.toml"), 0.5);
-    match experiment.map_err(|error| error.to_string())?.load.unwrap().set_points {
+    match set_points("load", "force_limit_n = 500\ninitial_force_n = 100", segments)? {
         SetPoints::Forces(profile) => Ok(ForceSource::new(profile)),
         SetPoints::Positions(_) => panic!("a row of positions"),
     }

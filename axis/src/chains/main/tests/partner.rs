@@ -235,7 +235,7 @@ fn a_partner_that_is_a_little_later_on_the_way_back_is_waited_for() {
 fn a_partner_that_stays_aborted_on_the_way_back_ends_it_until_a_person_starts() {
     let mut duo = recovering_apart(110);
     assert_eq!(duo.states(), [S::Aborted; 2]);
-    assert_eq!(duo.axes[0].leading.main.entered().cause, MainCause::PartnerAborted);
+    assert_eq!(duo.axes[0].leading.main.entered.cause, MainCause::PartnerAborted);
     // The second still goes by itself, is left alone, and gives up too.
     duo.run(1000);
     assert_eq!(duo.states(), [S::Aborted; 2]);
@@ -288,6 +288,6 @@ fn a_partner_that_had_ended_before_ends_the_waiting_for_the_rig_too() {
             let expected = if cycle > 100 { S::Aborted } else { S::WaitingForRig };
             assert_eq!(output.state, expected, "cycle {cycle}");
         }
-        assert_eq!(chain.entered().cause, cause);
+        assert_eq!(chain.entered.cause, cause);
     }
 }
