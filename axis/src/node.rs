@@ -94,8 +94,7 @@ impl Mail {
     }
 
     fn heard_in(&mut self, cycle: u64) -> Option<Frame> {
-        let due = self.0.front().is_some_and(|(sent, _)| *sent < cycle);
-        if due { self.0.pop_front().map(|(_, frame)| frame) } else { None }
+        self.0.pop_front_if(|(sent, _)| *sent < cycle).map(|(_, frame)| frame)
     }
 }
 

@@ -221,7 +221,7 @@ impl Pressing {
         }
         let asked = self.force_asked(output.phase, linked);
         self.fault = self.fault.or(self.not_linked(output.state, linked));
-        let matching = asked != ForceAsked::Idle && self.matches(output.phase);
+        let matching = asked != ForceAsked::Idle && self.preparing(output.phase) == Some(Prepare::Match);
         self.advance_matching(matching, linked, seen, program);
         let ready = *program.ready();
         let chain = self.force.advance(
@@ -234,8 +234,8 @@ impl Pressing {
             program.task(Task::ForceChain),
         );
         self.fault = self.fault.or(chain.fault);
-        let relieving = self.plan.prepare.get(self.step) == Some(&Prepare::Relieve);
-        if matches!(output.phase, Phase::Prepare) && relieving && chain.relieved {
+        let relieving = self.preparing(output.phase) == Some(Prepare::Relieve);
+        if relieving && chain.relieved {
             self.step += 1;
         }
         match asked {
@@ -278,9 +278,9 @@ impl Pressing {
         (needed && !self.plan.manual && !linked).then_some(Fault::NotLinked)
     }
 
-    fn matches(&self, phase: Phase) -> bool {
-        let step = self.plan.prepare.get(self.step);
-        matches!(phase, Phase::Prepare) && step == Some(&Prepare::Match)
+    /// The step of the preparation that is going on.
+    fn preparing(&self, phase: Phase) -> Option<Prepare> {
+        self.plan.prepare.get(self.step).copied().filter(|_| phase == Phase::Prepare)
     }
 
     fn advance_matching(&mut self, asked: bool, linked: bool, seen: &Seen<'_>, program: &mut Program) {

@@ -40,18 +40,8 @@ fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
         let said = format!("hold_s = {hold_s} s; allowed are at most {MOST_STEPS} steps in duration_s");
         return Err(given.section.wrong_at("hold_s", &said));
     }
-    Ok(Arc::new(PseudoRandomSteps::new(
-        given.from,
-        amplitude,
-        Drawing { hold_s, duration_s, seed: seed.into(), levels },
-    )))
-}
-
-struct Drawing {
-    hold_s: f64,
-    duration_s: f64,
-    seed: u64,
-    levels: u32,
+    let around = [given.from, amplitude];
+    Ok(Arc::new(PseudoRandomSteps::new(around, [hold_s, duration_s], seed.into(), levels)))
 }
 
 #[derive(Debug)]
@@ -64,8 +54,8 @@ struct PseudoRandomSteps {
 }
 
 impl PseudoRandomSteps {
-    fn new(from: f64, amplitude: f64, drawing: Drawing) -> Self {
-        let Drawing { hold_s, duration_s, seed, levels } = drawing;
+    /// Steps around a value by an amplitude, each held for a time until the duration is over.
+    fn new([from, amplitude]: [f64; 2], [hold_s, duration_s]: [f64; 2], seed: u64, levels: u32) -> Self {
         let mut random = Pcg64::seed_from_u64(seed);
         let count = (duration_s / hold_s).ceil().max(1.0) as usize;
         let mut draw = || {
@@ -98,7 +88,7 @@ mod tests {
     use super::*;
 
     fn steps(seed: u64, levels: u32) -> PseudoRandomSteps {
-        PseudoRandomSteps::new(0.25, 0.1, Drawing { hold_s: 0.05, duration_s: 50.0, seed, levels })
+        PseudoRandomSteps::new([0.25, 0.1], [0.05, 50.0], seed, levels)
     }
 
     #[test]
