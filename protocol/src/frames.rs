@@ -25,6 +25,10 @@ use std::time::Duration;
 use crate::can::{CanFrame, ERROR_FLAG, REMOTE_FLAG};
 use crate::checksum;
 
+mod layout;
+
+use layout::{Field, exact, frames, payload, plain_bytes, put_counts, value_table};
+
 include!("frames/generated.rs");
 
 /// Values of the counter `alive` in commands and sensors: it counts modulo this.
@@ -317,30 +321,6 @@ fn frame_kind(raw_id: u32) -> &'static str {
     }
 }
 
-// What the generated code calls. `index` is the signal's place in the message.
-
-fn put_physical(message: &'static MessageSpec, index: usize, value: f64) -> Result<u64, EncodeError> {
-    let signal = &message.signals[index];
-    if !value.is_finite() {
-        return Err(EncodeError::NotFinite { message, signal, value });
-    }
-    // Far below half a step, so a value that passes rounds into the range; the same figure as in cantools.
-    let tolerance = signal.factor * 1e-6;
-    if value < signal.min - tolerance || value > signal.max + tolerance {
-        return Err(EncodeError::OutOfRange { message, signal, value });
-    }
-    let raw = ((value - signal.offset) / signal.factor).round_ties_even() as i64;
-    Ok(signal.place(raw))
-}
-
-fn put_counts(message: &'static MessageSpec, index: usize, raw: i64) -> Result<u64, EncodeError> {
-    let signal = &message.signals[index];
-    if !signal.allows(raw) {
-        return Err(EncodeError::OutOfRange { message, signal, value: raw as f64 });
-    }
-    Ok(signal.place(raw))
-}
-
 /// The data of a frame in one word, after length, checksum and reserved bits were checked.
 fn open(message: &'static MessageSpec, frame: &CanFrame) -> Result<u64, DecodeError> {
     let (name, data) = (message.name, frame.data());
@@ -363,34 +343,4 @@ fn open(message: &'static MessageSpec, frame: &CanFrame) -> Result<u64, DecodeEr
         0 => Ok(word),
         bits => Err(DecodeError::ReservedBits { message: name, bits }),
     }
-}
-
-fn raw(message: &MessageSpec, index: usize, word: u64) -> i64 {
-    message.signals[index].raw(word)
-}
-
-fn counts(message: &'static MessageSpec, index: usize, word: u64) -> Result<i64, DecodeError> {
-    let signal = &message.signals[index];
-    let raw = signal.raw(word);
-    if signal.allows(raw) {
-        return Ok(raw);
-    }
-    let (min, max) = (signal.raw_min, signal.raw_max);
-    Err(DecodeError::RawOutOfRange { message: message.name, signal: signal.name, raw, min, max })
-}
-
-fn physical(message: &'static MessageSpec, index: usize, word: u64) -> Result<f64, DecodeError> {
-    Ok(message.signals[index].physical(counts(message, index, word)?))
-}
-
-fn not_in_table(message: &'static MessageSpec, index: usize, word: u64) -> DecodeError {
-    let signal = &message.signals[index];
-    let (raw, max) = (signal.raw(word), signal.raw_max);
-    DecodeError::NotInValueTable { message: message.name, signal: signal.name, raw, max }
-}
-
-/// `value` as an integer, when it is one and fits.
-fn exact<T: TryFrom<i64>>(value: f64) -> Option<T> {
-    let integer = value as i64;
-    (integer as f64 == value).then(|| T::try_from(integer).ok()).flatten()
 }
