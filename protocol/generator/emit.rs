@@ -14,13 +14,10 @@ pub(crate) fn catalogue(catalogue: &Catalogue) -> String {
     for table in &catalogue.tables {
         value_table(&mut out, table);
     }
-    for message in &catalogue.messages {
-        message_spec(&mut out, message, &catalogue.tables);
-    }
     for each in &catalogue.payloads {
         payload(&mut out, each, catalogue);
     }
-    frame(&mut out, catalogue);
+    frames(&mut out, catalogue);
     out
 }
 
@@ -30,65 +27,6 @@ fn value_table(out: &mut String, table: &Table) {
         *out += &format!("    {raw} {} {text:?},\n", camel_case(text));
     }
     *out += "} }\n\n";
-}
-
-fn message_spec(out: &mut String, message: &Message, tables: &[Table]) {
-    let Message { name, id, length, sender, cycle_time_ms, send_type, comment, checksum_start, .. } = message;
-    let covered = message.signals.iter().map(|signal| mask(signal.start, signal.length));
-    let covered = covered.chain(checksum_start.map(|start| mask(start, 8))).fold(0, |all, bits| all | bits);
-    let reserved = mask(0, 8 * length) & !covered;
-    let period = if *cycle_time_ms == 0 { "event".to_owned() } else { format!("{cycle_time_ms} ms") };
-    *out += &format!(
-        "/// `{name}`, {id:#05X}, {length} bytes, {period}, sent by {sender}: {}
-pub const {}: &MessageSpec = &MessageSpec {{
-    name: {name:?},
-    id: {id:#05X},
-    length: {length},
-    cycle_time_ms: {cycle_time_ms},
-    send_type: {send_type:?},
-    sender: {sender:?},
-    comment: {comment:?},
-    checksum_start: {checksum_start:?},
-    reserved: {reserved:#X},
-    signals: &[\n",
-        doc(comment),
-        constant(name),
-    );
-    for signal in &message.signals {
-        let Signal {
-            name,
-            start,
-            length,
-            signed,
-            factor,
-            offset,
-            raw_min,
-            raw_max,
-            min,
-            max,
-            unit,
-            comment,
-            ..
-        } = signal;
-        let values: Vec<_> = match signal.kind {
-            Kind::Table(index) => tables[index].values.iter().map(|(_, text)| text.as_str()).collect(),
-            _ => Vec::new(),
-        };
-        let (field, receivers) = (&signal.field, &signal.receivers);
-        *out += &format!(
-            "        SignalSpec {{ name: {name:?}, field: {field:?}, unit: {unit:?}, comment: {comment:?}, start: {start}, \
-             length: {length}, signed: {signed}, factor: {factor:?}, offset: {offset:?}, raw_min: {raw_min}, \
-             raw_max: {raw_max}, min: {min:?}, max: {max:?}, values: &{values:?}, receivers: &{receivers:?}, \
-             kind: SignalKind::{} }},\n",
-            match signal.kind {
-                Kind::Physical => "Physical",
-                Kind::Integer(_) => "Integer",
-                Kind::Flag => "Flag",
-                Kind::Table(_) => "Table",
-            }
-        );
-    }
-    *out += "    ],\n};\n\n";
 }
 
 fn payload(out: &mut String, payload: &Payload, catalogue: &Catalogue) {
@@ -138,16 +76,68 @@ fn plain_bytes(message: &Message) -> Option<Vec<&str>> {
     plain.then(|| message.signals.iter().map(|signal| signal.field.as_str()).collect())
 }
 
-fn frame(out: &mut String, catalogue: &Catalogue) {
+fn frames(out: &mut String, catalogue: &Catalogue) {
     *out += "frames! {\n/// A frame of the wire with its payload in physical quantities.\npub enum Frame {\n";
-    for Message { name, id, sender, comment, payload, .. } in &catalogue.messages {
-        let (comment, message) = (doc(comment), constant(name));
-        let payload = &catalogue.payloads[*payload].name;
+    for message in &catalogue.messages {
+        let Message { name, id, length, sender, cycle_time_ms, send_type, comment, checksum_start, .. } =
+            message;
+        let payload = &catalogue.payloads[message.payload].name;
+        let covered = message.signals.iter().map(|signal| mask(signal.start, signal.length));
+        let covered =
+            covered.chain(checksum_start.map(|start| mask(start, 8))).fold(0, |all, bits| all | bits);
+        let reserved = mask(0, 8 * length) & !covered;
+        let period = if *cycle_time_ms == 0 { "event".to_owned() } else { format!("{cycle_time_ms} ms") };
         *out += &format!(
-            "    /// {id:#05X}, sent by {sender}: {comment}\n    {id:#05X} {name}({payload}) {message},\n"
+            "    /// {id:#05X}, {length} bytes, {period}, sent by {sender}: {}
+    {id:#05X} {name}({payload}) {} {{
+        comment: {comment:?},
+        sender: {sender:?}, send_type: {send_type:?}, cycle_time_ms: {cycle_time_ms}, \
+             length: {length}, checksum_start: {checksum_start:?}, reserved: {reserved:#X},
+        signals: &[\n",
+            doc(comment),
+            constant(name),
         );
+        for signal in &message.signals {
+            *out += &format!("            SignalSpec {{ {} }},\n", signal_spec(signal, &catalogue.tables));
+        }
+        *out += "        ],\n    },\n";
     }
     *out += "} }\n";
+}
+
+fn signal_spec(signal: &Signal, tables: &[Table]) -> String {
+    let Signal {
+        name,
+        start,
+        length,
+        signed,
+        factor,
+        offset,
+        raw_min,
+        raw_max,
+        min,
+        max,
+        unit,
+        comment,
+        field,
+        kind,
+        receivers,
+    } = signal;
+    let values: Vec<_> = match kind {
+        Kind::Table(index) => tables[*index].values.iter().map(|(_, text)| text.as_str()).collect(),
+        _ => Vec::new(),
+    };
+    let kind = match kind {
+        Kind::Physical => "Physical",
+        Kind::Integer(_) => "Integer",
+        Kind::Flag => "Flag",
+        Kind::Table(_) => "Table",
+    };
+    format!(
+        "name: {name:?}, field: {field:?}, unit: {unit:?}, comment: {comment:?}, start: {start}, length: {length}, \
+         signed: {signed}, factor: {factor:?}, offset: {offset:?}, raw_min: {raw_min}, raw_max: {raw_max}, min: {min:?}, \
+         max: {max:?}, values: &{values:?}, receivers: &{receivers:?}, kind: SignalKind::{kind}"
+    )
 }
 
 /// `DriveValveCommand` as `DRIVE_VALVE_COMMAND`.

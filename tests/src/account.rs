@@ -16,10 +16,6 @@ pub struct SensorAccount {
 }
 
 /// The account of the sensor frames with identifier `id`, from the beginning of the run to the last tick heard.
-///
-/// # Panics
-/// When no tick was heard.
-#[must_use]
 pub fn of_sensors(heard: &[CanFrame], id: u16) -> SensorAccount {
     let mut frames = 0;
     let mut at_ticks = Vec::new();
@@ -46,7 +42,6 @@ fn sent_by(tick: &Tick) -> u64 {
 }
 
 /// Counters of the valve commands with identifier `id`, in the order heard.
-#[must_use]
 pub fn command_counters(heard: &[CanFrame], id: u16) -> Vec<u8> {
     let commands = heard.iter().filter(|frame| frame.standard_id() == Some(id));
     commands
@@ -58,7 +53,6 @@ pub fn command_counters(heard: &[CanFrame], id: u16) -> Vec<u8> {
 }
 
 /// Frames missing between the first and the last of `counters`, which count modulo 16, none missing 16 in a row.
-#[must_use]
 pub fn gaps(counters: &[u8]) -> u64 {
     counters.windows(2).map(|pair| u64::from((pair[1] + 15 - pair[0]) % 16)).sum()
 }

@@ -11,10 +11,6 @@ pub struct AxisTable {
 
 impl AxisTable {
     /// Reads a table up to its last whole line; the process that wrote it may have been killed.
-    ///
-    /// # Panics
-    /// When it is not there, or a row has another number of fields than the head.
-    #[must_use]
     pub fn read(path: &Path) -> Self {
         let text =
             std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -30,10 +26,6 @@ impl AxisTable {
     }
 
     /// A column as it is written.
-    ///
-    /// # Panics
-    /// When there is none of this name.
-    #[must_use]
     pub fn texts(&self, name: &str) -> Vec<&str> {
         let place = self.columns.iter().position(|column| column == name);
         let place = place.unwrap_or_else(|| panic!("no column {name} in {:?}", self.columns));
@@ -41,10 +33,6 @@ impl AxisTable {
     }
 
     /// A column of numbers; where there is none, not a number.
-    ///
-    /// # Panics
-    /// When a field is neither empty nor a number.
-    #[must_use]
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let number = |text: &str| match text {
             "" => f64::NAN,
@@ -54,28 +42,21 @@ impl AxisTable {
     }
 
     /// The rig's cycle of each row.
-    #[must_use]
     pub fn cycles(&self) -> Vec<usize> {
         self.numbers("time_s").into_iter().map(|time_s| (time_s * 1000.0).round() as usize).collect()
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
     /// Whether there is no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// First row from `from` on in which the chain of column `chain` is in `state`.
-    ///
-    /// # Panics
-    /// When there is none, with the states that there are.
-    #[must_use]
     #[track_caller]
     pub fn first(&self, chain: &str, state: &str, from: usize) -> usize {
         let states = self.texts(chain);
@@ -86,7 +67,6 @@ impl AxisTable {
     }
 
     /// The states of a chain in their order, each once for each time that it was entered.
-    #[must_use]
     pub fn states(&self, chain: &str) -> Vec<&str> {
         let mut states = self.texts(chain);
         states.dedup();

@@ -4,6 +4,8 @@
 //! `bench`, `discrepancy` and `campaign`; a script that has built them sets these. Without them cargo builds the release
 //! profile, and says itself where the results are.
 
+use crate::process::Running;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
@@ -25,7 +27,6 @@ pub enum Program {
 
 impl Program {
     /// Name of package and binary.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Emulator => "emulator",
@@ -34,6 +35,17 @@ impl Program {
             Self::Discrepancy => "discrepancy",
             Self::Campaign => "campaign",
         }
+    }
+
+    /// A command line of the shipped build.
+    pub fn command(self) -> Command {
+        Command::new(executable(self, Build::Shipped))
+    }
+
+    /// Starts the shipped build.
+    pub fn start(self, arguments: &[&dyn AsRef<OsStr>]) -> Running {
+        let name = format!("{} {}", self.name(), arguments[0].as_ref().display());
+        Running::start(&name, self.command().args(arguments.iter().map(|argument| argument.as_ref())))
     }
 }
 
@@ -47,10 +59,6 @@ pub enum Build {
 }
 
 /// The executable of `program` in `build`, which is made if nobody has.
-///
-/// # Panics
-/// When the programs are not where the environment says, or cannot be built.
-#[must_use]
 pub fn executable(program: Program, build: Build) -> PathBuf {
     static SHIPPED: OnceLock<PathBuf> = OnceLock::new();
     static COUNTING: OnceLock<PathBuf> = OnceLock::new();
@@ -69,7 +77,6 @@ pub fn executable(program: Program, build: Build) -> PathBuf {
 }
 
 /// The checkout that is tested.
-#[must_use]
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the workspace").to_owned()
 }

@@ -65,10 +65,6 @@ pub struct Row {
 }
 
 /// The rows of a `faults.csv`.
-///
-/// # Panics
-/// When one is not whole.
-#[must_use]
 pub fn rows(path: &Path) -> Vec<Row> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut lines = text.lines();
@@ -90,10 +86,6 @@ pub fn rows(path: &Path) -> Vec<Row> {
 
 impl Plan<'_> {
     /// Makes the run.
-    ///
-    /// # Panics
-    /// When it does not end as it should.
-    #[must_use]
     pub fn run(&self) -> Left {
         let scene = Scene::new(&format!("title = \"broken\"\n[rig]\n{}", self.rig));
         let mut emulator = scene.emulator(Pace::Lockstep).with("--seconds");
@@ -135,15 +127,11 @@ impl Plan<'_> {
 
 impl Left {
     /// The rows of its `faults.csv`.
-    #[must_use]
     pub fn rows(&self) -> Vec<Row> {
         rows(&self.scene.path("emulator/faults.csv"))
     }
 
     /// Holds that every log tells the same faults: table, summary, frames of the bench, and the count beside the truth.
-    ///
-    /// # Panics
-    /// When one does not.
     pub fn expect_marks_in_every_log(&self) {
         let rows = self.rows();
         assert!(!rows.is_empty(), "a script without a mark");
@@ -194,7 +182,6 @@ impl Left {
     }
 
     /// Frames of an identifier that the member heard, by the cycle.
-    #[must_use]
     pub fn heard_of(&self, id: u16) -> Vec<Vec<CanFrame>> {
         let of_id = |frames: &Vec<CanFrame>| {
             frames.iter().filter(|frame| frame.standard_id() == Some(id)).copied().collect()

@@ -14,13 +14,11 @@ pub struct Logged {
 }
 
 /// The frames of a log that was closed properly.
-#[must_use]
 pub fn read(log: &Path) -> Vec<Logged> {
     by_cycle(&records::bus_log(log))
 }
 
 /// The frames of a log whose writer still writes, or was killed.
-#[must_use]
 pub fn read_to_last_whole_line(log: &Path) -> Vec<Logged> {
     by_cycle(&records::bus_log_to_last_whole_line(log))
 }

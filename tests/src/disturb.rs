@@ -4,7 +4,7 @@
 //! customer's algorithm faults pages, a logger does not read, the wire loses frames, somebody sets the clock. The report is made
 //! of the run's folder alone; `bench cause` sees the report alone.
 
-use crate::binaries::{Build, Program, executable};
+use crate::binaries::Program;
 use crate::launch::Pace;
 use crate::own;
 use crate::process::Running;
@@ -13,7 +13,6 @@ use realtime::Request;
 use rustix::process::Signal;
 use rustix::time::{ClockId, Timespec, clock_gettime, clock_settime};
 use std::path::Path;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Length of each run, s of the rig's time.
@@ -64,7 +63,6 @@ impl Disturbance {
     ];
 
     /// What `bench cause` has to say.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Nothing => "nothing",
@@ -79,7 +77,6 @@ impl Disturbance {
     }
 
     /// Whether only root can do it.
-    #[must_use]
     pub fn needs_root(self) -> bool {
         matches!(self, Self::CpuContention | Self::ClockStep)
     }
@@ -94,10 +91,6 @@ pub struct Named {
 }
 
 /// Runs emulator and controller for some seconds with a disturbance after `after`, reports, and has the cause named.
-///
-/// # Panics
-/// When a program fails that should not.
-#[must_use]
 pub fn run(disturbance: Disturbance, after: Duration) -> Named {
     let scene = Scene::new(RESTLESS);
     if disturbance == Disturbance::PageFaults {
@@ -174,13 +167,8 @@ fn step_the_clock() {
 
 /// Has the run reported, and the cause named from the report.
 fn name_cause(out: &Path) -> Named {
-    let bench = executable(Program::Bench, Build::Shipped);
     let report = out.join("report");
-    let mut command = Command::new(&bench);
-    let reported = Running::start("bench report", command.arg("report").arg(out).arg("--out").arg(&report));
-    let _ = reported.wait().expect_code(0);
-    let mut command = Command::new(&bench);
-    let named = Running::start("bench cause", command.arg("cause").arg(report.join("report.json")));
-    let named = named.wait().expect_code(0);
+    let _ = Program::Bench.start(&[&"report", &out, &"--out", &report]).wait().expect_code(0);
+    let named = Program::Bench.start(&[&"cause", &report.join("report.json")]).wait().expect_code(0);
     Named { cause: named.stdout.trim().to_owned(), sentence: named.stderr.trim().to_owned() }
 }

@@ -1,6 +1,6 @@
 //! The gateway as a process, and a client of the socketcand protocol that does exactly what it is told.
 
-use crate::binaries::{Build, Program, executable};
+use crate::binaries::Program;
 use crate::process::{PATIENCE, Running, wait_until};
 use crate::records::json;
 use crate::scene::Scene;
@@ -9,7 +9,6 @@ use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::PathBuf;
-use std::process::Command;
 use std::time::Duration;
 
 /// A gateway on the bus of a scene, at a free port of loopback.
@@ -22,13 +21,9 @@ pub struct Door {
 
 impl Door {
     /// Opens it; `options` are separated by spaces.
-    ///
-    /// # Panics
-    /// When it does not tell where it listens.
-    #[must_use]
     pub fn open(scene: &Scene, options: &str) -> Self {
         let report = scene.path("gateway.json");
-        let mut command = Command::new(executable(Program::Bench, Build::Shipped));
+        let mut command = Program::Bench.command();
         command.args(["gateway", "--listen", "127.0.0.1:0", "--bus", &scene.url(), "--report"]).arg(&report);
         let mut running = Running::start("bench gateway", command.args(options.split_whitespace()));
         running.wait_for("Ctrl-C ends it");
@@ -44,10 +39,6 @@ impl Door {
     }
 
     /// The most memory that it ever had, KiB, as the kernel tells it.
-    ///
-    /// # Panics
-    /// When it is gone.
-    #[must_use]
     pub fn peak_memory_kib(&self) -> u64 {
         let path = format!("/proc/{}/status", self.running.number());
         let status = std::fs::read_to_string(path).expect("the gateway runs");
@@ -57,7 +48,6 @@ impl Door {
     }
 
     /// Ends it, and gives what it counted.
-    #[must_use]
     pub fn close(self) -> Value {
         self.running.signal(Signal::INT);
         let _ = self.running.wait().expect_code(130);
@@ -65,7 +55,6 @@ impl Door {
     }
 
     /// Arguments with which python-can's programs reach it, after all others.
-    #[must_use]
     pub fn python_can(&self) -> [String; 5] {
         let (host, port) = (format!("host={}", self.address.ip()), format!("port={}", self.address.port()));
         ["-isocketcand".into(), "-cbus".into(), "--bus-kwargs".into(), host, port]
@@ -80,10 +69,6 @@ pub struct DoorClient {
 
 impl DoorClient {
     /// Connects, and does nothing more.
-    ///
-    /// # Panics
-    /// When nobody listens.
-    #[must_use]
     pub fn connect(door: &Door) -> Self {
         let stream = TcpStream::connect(door.address).expect("the gateway listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time-out");
@@ -91,10 +76,6 @@ impl DoorClient {
     }
 
     /// Connects, as soon as there is room, and goes to raw mode.
-    ///
-    /// # Panics
-    /// When there is no room in the end.
-    #[must_use]
     pub fn on_the_bus(door: &Door) -> Self {
         let mut client = Self::connect(door);
         wait_until("a place at the gateway", || {
@@ -112,17 +93,11 @@ impl DoorClient {
     }
 
     /// Sends a text as it is.
-    ///
-    /// # Panics
-    /// When the gateway has gone.
     pub fn say(&mut self, text: &str) {
         self.stream.write_all(text.as_bytes()).expect("the gateway takes it");
     }
 
     /// The next `< … >`; `None` at the end of the connection.
-    ///
-    /// # Panics
-    /// When nothing comes.
     pub fn hear(&mut self) -> Option<String> {
         loop {
             if let Some(end) = self.text.find('>') {
@@ -140,18 +115,12 @@ impl DoorClient {
     }
 
     /// Reads the next `< … >` and holds it against what must come.
-    ///
-    /// # Panics
-    /// When it is another.
     #[track_caller]
     pub fn expect(&mut self, text: &str) {
         assert_eq!(self.hear().as_deref(), Some(text));
     }
 
     /// The next frame: identifier and data, without its time.
-    ///
-    /// # Panics
-    /// When something else comes.
     pub fn frame(&mut self) -> (String, String) {
         let text = self.hear().expect("a frame");
         let words: Vec<_> = text.split(' ').collect();

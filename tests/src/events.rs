@@ -16,10 +16,6 @@ pub struct Event {
 }
 
 /// All events of a summary.
-///
-/// # Panics
-/// When the summary does not hold them all.
-#[must_use]
 pub fn all(summary: &Value) -> Vec<Event> {
     let events = summary["events"].as_array().expect("events");
     assert_eq!(count(summary, "/event_count"), events.len() as u64, "more events than the summary keeps");
@@ -39,13 +35,11 @@ fn read(event: &Value) -> Event {
 }
 
 /// How often an event was told.
-#[must_use]
 pub fn times(events: &[Event], kind: &str) -> usize {
     events.iter().filter(|event| event.kind == kind).count()
 }
 
 /// Rows from each event `from` of the drive to the next `to`, or to the last row.
-#[must_use]
 pub fn spans(events: &[Event], from: &str, to: &str, rows: usize) -> Vec<Range<usize>> {
     let of_drive = |event: &&Event, kind: &str| event.kind == kind && event.of == "drive";
     let starts = events.iter().enumerate().filter(|(_, event)| of_drive(event, from));
@@ -59,9 +53,6 @@ pub fn spans(events: &[Event], from: &str, to: &str, rows: usize) -> Vec<Range<u
 
 /// Holds that the drive's valve was shut from each event `from` to the next `to`, and that it moved before the first of
 /// them and after the last.
-///
-/// # Panics
-/// With the first row that says otherwise.
 #[track_caller]
 pub fn expect_valve_shut_between(summary: &Value, measurement: &Table, from: &str, to: &str) {
     let valve = measurement.column("drive_valve");

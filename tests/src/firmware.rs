@@ -3,7 +3,7 @@
 //! It keeps no table of its own: what it does is read off the bus, and its set-point is computed a second time here.
 
 use crate::binaries::workspace;
-use crate::guest::python;
+use crate::foreign_python::python;
 use protocol::can::CanFrame;
 use protocol::frames::{ECHO_RANGE, Frame, MainChainState};
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,9 +31,6 @@ const HELD_UP_CYCLES: u64 = 20;
 const RECOVERY_CYCLES: u64 = 500;
 
 /// Builds it into `folder`, as its Makefile does for a customer, warnings being errors; gives the folder.
-///
-/// # Panics
-/// When it does not build.
 pub fn build(folder: &Path, options: &[&str]) -> PathBuf {
     let mut make = Command::new("make");
     make.arg("-C").arg(workspace().join("tests/firmware")).args(options);
@@ -65,10 +62,6 @@ pub struct Positioned {
 }
 
 /// Reads off the frames of a run how it positioned. What a machine that stood still did to the loop is left out, and told.
-///
-/// # Panics
-/// When it did not begin its experiment, or no sensors show one of its moves or rests.
-#[must_use]
 pub fn positioned(frames: &[CanFrame]) -> Positioned {
     let mut counted = Counted::default();
     frames.iter().filter_map(|frame| Frame::decode(frame).ok()).for_each(|frame| counted.take(&frame));

@@ -7,10 +7,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The python that has them: `AIRBENCH_PYTHON`, else that of `target/tools/venv`, which `scripts/test` makes.
-///
-/// # Panics
-/// When there is none.
-#[must_use]
 pub fn python() -> PathBuf {
     let python = std::env::var_os("AIRBENCH_PYTHON")
         .map_or_else(|| workspace().join("target/tools/venv/bin/python"), PathBuf::from);
@@ -19,10 +15,6 @@ pub fn python() -> PathBuf {
 }
 
 /// The python of another environment beside it, as `scripts/tools.sh` names it.
-///
-/// # Panics
-/// When there is none.
-#[must_use]
 pub fn of(environment: &str) -> PathBuf {
     let python = python();
     let tools = python.ancestors().nth(3).expect("an environment lies in the folder of tools");
@@ -32,10 +24,6 @@ pub fn of(environment: &str) -> PathBuf {
 }
 
 /// Runs a script of `tests/python` and gives what it printed.
-///
-/// # Panics
-/// When it fails, with what it said.
-#[must_use]
 pub fn run_script(name: &str, arguments: &[impl AsRef<OsStr>]) -> String {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python").join(name);
     let mut command = Command::new(python());

@@ -4,6 +4,8 @@
 //! instructions, so that it never stands still while other tests run. What is tested is that every cycle and every frame is
 //! accounted for, never how fast anything was.
 
+use crate::binaries::workspace;
+use crate::foreign_python::python;
 use crate::process::Running;
 use crate::records::{count, json};
 use protocol::can::CanFrame;
@@ -33,15 +35,6 @@ fn only_one() -> MutexGuard<'static, ()> {
     MACHINE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// The checkout.
-///
-/// # Panics
-/// Never: the crate stands in it.
-#[must_use]
-pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate stands in the workspace")
-}
-
 /// Machines that this process started.
 static STARTED: AtomicU32 = AtomicU32::new(0);
 
@@ -55,20 +48,12 @@ pub struct Guest {
 
 impl Guest {
     /// Runs a job in a machine of its own; the job's exit code must be 0.
-    ///
-    /// # Panics
-    /// When it was not, or no machine could be had. Nothing is ever skipped: without network for the first download this fails.
-    #[must_use]
     #[track_caller]
     pub fn run(arguments: &[&str]) -> Self {
         Self::run_so(&[&["--even"], arguments].concat())
     }
 
     /// The same on two processors, for what one cannot show. Its time goes on while the host does something else.
-    ///
-    /// # Panics
-    /// As `run`.
-    #[must_use]
     #[track_caller]
     pub fn run_on_two_processors(arguments: &[&str]) -> Self {
         Self::run_so(arguments)
@@ -78,7 +63,7 @@ impl Guest {
     fn run_so(arguments: &[&str]) -> Self {
         let _machine = only_one();
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut command = Command::new(root().join("scripts/vcan-vm"));
+        let mut command = Command::new(workspace().join("scripts/vcan-vm"));
         // The guest's programs are built by vcan-vm as it wants them, whatever this test was built with.
         command.env_remove("CARGO_TARGET_DIR").arg("--out").arg(folder.path());
         command.args(["--seconds", "3000"]).args(arguments);
@@ -86,29 +71,23 @@ impl Guest {
         let lines: Vec<&str> = ended.stderr.lines().collect();
         let last = lines[lines.len().saturating_sub(LAST_LINES)..].join("\n");
         let nth = STARTED.fetch_add(1, Ordering::Relaxed);
-        let log = root().join(format!("target/vm-said-{}-{nth}.txt", std::process::id()));
+        let log = workspace().join(format!("target/vm-said-{}-{nth}.txt", std::process::id()));
         fs::write(&log, &ended.stderr).expect("a log in target");
         eprintln!("the last lines of {}:\n{last}", log.display());
         Self { folder, said: ended.expect_code(0).stderr }
     }
 
     /// What the job left in `/out`.
-    #[must_use]
     pub fn out(&self) -> PathBuf {
         self.folder.path().join("run")
     }
 
     /// A file beside it, such as `candump.log`.
-    #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
     /// Exit codes by name, from the job's file.
-    ///
-    /// # Panics
-    /// When a line is not "NAME CODE".
-    #[must_use]
     pub fn codes(&self) -> BTreeMap<String, i32> {
         let text = fs::read_to_string(self.out().join("codes")).expect("the job's codes");
         text.lines()
@@ -121,10 +100,6 @@ impl Guest {
 
     /// The lines of one run in a log of candump that holds several: from the rig's cycle 0 of the run in `folder` to that of the
     /// next run of the job, on whatever bus.
-    ///
-    /// # Panics
-    /// When a line has no time stamp.
-    #[must_use]
     pub fn lines_of_run(&self, log: &str, folder: &Path) -> String {
         let from_s = starts_s(folder)[0];
         let all_s = starts_s(&self.out());
@@ -156,7 +131,6 @@ fn starts_s(folder: &Path) -> Vec<f64> {
 }
 
 /// The data frames with 11-bit identifiers in lines of candump -L.
-#[must_use]
 pub fn data_frames(lines: &str) -> Vec<CanFrame> {
     let frame = |line: &str| {
         let (id, hex) = line.rsplit_once(' ')?.1.split_once('#')?;
@@ -183,10 +157,6 @@ pub struct InterfaceCounters {
 
 impl InterfaceCounters {
     /// What `interface` counted between `links-before.json` and `links-after.json` of `folder`.
-    ///
-    /// # Panics
-    /// When they do not hold it.
-    #[must_use]
     pub fn during(folder: &Path, interface: &str) -> Self {
         let [before, after] =
             ["links-before.json", "links-after.json"].map(|file| link(&json(&folder.join(file)), interface));
@@ -201,10 +171,6 @@ impl InterfaceCounters {
 }
 
 /// An interface in the list that `ip -json link` prints.
-///
-/// # Panics
-/// When it is not there.
-#[must_use]
 pub fn link(links: &Value, interface: &str) -> Value {
     let all = links.as_array().expect("a list of interfaces");
     all.iter()
@@ -213,32 +179,14 @@ pub fn link(links: &Value, interface: &str) -> Value {
         .clone()
 }
 
-/// Python of the tests' virtual environment.
-///
-/// # Panics
-/// When `scripts/test` has not made it.
-pub fn python() -> PathBuf {
-    let python = std::env::var_os("AIRBENCH_PYTHON")
-        .map_or_else(|| root().join("target/tools/venv/bin/python"), PathBuf::from);
-    assert!(
-        python.exists(),
-        "{} is missing: run scripts/test, which makes the Python environment with cantools",
-        python.display()
-    );
-    python
-}
-
 /// What `compare_candump.py` says of candump's log and a run's folder.
 ///
 /// # Errors
 /// Its complaint when they do not agree.
-///
-/// # Panics
-/// When it cannot be started.
 pub fn compare_candump(log: &Path, run: &Path) -> Result<String, String> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/compare_candump.py");
     let mut command = Command::new(python());
-    command.args(["-W", "error"]).arg(script).arg(root().join("protocol/rig.dbc")).arg(log).arg(run);
+    command.args(["-W", "error"]).arg(script).arg(workspace().join("protocol/rig.dbc")).arg(log).arg(run);
     let output = command.output().expect("Python starts");
     let [told, complaint] =
         [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());

@@ -1,7 +1,7 @@
 //! Effects for whole-system tests: every one, some drawn, at the ends of their ranges; and an experiment in which each has
 //! work to do.
 
-use crate::launch::Pace;
+use crate::launch::{Pace, run_both};
 use crate::records::{Table, count, json};
 use crate::scene::Scene;
 use plant::Truth;
@@ -55,7 +55,6 @@ pub enum Extreme {
 }
 
 /// Every effect at each of its places, at the end of its range.
-#[must_use]
 pub fn everything(extreme: Extreme) -> Vec<Switched> {
     let mut turn = false;
     let mut number = |key: &EffectKey| {
@@ -79,7 +78,6 @@ pub fn everything(extreme: Extreme) -> Vec<Switched> {
 }
 
 /// Each effect once: at the largest number that is drawn of its amplitude, its other keys at their defaults.
-#[must_use]
 pub fn each_alone() -> Vec<Switched> {
     let alone = |sheet: &Sheet| Switched {
         name: sheet.name,
@@ -95,10 +93,6 @@ pub fn each_alone() -> Vec<Switched> {
 }
 
 /// So many different effects, drawn from this seed.
-///
-/// # Panics
-/// When there are not so many.
-#[must_use]
 pub fn drawn(seed: u64, count: usize) -> Vec<Switched> {
     draw(seed, count, Among::Both).expect("the catalogue has so many")
 }
@@ -130,18 +124,14 @@ pub struct Live {
 }
 
 /// Runs emulator and controllers in real time with these effects; the run lies in the folder `run` of the scene.
-///
-/// # Panics
-/// When a program does not end well, or a file is not as it must be.
-#[must_use]
 pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> Live {
     let rig = rig_with(scene, effects);
     let folder = scene.path("run");
     let options = format!("--seconds {seconds} --full-timing --no-flight");
-    let emulator = scene.emulator(Pace::Real).rig(&rig).out(&folder).with(&options).start();
-    let controller = scene.controller(Pace::Real).out(&folder).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &scene.emulator(Pace::Real).rig(&rig).out(&folder).with(&options),
+        &scene.controller(Pace::Real).out(&folder).with("--repeat"),
+    );
     let summary = json(&folder.join("summary.json"));
     let figure = |name: &str| count(&summary, name);
     let rows = Table::read(&folder.join("emulator-timing.csv"));
@@ -162,9 +152,6 @@ pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> Live {
 }
 
 /// Holds that everything in a truth.csv is finite and every pressure positive, from the first row to the last.
-///
-/// # Panics
-/// With the column and row that is not.
 pub fn expect_physical(truth: &Path) {
     let table = Table::read(truth);
     assert!(table.len() > 100, "{}: {} rows", truth.display(), table.len());

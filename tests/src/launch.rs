@@ -1,7 +1,7 @@
 //! The command line of a program in a scene.
 
 use crate::binaries::{Build, Program, executable};
-use crate::process::Running;
+use crate::process::{Ended, Running};
 use crate::scene::Scene;
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
@@ -17,8 +17,15 @@ pub enum Pace {
     Lockstep,
 }
 
+/// Runs emulator and controller until both have ended well.
+pub fn run_both(emulator: &Launch, controller: &Launch) -> [Ended; 2] {
+    let (emulator, controller) = (emulator.start(), controller.start());
+    [emulator.wait(), controller.wait()].map(|ended| ended.expect_code(0))
+}
+
 /// A program about to be started; each method changes one thing and hands it back.
 #[derive(Clone)]
+#[must_use]
 pub struct Launch {
     program: Program,
     build: Build,
@@ -50,63 +57,54 @@ impl Launch {
     }
 
     /// Another bus than the scene's.
-    #[must_use]
     pub fn bus(mut self, url: impl Into<String>) -> Self {
         self.bus = url.into();
         self
     }
 
     /// Another rig file.
-    #[must_use]
     pub fn rig(mut self, path: &Path) -> Self {
         self.rig = path.into();
         self
     }
 
     /// Another experiment file.
-    #[must_use]
     pub fn experiment(mut self, path: &Path) -> Self {
         self.experiment = path.into();
         self
     }
 
     /// Another output folder.
-    #[must_use]
     pub fn out(mut self, folder: &Path) -> Self {
         self.out = folder.into();
         self
     }
 
     /// Another build.
-    #[must_use]
     pub fn build(mut self, build: Build) -> Self {
         self.build = build;
         self
     }
 
     /// More options, separated by spaces.
-    #[must_use]
     pub fn with(mut self, options: &str) -> Self {
         self.more.extend(options.split_whitespace().map(OsString::from));
         self
     }
 
     /// A line of shell that is run first, in the same process: `ulimit` and the like.
-    #[must_use]
     pub fn after_shell(mut self, line: &str) -> Self {
         self.shell = Some(line.into());
         self
     }
 
     /// As another user, which only root can ask for.
-    #[must_use]
     pub fn as_user(mut self, user: u32) -> Self {
         self.user = Some(user);
         self
     }
 
     /// Starts it.
-    #[must_use]
     pub fn start(&self) -> Running {
         let program = executable(self.program, self.build);
         let mut command = match &self.shell {

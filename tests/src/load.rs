@@ -13,7 +13,6 @@ pub struct BusyLoops {
 
 impl BusyLoops {
     /// One busy thread for each processor.
-    #[must_use]
     pub fn on_every_processor() -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let count = std::thread::available_parallelism().map_or(2, usize::from);

@@ -62,7 +62,6 @@ pub struct Noise {
 
 impl Noise {
     /// Sends so many frames a second to the embedded bus at `socket`; the same ones for the same seed.
-    #[must_use]
     pub fn start(socket: &Path, per_second: u32, seed: u64) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let peer = Peer::connect(socket);
@@ -72,10 +71,6 @@ impl Noise {
     }
 
     /// Ends it.
-    ///
-    /// # Panics
-    /// When the thread did.
-    #[must_use]
     pub fn end(self) -> Sent {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().expect("the noise does not panic")
@@ -178,10 +173,6 @@ pub struct Outcome {
 }
 
 /// Runs rig and controllers in real time for so long, with so many frames of noise each second.
-///
-/// # Panics
-/// When a program fails.
-#[must_use]
 pub fn run(seconds: u32, per_second: u32, seed: u64) -> Outcome {
     let scene = Scene::new(RESTLESS);
     let emulator = scene.emulator(Pace::Real).with(&format!("--seconds {seconds}")).start();

@@ -1,6 +1,6 @@
 //! Who looks on at a run: a viewer of the telemetry, and the live page as a program sees it.
 
-use crate::binaries::{Build, Program, executable};
+use crate::binaries::Program;
 use crate::process::{PATIENCE, Running, wait_until};
 use crate::scene::Scene;
 use runlog::telemetry::{Decoder, Packet};
@@ -10,7 +10,6 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::process::Command;
 
 /// A viewer of the telemetry.
 pub struct Viewer {
@@ -37,10 +36,6 @@ pub struct Told {
 
 impl Viewer {
     /// Connects as soon as an emulator listens.
-    ///
-    /// # Panics
-    /// When none does.
-    #[must_use]
     pub fn connect(path: &Path) -> Self {
         let mut stream = None;
         wait_until(&format!("telemetry at {}", path.display()), || {
@@ -53,9 +48,6 @@ impl Viewer {
     }
 
     /// The next packet; `None` at the end of the run.
-    ///
-    /// # Panics
-    /// When nothing comes, or something else than telemetry.
     pub fn packet(&mut self) -> Option<Packet> {
         let mut bytes = [0; 65536];
         loop {
@@ -73,9 +65,6 @@ impl Viewer {
     }
 
     /// Sends a line, and gives the answer to it.
-    ///
-    /// # Panics
-    /// When none comes.
     pub fn ask(&mut self, line: &str) -> Value {
         writeln!(self.stream, "{line}").expect("the emulator listens");
         loop {
@@ -86,10 +75,6 @@ impl Viewer {
     }
 
     /// Everything until the run ends.
-    ///
-    /// # Panics
-    /// When something is not as it should be.
-    #[must_use]
     pub fn to_the_end(mut self) -> Told {
         let mut told = Told::default();
         let json = |text: &str| serde_json::from_str(text).expect("JSON");
@@ -128,10 +113,6 @@ pub struct Answer {
 
 impl Answer {
     /// The body as JSON.
-    ///
-    /// # Panics
-    /// When it is none.
-    #[must_use]
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.body).unwrap_or_else(|error| panic!("{error}: {}", self.body))
     }
@@ -139,22 +120,14 @@ impl Answer {
 
 impl LivePage {
     /// Starts it beside a scene; `options` are separated by spaces.
-    ///
-    /// # Panics
-    /// When it does not tell where it listens.
-    #[must_use]
     pub fn open(scene: &Scene, options: &str) -> Self {
-        let mut command = Command::new(executable(Program::Bench, Build::Shipped));
+        let mut command = Program::Bench.command();
         command.args(["watch", "--http", "127.0.0.1:0", "--bus", &scene.url(), "--telemetry"]);
         command.arg(scene.path("telemetry"));
         Self::announced_by(Running::start("bench watch", command.args(options.split_whitespace())))
     }
 
     /// The page of a program that is it, or starts it and ends with it.
-    ///
-    /// # Panics
-    /// When it does not tell where it listens.
-    #[must_use]
     pub fn announced_by(mut running: Running) -> Self {
         running.wait_for("Ctrl-C ends it");
         let said = running.stderr();
@@ -170,10 +143,6 @@ impl LivePage {
     }
 
     /// Sends a request as it is, and gives the answer.
-    ///
-    /// # Panics
-    /// When none comes.
-    #[must_use]
     pub fn send(&self, request: &str) -> Answer {
         let mut stream = self.connect();
         stream.write_all(request.as_bytes()).expect("it listens");
@@ -186,10 +155,6 @@ impl LivePage {
     }
 
     /// Connects and does nothing more.
-    ///
-    /// # Panics
-    /// When nobody listens.
-    #[must_use]
     pub fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time-out");
@@ -197,18 +162,15 @@ impl LivePage {
     }
 
     /// Gets a path.
-    #[must_use]
     pub fn get(&self, path: &str) -> Answer {
         self.send(&format!("GET {path} HTTP/1.1\r\nHost: {}\r\n\r\n", self.address))
     }
 
-    #[must_use]
     pub fn state(&self) -> Value {
         self.get("/api/state").json()
     }
 
     /// Gives an order with further header fields, each with its line end.
-    #[must_use]
     pub fn order_with(&self, fields: &str, order: &Value) -> Answer {
         let body = order.to_string();
         self.send(&format!(
@@ -219,13 +181,11 @@ impl LivePage {
     }
 
     /// Gives an order as one who may.
-    #[must_use]
     pub fn order(&self, order: &Value) -> Answer {
         self.order_with(&format!("X-Airbench-Token: {}\r\n", self.token), order)
     }
 
     /// Listens to events.
-    #[must_use]
     pub fn events(&self) -> Events {
         let mut stream = self.connect();
         let request = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\n\r\n", self.address);
@@ -247,9 +207,6 @@ pub struct Events {
 
 impl Events {
     /// The next event of this name that is so.
-    ///
-    /// # Panics
-    /// When the stream ends, or nothing comes.
     pub fn wait_for(&mut self, name: &str, is_so: impl Fn(&Value) -> bool) -> Value {
         let mut current = String::new();
         loop {

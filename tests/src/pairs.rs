@@ -32,7 +32,6 @@ pub fn in_turns<T>(
 }
 
 /// Medians without and with, and of the difference with its interval.
-#[must_use]
 pub fn table<T>(runs: &[(T, T)], figures: &[Figure<T>]) -> Grid {
     let head = ["in each run", "without", "with", "difference", "interval"];
     let mut grid = Grid { head: head.map(str::to_owned).to_vec(), rows: Vec::new() };

@@ -31,10 +31,6 @@ pub struct Peer {
 
 impl Peer {
     /// Connects, trying until a host is there.
-    ///
-    /// # Panics
-    /// When none comes within the usual patience.
-    #[must_use]
     pub fn connect(path: &Path) -> Self {
         let flags = SocketFlags::CLOEXEC;
         let until = Instant::now() + PATIENCE;
@@ -53,32 +49,21 @@ impl Peer {
     }
 
     /// Sends a packet as it is.
-    ///
-    /// # Panics
-    /// When the host does not take it.
     pub fn send(&self, packet: &[u8]) {
         send(&self.socket, packet, SendFlags::NOSIGNAL).expect("the host takes the packet");
     }
 
     /// Goes, as a program does that dies: the host sees the end, and so does the next [`Peer::receive`].
-    ///
-    /// # Panics
-    /// When it is not connected.
     pub fn leave(&self) {
         shutdown(&self.socket, Shutdown::Both).expect("it is connected");
     }
 
     /// Sends a packet as it is; `false` when there is no host any more.
-    #[must_use]
     pub fn try_send(&self, packet: &[u8]) -> bool {
         send(&self.socket, packet, SendFlags::NOSIGNAL).is_ok()
     }
 
     /// The next packet; `None` when none comes within `patience`.
-    ///
-    /// # Panics
-    /// On packets that no host sends.
-    #[must_use]
     pub fn receive(&self, patience: Duration) -> Option<Packet> {
         let timeout = Timespec::try_from(patience).expect("a short time");
         if poll(&mut [PollFd::new(&self.socket, PollFlags::IN)], Some(&timeout)) == Ok(0) {
@@ -102,10 +87,6 @@ impl Peer {
     }
 
     /// All frames from now until the host goes.
-    ///
-    /// # Panics
-    /// When nothing comes for longer than the usual patience.
-    #[must_use]
     pub fn frames_to_the_end(&self) -> Vec<CanFrame> {
         let mut frames = Vec::new();
         loop {
@@ -120,9 +101,6 @@ impl Peer {
 
     /// Takes part in the lockstep barrier until the host goes: `act` is told the cycle and its frames, and sends through the
     /// peer what it likes before the member is done.
-    ///
-    /// # Panics
-    /// When the barrier stands still.
     pub fn take_part(&self, name: &str, mut act: impl FnMut(&Self, u32, &[CanFrame])) {
         self.send(&Control::named(Kind::Join(Role::Member), 0, name).to_bytes());
         let mut frames = Vec::new();

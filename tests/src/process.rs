@@ -14,6 +14,7 @@ pub const PATIENCE: Duration = Duration::from_secs(300);
 const POLL: Duration = Duration::from_millis(5);
 
 /// A program in a process group of its own.
+#[must_use]
 pub struct Running {
     name: String,
     child: Child,
@@ -44,10 +45,6 @@ pub struct Ended {
 
 impl Running {
     /// Starts `command`.
-    ///
-    /// # Panics
-    /// When the system does not start it.
-    #[must_use]
     pub fn start(name: &str, command: &mut Command) -> Self {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{name} does not start: {error}"));
@@ -57,10 +54,7 @@ impl Running {
         Self { name: name.into(), child, input, said: [stderr, stdout] }
     }
 
-    /// Sends a signal to the program.
-    ///
-    /// # Panics
-    /// When the program is gone: then the test is about something else than it says.
+    /// Sends a signal to the program, which must still be there: else the test is about something else than it says.
     pub fn signal(&self, signal: Signal) {
         if let Err(error) = kill_process(self.pid(), signal) {
             panic!("{} cannot be sent {signal:?}: {error}\n{}", self.name, self.stderr());
@@ -68,9 +62,6 @@ impl Running {
     }
 
     /// Stops the program as a debugger does, and returns once all its threads stand still.
-    ///
-    /// # Panics
-    /// As [`Running::signal`], and when a thread goes on.
     pub fn stop(&self) {
         self.signal(Signal::STOP);
         let tasks = format!("/proc/{}/task", self.number());
@@ -84,9 +75,6 @@ impl Running {
     }
 
     /// Types a line at its standard input.
-    ///
-    /// # Panics
-    /// When nobody reads it.
     pub fn type_line(&mut self, line: &str) {
         let input = self.input.as_mut().expect("the input is open");
         writeln!(input, "{line}").unwrap_or_else(|error| panic!("{} takes no '{line}': {error}", self.name));
@@ -98,29 +86,21 @@ impl Running {
     }
 
     /// What it has written to standard error so far.
-    #[must_use]
     pub fn stderr(&self) -> String {
         self.said[0].so_far()
     }
 
     /// The number of the process.
-    #[must_use]
     pub fn number(&self) -> u32 {
         self.child.id()
     }
 
     /// Waits until standard error holds `text`.
-    ///
-    /// # Panics
-    /// When it does not within [`PATIENCE`], or the program ends without saying it.
     pub fn wait_for(&mut self, text: &str) {
         self.wait_for_times(text, 1);
     }
 
     /// Waits until standard error holds `text` so many times.
-    ///
-    /// # Panics
-    /// As [`Running::wait_for`].
     pub fn wait_for_times(&mut self, text: &str, times: usize) {
         let until = Instant::now() + PATIENCE;
         while self.stderr().matches(text).count() < times {
@@ -137,19 +117,11 @@ impl Running {
     }
 
     /// Waits for the end.
-    ///
-    /// # Panics
-    /// When the program hangs.
-    #[must_use]
     pub fn wait(self) -> Ended {
         self.wait_within(PATIENCE)
     }
 
     /// Waits for the end for so long.
-    ///
-    /// # Panics
-    /// When the program has not ended by then.
-    #[must_use]
     pub fn wait_within(mut self, limit: Duration) -> Ended {
         let until = Instant::now() + limit;
         let status = loop {
@@ -170,9 +142,6 @@ impl Running {
     }
 
     /// Kills it at once, as a crash would, and waits until it is gone.
-    ///
-    /// # Panics
-    /// When it was gone already.
     pub fn kill(self) -> Ended {
         self.signal(Signal::KILL);
         self.wait()
@@ -218,9 +187,6 @@ impl Said {
 
 impl Ended {
     /// Holds the exit code against what is documented.
-    ///
-    /// # Panics
-    /// When it is another, with what the program said.
     #[track_caller]
     pub fn expect_code(self, code: i32) -> Self {
         let Self { name, stderr, signal, .. } = &self;
@@ -229,9 +195,6 @@ impl Ended {
     }
 
     /// Holds what it said against what a person must learn.
-    ///
-    /// # Panics
-    /// When one of `parts` is missing.
     #[track_caller]
     pub fn expect_said(self, parts: &[&str]) -> Self {
         for part in parts {
@@ -241,10 +204,7 @@ impl Ended {
     }
 }
 
-/// Waits until `condition` holds.
-///
-/// # Panics
-/// When it does not within [`PATIENCE`]; `what` tells what was waited for.
+/// Waits until `condition` holds; `what` tells what was waited for.
 #[track_caller]
 pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let until = Instant::now() + PATIENCE;

@@ -5,19 +5,11 @@ use serde_json::Value;
 use std::path::Path;
 
 /// A JSON file.
-///
-/// # Panics
-/// When it is not there or does not parse.
-#[must_use]
 pub fn json(path: &Path) -> Value {
     serde_json::from_str(&text(path)).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 /// A number that is counted in a JSON file, by its path of keys.
-///
-/// # Panics
-/// When there is no such count.
-#[must_use]
 #[track_caller]
 pub fn count(value: &Value, pointer: &str) -> u64 {
     value
@@ -27,10 +19,6 @@ pub fn count(value: &Value, pointer: &str) -> u64 {
 }
 
 /// A count by identifier, 0 where the identifier is not in the table.
-///
-/// # Panics
-/// When the table is not there.
-#[must_use]
 #[track_caller]
 pub fn count_of_id(table: &Value, id: &str) -> u64 {
     let table = table.as_object().unwrap_or_else(|| panic!("no table by identifier: {table}"));
@@ -46,10 +34,6 @@ pub struct Table {
 
 impl Table {
     /// Reads a table that was closed properly.
-    ///
-    /// # Panics
-    /// When the last line is not whole, or a row does not have a number for each column.
-    #[must_use]
     pub fn read(path: &Path) -> Self {
         let text = text(path);
         assert!(text.ends_with('\n'), "{}: the last line is cut: {:?}", path.display(), text.lines().last());
@@ -57,10 +41,6 @@ impl Table {
     }
 
     /// Reads a table whose writer was killed: up to its last whole line.
-    ///
-    /// # Panics
-    /// When a row does not have a number for each column.
-    #[must_use]
     pub fn read_to_last_whole_line(path: &Path) -> Self {
         let text = text(path);
         Self::parse(path, &text[..=text.rfind('\n').expect("at least the head")])
@@ -81,10 +61,6 @@ impl Table {
     }
 
     /// A column by its name.
-    ///
-    /// # Panics
-    /// When there is none.
-    #[must_use]
     pub fn column(&self, name: &str) -> Vec<f64> {
         let index = self.columns.iter().position(|column| column == name);
         let index = index.unwrap_or_else(|| panic!("no column {name} in {:?}", self.columns));
@@ -92,27 +68,21 @@ impl Table {
     }
 
     /// Names of the columns.
-    #[must_use]
     pub fn names(&self) -> &[String] {
         &self.columns
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
     /// Whether there is no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Holds that row k is that of cycle k, from 0 on without a hole.
-    ///
-    /// # Panics
-    /// With the first row that is not.
     #[track_caller]
     pub fn expect_no_hole(&self) {
         for (row, time_s) in self.column("time_s").into_iter().enumerate() {
@@ -122,9 +92,6 @@ impl Table {
 }
 
 /// Holds that a table, whatever its fields, consists of whole lines. Returns how many rows it has.
-///
-/// # Panics
-/// With the line that is cut, or has another number of fields than the head.
 #[track_caller]
 pub fn expect_whole_lines(path: &Path) -> usize {
     let text = text(path);
@@ -136,10 +103,6 @@ pub fn expect_whole_lines(path: &Path) -> usize {
 }
 
 /// The frames of a `bus.log`, each line checked for candump's form.
-///
-/// # Panics
-/// With the first line that is malformed.
-#[must_use]
 pub fn bus_log(path: &Path) -> Vec<CanFrame> {
     let text = text(path);
     assert!(text.is_empty() || text.ends_with('\n'), "{}: the last line is cut", path.display());
@@ -147,10 +110,6 @@ pub fn bus_log(path: &Path) -> Vec<CanFrame> {
 }
 
 /// The frames of a `bus.log` whose writer was killed, up to the last whole line.
-///
-/// # Panics
-/// With the first line that is malformed.
-#[must_use]
 pub fn bus_log_to_last_whole_line(path: &Path) -> Vec<CanFrame> {
     let text = text(path);
     log_lines(path, &text[..text.rfind('\n').map_or(0, |end| end + 1)])

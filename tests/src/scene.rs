@@ -1,11 +1,10 @@
 //! A folder of its own for each test, with everything that a run needs and everything that it leaves.
 
-use crate::binaries::{Build, Program, executable, workspace};
+use crate::binaries::{Program, workspace};
 use crate::launch::{Launch, Pace};
 use crate::peer::Peer;
 use crate::process::{Running, wait_until};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use tempfile::TempDir;
 
 /// An experiment of some 1.6 s: initial positioning 0.5 s, settling, 0.05 m in 0.4 s, a rest, settling, done.
@@ -108,10 +107,6 @@ pub struct Scene {
 
 impl Scene {
     /// A folder with the shipped rig file, this experiment and the programs that it names.
-    ///
-    /// # Panics
-    /// When the temporary folder cannot be written.
-    #[must_use]
     pub fn new(experiment: &str) -> Self {
         // Short, since the path of a socket holds 107 bytes.
         let folder = tempfile::Builder::new().prefix("airbench-").tempdir().expect("a temporary folder");
@@ -126,15 +121,11 @@ impl Scene {
     }
 
     /// A path in the folder.
-    #[must_use]
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
     /// Writes a file of the folder.
-    ///
-    /// # Panics
-    /// When it cannot be written.
     pub fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.path(name);
         std::fs::write(&path, text).expect("the temporary folder can be written");
@@ -142,9 +133,6 @@ impl Scene {
     }
 
     /// The shipped rig file with one text replaced, under another name.
-    ///
-    /// # Panics
-    /// When the text to be replaced is not in the file.
     pub fn rig_with(&self, name: &str, from: &str, to: &str) -> PathBuf {
         let rig = std::fs::read_to_string(self.path("rig.toml")).expect("the rig file is there");
         assert!(rig.contains(from), "'{from}' is not in the rig file");
@@ -152,43 +140,36 @@ impl Scene {
     }
 
     /// The socket of the scene's bus.
-    #[must_use]
     pub fn socket(&self) -> PathBuf {
         self.path("bus")
     }
 
     /// The scene's bus by its URL.
-    #[must_use]
     pub fn url(&self) -> String {
         format!("unix://{}", self.socket().display())
     }
 
     /// The emulator on the scene's bus, writing to the folder `emulator`.
-    #[must_use]
     pub fn emulator(&self, pace: Pace) -> Launch {
         Launch::new(Program::Emulator, self, Some(pace))
     }
 
     /// The controller on the scene's bus, writing to the folder `controller`.
-    #[must_use]
     pub fn controller(&self, pace: Pace) -> Launch {
         Launch::new(Program::Controller, self, Some(pace))
     }
 
     /// The controller of one axis alone, writing to the folder `controller` too: its files have names of their own.
-    #[must_use]
     pub fn axis_controller(&self, pace: Pace, axis: &str) -> Launch {
         self.controller(pace).with(&format!("--axis {axis}"))
     }
 
     /// A rehearsal, writing to the folder `controller`.
-    #[must_use]
     pub fn rehearsal(&self) -> Launch {
         Launch::new(Program::Controller, self, None)
     }
 
     /// A bus of its own process; `options` follow the URL's question mark. It serves when this returns.
-    #[must_use]
     pub fn bus_host(&self, options: &str) -> Running {
         let mut host = self.start_bus_host(options);
         host.wait_for("hosting");
@@ -196,15 +177,12 @@ impl Scene {
     }
 
     /// A bus of its own process, which may not get as far as serving.
-    #[must_use]
     pub fn start_bus_host(&self, options: &str) -> Running {
         let url = if options.is_empty() { self.url() } else { format!("{}?{options}", self.url()) };
-        let mut command = Command::new(executable(Program::Emulator, Build::Shipped));
-        Running::start("emulator bus", command.args(["bus", "--bus", &url]))
+        Program::Emulator.start(&[&"bus", &"--bus", &url])
     }
 
     /// A peer on the scene's bus, waiting for its host if need be.
-    #[must_use]
     pub fn peer(&self) -> Peer {
         Peer::connect(&self.socket())
     }
@@ -237,10 +215,6 @@ impl Scene {
     }
 
     /// Whether two files of the scene hold the same bytes.
-    ///
-    /// # Panics
-    /// When one cannot be read.
-    #[must_use]
     pub fn same(&self, one: &Path, other: &Path) -> bool {
         let read =
             |path: &Path| std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

@@ -11,10 +11,6 @@ pub struct SmallDisk {
 
 impl SmallDisk {
     /// A disk of `kib` KiB at `path`, which is made; `None` where nobody may mount one.
-    ///
-    /// # Panics
-    /// When the folder cannot be made.
-    #[must_use]
     pub fn mount(path: PathBuf, kib: u32) -> Option<Self> {
         std::fs::create_dir(&path).expect("the folder can be written");
         let mut mount = Command::new("mount");

@@ -10,10 +10,6 @@ pub struct Turn {
 }
 
 /// Waits for the machine; it is this test's until the turn goes, or its process.
-///
-/// # Panics
-/// When the file that stands for the machine cannot be made.
-#[must_use]
 pub fn take() -> Turn {
     let folder = workspace().join("target");
     let made = std::fs::create_dir_all(&folder).and_then(|()| File::create(folder.join("turn.lock")));

@@ -31,10 +31,6 @@ pub struct Outcome {
 }
 
 /// Runs rig and controllers in real time for so long, with the live page and ten viewers, or with neither.
-///
-/// # Panics
-/// When a program fails, or there is no chromium.
-#[must_use]
 pub fn run(seconds: u32, with: bool) -> Outcome {
     let scene = Scene::new(RESTLESS);
     let mut options = format!("--seconds {seconds}");

@@ -1,6 +1,7 @@
 //! Clients of the controllers' XCP: one of our own, packet by packet over a [`Peer`], and the foreign one in Python.
 
-use crate::binaries::{Build, Program, executable, workspace};
+use crate::binaries::{Program, workspace};
+use crate::foreign_python::python;
 use crate::peer::{Packet, Peer};
 use crate::process::{Ended, PATIENCE, Running};
 use crate::records::json;
@@ -15,14 +16,12 @@ use xcp::lock;
 pub const SECRET: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Writes the configuration of XCP with the secret, and room for two DAQ packets a cycle.
-#[must_use]
 pub fn config(scene: &Scene) -> PathBuf {
     let hex: String = SECRET.iter().map(|byte| format!("{byte:02x}")).collect();
     scene.write("xcp.toml", &format!("key = \"{hex}\"\ndaq_packets_per_cycle = 2\n"))
 }
 
 /// A command to the drive's controller, padded as `rig.dbc` has it.
-#[must_use]
 pub fn command(packet: &[u8]) -> CanFrame {
     let mut bytes = [0; 8];
     bytes[..packet.len()].copy_from_slice(packet);
@@ -30,7 +29,6 @@ pub fn command(packet: &[u8]) -> CanFrame {
 }
 
 /// What the drive's controller says over XCP in a frame, if it is one of its.
-#[must_use]
 pub fn said(frame: &CanFrame) -> Option<[u8; 8]> {
     (frame.standard_id() == Some(0x1E1)).then(|| frame.data().try_into().expect("padded to 8 bytes"))
 }
@@ -40,10 +38,6 @@ pub struct Talk<'a>(pub &'a Peer);
 
 impl Talk<'_> {
     /// Says a command and waits for its answer, whatever else comes meanwhile.
-    ///
-    /// # Panics
-    /// When none comes.
-    #[must_use]
     pub fn ask(&self, packet: &[u8]) -> [u8; 8] {
         self.0.send(&command(packet).to_bytes());
         loop {
@@ -58,9 +52,6 @@ impl Talk<'_> {
     }
 
     /// Says a command that must be answered well.
-    ///
-    /// # Panics
-    /// When it is refused.
     #[track_caller]
     pub fn good(&self, packet: &[u8]) -> [u8; 7] {
         let [first, rest @ ..] = self.ask(packet);
@@ -103,17 +94,10 @@ pub struct Foreign {
 impl Foreign {
     /// Starts a scenario of `tests/python/xcp_client.py` at the controller of `axis`, whose files are in `folder`. A `member`
     /// takes part in the lockstep barrier.
-    ///
-    /// # Panics
-    /// Without the Python environment that `scripts/test` makes.
-    #[must_use]
     pub fn start(scene: &Scene, scenario: &str, folder: &str, axis: &str, member: bool) -> Self {
-        let python = std::env::var_os("AIRBENCH_PYTHON")
-            .map_or_else(|| workspace().join("target/tools/venv/bin/python"), PathBuf::from);
-        assert!(python.exists(), "{} is missing: run scripts/test, which makes it", python.display());
         let scripts = workspace().join("tests/python");
         let seen = scene.path(&format!("seen-{axis}.json"));
-        let mut command = Command::new(python);
+        let mut command = Command::new(python());
         command
             .env("PYTHONPATH", &scripts)
             .env("PYTHONDONTWRITEBYTECODE", "1")
@@ -126,10 +110,6 @@ impl Foreign {
     }
 
     /// What it has seen at its end.
-    ///
-    /// # Panics
-    /// When it failed, with what it said.
-    #[must_use]
     pub fn wait(self) -> Value {
         let Ended { code, stderr, stdout, .. } = self.running.wait_within(PATIENCE);
         assert_eq!(code, Some(0), "pyXCP failed:\n{stdout}\n{stderr}");
@@ -144,12 +124,8 @@ pub fn wait_for_a2l(scene: &Scene, folder: &str, axis: &str) {
 }
 
 /// What the controller prints for the scene's files under a command such as `parameters`.
-///
-/// # Panics
-/// When it refuses.
-#[must_use]
 pub fn print_with(scene: &Scene, command: &str, options: &[&str]) -> String {
-    let mut program = Command::new(executable(Program::Controller, Build::Shipped));
+    let mut program = Program::Controller.command();
     program.arg(command).arg("--rig").arg(scene.path("rig.toml"));
     program.arg("--experiment").arg(scene.path("experiment.toml")).args(options);
     let Ended { code, stdout, stderr, .. } = Running::start("controller", &mut program).wait();

@@ -9,7 +9,7 @@ use protocol::can::CanFrame;
 use rustix::process::Signal;
 use system_tests::axis_table::AxisTable;
 use system_tests::binaries::Build;
-use system_tests::launch::Pace;
+use system_tests::launch::{Pace, run_both};
 use system_tests::onlooker::Viewer;
 use system_tests::peer::Peer;
 use system_tests::records::{count, json};
@@ -149,14 +149,10 @@ fn tune(peer: &Peer, row: usize) {
 fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
     let _machine = turn::take();
     let scene = Scene::new(LINKED);
-    let emulator = scene
-        .emulator(Pace::Real)
-        .build(Build::CountingAllocations)
-        .with("--seconds 14 --full-timing")
-        .start();
-    let controller = scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &scene.emulator(Pace::Real).build(Build::CountingAllocations).with("--seconds 14 --full-timing"),
+        &scene.controller(Pace::Real).build(Build::CountingAllocations).with("--repeat"),
+    );
     // Past the warm-up of 1 s both axes have been through every state of the way, and into the next repetition.
     let load = AxisTable::read(&scene.path("controller/controller-load.csv"));
     let late = load.cycles().iter().position(|cycle| *cycle >= 1500).expect("rows after the warm-up");
@@ -179,10 +175,10 @@ fn a_linked_experiment_with_all_its_chains_allocates_nothing_over_and_over() {
 fn programs_that_do_not_count_say_so() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Real).with("--seconds 1.2").start();
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &scene.emulator(Pace::Real).with("--seconds 1.2"),
+        &scene.controller(Pace::Real).with("--repeat"),
+    );
     assert_eq!(json(&scene.path("emulator/run.json"))["counts_allocations"], false);
     assert!(json(&scene.path("emulator/summary.json"))["allocations_in_cycle"].is_null());
     assert!(json(&scene.path("controller/controller.json"))["allocations_in_cycle"].is_null());

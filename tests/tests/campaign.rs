@@ -42,7 +42,7 @@ impl Place {
     }
 
     fn command(&self, command: &str, arguments: &[&str]) -> Command {
-        let mut program = Command::new(executable(Program::Campaign, Build::Shipped));
+        let mut program = Program::Campaign.command();
         program.args([command, "c.toml"]).args(arguments).current_dir(self.folder.path());
         program.arg("--shipped").arg(workspace().join("controller"));
         for variable in ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"] {

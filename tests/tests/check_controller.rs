@@ -8,7 +8,6 @@ use protocol::checksum;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, ValveCommand};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 use system_tests::binaries::{Build, Program, executable};
 use system_tests::firmware;
 use system_tests::peer::Peer;
@@ -18,7 +17,7 @@ use system_tests::turn;
 
 /// The check on the scene's bus; what follows `--` is the controller's command line.
 fn check(scene: &Scene, options: &str, controller: &[&str]) -> Running {
-    let mut command = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut command = Program::Bench.command();
     command.args(["check-controller", "--bus", &scene.url(), "--junit"]).arg(scene.path("junit.xml"));
     command.args(options.split_whitespace());
     if !controller.is_empty() {

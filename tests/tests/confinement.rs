@@ -5,9 +5,8 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use system_tests::binaries::{Build, Program, executable};
-use system_tests::launch::Pace;
+use system_tests::binaries::Program;
+use system_tests::launch::{Pace, run_both};
 use system_tests::process::Running;
 use system_tests::scene::{SHORT, Scene};
 use system_tests::xcp;
@@ -45,18 +44,16 @@ fn nothing_is_written_outside_the_folders_that_are_given() {
     );
     let config = xcp::config(&scene);
     let logs = [scene.path("emulator.strace"), scene.path("controller.strace")];
-    let emulator = scene
-        .emulator(Pace::Lockstep)
-        .with(&format!("--faults {}", faults.display()))
-        .after_shell(&traced(&logs[0]))
-        .start();
-    let controller = scene
-        .controller(Pace::Lockstep)
-        .with(&format!("--xcp {}", config.display()))
-        .after_shell(&traced(&logs[1]))
-        .start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &scene
+            .emulator(Pace::Lockstep)
+            .with(&format!("--faults {}", faults.display()))
+            .after_shell(&traced(&logs[0])),
+        &scene
+            .controller(Pace::Lockstep)
+            .with(&format!("--xcp {}", config.display()))
+            .after_shell(&traced(&logs[1])),
+    );
     let folder = scene.path("");
     for log in logs {
         let written = written(&log);
@@ -97,9 +94,8 @@ fn rig_and_controllers_listen_nowhere_and_the_gateway_on_loopback_alone() {
     let controller =
         scene.controller(Pace::Real).with(&format!("--repeat --xcp {}", config.display())).start();
     scene.wait_for_rows("emulator", 100);
-    let mut command = Command::new(executable(Program::Bench, Build::Shipped));
     // No --listen: what it does by default.
-    let mut gateway = Running::start("bench gateway", command.args(["gateway", "--bus", &scene.url()]));
+    let mut gateway = Program::Bench.start(&[&"gateway", &"--bus", &scene.url()]);
     gateway.wait_for("Ctrl-C ends it");
     assert_eq!(listens(&emulator), Vec::<String>::new());
     assert_eq!(listens(&controller), Vec::<String>::new());

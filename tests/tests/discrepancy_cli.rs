@@ -11,9 +11,8 @@ use serde_json::Value;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::binaries::{Build, Program, executable};
+use system_tests::binaries::Program;
 use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::launch::Pace;
 use system_tests::process::{Ended, Running};
@@ -359,7 +358,7 @@ fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves
     assert!(out.join("notes.txt").exists(), "foreign files stay");
 
     let empty = folder.path().join("empty");
-    let mut command = Command::new(executable(Program::Discrepancy, Build::Shipped));
+    let mut command = Program::Discrepancy.command();
     command.args([OsStr::new("close"), OsStr::new("--rig"), rig().as_os_str(), OsStr::new("--train")]);
     command.args([records().train.as_os_str(), OsStr::new("--out"), empty.as_os_str()]);
     let mut running = Running::start("discrepancy", &mut command);

@@ -10,7 +10,7 @@ use std::thread;
 use system_tests::hidden::{
     Extreme, LIVELY, Live, drawn, each_alone, everything, expect_physical, live, rig_with,
 };
-use system_tests::launch::Pace;
+use system_tests::launch::{Pace, run_both};
 use system_tests::records::Table;
 use system_tests::scene::Scene;
 use system_tests::turn;
@@ -24,10 +24,10 @@ const ROUNDS: usize = 3;
 fn lockstep(effects: &[Switched]) {
     let scene = Scene::new(LIVELY);
     let rig = rig_with(&scene, effects);
-    let emulator = scene.emulator(Pace::Lockstep).rig(&rig).with("--seconds 1.3").start();
-    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &scene.emulator(Pace::Lockstep).rig(&rig).with("--seconds 1.3"),
+        &scene.controller(Pace::Lockstep).with("--repeat"),
+    );
     let path = scene.path("emulator/truth.csv");
     expect_physical(&path);
     let truth = Table::read(&path);

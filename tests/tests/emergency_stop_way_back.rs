@@ -6,13 +6,12 @@
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand};
 use rustix::process::Signal;
 use serde_json::Value;
-use std::process::Command;
 use system_tests::axis_table::AxisTable;
-use system_tests::binaries::{Build, Program, executable};
+use system_tests::binaries::Program;
 use system_tests::bus_cycles::read;
 use system_tests::launch::Pace;
 use system_tests::own;
-use system_tests::process::{Ended, Running};
+use system_tests::process::Ended;
 use system_tests::records::{Table, json};
 use system_tests::scene::{LINKED, Scene};
 use system_tests::turn;
@@ -87,9 +86,8 @@ fn tripped(by: By) -> Scene {
 }
 
 fn figures(scene: &Scene) -> Value {
-    let mut command = Command::new(executable(Program::Bench, Build::Shipped));
     // Its code tells of the run, which was stopped; its figures are what is wanted.
-    let _ = Running::start("bench summary", command.arg("summary").arg(scene.path("run"))).wait();
+    let _ = Program::Bench.start(&[&"summary", &scene.path("run")]).wait();
     json(&scene.path("run/summary.json"))
 }
 

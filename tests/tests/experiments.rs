@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Program, workspace};
 use system_tests::process::Running;
 use system_tests::records::json;
 use system_tests::scene::{SHORT, Scene};
@@ -35,8 +35,7 @@ fn rehearse(name: &str, path: &Path) -> Result<(), String> {
     if rehearsal.code != Some(0) {
         return Err(format!("{name}: rehearsed with code {:?}:\n{}", rehearsal.code, rehearsal.stderr));
     }
-    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
-    let summary = Running::start("bench summary", bench.arg("summary").arg(&out)).wait();
+    let summary = Program::Bench.start(&[&"summary", &out]).wait();
     let bounds = &json(&out.join("summary.json"))["thresholds"];
     if summary.code != Some(0) {
         return Err(format!(
@@ -77,8 +76,7 @@ fn point_to_point_keeps_its_bounds_in_every_repetition_and_with_weights() {
         let options = format!("--programs {} --seed {seed}", programs.display());
         let _ =
             scene.rehearsal().experiment(&experiment).out(&out).with(&options).start().wait().expect_code(0);
-        let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
-        let summary = Running::start("bench summary", bench.arg("summary").arg(&out)).wait().expect_code(0);
+        let summary = Program::Bench.start(&[&"summary", &out]).wait().expect_code(0);
         let told = json(&out.join("summary.json"));
         assert!(
             told["position_error_dynamic_m"].as_f64().is_some_and(|error_m| error_m <= 0.004),
@@ -107,8 +105,7 @@ fn a_bound_that_is_broken_fails_the_experiment() {
     let programs = workspace().join("controller/programs");
     let options = format!("--programs {}", programs.display());
     let _ = scene.rehearsal().experiment(&strict).out(&out).with(&options).start().wait().expect_code(0);
-    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
-    let _ = Running::start("bench summary", bench.arg("summary").arg(&out)).wait().expect_code(1);
+    let _ = Program::Bench.start(&[&"summary", &out]).wait().expect_code(1);
 }
 
 #[test]

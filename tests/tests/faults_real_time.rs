@@ -2,7 +2,7 @@
 
 use system_tests::broken::{Row, rows};
 use system_tests::events;
-use system_tests::launch::Pace;
+use system_tests::launch::{Pace, run_both};
 use system_tests::records::{Table, bus_log, count, count_of_id, json};
 use system_tests::scene::{RESTLESS, Scene};
 use system_tests::turn;
@@ -49,10 +49,7 @@ fn run(pace: Pace) -> Scene {
     let scene = Scene::new(RESTLESS);
     let script = scene.write("faults.toml", SCRIPT);
     let options = format!("--seconds 1.8 --faults {}", script.display());
-    let emulator = scene.emulator(pace).with(&options).start();
-    let controller = scene.controller(pace).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(&scene.emulator(pace).with(&options), &scene.controller(pace).with("--repeat"));
     scene
 }
 

@@ -1,8 +1,7 @@
 //! Scripts of faults: the same bytes from the same one, refused when wrong, and a table of which no row is forgotten.
 
 use std::collections::BTreeSet;
-use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Program, workspace};
 use system_tests::broken::{Left, Plan};
 use system_tests::launch::Pace;
 use system_tests::scene::{SHORT, Scene};
@@ -31,8 +30,7 @@ fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() 
 }
 
 fn listing(arguments: &[&str]) -> String {
-    let output =
-        Command::new(executable(Program::Emulator, Build::Shipped)).arg("faults").args(arguments).output();
+    let output = Program::Emulator.command().arg("faults").args(arguments).output();
     let output = output.expect("the emulator starts");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")

@@ -4,8 +4,7 @@ use plant::{Inputs, Plant, RigParameters, Setup, quantise_valve};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use system_tests::binaries::{Build, Program, executable};
+use system_tests::binaries::Program;
 use system_tests::foreign_python::run_script;
 use system_tests::process::{Ended, Running};
 use system_tests::records::Table;
@@ -15,7 +14,7 @@ use system_tests::scene::{SHORT, Scene};
 const TOLERANCE: f64 = 1e-9;
 
 fn export(rig: &Path, out: &Path, options: &[&str]) -> Ended {
-    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut bench = Program::Bench.command();
     bench.arg("export-fmu").arg("--rig").arg(rig).arg("--out").arg(out);
     Running::start("bench export-fmu", bench.args(options)).wait()
 }

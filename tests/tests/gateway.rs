@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 use system_tests::door::{Door, DoorClient};
-use system_tests::guest::python;
+use system_tests::foreign_python::python;
 use system_tests::launch::Pace;
 use system_tests::peer::{Packet, Peer};
 use system_tests::process::{PATIENCE, Running, wait_until};

@@ -5,11 +5,10 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::OnceLock;
-use system_tests::binaries::{Build, Program, executable};
+use system_tests::binaries::Program;
 use system_tests::foreign_python::{python, run_script};
-use system_tests::launch::Pace;
+use system_tests::launch::{Pace, run_both};
 use system_tests::process::{Ended, Running};
 use system_tests::records::Table;
 use system_tests::scene::{SHORT, Scene};
@@ -19,16 +18,14 @@ fn run_folder() -> PathBuf {
     static RUN: OnceLock<Scene> = OnceLock::new();
     let scene = RUN.get_or_init(|| {
         let scene = Scene::new(SHORT);
-        let emulator = scene.emulator(Pace::Lockstep).start();
-        let controller = scene.controller(Pace::Lockstep).start();
-        let _ = (emulator.wait().expect_code(0), controller.wait().expect_code(0));
+        let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
         scene
     });
     scene.path("emulator")
 }
 
 fn export(source: &Path, format: &str, out: &Path, options: &[&str]) -> Ended {
-    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut bench = Program::Bench.command();
     bench.env("AIRBENCH_PYTHON", python()).arg("export").arg(source).args(["--to", format, "--out"]).arg(out);
     Running::start("bench export", bench.args(options)).wait()
 }

@@ -5,10 +5,9 @@ use runlog::candump::read_line;
 use rustix::process::Signal;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 use std::time::Duration;
-use system_tests::binaries::{Build, Program, executable};
-use system_tests::launch::Pace;
+use system_tests::binaries::Program;
+use system_tests::launch::{Pace, run_both};
 use system_tests::peer::{Packet, Peer};
 use system_tests::process::Running;
 use system_tests::records::{count, json};
@@ -18,7 +17,7 @@ use system_tests::scene::{SHORT, Scene};
 const SILENCE: Duration = Duration::from_millis(500);
 
 fn replay(scene: &Scene, log: &Path, options: &str) -> Running {
-    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut bench = Program::Bench.command();
     bench.arg("replay").arg(log).args(["--bus", &scene.url()]).args(options.split_whitespace());
     Running::start("bench replay", bench.arg("--out").arg(scene.path("replayed")))
 }
@@ -53,9 +52,7 @@ fn commands(count: u64) -> String {
 #[test]
 fn every_frame_of_a_run_is_on_the_bus_again_in_its_order() {
     let scene = Scene::new(SHORT);
-    let emulator = scene.emulator(Pace::Lockstep).start();
-    let controller = scene.controller(Pace::Lockstep).start();
-    let _ = (emulator.wait().expect_code(0), controller.wait().expect_code(0));
+    let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
     let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the log");
     // The first 300 ms, and frames of others.
     let mut short: String = log.lines().take(1500).map(|line| format!("{line}\n")).collect();

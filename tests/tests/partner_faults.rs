@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use system_tests::axis_table::AxisTable;
 use system_tests::bus_cycles::{Logged, read, read_to_last_whole_line};
 use system_tests::events;
-use system_tests::launch::Pace;
+use system_tests::launch::{Pace, run_both};
 use system_tests::peer::Peer;
 use system_tests::process::{Ended, Running};
 use system_tests::records::{Table, count, json};
@@ -180,10 +180,10 @@ fn a_controller_whose_partner_never_comes_gives_up_after_10_s_and_says_what_to_d
 #[test]
 fn alone_no_partner_is_waited_for_nor_missed() {
     let scene = Scene::new(SHORT);
-    let emulator = scene.emulator(Pace::Lockstep).start();
-    let controller = scene.axis_controller(Pace::Lockstep, "drive").with("--alone").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &scene.emulator(Pace::Lockstep),
+        &scene.axis_controller(Pace::Lockstep, "drive").with("--alone"),
+    );
     let report = json(&scene.path("controller/controller-drive.json"));
     assert_eq!(report["axes"]["drive"]["chain_state"], "done");
     assert!(count(&report, "/cycles_answered") > 1500);

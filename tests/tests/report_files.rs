@@ -2,9 +2,9 @@
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::launch::Pace;
+use system_tests::binaries::Program;
+use system_tests::foreign_python::run_script;
+use system_tests::launch::{Pace, run_both};
 use system_tests::process::{Ended, Running};
 use system_tests::records::{count, json};
 use system_tests::scene::{SHORT, Scene};
@@ -14,35 +14,19 @@ use system_tests::turn;
 fn run(scene: &Scene) -> PathBuf {
     let _machine = turn::take();
     let out = scene.path("run");
-    let emulator = scene.emulator(Pace::Real).out(&out).start();
-    let controller = scene.controller(Pace::Real).out(&out).start();
-    let _ = controller.wait().expect_code(0);
-    let _ = emulator.wait().expect_code(0);
+    let _ = run_both(&scene.emulator(Pace::Real).out(&out), &scene.controller(Pace::Real).out(&out));
     out
 }
 
 fn report(folder: &Path, options: &[&str]) -> Ended {
-    let mut bench = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut bench = Program::Bench.command();
     Running::start("bench report", bench.arg("report").arg(folder).args(options)).wait()
-}
-
-fn python() -> PathBuf {
-    let python = std::env::var_os("AIRBENCH_PYTHON")
-        .map_or_else(|| workspace().join("target/tools/venv/bin/python"), PathBuf::from);
-    assert!(
-        python.exists(),
-        "{} is missing: run scripts/test, which makes the Python environment with hdrhistogram",
-        python.display()
-    );
-    python
 }
 
 /// What the Python package makes of a log: count and maximum of each tag.
 fn read_by_python(log: &Path) -> Value {
-    let mut python = Command::new(python());
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/read_hlog.py");
-    let ended = Running::start("read_hlog.py", python.arg(script).arg(log)).wait().expect_code(0);
-    serde_json::from_str(&ended.stdout).unwrap_or_else(|error| panic!("{error}: {}", ended.stdout))
+    let printed = run_script("read_hlog.py", &[log]);
+    serde_json::from_str(&printed).unwrap_or_else(|error| panic!("{error}: {printed}"))
 }
 
 #[test]

@@ -6,15 +6,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use plant::effects::draw::as_toml;
 use plant::effects::sheet::Switched;
 use plant::effects::{SHEETS, sheet};
 use protocol::frames::{DRIVE_SENSORS, MESSAGES};
-use system_tests::binaries::{Build, Program, executable};
+use system_tests::binaries::Program;
 use system_tests::hidden::{Extreme, LIVELY, drawn, everything, rig_with};
-use system_tests::launch::Pace;
+use system_tests::launch::{Pace, run_both};
 use system_tests::process::Running;
 use system_tests::records::{bus_log, json};
 use system_tests::scene::Scene;
@@ -46,7 +45,7 @@ fn run(sealed: &str, pace: Pace, options: &str) -> Left {
         scene.emulator(pace).out(&folder).with("--seconds 1.3").with(&sealed).with(options).start();
     let controller = scene.controller(pace).out(&folder).with("--repeat").start();
     let ended = [emulator.wait(), controller.wait()].map(|ended| ended.expect_code(0));
-    let mut summary = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut summary = Program::Bench.command();
     let summary = Running::start("bench summary", summary.arg("summary").arg(&folder)).wait().expect_code(0);
     let said =
         ended.iter().chain([&summary]).map(|ended| format!("{}{}", ended.stdout, ended.stderr)).collect();
@@ -205,10 +204,10 @@ fn what_only_real_time_leaves_tells_nothing_of_it_either() {
 fn an_empty_seal_changes_no_byte() {
     let sealed = run("# nothing\n", Pace::Lockstep, "");
     let scene = Scene::new(LIVELY);
-    let emulator = scene.emulator(Pace::Lockstep).with("--seconds 1.3").start();
-    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &scene.emulator(Pace::Lockstep).with("--seconds 1.3"),
+        &scene.controller(Pace::Lockstep).with("--repeat"),
+    );
     for file in ["bus.log", "measurement.csv", "truth.csv"] {
         assert!(scene.same(&scene.path("emulator").join(file), &sealed.path(file)), "{file} differs");
     }
@@ -309,10 +308,9 @@ fn a_wrong_seal_is_refused_before_the_run_with_file_line_and_key() {
 fn lockstep(scene: &Scene, rig: &Path, folder: &str, options: &str) -> PathBuf {
     let folder = scene.path(folder);
     let emulator = scene.emulator(Pace::Lockstep).rig(rig).out(&folder.join("emulator"));
-    let emulator = emulator.with("--seconds 1.3").with(options).start();
-    let controller =
-        scene.controller(Pace::Lockstep).rig(rig).out(&folder.join("controller")).with("--repeat").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(
+        &emulator.with("--seconds 1.3").with(options),
+        &scene.controller(Pace::Lockstep).rig(rig).out(&folder.join("controller")).with("--repeat"),
+    );
     folder
 }

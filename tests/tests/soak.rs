@@ -2,8 +2,7 @@
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
-use std::process::Command;
-use system_tests::binaries::{Build, Program, executable};
+use system_tests::binaries::Program;
 use system_tests::process::{Running, wait_until};
 use system_tests::records::{count, expect_whole_lines, json};
 use system_tests::scene::{RESTLESS, Scene};
@@ -11,7 +10,7 @@ use system_tests::turn;
 
 /// A soak in the scene's folder `soak`, in segments of 8 s, with a program that does nothing as its load generator.
 fn soak(scene: &Scene, minutes: f64) -> Running {
-    let mut command = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut command = Program::Bench.command();
     command.args(["soak", "--minutes", &minutes.to_string(), "--segment-seconds", "8"]);
     command.args(["--load", "sleep 600", "--experiments", "experiment", "--min-free-mb", "1"]);
     command.args(["--bus", &scene.url()]).arg("--out").arg(scene.path("soak"));
@@ -146,7 +145,7 @@ fn a_soak_that_was_killed_or_interrupted_goes_on_with_all_it_had() {
     let counted = |results: &Value| count(results, "/distributions/emulator-wakeup/count");
     assert!(counted(&second) > counted(&first));
 
-    let mut other = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut other = Program::Bench.command();
     other.args(["soak", "--minutes", "1", "--experiments", "experiment", "--bus", &scene.url()]);
     other.arg("--rig").arg(scene.path("rig.toml")).arg("--experiment-folder").arg(scene.path(""));
     other.arg("--out").arg(scene.path("soak"));

@@ -12,7 +12,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::account;
-use system_tests::guest::{Guest, InterfaceCounters, compare_candump, data_frames, link, python, root};
+use system_tests::binaries::workspace;
+use system_tests::foreign_python::python;
+use system_tests::guest::{Guest, InterfaceCounters, compare_candump, data_frames, link};
 use system_tests::records::{Table, count, json};
 
 const LOG_OF_CAN1: &str = "candump-can1.log";
@@ -420,7 +422,7 @@ fn cyclictest_stands_beside_our_figures(run: &Path, kernel: &str) {
 /// The reports that `.github/workflows/ci.yml` keeps, in `target/vm-reports`; they say themselves that they support no claim.
 fn reports_are_kept(kernel: &str) {
     for bus in ["vcan0", "cards"] {
-        let folder = root().join(format!("target/vm-reports/{kernel}-{bus}"));
+        let folder = workspace().join(format!("target/vm-reports/{kernel}-{bus}"));
         for file in ["guest.json", "report.html", "report.md"] {
             assert!(folder.join(file).exists(), "no {file} in {}", folder.display());
         }

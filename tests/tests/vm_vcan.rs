@@ -10,7 +10,8 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 use system_tests::firmware;
-use system_tests::guest::{Guest, compare_candump, data_frames, python};
+use system_tests::foreign_python::python;
+use system_tests::guest::{Guest, compare_candump, data_frames};
 use system_tests::records::{count, json};
 
 #[test]

@@ -6,7 +6,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::guest::python;
+use system_tests::foreign_python::python;
 use system_tests::launch::Pace;
 use system_tests::onlooker::LivePage;
 use system_tests::process::{Running, wait_until};
@@ -237,10 +237,8 @@ fn orders_reach_rig_controllers_and_folder() {
     assert!(of.ends_with("s, since linkage or weights changed before)"), "{message}");
     let record_s = Table::read(&Path::new(folder).join("measurement.csv")).column("time_s");
     for file in ["measurement.csv", "bus.log"] {
-        let mut check = Command::new(executable(Program::Discrepancy, Build::Shipped));
-        check.arg("check").arg("--rig").arg(watched.scene.path("rig.toml"));
-        check.args(["--train", &format!("{folder}/{file}")]);
-        let checked = Running::start("discrepancy check", &mut check).wait();
+        let (rig, record) = (watched.scene.path("rig.toml"), format!("{folder}/{file}"));
+        let checked = Program::Discrepancy.start(&[&"check", &"--rig", &rig, &"--train", &record]).wait();
         assert_eq!(checked.code, Some(0), "{file}: {}{}", checked.stdout, checked.stderr);
     }
 

@@ -8,7 +8,7 @@ use protocol::frames::{EmergencyStop, Frame, HandSetPoint, HandSetPointAxis};
 use rustix::process::Signal;
 use std::path::PathBuf;
 use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
+use system_tests::binaries::{Program, workspace};
 use system_tests::launch::Pace;
 use system_tests::process::Running;
 use system_tests::records::{Table, bus_log};
@@ -75,7 +75,7 @@ fn the_page_shows_a_run_and_a_hand_on_it_reaches_the_rig() {
     let _machine = turn::take();
     let scene = Scene::new(TO_AND_FRO);
     let first = Rig::start(&scene, "first");
-    let mut command = Command::new(executable(Program::Bench, Build::Shipped));
+    let mut command = Program::Bench.command();
     command.args(["watch", "--http", "127.0.0.1:0", "--control", "--bus", &scene.url(), "--telemetry"]);
     let mut watch = Running::start("bench watch", command.arg(scene.path("telemetry")));
     watch.wait_for("Ctrl-C ends it");

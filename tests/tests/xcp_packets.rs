@@ -3,7 +3,7 @@
 
 use protocol::can::CanFrame;
 use system_tests::axis_table::AxisTable;
-use system_tests::launch::Pace;
+use system_tests::launch::{Pace, run_both};
 use system_tests::records::{count, json};
 use system_tests::scene::{PROGRAM, SHORT, Scene};
 use system_tests::xcp::{SECRET, command, config, said};
@@ -253,10 +253,7 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
 #[test]
 fn the_a2l_file_can_be_had_without_a_run_and_is_that_of_the_run() {
     let scene = Scene::new(SHORT);
-    let emulator = scene.emulator(Pace::Lockstep).start();
-    let controller = scene.controller(Pace::Lockstep).with("--xcp").start();
-    let _ = emulator.wait().expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep).with("--xcp"));
     for axis in ["drive", "load"] {
         let printed = system_tests::xcp::print_with(&scene, "a2l", &["--axis", axis]);
         let written = bytes(&scene, &format!("controller/controller-{axis}.a2l"));

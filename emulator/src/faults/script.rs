@@ -23,7 +23,6 @@
 use super::{Fault, FaultError};
 use plant::Truth;
 use settings::number;
-use std::fmt;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -107,7 +106,8 @@ impl Condition {
 }
 
 /// Why a script is refused.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{file}:{line}: {problem}")]
 pub struct ScriptError {
     /// File as given by the caller.
     pub file: String,
@@ -138,14 +138,6 @@ pub enum Problem {
     /// Something is missing, or does not go with something else.
     #[error("{0}")]
     Rule(String),
-}
-
-impl std::error::Error for ScriptError {}
-
-impl fmt::Display for ScriptError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}: {}", self.file, self.line, self.problem)
-    }
 }
 
 /// Keys of a fault that are not its numbers.

@@ -7,73 +7,31 @@ use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 const TERMINATED: c_int = 3;
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SerializedFMUstateSize(
-    component: *mut c_void,
-    _state: *mut c_void,
-    _size: *mut usize,
-) -> Status {
-    unsupported(component, "canSerializeFMUstate")
+/// Functions that tell which attribute of modelDescription.xml is not set, from `name(further arguments) attribute`.
+macro_rules! not_offered {
+    ($($name:ident($($argument:ident: $kind:ty),*) $attribute:literal;)*) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(component: *mut c_void, $($argument: $kind),*) -> Status {
+            unsupported(component, $attribute)
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SerializeFMUstate(
-    component: *mut c_void,
-    _state: *mut c_void,
-    _bytes: *mut c_char,
-    _size: usize,
-) -> Status {
-    unsupported(component, "canSerializeFMUstate")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2DeSerializeFMUstate(
-    component: *mut c_void,
-    _bytes: *const c_char,
-    _size: usize,
-    _state: *mut *mut c_void,
-) -> Status {
-    unsupported(component, "canSerializeFMUstate")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetDirectionalDerivative(
-    component: *mut c_void,
-    _unknowns: *const c_uint,
-    _unknown_count: usize,
-    _knowns: *const c_uint,
-    _known_count: usize,
-    _known_differentials: *const c_double,
-    _unknown_differentials: *mut c_double,
-) -> Status {
-    unsupported(component, "providesDirectionalDerivative")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetRealInputDerivatives(
-    component: *mut c_void,
-    _references: *const c_uint,
-    _count: usize,
-    _orders: *const c_int,
-    _values: *const c_double,
-) -> Status {
-    unsupported(component, "canInterpolateInputs")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetRealOutputDerivatives(
-    component: *mut c_void,
-    _references: *const c_uint,
-    _count: usize,
-    _orders: *const c_int,
-    _values: *mut c_double,
-) -> Status {
-    unsupported(component, "maxOutputDerivativeOrder")
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2CancelStep(component: *mut c_void) -> Status {
-    unsupported(component, "canRunAsynchronuously")
+not_offered! {
+    fmi2SerializedFMUstateSize(_state: *mut c_void, _size: *mut usize) "canSerializeFMUstate";
+    fmi2SerializeFMUstate(_state: *mut c_void, _bytes: *mut c_char, _size: usize) "canSerializeFMUstate";
+    fmi2DeSerializeFMUstate(_bytes: *const c_char, _size: usize, _state: *mut *mut c_void) "canSerializeFMUstate";
+    fmi2GetDirectionalDerivative(
+        _unknowns: *const c_uint, _unknown_count: usize, _knowns: *const c_uint, _known_count: usize,
+        _known_differentials: *const c_double, _unknown_differentials: *mut c_double
+    ) "providesDirectionalDerivative";
+    fmi2SetRealInputDerivatives(
+        _references: *const c_uint, _count: usize, _orders: *const c_int, _values: *const c_double
+    ) "canInterpolateInputs";
+    fmi2GetRealOutputDerivatives(
+        _references: *const c_uint, _count: usize, _orders: *const c_int, _values: *mut c_double
+    ) "maxOutputDerivativeOrder";
+    fmi2CancelStep() "canRunAsynchronuously";
 }
 
 fn unsupported(component: *mut c_void, attribute: &str) -> Status {

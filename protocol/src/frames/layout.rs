@@ -236,12 +236,17 @@ macro_rules! plain_bytes {
 }
 pub(super) use plain_bytes;
 
-/// `Frame` and `MESSAGES`, from `identifier Variant(Payload) CONSTANT` for each message.
+/// `Frame`, `MESSAGES` and their constants, from `identifier Variant(Payload) CONSTANT { rest of its MessageSpec }` for each message.
 macro_rules! frames {
     (
         $(#[$doc:meta])*
-        pub enum Frame { $($(#[$message_doc:meta])* $id:literal $name:ident($payload:ident) $message:ident,)* }
+        pub enum Frame {
+            $($(#[$message_doc:meta])* $id:literal $name:ident($payload:ident) $message:ident { $($spec:tt)* },)*
+        }
     ) => {
+        $($(#[$message_doc])*
+        pub const $message: &MessageSpec = &MessageSpec { name: stringify!($name), id: $id, $($spec)* };)*
+
         /// Every message of `rig.dbc`, by identifier.
         pub const MESSAGES: &[&MessageSpec] = &[$($message,)*];
 
