@@ -4,7 +4,6 @@ use crate::binaries::Program;
 use crate::process::{PATIENCE, Running, wait_until};
 use crate::records::json;
 use crate::scene::Scene;
-use rustix::process::Signal;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -49,8 +48,7 @@ impl Door {
 
     /// Ends it, and gives what it counted.
     pub fn close(self) -> Value {
-        self.running.signal(Signal::INT);
-        let _ = self.running.wait().expect_code(130);
+        let _ = self.running.interrupt();
         json(&self.report)
     }
 

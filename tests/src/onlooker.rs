@@ -4,7 +4,6 @@ use crate::binaries::Program;
 use crate::process::{PATIENCE, Running, wait_until};
 use crate::scene::Scene;
 use runlog::telemetry::{Decoder, Packet};
-use rustix::process::Signal;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -195,8 +194,7 @@ impl LivePage {
 
     /// Ends it.
     pub fn close(self) {
-        self.running.signal(Signal::INT);
-        let _ = self.running.wait().expect_code(130);
+        let _ = self.running.interrupt();
     }
 }
 

@@ -147,6 +147,12 @@ impl Running {
         self.wait()
     }
 
+    /// Presses Ctrl-C, and waits for the end that follows.
+    pub fn interrupt(self) -> Ended {
+        self.signal(Signal::INT);
+        self.wait().expect_code(130)
+    }
+
     fn pid(&self) -> Pid {
         Pid::from_child(&self.child)
     }
@@ -201,6 +207,15 @@ impl Ended {
             assert!(self.stderr.contains(part), "{} does not say '{part}' but:\n{}", self.name, self.stderr);
         }
         self
+    }
+
+    /// Holds that standard output has all of `parts`.
+    #[track_caller]
+    pub fn expect_printed(&self, parts: &[&str]) {
+        for part in parts {
+            let Self { name, stdout, stderr, .. } = self;
+            assert!(stdout.contains(part), "{name} does not print '{part}' but:\n{stdout}\n{stderr}");
+        }
     }
 }
 

@@ -187,6 +187,14 @@ impl Scene {
         Peer::connect(&self.socket())
     }
 
+    /// Emulator and controller, whose experiment repeats, once the emulator has recorded so many rows.
+    pub fn under_way(&self, pace: Pace, rows: usize) -> (Running, Running) {
+        let emulator = self.emulator(pace).start();
+        let controller = self.controller(pace).with("--repeat").start();
+        self.wait_for_rows("emulator", rows);
+        (emulator, controller)
+    }
+
     /// Waits until so many peers are connected to the scene's bus, as the kernel's list of sockets shows.
     pub fn wait_for_peers(&self, count: usize) {
         let socket = self.socket().display().to_string();

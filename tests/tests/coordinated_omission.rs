@@ -131,8 +131,7 @@ fn a_dump_can_be_asked_for_and_changes_nothing() {
     let event: Value = json(&dump.join("event.json"));
     let (from, at) = (count(&event, "/window_from_ns"), count(&event, "/at_monotonic_ns"));
     assert!(at - from >= 1000 * MS, "a second before: {event}");
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let _ = controller.wait();
     assert!(count(&json(&scene.path("emulator/summary.json")), "/flight/dumps") >= 1);
 }

@@ -193,10 +193,11 @@ fn the_steps_after_a_report(closed: &Path) {
         discrepancy(&[&"verify", &"--rig", &rig, &"--extended", &extended, &"--test", test, &"--out", &out]);
     let confirmed = json(&report)["verification"]["confirmed"].as_bool().expect("a verification");
     let verified = verified.expect_code(i32::from(!confirmed));
-    for part in ["drive_position_m: before", "chi2", if confirmed { ": confirmed" } else { "not confirmed" }]
-    {
-        assert!(verified.stdout.contains(part), "'{part}' is missing in: {}", verified.stdout);
-    }
+    verified.expect_printed(&[
+        "drive_position_m: before",
+        "chi2",
+        if confirmed { ": confirmed" } else { "not confirmed" },
+    ]);
     let alone = json(&out.join("verification.json"));
     for field in ["gap", "verification"] {
         assert_eq!(alone[field], json(&report)[field], "{field} of verify alone is that of close");
@@ -215,9 +216,7 @@ fn the_steps_before_a_report_run_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let train = &records().train;
     let check = on("check", train, folder.path(), &[]).expect_code(GOOD);
-    for part in ["8000 rows", "can be used", "drive_force_N: noise 0.5"] {
-        assert!(check.stdout.contains(part), "'{part}' is missing in: {}", check.stdout);
-    }
+    check.expect_printed(&["8000 rows", "can be used", "drive_force_N: noise 0.5"]);
     assert_eq!(json(&folder.path().join("checks.json"))[0]["usable"], true);
 
     let calibrate = on("calibrate", train, folder.path(), &[]).expect_code(GOOD);
@@ -306,9 +305,7 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
         let own = findings.iter().find(|own| own["kind"] == kind).unwrap_or_else(|| panic!("{findings:#?}"));
         assert_eq!(own["fatal"], true);
         let line = own["line"].as_u64().unwrap_or_else(|| panic!("no line in {own}"));
-        for part in [told, &format!("{}:{line}: ", record.display())] {
-            assert!(ended.stdout.contains(part), "'{part}' is missing in: {}", ended.stdout);
-        }
+        ended.expect_printed(&[told, &format!("{}:{line}: ", record.display())]);
         assert!(folder.path().join("report.html").exists());
         assert!(!folder.path().join("rig.toml").exists(), "a model out of a record that cannot be used");
         // The steps alone refuse it too, with the same words.
@@ -349,9 +346,7 @@ fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves
     let text = fs::read_to_string(&records().train).expect("the record");
     fs::write(&record, text.replace("drive_pressure_b_Pa", "drive_presure_b_Pa")).expect("room");
     let check = on("check", &record, &out, &[]).expect_code(BAD_INPUT);
-    for part in ["cannot be used", "column drive_presure_b_Pa", "no column drive_pressure_b_Pa"] {
-        assert!(check.stdout.contains(part), "'{part}' is missing in: {}", check.stdout);
-    }
+    check.expect_printed(&["cannot be used", "column drive_presure_b_Pa", "no column drive_pressure_b_Pa"]);
     let _ = on("close", &record, &out, &[]).expect_code(BAD_INPUT);
     assert_eq!(json(&out.join("report.json"))["verdict"], "bad-data");
     assert!(!out.join("rig.toml").exists() && !out.join("next-chirps.toml").exists());
@@ -435,9 +430,17 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
 #[test]
 fn help_tells_every_step_every_option_and_the_exit_codes() {
     let whole = discrepancy(&[&"--help"]).expect_code(GOOD);
-    for part in ["close", "check", "calibrate", "locate", "name", "extend", "verify", "next", "Exit codes"] {
-        assert!(whole.stdout.contains(part), "'{part}' is missing in: {}", whole.stdout);
-    }
+    whole.expect_printed(&[
+        "close",
+        "check",
+        "calibrate",
+        "locate",
+        "name",
+        "extend",
+        "verify",
+        "next",
+        "Exit codes",
+    ]);
     for (step, parts) in [
         (
             "close",
@@ -457,9 +460,7 @@ fn help_tells_every_step_every_option_and_the_exit_codes() {
         ("next", &["--rig", "--report", "--out"]),
     ] {
         let help = discrepancy(&[&step, &"--help"]).expect_code(GOOD);
-        for part in parts {
-            assert!(help.stdout.contains(part), "'{part}' is missing in {step}: {}", help.stdout);
-        }
+        help.expect_printed(parts);
     }
     let _ = discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_said(&["--rig", "--train"]);
     assert!(records().folder.path().exists());

@@ -70,9 +70,10 @@ fn next_writes_an_experiment_that_tells_apart_what_a_report_could_not() {
     fs::write(&report, told).expect("a report");
     let next =
         discrepancy(&[&"next", &"--rig", &rig(), &"--report", &report, &"--out", &out]).expect_code(GOOD);
-    for part in ["command-dead-time drive and valve-dead-zone drive", "is expected to separate them"] {
-        assert!(next.stdout.contains(part), "'{part}' is missing in: {}", next.stdout);
-    }
+    next.expect_printed(&[
+        "command-dead-time drive and valve-dead-zone drive",
+        "is expected to separate them",
+    ]);
     let experiment = fs::read_to_string(&out).expect("an experiment file");
     assert!(experiment.contains("[run]") && experiment.starts_with("# Proposed by"), "{experiment}");
 }

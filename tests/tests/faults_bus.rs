@@ -37,8 +37,7 @@ fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
     second.into_iter().for_each(|controller| drop(controller.kill()));
     emulator.wait_for("one sender left on the drive command, valve follows");
     scene.wait_for_more_rows("emulator", 600);
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     first.into_iter().for_each(|controller| drop(controller.wait().expect_code(0)));
     let summary = json(&scene.path("emulator/summary.json"));
     let measurement = Table::read(&scene.path("emulator/measurement.csv"));
@@ -62,8 +61,7 @@ fn controllers_that_know_of_each_other_take_a_second_one_for_a_fault_and_stop() 
     let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
     let _ = first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
     let _ = second.wait().expect_code(1);
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let told = events::all(&json(&scene.path("emulator/summary.json")));
     assert!(events::times(&told, "emergency-stop") >= 1, "{told:?}");
     let valve = Table::read(&scene.path("emulator/measurement.csv")).column("drive_valve");
@@ -84,8 +82,7 @@ fn a_listener_that_never_reads_loses_at_its_own_queue_and_finds_just_that_in_the
     scene.wait_for_rows("emulator", 2000);
     let heard = std::thread::spawn(move || listener.frames_to_the_end());
     scene.wait_for_more_rows("emulator", 500);
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let _ = controller.wait().expect_code(0);
     host.signal(Signal::INT);
     let host = host.wait().expect_code(130);
@@ -192,8 +189,7 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
     controller.wait_for("the bus is back");
     emulator.wait_for("fresh drive commands again");
     scene.wait_for_more_rows("emulator", 600);
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let _ = controller.wait().expect_code(0);
     drop(host);
     let summary = json(&scene.path("emulator/summary.json"));
@@ -244,8 +240,7 @@ fn a_second_host_is_refused_and_a_second_rig_leaves_while_the_first_goes_on() {
         .expect_code(3)
         .expect_said(&["has a host already; joining it", "another rig is on this bus already"]);
     first.wait_for("another rig is on this bus; stop one of them");
-    first.signal(Signal::INT);
-    let _ = first.wait().expect_code(130);
+    let _ = first.interrupt();
     assert!(json(&scene.path("second/summary.json"))["bus_host"].is_null());
     assert!(count(&json(&scene.path("emulator/summary.json")), "/frames_ignored/second_rig") > 0);
 }

@@ -17,9 +17,7 @@ fn expect_complete(scene: &Scene) {
 #[test]
 fn a_member_that_is_never_done_ends_the_run_by_its_name() {
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Lockstep).start();
-    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    scene.wait_for_rows("emulator", 600);
+    let (emulator, controller) = scene.under_way(Pace::Lockstep, 600);
     controller.signal(Signal::STOP);
     let _ = emulator
         .wait()
@@ -52,9 +50,7 @@ fn a_barrier_that_one_of_two_joins_is_given_up_and_the_one_ends_too() {
 #[test]
 fn a_member_that_is_killed_ends_the_run_and_what_was_recorded_stays() {
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Lockstep).start();
-    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    scene.wait_for_rows("emulator", 600);
+    let (emulator, controller) = scene.under_way(Pace::Lockstep, 600);
     let _ = controller.kill();
     let _ = emulator.wait().expect_code(BUS_FAILED).expect_said(&["all members left the barrier"]);
     expect_complete(&scene);
@@ -63,9 +59,7 @@ fn a_member_that_is_killed_ends_the_run_and_what_was_recorded_stays() {
 #[test]
 fn an_emulator_that_is_killed_ends_the_member() {
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(Pace::Lockstep).start();
-    let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    scene.wait_for_rows("emulator", 600);
+    let (emulator, controller) = scene.under_way(Pace::Lockstep, 600);
     let _ = emulator.kill();
     let _ = controller.wait().expect_code(BUS_FAILED);
     let rows = expect_whole_lines(&scene.path("controller/controller-drive.csv"));

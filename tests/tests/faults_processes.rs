@@ -19,17 +19,13 @@ const STOPPED: Duration = Duration::from_millis(200);
 
 /// Emulator and controller under way; the experiment repeats until the emulator is interrupted.
 fn under_way(scene: &Scene) -> (Running, Running) {
-    let emulator = scene.emulator(Pace::Real).start();
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
-    scene.wait_for_rows("emulator", UNDER_WAY);
-    (emulator, controller)
+    scene.under_way(Pace::Real, UNDER_WAY)
 }
 
 /// Goes on for a while, ends the run as a person would, and hands back summary and measurement.
 fn end(scene: &Scene, emulator: Running) -> (Value, Table) {
     scene.wait_for_more_rows("emulator", 600);
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let measurement = Table::read(&scene.path("emulator/measurement.csv"));
     measurement.expect_no_hole();
     let summary = json(&scene.path("emulator/summary.json"));

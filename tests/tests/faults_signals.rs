@@ -13,9 +13,7 @@ const PACES: [Pace; 2] = [Pace::Real, Pace::Lockstep];
 
 fn under_way(pace: Pace) -> (Scene, Running, Running) {
     let scene = Scene::new(RESTLESS);
-    let emulator = scene.emulator(pace).start();
-    let controller = scene.controller(pace).with("--repeat").start();
-    scene.wait_for_rows("emulator", 600);
+    let (emulator, controller) = scene.under_way(pace, 600);
     (scene, emulator, controller)
 }
 

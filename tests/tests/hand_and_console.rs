@@ -281,8 +281,7 @@ fn the_end_of_the_input_closes_the_console_and_not_the_run() {
     emulator.wait_for("10 N");
     emulator.end_input();
     scene.wait_for_more_rows("emulator", 500);
-    emulator.signal(rustix::process::Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
 }
 
 #[test]

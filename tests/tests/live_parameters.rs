@@ -107,8 +107,7 @@ fn under_way(options: &str) -> (Scene, Running, Running) {
 
 fn end(scene: &Scene, emulator: Running, controller: Running) -> String {
     scene.wait_for_more_rows("emulator", 600);
-    emulator.signal(rustix::process::Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     controller.wait().expect_code(0).stderr
 }
 

@@ -142,8 +142,7 @@ fn an_interrupted_replay_keeps_what_was_done() {
     let peer = scene.peer();
     let replayed = replay(&scene, &log, "--spin-us 100");
     let before = heard_some(&peer, 10);
-    replayed.signal(Signal::INT);
-    let _ = replayed.wait().expect_code(130);
+    let _ = replayed.interrupt();
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!(report["ended"], "interrupted");
     let sent = (before + heard(&peer, 0).len()) as u64;

@@ -153,8 +153,7 @@ fn a_controller_that_stands_still_is_noticed_by_the_other_and_ends_too_when_it_g
         failing.signal(Signal::CONT);
         let _ = expect_partner_lost(left.wait(), other);
         let _ = failing.wait().expect_code(STOPPED).expect_said(&["stopped before the end"]);
-        emulator.signal(Signal::INT);
-        let _ = emulator.wait().expect_code(130);
+        let _ = emulator.interrupt();
         // In real time the last status may have been a cycle that was missed: one more period.
         expect_lost(&read(&log_of(&scene)), lost, other, 10);
     }

@@ -1,7 +1,6 @@
 //! The telemetry: what viewers are told is what stands in the run's files, and nothing that they do reaches the run.
 
 use runlog::telemetry::Packet;
-use rustix::process::Signal;
 use serde_json::{Value, json as value};
 use std::os::unix::fs::PermissionsExt;
 use system_tests::events::{all, times};
@@ -130,8 +129,7 @@ fn a_viewer_that_stands_still_or_dies_costs_the_run_nothing() {
             None => break,
         }
     }
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let _ = controller.wait();
     assert!(lost.is_some_and(|lost| lost > 1000), "{lost:?} lost");
     assert!(cycles.windows(2).all(|pair| pair[1] == pair[0] + 1), "until it was full nothing was lost");
@@ -152,8 +150,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
     assert_eq!(refused["ok"], false);
     assert!(refused["text"].as_str().is_some_and(|text| text.contains("--console")), "{refused}");
     drop(one);
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     // A late wake-up may stand there; nothing that was asked for does.
     let events = all(&json(&scene.path("emulator/summary.json")));
     assert_eq!(times(&events, "emergency-stop"), 0, "{events:?}");

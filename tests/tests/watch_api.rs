@@ -45,8 +45,7 @@ impl Watched {
     fn end(self) -> Scene {
         let Self { scene, emulator, controller, page } = self;
         page.close();
-        emulator.signal(Signal::INT);
-        let _ = emulator.wait().expect_code(130);
+        let _ = emulator.interrupt();
         let _ = controller.wait();
         scene
     }
@@ -321,8 +320,7 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     let mut page = page;
     page.running().signal(Signal::KILL);
     scene.wait_for_more_rows("emulator", 500);
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let _ = controller.wait();
     assert_eq!(count(&json(&scene.path("emulator/summary.json")), "/records_dropped"), 0);
 }
@@ -338,8 +336,7 @@ fn without_telemetry_the_page_shows_what_is_on_the_bus() {
     assert!(rows["columns"]["drive_position_m"][0].is_number(), "{rows}");
     assert!(rows["columns"]["drive_true_position_m"][0].is_null(), "{rows}");
     page.close();
-    emulator.signal(Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     let _ = controller.wait();
 }
 

@@ -100,8 +100,7 @@ fn the_page_shows_a_run_and_a_hand_on_it_reaches_the_rig() {
     // For who reads the log of a passing test.
     eprintln!("{}", ended.stderr);
     second.end();
-    watch.signal(Signal::INT);
-    let _ = watch.wait().expect_code(130);
+    let _ = watch.interrupt();
 
     two_stops_and_both_stopped_the_axis(&scene);
     one_set_point_by_hand(&scene);

@@ -54,8 +54,7 @@ fn expect_rows_of(table: &AxisTable, rows: &[(usize, Option<f64>, f64)]) {
 }
 
 fn end(emulator: Running, controllers: Vec<Running>) {
-    emulator.signal(rustix::process::Signal::INT);
-    let _ = emulator.wait().expect_code(130);
+    let _ = emulator.interrupt();
     for controller in controllers {
         let _ = controller.wait().expect_code(0);
     }
