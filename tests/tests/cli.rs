@@ -218,13 +218,7 @@ fn help_tells_the_exit_codes_in_one_table() {
     for program in [Program::Emulator, Program::Controller] {
         let mut command = Command::new(executable(program, Build::Shipped));
         let ended = Running::start(program.name(), command.arg("--help")).wait().expect_code(0);
-        ended.expect_printed(&[
-            "0 good",
-            "1 a bound",
-            "2 usage",
-            "3 the bus",
-            "4 lockstep",
-            "130 interrupted",
-        ]);
+        let parts = ["0 good", "1 a bound", "2 usage", "3 the bus", "4 lockstep", "130 interrupted"];
+        ended.expect_printed(&parts);
     }
 }

@@ -193,11 +193,8 @@ fn the_steps_after_a_report(closed: &Path) {
         discrepancy(&[&"verify", &"--rig", &rig, &"--extended", &extended, &"--test", test, &"--out", &out]);
     let confirmed = json(&report)["verification"]["confirmed"].as_bool().expect("a verification");
     let verified = verified.expect_code(i32::from(!confirmed));
-    verified.expect_printed(&[
-        "drive_position_m: before",
-        "chi2",
-        if confirmed { ": confirmed" } else { "not confirmed" },
-    ]);
+    let parts = ["drive_position_m: before", "chi2", if confirmed { ": confirmed" } else { "not confirmed" }];
+    verified.expect_printed(&parts);
     let alone = json(&out.join("verification.json"));
     for field in ["gap", "verification"] {
         assert_eq!(alone[field], json(&report)[field], "{field} of verify alone is that of close");
@@ -430,17 +427,8 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
 #[test]
 fn help_tells_every_step_every_option_and_the_exit_codes() {
     let whole = discrepancy(&[&"--help"]).expect_code(GOOD);
-    whole.expect_printed(&[
-        "close",
-        "check",
-        "calibrate",
-        "locate",
-        "name",
-        "extend",
-        "verify",
-        "next",
-        "Exit codes",
-    ]);
+    let parts = ["close", "check", "calibrate", "locate", "name", "extend", "verify", "next", "Exit codes"];
+    whole.expect_printed(&parts);
     for (step, parts) in [
         (
             "close",

@@ -70,10 +70,8 @@ fn next_writes_an_experiment_that_tells_apart_what_a_report_could_not() {
     fs::write(&report, told).expect("a report");
     let next =
         discrepancy(&[&"next", &"--rig", &rig(), &"--report", &report, &"--out", &out]).expect_code(GOOD);
-    next.expect_printed(&[
-        "command-dead-time drive and valve-dead-zone drive",
-        "is expected to separate them",
-    ]);
+    let parts = ["command-dead-time drive and valve-dead-zone drive", "is expected to separate them"];
+    next.expect_printed(&parts);
     let experiment = fs::read_to_string(&out).expect("an experiment file");
     assert!(experiment.contains("[run]") && experiment.starts_with("# Proposed by"), "{experiment}");
 }

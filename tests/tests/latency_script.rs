@@ -17,14 +17,8 @@ fn latency(arguments: &[&str]) -> Ended {
 #[test]
 fn help_tells_options_files_and_exit_codes() {
     let ended = latency(&["--help"]).expect_code(0);
-    ended.expect_printed(&[
-        "--pairs",
-        "--probe",
-        "--load",
-        "report.html",
-        "Exit codes: 0 good; 1",
-        "130 interrupted",
-    ]);
+    let parts = ["--pairs", "--probe", "--load", "report.html", "Exit codes: 0 good; 1", "130 interrupted"];
+    ended.expect_printed(&parts);
 }
 
 #[test]
