@@ -29,8 +29,6 @@ pub struct Calibrated {
     pub fit: Refit,
 }
 
-/// Fits all parameters.
-#[must_use]
 pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
     let mut best = refit(engine, baseline, &[], 0.0).expect("the baseline is a rig");
     for _ in 1..POINTS {
@@ -49,15 +47,12 @@ pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
 }
 
 impl Calibrated {
-    /// The calibrated rig.
-    #[must_use]
     pub fn rig(&self, rig: &RigParameters) -> RigParameters {
         with_factors(rig, &self.fit.factors)
     }
 }
 
 /// A parameter of a fit, in the unit of the rig file; of tables their common factor.
-#[must_use]
 pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
     let (parameter, measured) = (PARAMETERS[at], engine.windows()[0].record().measured);
     let (before, unit) = parameter.value(engine.rig(), measured);

@@ -37,11 +37,9 @@ const BENT: [&str; 6] = [
 /// Keys of a sheet at most.
 const MOST_KEYS: usize = 6;
 
-/// An effect at a place.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
     pub sheet: &'static Sheet,
-    /// Where.
     pub place: Place,
     /// Numbers of its keys in the rig file, in the file's units; `None` where it is not on there.
     present: Option<[f64; MOST_KEYS]>,
@@ -103,7 +101,6 @@ impl Scale {
 
 impl Candidate {
     /// All candidates that records of these axes can show.
-    #[must_use]
     pub fn all(rig: &RigParameters, measured: [bool; 2], linked: bool, without: &[String]) -> Vec<Candidate> {
         let shown = |place: &Place| match place.part {
             Part::Drive => measured[Axis::Drive.index()],
@@ -137,44 +134,37 @@ impl Candidate {
 
     /// Baseline value of a key: the rig file's number, else the neutral value; `None` for shapes and for effects without a
     /// neutral value.
-    #[must_use]
     pub fn baseline(&self, key: usize) -> Option<f64> {
         let neutral = self.sheet.keys[key].neutral.filter(|neutral| neutral.is_finite());
         self.present.map(|numbers| numbers[key]).or(neutral)
     }
 
     /// Whether the rig file has it.
-    #[must_use]
     pub(crate) fn is_present(&self) -> bool {
         self.present.is_some()
     }
 
     /// Name and place, as `piston-leakage drive`.
-    #[must_use]
     pub fn name(&self) -> String {
         format!("{} {}", self.sheet.name, self.place)
     }
 
     /// Coordinates of the baseline: all 0.
-    #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         vec![0.0; self.sheet.keys.len()]
     }
 
     /// Whether a key has no influence at zero amplitude.
-    #[must_use]
     pub(crate) fn is_shape(&self, key: usize) -> bool {
         key > 0 && !self.is_present() && self.sheet.keys[key].neutral.is_none()
     }
 
     /// Whether the effect vanishes continuously with its amplitude.
-    #[must_use]
     pub fn is_anchored(&self) -> bool {
         self.is_present() || self.sheet.keys[0].neutral.is_some()
     }
 
     /// Smallest and largest coordinate of a key.
-    #[must_use]
     pub fn range(&self, key: usize) -> [f64; 2] {
         let sheet_key = &self.sheet.keys[key];
         let scale = self.scale(key);
@@ -183,7 +173,6 @@ impl Candidate {
     }
 
     /// Bounds of a key's coordinate in a fit.
-    #[must_use]
     pub fn reach(&self, key: usize) -> [f64; 2] {
         let [least, most] = self.range(key);
         let most = most.min(FARTHEST);
@@ -191,14 +180,12 @@ impl Candidate {
     }
 
     /// Whether the first key can go to both sides of the baseline.
-    #[must_use]
     pub fn is_two_sided(&self) -> bool {
         let [least, most] = self.range(0);
         least < -1e-6 && most > 1e-6
     }
 
     /// The numbers at some coordinates, in the file's units, held in their ranges.
-    #[must_use]
     pub fn numbers(&self, coordinates: &[f64]) -> Vec<f64> {
         self.sheet
             .keys
@@ -210,13 +197,11 @@ impl Candidate {
     }
 
     /// d number / d coordinate of a key.
-    #[must_use]
     pub fn slope(&self, key: usize, coordinate: f64) -> f64 {
         self.scale(key).slope(coordinate)
     }
 
     /// The coordinate of a number of a key.
-    #[must_use]
     pub(crate) fn coordinate(&self, key: usize, number: f64) -> f64 {
         self.scale(key).coordinate(number)
     }
@@ -233,7 +218,6 @@ impl Candidate {
     }
 
     /// Coordinates of the screening simulations.
-    #[must_use]
     pub(crate) fn probes(&self) -> Vec<Vec<f64>> {
         let keys = self.sheet.keys.len();
         let at = |key: usize, z: f64| {

@@ -38,21 +38,17 @@ pub(crate) const PARKED: &str = "parked";
 /// A record's check with what follows for each of its samples.
 #[derive(Clone, Debug)]
 pub struct Checked {
-    /// Report of the check.
     pub report: RecordCheck,
     /// For each channel (by [`Channel::index`]) and row whether the sample can be used; empty for a channel without bad ones.
     pub unusable: Vec<Vec<bool>>,
 }
 
 impl Checked {
-    /// Whether a sample can be used.
-    #[must_use]
     pub fn is_usable(&self, channel: Channel, row: usize) -> bool {
         !self.unusable[channel.index()].get(row).copied().unwrap_or(false)
     }
 
     /// Fatal findings, one line each.
-    #[must_use]
     pub fn why_not(&self) -> String {
         let fatal = self.report.findings.iter().filter(|finding| finding.fatal);
         fatal.map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("\n")
@@ -72,13 +68,11 @@ impl Checked {
     }
 
     /// Standard deviation of a channel's noise, rounding included; `None` when unknown.
-    #[must_use]
     pub fn noise(&self, channel: Channel) -> Option<f64> {
         self.report.channels.get(&channel.column()).and_then(|check| check.noise)
     }
 
     /// Whether the axis was parked at the end of its stroke, its position sensor at the limit.
-    #[must_use]
     pub fn is_parked(&self, axis: Axis) -> bool {
         let column = Channel::Of(axis, Signal::Position).column();
         self.report
@@ -88,8 +82,6 @@ impl Checked {
     }
 }
 
-/// Checks a record of this rig.
-#[must_use]
 pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     let mut notes = Notes::new(record);
     for warning in record.warnings() {

@@ -69,7 +69,6 @@ pub struct ReadArguments {
 
 impl ReadArguments {
     /// The same for the reader.
-    #[must_use]
     pub(crate) fn options(&self) -> ReadOptions {
         let unknown = if self.strict { Unknown::Refused } else { Unknown::Ignored };
         ReadOptions { unknown, mapping: self.mapping.clone(), ..ReadOptions::default() }

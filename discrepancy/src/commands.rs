@@ -29,45 +29,32 @@ use std::time::Instant;
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
-    /// A step of the workflow.
     #[error(transparent)]
     Workflow(#[from] WorkflowError),
-    /// A model of one balance.
     #[error(transparent)]
     Balance(#[from] single_equation::BalanceError),
-    /// A result cannot be written.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file that cannot be read, or standard output that cannot be written.
     #[error("{file}: {why}")]
     File {
         file: PathBuf,
-        /// What the system said.
         why: io::Error,
     },
-    /// A report that is none.
     #[error("{file}: {why}: give the report.json of a close")]
     Report {
         file: PathBuf,
-        /// What is wrong.
         why: serde_json::Error,
     },
-    /// A record cannot be used.
     #[error("{0}")]
     BadData(String),
-    /// An excluded effect that the catalogue does not have.
     #[error("--without {name}: unknown effect; the catalogue has {known}")]
     UnknownEffect {
-        /// As given.
         name: String,
-        /// All names.
         known: String,
     },
 }
 
 impl CommandError {
-    /// The exit code.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         Exit::BadInput
     }

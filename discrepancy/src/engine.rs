@@ -44,7 +44,6 @@ pub struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     /// An engine of some records of the same axes.
-    #[must_use]
     pub fn new(records: &'a [GriddedRecord], rig: &RigParameters) -> Self {
         let windows: Vec<Windows<'a>> = records.par_iter().map(|record| Windows::new(record, rig)).collect();
         let rows = windows.first().map_or(0, Windows::rows);
@@ -59,7 +58,6 @@ impl<'a> Engine<'a> {
 
     /// The same records with the start states re-estimated under another rig. On linked rods micrometres decide whether they
     /// touch, so that each rig needs its own start states.
-    #[must_use]
     pub(crate) fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
         let windows: Vec<Windows<'a>> =
             self.windows.par_iter().map(|windows| Windows::new(windows.record(), rig)).collect();
@@ -75,54 +73,44 @@ impl<'a> Engine<'a> {
     }
 
     /// Whether a record was made with linked rods.
-    #[must_use]
     pub(crate) fn is_linked(&self) -> bool {
         self.windows.iter().any(|windows| windows.record().linked)
     }
 
-    #[must_use]
     pub fn rig(&self) -> &RigParameters {
         &self.rig
     }
 
-    /// The windows of each record.
-    #[must_use]
     pub fn windows(&self) -> &[Windows<'a>] {
         &self.windows
     }
 
     /// Numbers in a window.
-    #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
     /// Degrees of freedom of each window times the common variance factor.
-    #[must_use]
     pub fn freedom(&self) -> &[f64] {
         &self.freedom
     }
 
     /// Readings of a rig over their noise, all records.
-    #[must_use]
     pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
         self.windows.iter().flat_map(|windows| windows.simulate(rig)).collect()
     }
 
     /// The same with longer steps, for differences.
-    #[must_use]
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.windows.iter().flat_map(|windows| windows.simulate_coarsely(rig)).collect()
     }
 
     /// The same, kept for [`Engine::simulate_where`].
-    #[must_use]
     pub fn pass(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
         self.windows.par_iter().map(|windows| windows.pass(rig)).collect()
     }
 
     /// Readings of a neighbour of the reference rig: [`Windows::simulate_where`].
-    #[must_use]
     pub fn simulate_where(
         &self,
         rig: &RigParameters,
@@ -151,7 +139,6 @@ impl<'a> Engine<'a> {
     }
 
     /// Finite differences: each rig of the first half minus its counterpart of the second half, over `change`.
-    #[must_use]
     pub(crate) fn differences(&self, rigs: &[RigParameters], change: f64) -> Vec<Vec<f64>> {
         let simulated = self.simulate_side_by_side(rigs);
         let (up, down) = simulated.split_at(rigs.len() / 2);
@@ -164,13 +151,11 @@ impl<'a> Engine<'a> {
     }
 
     /// Whitened residual of a simulation.
-    #[must_use]
     pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
         self.each(simulated, |windows, simulated, _| windows.residual(simulated), simulated)
     }
 
     /// Difference of two simulations, processed like a residual.
-    #[must_use]
     pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
         self.each(simulated, Windows::difference, from)
     }
@@ -195,7 +180,6 @@ impl<'a> Engine<'a> {
     ///
     /// # Panics
     /// When another thread panicked here.
-    #[must_use]
     pub fn parameter_columns(&self, rig: &RigParameters, factors: &[f64; COUNT]) -> Vec<Vec<f64>> {
         let kept = || self.kept.lock().expect("nobody panics with it");
         if let Some((.., columns)) = kept().iter().find(|(at_rig, at, _)| at_rig == rig && at == factors) {

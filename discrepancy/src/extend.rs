@@ -28,7 +28,6 @@ use toml_edit::Document;
 /// An effect to be switched on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Addition {
-    /// Name in the catalogue.
     pub effect: String,
     /// `drive`, `drive.a` and so on.
     pub place: String,
@@ -39,76 +38,53 @@ pub struct Addition {
 /// Why a rig file cannot be extended.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExtendError {
-    /// The file is no rig.
     #[error(transparent)]
     Rig(ParameterError),
-    /// No such effect.
     #[error("unknown effect {effect}; known: {known}")]
     UnknownEffect {
-        /// As given.
         effect: String,
         known: String,
     },
-    /// The effect cannot be there.
     #[error("{effect} cannot be at {place}; it can be at {known}")]
     UnknownPlace {
         effect: String,
-        /// As given.
         place: String,
         known: String,
     },
-    /// The effect has no such number.
     #[error("{effect} has no number {key}; it has {known}")]
     UnknownKey {
         effect: String,
-        /// As given.
         key: String,
         known: String,
     },
-    /// Reported twice.
     #[error("{what} is to be changed twice")]
     Twice {
-        /// Effect and place, or the parameter.
         what: String,
     },
-    /// No such parameter.
     #[error("unknown parameter {name}; known: {known}")]
     UnknownParameter {
-        /// As given.
         name: String,
-        /// Those of effects.md.
         known: String,
     },
-    /// The parameter's number is in another unit than the rig file's.
     #[error("{name} is in {unit:?}; the rig file has it in {wanted:?}, and a factor has no unit")]
     Unit {
         name: String,
-        /// As given.
         unit: String,
-        /// The file's.
         wanted: String,
     },
-    /// A value that is none.
     #[error("{what} = {value} is no finite number")]
     NotFinite {
-        /// Effect, place and key, or the parameter.
         what: String,
-        /// As given.
         value: String,
     },
-    /// What came out is no rig, as when a value is out of its range.
     #[error("the extended rig file would be refused: {0}")]
     Refused(ParameterError),
-    /// The layout of the file does not allow an addition.
     #[error(
         "{file}: cannot add {what} to a file written like this: {reason}; write it as a table of its own"
     )]
     Layout {
-        /// The rig file.
         file: String,
-        /// What was to be added.
         what: String,
-        /// What the parser said.
         reason: String,
     },
 }
@@ -158,9 +134,6 @@ pub fn extend(
 }
 
 /// The rig file with these tables at its end, `records` named as where they come from; `file` is only its name for messages.
-///
-/// # Errors
-/// [`ExtendError`] for a file that cannot take them and for numbers that a rig file must not hold.
 pub(crate) fn add_tables(
     rig_text: &str,
     file: &str,

@@ -26,7 +26,6 @@ const CONVERGED: f64 = 1e-3;
 pub(crate) const LEAST: f64 = 1e-3;
 
 /// The loss of windows with these squares and degrees of freedom.
-#[must_use]
 pub(crate) fn loss(squares: &[f64], freedom: &[f64]) -> f64 {
     squares.iter().zip(freedom).map(|(square, freedom)| freedom * (square / freedom).max(LEAST).ln()).sum()
 }
@@ -50,7 +49,6 @@ pub(crate) struct Products {
 pub(crate) struct Fit {
     /// Coefficient of each column that took part.
     pub(crate) coefficients: Vec<f64>,
-    /// Minimum of the loss.
     pub(crate) loss: f64,
     /// |e - C a|^2 of each window.
     pub(crate) squares: Vec<f64>,
@@ -60,7 +58,6 @@ pub(crate) struct Fit {
 
 impl Products {
     /// The products of a residual with columns, all window by window of `rows` numbers.
-    #[must_use]
     pub(crate) fn new(residual: &[f64], columns: &[&[f64]], freedom: &[f64], rows: usize) -> Self {
         let windows = freedom.len();
         let information = (0..windows)
@@ -88,7 +85,6 @@ impl Products {
         products
     }
 
-    /// Replaces the residual.
     pub(crate) fn set_residual(&mut self, residual: &[f64], columns: &[&[f64]], rows: usize) {
         let windows = residual.chunks_exact(rows);
         self.squares = windows.clone().map(|residual| dot(residual, residual)).collect();
@@ -100,20 +96,16 @@ impl Products {
             .collect();
     }
 
-    /// Columns.
-    #[must_use]
     pub(crate) fn columns(&self) -> usize {
         self.columns
     }
 
     /// The loss of windows with these squares.
-    #[must_use]
     pub(crate) fn loss(&self, squares: &[f64]) -> f64 {
         loss(squares, &self.freedom)
     }
 
     /// Weights of windows with these squares.
-    #[must_use]
     pub(crate) fn weights(&self, squares: &[f64]) -> Vec<f64> {
         let weight = |(square, freedom): (&f64, &f64)| freedom / square.max(LEAST * freedom);
         squares.iter().zip(&self.freedom).map(weight).collect()
@@ -137,7 +129,6 @@ impl Products {
     }
 
     /// Weighted normal equations of some columns, with ridges 1 / tolerance^2.
-    #[must_use]
     pub(crate) fn normal(
         &self,
         chosen: &[usize],
@@ -165,13 +156,11 @@ impl Products {
     }
 
     /// The best coefficients of some columns; `ridges` as in [`Products::normal`].
-    #[must_use]
     pub(crate) fn fit(&self, chosen: &[usize], ridges: &[f64]) -> Fit {
         self.fit_from(chosen, ridges, &vec![0.0; chosen.len()])
     }
 
     /// The same with prior means at `-from`: ridges act on the sums of `from` and the coefficients.
-    #[must_use]
     pub(crate) fn fit_from(&self, chosen: &[usize], ridges: &[f64], from: &[f64]) -> Fit {
         let mut weights = self.weights(&self.squares);
         let mut coefficients = vec![0.0; chosen.len()];
@@ -207,7 +196,6 @@ impl Products {
 
     /// Cross-validated loss: each fold, a contiguous stretch of windows, is judged with the coefficients of the others; `ridges`
     /// and `from` as in [`Products::fit_from`]. At a minimum, the difference to [`Products::loss`] is overfitting.
-    #[must_use]
     pub(crate) fn unseen_loss(&self, chosen: &[usize], ridges: &[f64], from: &[f64], folds: usize) -> f64 {
         let all = self.weights(&self.squares);
         let windows = self.squares.len();
@@ -225,7 +213,6 @@ impl Products {
     }
 
     /// For each further column: its weighted window scores and its information, with the first columns projected out.
-    #[must_use]
     pub(crate) fn cleared_scores(
         &self,
         first: &[usize],
@@ -268,7 +255,6 @@ impl Products {
     }
 
     /// Sandwich covariance of the coefficients, clustered by windows: A^-1 (sum_k w_k^2 s_k s_k') A^-1.
-    #[must_use]
     pub(crate) fn covariance(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<DMatrix<f64>> {
         let (matrix, _) = self.normal(chosen, &fit.weights, ridges);
         let inverse = matrix.try_inverse()?;
@@ -304,14 +290,12 @@ impl Products {
     /// Delete-one-window jackknife standard errors. Where few windows determine a number, residuals understate its error. Errors
     /// are scaled so that two of them cover as two of a normal distribution do. Source: Bell, McCaffrey 2002, Survey Methodology
     /// 28(2): jackknife variance with Student's distribution and Satterthwaite degrees of freedom.
-    #[must_use]
     pub(crate) fn jackknife(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<Vec<f64>> {
         let each: Vec<[usize; 1]> = (0..chosen.len()).map(|at| [at]).collect();
         self.jackknife_of_sums(chosen, fit, ridges, &each)
     }
 
     /// The same for sums of coefficients, each given by places in `chosen`.
-    #[must_use]
     pub(crate) fn jackknife_of_sums<S: AsRef<[usize]>>(
         &self,
         chosen: &[usize],

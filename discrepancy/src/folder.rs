@@ -11,14 +11,11 @@ use std::path::{Path, PathBuf};
 /// Why a result cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// The system does not let it be written.
     #[error("{}: {why}: choose another folder, or make room", file.display())]
     Write {
         file: PathBuf,
-        /// What the system said.
         why: io::Error,
     },
-    /// A result would take the place of a file that is read.
     #[error("{} is read here and would be written over: choose another --out", file.display())]
     Input { file: PathBuf },
 }
@@ -33,9 +30,6 @@ pub(crate) struct Folder {
 
 impl Folder {
     /// Makes the folder if it is missing.
-    ///
-    /// # Errors
-    /// [`FolderError::Write`].
     pub(crate) fn open<'a>(
         path: &Path,
         inputs: impl IntoIterator<Item = &'a PathBuf>,
@@ -46,16 +40,11 @@ impl Folder {
         Ok(Self { path: path.to_owned(), inputs })
     }
 
-    /// Its path, as given.
-    #[must_use]
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// A file of results that may be written.
-    ///
-    /// # Errors
-    /// [`FolderError::Input`] when it is one of those that are read.
     pub(crate) fn file(&self, name: impl AsRef<Path>) -> Result<PathBuf, FolderError> {
         let file = self.path.join(name);
         let known = fs::canonicalize(&file).is_ok_and(|path| self.inputs.contains(&path));
@@ -63,9 +52,6 @@ impl Folder {
     }
 
     /// Removes the results of an earlier close; `model` is the name of its model.
-    ///
-    /// # Errors
-    /// [`FolderError::Input`] when one of its files is read here, [`FolderError::Write`] when one cannot be taken away.
     pub(crate) fn clear(&self, model: &Path) -> Result<(), FolderError> {
         if !self.path.join("report.json").exists() {
             return Ok(());
@@ -86,17 +72,11 @@ impl Folder {
     }
 
     /// Writes a text.
-    ///
-    /// # Errors
-    /// [`FolderError`].
     pub(crate) fn write(&self, name: impl AsRef<Path>, text: &str) -> Result<(), FolderError> {
         write(&self.file(name)?, text)
     }
 
     /// Writes a value as JSON.
-    ///
-    /// # Errors
-    /// [`FolderError`].
     pub(crate) fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), FolderError> {
         let mut text = serde_json::to_string_pretty(value).expect("reports hold nothing that JSON does not");
         text.push('\n');
@@ -105,9 +85,6 @@ impl Folder {
 }
 
 /// Writes a file by [`write_whole`].
-///
-/// # Errors
-/// [`FolderError::Write`].
 pub(crate) fn write(file: &Path, text: &str) -> Result<(), FolderError> {
     write_whole(file, text).map_err(|why| FolderError::Write { file: file.to_owned(), why })
 }

@@ -46,15 +46,12 @@ pub(crate) const HELD_LONGEST: usize = 3;
 /// A record on its grid.
 #[derive(Clone, Debug)]
 pub struct GriddedRecord {
-    /// File of the record.
     pub name: String,
-    /// Whether the rods were linked.
     pub linked: bool,
     /// Weights on the carriage, kg.
     pub added_mass_kg: f64,
     /// Which axes were measured, drive and load.
     pub measured: [bool; 2],
-    /// Inputs of each period.
     pub inputs: Vec<Inputs>,
     /// Readings at the start of each period, in the order of [`SIGNALS`], rig coordinates, the load's offset taken off.
     pub samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
@@ -64,7 +61,6 @@ pub struct GriddedRecord {
     pub noise: [[f64; CHANNELS]; 2],
     /// Lag-1 autocorrelation of the noise, 0 to 1.
     pub memory: [[f64; CHANNELS]; 2],
-    /// Sampling jitter, rms, s.
     pub(crate) jitter_s: f64,
     /// Periods without a known command or without a smoothed state.
     pub(crate) gaps: Vec<bool>,
@@ -73,7 +69,6 @@ pub struct GriddedRecord {
 /// Mechanical state and pressures of an axis, along its extension.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
-    /// Extension of the rod, m.
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 at rest.
     pub(crate) rod_velocity_m_per_s: f64,
@@ -102,27 +97,22 @@ impl Point {
 /// Why a record cannot be simulated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GriddingError {
-    /// A signal that the simulation needs is not there.
     #[error(
         "{file}: no column {column}: the simulation of an axis needs valve, position, force and both pressures"
     )]
     Missing { file: String, column: String },
-    /// No axis is measured.
     #[error("{file}: no axis is measured: a record needs the columns of drive or load")]
     NoAxis { file: String },
-    /// The record is too short.
     #[error("{file}: {length_ms} ms: a record needs at least {least_ms} ms")]
     Short {
         file: String,
         length_ms: usize,
-        /// What is needed.
         least_ms: usize,
     },
 }
 
 impl GriddingError {
     /// The column that it is about.
-    #[must_use]
     pub fn column(&self) -> Option<&str> {
         match self {
             GriddingError::Missing { column, .. } => Some(column),
@@ -187,14 +177,10 @@ impl GriddedRecord {
         Ok(gridded)
     }
 
-    /// Periods.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.inputs.len()
     }
 
-    /// Whether it is empty.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.inputs.is_empty()
     }

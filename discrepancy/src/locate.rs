@@ -79,7 +79,6 @@ pub struct Located {
     pub unknowns: Vec<UnknownSeries>,
 }
 
-/// The unknown input of a balance.
 #[derive(Clone, Debug)]
 pub struct UnknownSeries {
     /// As in [`BalanceBar::balance`].
@@ -90,7 +89,6 @@ pub struct UnknownSeries {
     pub points: Vec<UnknownPoint>,
 }
 
-/// The unknown input of a window.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownPoint {
     /// Which window of it.
@@ -103,13 +101,11 @@ pub struct UnknownPoint {
     pub(crate) variables: [f64; VARIABLES.len()],
     /// Sensitivity of the estimate to an offset of the pressure sensors a and b, per Pa.
     pub(crate) per_pressure_offset: [f64; 2],
-    /// Regimes of the window.
     pub(crate) regimes: Regimes,
 }
 
 impl UnknownPoint {
     /// The estimate over its standard deviation.
-    #[must_use]
     pub(crate) fn over_noise(&self) -> f64 {
         self.value / self.deviation
     }
@@ -117,7 +113,6 @@ impl UnknownPoint {
 
 impl UnknownSeries {
     /// rms of the estimates over their standard deviations; 1 for a closed balance. `None` without a point.
-    #[must_use]
     pub fn over_noise(&self) -> Option<f64> {
         over_noise(self.points.iter())
     }

@@ -77,12 +77,10 @@ pub struct Alternative {
     pub share: f64,
 }
 
-/// The result of naming.
 #[derive(Debug)]
 pub struct Found {
     /// Calibration: parameters without effects.
     pub(crate) calibrated: Calibrated,
-    /// The selected model.
     pub model: Refit,
     /// The model to report: parameters that it does not need are back at the rig file's values. For an inadequate model, the
     /// calibration alone.
@@ -97,18 +95,15 @@ pub struct Found {
     pub fitted: Vec<Refit>,
     /// 99th percentile of the largest gain of any candidate under the null distribution.
     pub(crate) threshold: f64,
-    /// Columns of the screening.
     pub columns: Columns,
     /// Null loss: parameters alone, linearised.
     pub(crate) null_loss: f64,
     /// Detection limit of each candidate as a coordinate of its amplitude; `None` where the record does not excite it.
     pub limits: Vec<Option<f64>>,
-    /// Whether the model is inadequate.
     pub inadequate: bool,
 }
 
 /// Selects the effects that are missing from the baseline.
-#[must_use]
 pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn FnMut(&str)) -> Found {
     let ones = [1.0; COUNT];
     let around = Around { columns: engine.parameter_columns(engine.rig(), &ones), factors: ones };
@@ -232,7 +227,6 @@ fn takes(before: &Refit, after: &Refit) -> bool {
 }
 
 /// Whether one of an effect's amplitudes is above the floor.
-#[must_use]
 pub(crate) fn is_large(placed: &Placed) -> bool {
     let candidate = &placed.candidate;
     let keys = if DEFINED_BY_FIRST.contains(&candidate.sheet.name) { 1 } else { placed.coordinates.len() };

@@ -75,7 +75,6 @@ pub struct Proposal {
 
 impl Judged {
     /// The smallest T of its pairs, in one repetition.
-    #[must_use]
     pub fn least(&self) -> f64 {
         self.pairs.iter().map(|pair| pair.2.in_repetitions(1)).fold(f64::INFINITY, f64::min)
     }
@@ -116,7 +115,6 @@ pub fn propose(
 }
 
 /// T of all ordered pairs in an entry; `None` where a rehearsal fails, does not end or comes near an end of the stroke.
-#[must_use]
 pub fn judge(
     entry: &Entry,
     baseline: &RigParameters,

@@ -40,7 +40,6 @@ pub(crate) struct Trace {
     pub(crate) signal: String,
     /// SI.
     pub(crate) unit: String,
-    /// Times, s.
     pub(crate) time_s: Values,
     /// What the record says.
     pub(crate) measured: Values,
@@ -56,16 +55,13 @@ pub(crate) struct Trace {
     pub(crate) noise: f64,
 }
 
-/// What the pictures are made of.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pictures {
     pub(crate) record: String,
-    /// Whether it is a held-out record.
     pub(crate) held_out: bool,
     pub(crate) traces: Vec<Trace>,
 }
 
-#[must_use]
 pub(crate) fn page(report: &Report, pictures: &Pictures) -> String {
     let bad = report.verdict == Verdict::BadData;
     let mut sections = vec![

@@ -53,7 +53,6 @@ pub const PARAMETERS: [Parameter; 9] = [
 const SLIDING: &str = "friction.sliding_force_n";
 const BREAK_AWAY: &str = "friction.break_away_force_n";
 
-/// Number of parameters.
 pub const COUNT: usize = PARAMETERS.len();
 
 impl Parameter {
@@ -69,7 +68,6 @@ impl Parameter {
     }
 
     /// Value and unit in a rig file, of the first axis that is measured; of tables 1, without a unit: their common factor.
-    #[must_use]
     pub fn value(&self, rig: &RigParameters, measured: [bool; 2]) -> (f64, &'static str) {
         // For both axes together the mass is a common factor.
         if self.name == "parameter:mass" && measured == [true; 2] {
@@ -86,7 +84,6 @@ impl Parameter {
 
 /// The rig with all factors applied. Numbers are clamped to their ranges and the break-away force to the sliding force; numbers
 /// inconsistent with the rest of the file stay unchanged.
-#[must_use]
 pub fn with_factors(rig: &RigParameters, factors: &[f64; COUNT]) -> RigParameters {
     let mut changes: Vec<(&str, Vec<f64>)> = Vec::new();
     for (parameter, factor) in PARAMETERS.iter().zip(factors).filter(|(_, factor)| **factor != 1.0) {

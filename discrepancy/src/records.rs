@@ -72,7 +72,6 @@ pub enum Form {
     Foreign,
 }
 
-/// How the rig was set up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigSetup {
     /// Whether the load's eye sat in the carriage.
@@ -81,7 +80,6 @@ pub struct RigSetup {
     pub added_mass_kg: f64,
 }
 
-/// A warning of the reader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
     /// Line in the file, from 1; `None` when it is about the file as a whole.
@@ -160,79 +158,59 @@ impl Record {
         self.warnings.push(Warning { line: line.into(), text: text.into() });
     }
 
-    /// The file it was read from.
-    #[must_use]
     pub fn file(&self) -> &Path {
         &self.file
     }
 
-    /// The form it had.
-    #[must_use]
     pub fn form(&self) -> Form {
         self.form
     }
 
-    /// How the rig was set up.
-    #[must_use]
     pub fn setup(&self) -> RigSetup {
         self.setup
     }
 
     /// The period in which samples were meant to be taken, s; `None` for a record that has none.
-    #[must_use]
     pub fn nominal_period_s(&self) -> Option<f64> {
         self.nominal_period_s
     }
 
-    /// How many rows there are.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
 
-    /// Whether there is no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 
     /// Time of each row, s, as recorded: with holes, and unsorted where the file is.
-    #[must_use]
     pub fn time_s(&self) -> &[f64] {
         &self.time_s
     }
 
     /// Line of the file that a row comes from, from 1. In a log that of its sensors, or of the last frame before where none came.
-    #[must_use]
     pub fn line(&self, row: usize) -> u64 {
         self.lines[row]
     }
 
     /// The values of a channel, one for each row, `None` where there is none; `None` when the record lacks the channel.
-    #[must_use]
     pub fn channel(&self, channel: Channel) -> Option<&[Option<f64>]> {
         self.columns[channel.index()].as_deref()
     }
 
-    /// The value of a channel in a row.
-    #[must_use]
     pub fn value(&self, channel: Channel, row: usize) -> Option<f64> {
         self.channel(channel)?.get(row).copied().flatten()
     }
 
-    /// The channels that the record has.
     pub fn channels(&self) -> impl Iterator<Item = Channel> {
         Channel::ALL.into_iter().filter(|channel| self.channel(*channel).is_some())
     }
 
     /// Whether the record has any channel of the axis.
-    #[must_use]
     pub(crate) fn has_axis(&self, axis: Axis) -> bool {
         self.channels().any(|channel| matches!(channel, Channel::Of(channel_axis, _) if channel_axis == axis))
     }
 
-    /// Warnings of the reader.
-    #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }

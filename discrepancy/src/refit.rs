@@ -35,10 +35,8 @@ const PARAMETER_COSTS: f64 = NUMBER_COSTS;
 /// Relative deviation at which half of the penalty is due.
 const COUNTS_AS_OFF: f64 = 0.005;
 
-/// An effect at given coordinates.
 #[derive(Clone, Debug)]
 pub struct Placed {
-    /// Which.
     pub candidate: Candidate,
     /// One for each key of its sheet.
     pub coordinates: Vec<f64>,
@@ -71,14 +69,12 @@ pub struct Around {
 
 impl Around {
     /// Deviations of the parameters from the prior means.
-    #[must_use]
     pub fn off(&self) -> Vec<f64> {
         self.factors.iter().map(|factor| factor - 1.0).collect()
     }
 }
 
 /// The rig with effects and factors; `None` where the numbers are inconsistent.
-#[must_use]
 pub(crate) fn rig_of(
     rig: &RigParameters,
     placed: &[Placed],
@@ -103,7 +99,6 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
         .sum()
 }
 
-/// Penalty of a model.
 pub(crate) fn costs(numbers: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
     penalty * numbers as f64 + PARAMETER_COSTS * parameters_off(factors)
 }
@@ -124,7 +119,6 @@ fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
 }
 
 /// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
-#[must_use]
 pub(crate) fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
     let Some(rig) = rig_of(engine.rig(), placed, &around.factors) else { return f64::INFINITY };
     let residual = engine.residual(&engine.simulate_coarsely(&rig));
@@ -133,7 +127,6 @@ pub(crate) fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -
     products.fit_from(&(0..COUNT).collect::<Vec<_>>(), &parameter_ridges(), &around.off()).loss
 }
 
-/// An iterate of a fit.
 struct Point {
     placed: Vec<Placed>,
     simulated: Vec<f64>,
@@ -144,13 +137,11 @@ struct Point {
 /// Fits effects from a start; `penalty` is due for each coordinate.
 ///
 /// `None` where no rig can have the start.
-#[must_use]
 pub fn refit(engine: &Engine<'_>, around: &Around, start: &[Placed], penalty: f64) -> Option<Refit> {
     refit_steps(engine, around, start, penalty, STEPS)
 }
 
 /// The same with another maximum of steps; 0 evaluates the start.
-#[must_use]
 pub(crate) fn refit_steps(
     engine: &Engine<'_>,
     around: &Around,

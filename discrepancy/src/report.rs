@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 /// Version of the schema; a new optional field does not change it.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// Verdict of the workflow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -28,10 +27,8 @@ pub enum Verdict {
     BadData,
 }
 
-/// Results of the workflow.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
     pub verdict: Verdict,
     /// The verdict in a sentence or two.
@@ -126,9 +123,7 @@ pub struct Quantity {
 /// A missing effect with its numbers.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct NamedEffect {
-    /// Name in the catalogue.
     pub effect: String,
-    /// Where it is.
     #[serde(rename = "where")]
     pub place: Where,
     /// Its numbers, in the order of its sheet.
@@ -139,22 +134,16 @@ pub struct NamedEffect {
     pub alternatives: Vec<NamedEffect>,
 }
 
-/// An effect at a place.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct EffectPlace {
-    /// Name in the catalogue.
     pub effect: String,
-    /// Where.
     #[serde(rename = "where")]
     pub place: Where,
 }
 
-/// Result of a candidate.
 #[derive(Clone, Debug, Serialize)]
 pub struct Candidate {
-    /// Name in the catalogue.
     pub effect: String,
-    /// Where.
     #[serde(rename = "where")]
     pub place: Where,
     /// Screened gain over the null threshold of the final model; above 1 it exceeds what chance gives the best candidate; no test
@@ -170,19 +159,15 @@ pub struct Candidate {
     pub fate: String,
 }
 
-/// Detection limit of an effect.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct DetectionLimit {
-    /// Name in the catalogue.
     pub effect: String,
-    /// Where.
     #[serde(rename = "where")]
     pub place: Where,
     /// Key of the amplitude.
     pub name: String,
     /// Change from the value at which the rig is the baseline.
     pub value: f64,
-    /// Unit.
     pub unit: String,
 }
 
@@ -201,7 +186,6 @@ pub struct Outside {
     pub formula: Option<String>,
     /// Whether the extended rig file has it, as the tables.
     pub added: bool,
-    /// Why not, in words; null when it has.
     pub why_not: Option<String>,
     /// The terms that were added, each a table; empty when none.
     pub tables: Vec<TableTerm>,
@@ -303,7 +287,6 @@ pub struct Verification {
     pub confirmed: bool,
 }
 
-/// A figure before and after.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct BeforeAfter {
     /// Baseline.
@@ -327,7 +310,6 @@ pub struct Location {
     pub sensor_ratio: Option<String>,
 }
 
-/// The disagreement of a balance.
 #[derive(Clone, Debug, Serialize)]
 pub struct BalanceBar {
     /// `drive.flow-a`, `drive.flow-b`, `drive.force`, `drive.force-sensor`, the load's, `linkage`.
@@ -353,22 +335,17 @@ pub(crate) struct RegimeCell {
     pub over_noise: f64,
 }
 
-/// An unknown input over time.
 #[derive(Clone, Debug, Serialize)]
 pub struct UnknownInput {
     /// As in [`BalanceBar::balance`].
     pub balance: String,
-    /// Unit.
     pub unit: String,
-    /// Times, s.
     pub time_s: Vec<f64>,
-    /// Values.
     pub value: Vec<f64>,
     /// Propagated noise, one standard deviation.
     pub noise: f64,
 }
 
-/// Check of a record.
 #[derive(Clone, Debug, Serialize)]
 pub struct RecordCheck {
     pub file: String,
@@ -378,13 +355,11 @@ pub struct RecordCheck {
     pub rows: usize,
     /// Last time minus first, s.
     pub length_s: f64,
-    /// Findings.
     pub findings: Vec<Finding>,
     /// Noise and quantum of each channel, estimated from the record.
     pub channels: BTreeMap<String, ChannelCheck>,
 }
 
-/// A finding of the check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// gap, repeated-time, jumping-time, clipped, stuck, wrong-unit, swapped-pressures, force-sign, lost-samples, …
@@ -399,7 +374,6 @@ pub struct Finding {
     pub text: String,
 }
 
-/// Noise and quantum of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ChannelCheck {
     /// Standard deviation of its noise, in SI; null when unknown.
@@ -411,15 +385,12 @@ pub struct ChannelCheck {
 }
 
 /// Decimals of a value that is rounded to the second digit of its standard error.
-#[must_use]
 pub(crate) fn decimals(standard_error: f64) -> usize {
     (1.0 - standard_error.log10().floor()).clamp(0.0, 12.0) as usize
 }
 
-/// What to measure next.
 #[derive(Clone, Debug, Serialize)]
 pub struct Next {
-    /// Why.
     pub reason: String,
     /// File of the experiment beside the report; null when none discriminates.
     pub experiment: Option<String>,

@@ -11,7 +11,6 @@ use crate::parameters::COUNT;
 use crate::refit::{Around, Placed, parameter_ridges};
 use rayon::prelude::*;
 
-/// Columns of a screening.
 #[derive(Debug)]
 pub struct Columns {
     pub candidates: Vec<Candidate>,
@@ -20,7 +19,6 @@ pub struct Columns {
     columns: Vec<Vec<f64>>,
 }
 
-/// Screening result of a candidate.
 #[derive(Clone, Debug)]
 pub(crate) struct Screened {
     /// Place in [`Columns::candidates`].
@@ -33,7 +31,6 @@ pub(crate) struct Screened {
 
 impl Columns {
     /// Simulates all probes of some candidates.
-    #[must_use]
     pub fn new(engine: &Engine<'_>, candidates: Vec<Candidate>) -> Self {
         let baseline = engine.simulate_coarsely(engine.rig());
         let tasks: Vec<(usize, Vec<f64>)> = candidates
@@ -60,14 +57,12 @@ impl Columns {
     }
 
     /// Column of a probe.
-    #[must_use]
     pub fn column(&self, place: usize) -> &[f64] {
         &self.columns[place]
     }
 
     /// Null loss, and the screening of all candidates against a residual; `beside` are columns fitted with each (effects already
     /// in the model).
-    #[must_use]
     pub(crate) fn screen(
         &self,
         engine: &Engine<'_>,

@@ -11,7 +11,6 @@ use crate::gridded_record::{GriddedRecord, Point};
 use plant::effects::sheet::{Element, Part};
 use plant::{Axis, PERIOD_S, RigParameters};
 
-/// Sensor model of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reading {
     delay_s: f64,
@@ -37,7 +36,6 @@ pub(crate) struct SensorInverse {
 
 impl SensorInverse {
     /// Takes the sensor models from the effects of a rig.
-    #[must_use]
     pub(crate) fn of(rig: &RigParameters) -> Self {
         let mut axes = [[Reading::TRUE; 3]; 2];
         for effect in rig.effects() {
@@ -71,7 +69,6 @@ impl SensorInverse {
     }
 
     /// True states whose readings are those of the record at a period; `starts` are its estimated points there.
-    #[must_use]
     pub(crate) fn points(&self, record: &GriddedRecord, period: usize, starts: &[Point; 2]) -> [Point; 2] {
         let mut points = *starts;
         if self.is_true {

@@ -54,83 +54,60 @@ const SPEEDS_APART: f64 = 3.0;
 /// Why a balance cannot be closed.
 #[derive(Debug, thiserror::Error)]
 pub enum BalanceError {
-    /// The model file, or the rig file that it names.
     #[error(transparent)]
     File(#[from] DescriptionError),
-    /// A term that no balance of this kind has.
     #[error("this kind of model has no term '{effect}' of form '{form}', or its shape lacks a number")]
     Term { effect: String, form: String },
-    /// A chamber without a rig file.
     #[error("{name}: a chamber needs rig = \"…/rig.toml\" for its area, volume, valve tables and lags")]
     NoRig {
-        /// The model's name.
         name: String,
     },
-    /// A rig file that cannot be used.
     #[error("the model's rig: {reason}")]
     Rig {
-        /// Why.
         reason: String,
     },
-    /// A record that cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A column that a record lacks.
     #[error("{file}: no values of {column}, which the model's balance needs: see [channels] of the model")]
     Missing { file: String, column: String },
-    /// Time that stands or jumps back.
     #[error("{file}:{line}: time does not grow: sort the rows, or split the record there")]
     Time {
         file: String,
-        /// Line from 1.
         line: u64,
     },
-    /// A record without enough rows.
     #[error(
         "{file}: {rows} rows pass the model's [processing], {FEWEST_ROWS} are needed: are position_mm, speed_above_mm_per_s right?"
     )]
     Few {
         file: String,
-        /// How many there are.
         rows: usize,
     },
-    /// A held-out record that would mislead.
     #[error("{why}")]
     Unusable {
-        /// The finding, with file and line.
         why: String,
     },
-    /// A time stamp beyond all others.
     #[error(
         "{file}:{line}: {time_s} s: {rows} rows cannot reach as far at a period of {period_s} s: mend the time, or \
              processing.period_s of the model"
     )]
     Far {
         file: String,
-        /// Line from 1.
         line: u64,
-        /// The stamp, s.
         time_s: f64,
-        /// Rows of the record.
         rows: usize,
-        /// The model's period, s.
         period_s: f64,
     },
-    /// No training record.
     #[error("a balance needs one training record at least")]
     NoRecord,
-    /// Collinear columns of the baseline.
     #[error(
         "the training records cannot tell {columns} apart: add one in which they differ, or switch one off under [baseline]"
     )]
     NotExcited {
-        /// Their names.
         columns: String,
     },
 }
 
 /// Whether a text is a model file: TOML with a `kind` at its top. A rig file has none.
-#[must_use]
 pub(crate) fn is_model_file(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("kind"))
 }

@@ -55,9 +55,6 @@ pub(crate) struct Tables {
 }
 
 /// Tables for an unknown input, or the reason why there are none; `reported` is the calibration with the needed parameters.
-///
-/// # Errors
-/// The reason in words.
 pub(crate) fn tabulate(
     engine: &Engine<'_>,
     calibrated: &Calibrated,
@@ -327,7 +324,6 @@ fn term(table: &Tabulated) -> TableTerm {
 }
 
 /// Tables of a report as tables of a rig; invalid ones are left out.
-#[must_use]
 pub(crate) fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
     let table = |term: &TableTerm| {
         let (axis, balance) = place(&term.balance)?;

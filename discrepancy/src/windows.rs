@@ -56,7 +56,6 @@ pub struct Windows<'a> {
 
 impl<'a> Windows<'a> {
     /// The windows of a record, with start sensitivities under a baseline rig.
-    #[must_use]
     pub fn new(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         Self::with_recorded_starts(record, rig).estimate_starts(0)
     }
@@ -65,7 +64,6 @@ impl<'a> Windows<'a> {
     ///
     /// The projection is of first order only, and memories of effects continue from window to window. Where the points are far
     /// off, as behind a lagging sensor, both need a better start state.
-    #[must_use]
     pub(crate) fn with_estimated_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         Self::with_recorded_starts(record, rig).estimate_starts(START_PASSES)
     }
@@ -99,42 +97,35 @@ impl<'a> Windows<'a> {
     }
 
     /// The baseline rig.
-    #[must_use]
     pub fn rig(&self) -> &RigParameters {
         &self.rig
     }
 
-    #[must_use]
     pub fn record(&self) -> &'a GriddedRecord {
         self.record
     }
 
     /// Number of windows.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.starts.len()
     }
 
     /// First period of each window.
-    #[must_use]
     pub(crate) fn starts(&self) -> &[usize] {
         &self.starts
     }
 
     /// Axis and channel of each lane.
-    #[must_use]
     pub fn lanes(&self) -> &[(usize, usize)] {
         &self.lanes
     }
 
     /// Numbers in a window.
-    #[must_use]
     pub fn rows(&self) -> usize {
         WINDOW * self.lanes.len()
     }
 
     /// Degrees of freedom of each window.
-    #[must_use]
     pub fn freedom(&self) -> Vec<f64> {
         let rows = self.rows();
         let valid = self.valid.chunks_exact(rows).map(|valid| valid.iter().filter(|valid| **valid).count());
@@ -142,19 +133,16 @@ impl<'a> Windows<'a> {
     }
 
     /// Noise-free readings of a rig over their noise.
-    #[must_use]
     pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
         self.run(vec![self.plant(rig)]).remove(0)
     }
 
     /// The same with longer steps: half the cost, accurate enough for differences.
-    #[must_use]
     pub fn simulate_coarsely(&self, rig: &RigParameters) -> Vec<f64> {
         self.simulate_side_by_side(std::slice::from_ref(rig)).remove(0)
     }
 
     /// The same for several rigs, each with the bits of a run on its own. Rigs without effects cost a third in a batch.
-    #[must_use]
     pub fn simulate_side_by_side(&self, rigs: &[RigParameters]) -> Vec<Vec<f64>> {
         self.run(rigs.iter().map(|rig| self.plant(rig).with_substeps(COARSE_SUBSTEPS)).collect())
     }
@@ -187,7 +175,6 @@ impl<'a> Windows<'a> {
     }
 
     /// Whitened residual of a simulation, force spikes removed and start states projected out.
-    #[must_use]
     pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
         let mut left = self.raw_residual(simulated);
         self.project_windows(&mut left);
@@ -203,7 +190,6 @@ impl<'a> Windows<'a> {
     }
 
     /// Difference of two simulations, processed like a residual.
-    #[must_use]
     pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
         let mut differs: Vec<f64> = simulated.iter().zip(from).map(|(value, from)| value - from).collect();
         self.reduce(&mut differs);
@@ -250,7 +236,6 @@ pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
 }
 
 /// Sum of products, in four lanes that are added in one order.
-#[must_use]
 pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (left_chunks, right_chunks) = (left.chunks_exact(4), right.chunks_exact(4));

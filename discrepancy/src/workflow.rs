@@ -64,43 +64,32 @@ pub struct Outcome {
 /// Why the workflow did not run.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkflowError {
-    /// The rig file cannot be read.
     #[error("{file}: {why}")]
     Rig {
         file: String,
-        /// What the system said.
         why: std::io::Error,
     },
-    /// The rig file is no rig.
     #[error(transparent)]
     Parameters(#[from] ParameterError),
-    /// The rig file is a model of one balance.
     #[error(
         "{file}: a model of one balance (it has a kind): only close, name and extend take one; give a rig file here"
     )]
     OneBalance { file: String },
-    /// A record cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The held-out record cannot be used.
     #[error("{file}: cannot be used: {why}")]
     Unusable {
         file: String,
-        /// Its fatal findings.
         why: String,
     },
-    /// Records that show no common axis, or of linked rods one axis only in common.
     #[error(
         "{first} and {other} do not show the same axes: records are judged on what all of them show, and of linked rods that \
          must be both"
     )]
     Mixed {
-        /// The first record.
         first: String,
-        /// One that does not go with it.
         other: String,
     },
-    /// The rig file cannot be extended.
     #[error(transparent)]
     Extend(#[from] ExtendError),
 }
@@ -108,7 +97,6 @@ pub enum WorkflowError {
 /// A rig file and its text.
 #[derive(Clone, Debug)]
 pub struct RigFile {
-    /// As given.
     pub file: String,
     pub text: String,
     /// What it says.
@@ -308,7 +296,6 @@ pub fn extended(rig_file: &RigFile, reported: &Reported) -> Result<String, Exten
 }
 
 /// Proposes an experiment for an ambiguous report; `None` when it is not ambiguous.
-#[must_use]
 pub fn proposal(rig_file: &RigFile, reported: &Reported, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
     proposal_for(rig_file, reported, reported.measured(), progress)
 }
@@ -373,7 +360,6 @@ pub(crate) fn on_shared_axes(records: &mut [GriddedRecord]) -> Result<(), Workfl
 }
 
 /// The axis of a mass in kg; for both axes the mass is a common factor.
-#[must_use]
 pub(crate) fn weighed(measured: [bool; 2]) -> Axis {
     if measured == [false, true] { Axis::Load } else { Axis::Drive }
 }

@@ -47,7 +47,6 @@ pub struct Finer {
 }
 
 /// Fits numbers and parameters jointly; `None` where no rig can have the result.
-#[must_use]
 pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let rig = engine.rig();
     let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
@@ -183,7 +182,6 @@ fn moved(rig: &RigParameters, numbers: &[Number], factors: &[f64], step: &[f64])
     })
 }
 
-/// Sensitivities to all factors.
 fn columns(engine: &Engine<'_>, numbers: &[Number], factors: &[f64]) -> Option<Vec<Vec<f64>>> {
     let around = |change: f64| {
         (0..factors.len()).map(move |at| {

@@ -30,7 +30,6 @@ const DRIFT: f64 = 1.0;
 /// How far a quiet block's lags may lie above the mean of the quietest.
 const ABOVE: f64 = 2.2;
 
-/// Statistics of a block.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     drift: f64,

@@ -4,7 +4,6 @@ use crate::records::{Channel, Record, Signal};
 use crate::report::Finding;
 use plant::Axis;
 
-/// Findings and bad samples of a record.
 #[derive(Debug)]
 pub(super) struct Notes<'a> {
     pub(super) record: &'a Record,
@@ -12,7 +11,6 @@ pub(super) struct Notes<'a> {
     pub(super) unusable: Vec<Vec<bool>>,
 }
 
-/// Subject of a finding.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Subject {
     /// The column's channel; `None` for time and for the record as a whole.
@@ -47,7 +45,6 @@ impl<'a> Notes<'a> {
         }
     }
 
-    /// Leaves a sample out.
     pub(super) fn leave_out(&mut self, channel: Channel, row: usize) {
         let mask = &mut self.unusable[channel.index()];
         if mask.is_empty() {
@@ -56,7 +53,6 @@ impl<'a> Notes<'a> {
         mask[row] = true;
     }
 
-    /// Leaves all samples of a row out.
     pub(super) fn leave_row_out(&mut self, row: usize) {
         let record = self.record;
         record.channels().for_each(|channel| self.leave_out(channel, row));
@@ -83,7 +79,6 @@ impl<'a> Notes<'a> {
         self.record.channels().filter(|channel| !fatal(&channel.column())).collect()
     }
 
-    /// Whether a finding is fatal.
     pub(super) fn is_fatal(&self) -> bool {
         self.findings.iter().any(|finding| finding.fatal)
     }

@@ -114,7 +114,6 @@ fn add_finding(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usiz
     notes.add(kind, Subject { channel: Some(Channel::Of(axis, signal)), row }, true, &text);
 }
 
-/// The axis' series, read so.
 fn motion(notes: &Notes, rig: &RigParameters, grid: &Grid, axis: Axis, reading: Reading) -> Motion {
     let series = |signal| grid.series(notes, Channel::Of(axis, signal));
     let stroke = rig.cylinder().stroke_m;

@@ -93,7 +93,6 @@ fn is_noisy(channel: Channel, rig: &RigParameters) -> bool {
     }
 }
 
-/// A run of equal values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Run {
     /// Places from its first sample to its last.

@@ -155,7 +155,6 @@ fn growing(values: &[f64], same: f64) -> Vec<bool> {
     kept
 }
 
-/// Lost rows and holes.
 fn lost(notes: &mut Notes, period_s: f64) {
     let times = notes.record.time_s();
     let rows: Vec<usize> = (0..times.len()).filter(|row| !all_left_out(notes, *row)).collect();

@@ -17,7 +17,6 @@ pub(super) fn names() -> Vec<&'static str> {
 /// The keys of the rig file, as `mass.drive_kg`, that a parameter scales; the first holds the parameter's value.
 ///
 /// Only the mass differs between the axes. The carriage, which the force sensor moves, is scaled with the drive's mass.
-#[must_use]
 pub(crate) fn key_of_parameter(name: &str, axis: Axis) -> Option<Vec<&'static str>> {
     let parameter = PARAMETERS.iter().find(|parameter| parameter.name == name)?;
     let of_axis = |key: &&&str| name != "parameter:mass" || (**key == "mass.load_kg") == (axis == Axis::Load);

@@ -16,7 +16,6 @@ const BLOCK: usize = 6;
 pub(crate) const SEARCHED_S: f64 = 20.0;
 
 /// Share of the records that is searched.
-#[must_use]
 pub(crate) fn searched_share(records: &[GriddedRecord]) -> f64 {
     let axes = |record: &GriddedRecord| record.measured.iter().filter(|measured| **measured).count();
     let all_s: f64 =
@@ -26,7 +25,6 @@ pub(crate) fn searched_share(records: &[GriddedRecord]) -> f64 {
 
 impl GriddedRecord {
     /// About this share of the record; `None` where that is all of it or where it has too few blocks.
-    #[must_use]
     pub(crate) fn thinned(&self, share: f64) -> Option<GriddedRecord> {
         let blocks = self.len() / (BLOCK * WINDOW);
         let wanted = (share * blocks as f64).round().max(1.0) as usize;

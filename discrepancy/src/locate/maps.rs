@@ -27,7 +27,6 @@ pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
 }
 
 /// Map of a series over a variable; the curve's variable names the balance too.
-#[must_use]
 pub(crate) fn map(series: &UnknownSeries, variable: usize) -> Curve {
     let mut curve = Curve {
         variable: format!("{} over {}", series.balance, VARIABLES[variable].name),
@@ -55,7 +54,6 @@ pub(crate) fn map(series: &UnknownSeries, variable: usize) -> Curve {
 }
 
 /// The surface of a series over two variables.
-#[must_use]
 pub(crate) fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface {
     let places = [0, 1].map(|side| {
         let values: Vec<f64> = series.points.iter().map(|point| point.variables[variables[side]]).collect();
@@ -97,7 +95,6 @@ pub(crate) fn surface(series: &UnknownSeries, variables: [usize; 2]) -> Surface 
     }
 }
 
-/// Weighted mean.
 fn mean(points: &[&UnknownPoint], of: impl Fn(&UnknownPoint) -> f64) -> f64 {
     let weights: f64 = points.iter().map(|point| point.deviation.powi(-2)).sum();
     points.iter().map(|point| of(point) * point.deviation.powi(-2)).sum::<f64>() / weights
@@ -116,7 +113,6 @@ fn mean_and_band(points: &[&UnknownPoint]) -> Option<(f64, f64)> {
 }
 
 /// Quantile bin of each value; ties share a bin.
-#[must_use]
 pub(crate) fn bins(values: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|left, right| values[*left].total_cmp(&values[*right]).then(left.cmp(right)));
@@ -135,7 +131,6 @@ pub(crate) fn bins(values: &[f64]) -> Vec<usize> {
 }
 
 /// At most `most` bins; one for each distinct value where there are no more.
-#[must_use]
 pub(crate) fn few_bins(values: &[f64], most: usize) -> Vec<usize> {
     let mut apart = values.to_vec();
     apart.sort_unstable_by(f64::total_cmp);

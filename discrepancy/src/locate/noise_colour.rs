@@ -61,7 +61,6 @@ fn colour(mut windows: Vec<[f64; 2]>) -> f64 {
     if phi < WHITE { 0.0 } else { phi.min(MOST) }
 }
 
-/// Variance around the mean.
 fn variance(values: Vec<f64>) -> f64 {
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -17,7 +17,6 @@ const EDGE: f64 = 0.2;
 /// How long after an edge, periods.
 const AFTER_EDGE: usize = 20;
 
-/// The regimes of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Regimes {
     in_regime: [bool; REGIMES.len()],
@@ -40,8 +39,6 @@ impl Regimes {
         Regimes { in_regime: [hold, onset, moving && out, moving && !out, near, edge] }
     }
 
-    /// Whether the window is in a regime.
-    #[must_use]
     pub(crate) fn contains(&self, regime: &str) -> bool {
         REGIMES.iter().zip(self.in_regime).any(|(name, within)| *name == regime && within)
     }

@@ -26,7 +26,6 @@ const FEW: f64 = 0.05;
 
 /// Window scores of all candidates against a model's residual.
 pub(super) struct NullDistribution {
-    /// Excluded outlying windows.
     far: Vec<usize>,
     /// For each probe: candidate, coordinate of the amplitude, window scores, information.
     probes: Vec<(usize, f64, Vec<f64>, f64)>,

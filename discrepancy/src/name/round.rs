@@ -32,11 +32,9 @@ const CLOSE: f64 = 0.02;
 /// The backlash of the linkage. Screening underrates it, since the start states were estimated without it.
 const BACKLASH: &str = "coupling-backlash";
 
-/// Candidates to refit.
 pub(super) struct Contenders {
     /// Null loss of the screening.
     null_loss: f64,
-    /// Best first.
     best: Vec<Screened>,
     /// The backlash of linked rods, whatever its screened gain.
     gap: Option<Screened>,
@@ -75,7 +73,6 @@ impl Contenders {
 
 /// Models with one more effect.
 pub(super) struct Round<'a> {
-    /// Best first.
     pub(super) fits: Vec<Refit>,
     /// Their relinearised refits, each with its start states.
     restarted: Vec<Restarted<'a>>,

@@ -21,7 +21,6 @@ const LONGEST: usize = 30_000;
 const PARKED_M: f64 = 1e-3;
 /// Nearest to an end of the stroke, m: the menu keeps 5 mm with the baseline, a sensor may be off by 2.
 const NEAR_M: f64 = 2e-3;
-/// Seed of the sensors' noise.
 const SEED: u64 = 1;
 /// Loose criteria of standstill, so that an effect does not keep the experiment from starting.
 const UNSETTLED: [&str; 6] = [
@@ -36,37 +35,29 @@ const UNSETTLED: [&str; 6] = [
 /// Why an experiment cannot be rehearsed.
 #[derive(Debug, thiserror::Error)]
 pub enum ClosedLoopError {
-    /// The experiment or a program is none.
     #[error(transparent)]
     Files(#[from] InputError),
-    /// `[rig]` of the experiment is none.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The rig cannot be set up so.
     #[error(transparent)]
     Setup(#[from] SetupError),
 }
 
-/// Result of a run.
 #[derive(Clone, Debug)]
 pub struct ClosedLoopRun {
-    /// Whether the rods were linked.
     pub linked: bool,
     /// State at the start.
     pub start: State,
-    /// Inputs of each period.
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.
     pub points: Vec<[Point; 2]>,
     /// Period in which the experiment began, behind the initial positioning; `None` when it never did.
     pub began: Option<usize>,
-    /// Whether the experiment came to its end.
     pub done: bool,
 }
 
 impl ClosedLoopRun {
     /// Whether the experiment suits this rig: it begins, it ends, and no moved rod comes near an end of its stroke.
-    #[must_use]
     pub(crate) fn ends_well(&self, stroke_m: f64) -> bool {
         let Some(began) = self.began else { return false };
         let keeps_away = |axis: usize| {
@@ -113,7 +104,6 @@ pub fn drive(
     Ok(ClosedLoopRun { linked: scene.linked, start, inputs, points, began, done })
 }
 
-/// States of both axes.
 fn points_of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
     std::array::from_fn(|i| {
         let axis = &truth.axes[i];

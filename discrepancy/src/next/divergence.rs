@@ -59,7 +59,6 @@ pub struct Divergence {
 
 impl Divergence {
     /// T of so many repetitions, in squared standard deviations.
-    #[must_use]
     pub(crate) fn in_repetitions(&self, times: u32) -> f64 {
         let square = self.square * f64::from(times);
         square * (1.0 - self.cosine * self.cosine) / (1.0 + MODEL_ERROR * MODEL_ERROR * square)
@@ -68,7 +67,6 @@ impl Divergence {
 
 /// Divergence of the first of `rigs`, which made the run, from each of the others. `numbers` are baselines with one parameter off
 /// by a prior standard deviation each.
-#[must_use]
 pub(crate) fn divergences(
     driven: &ClosedLoopRun,
     baseline: &RigParameters,

@@ -3,7 +3,6 @@
 //! Each drives both axes, so that it serves whichever has the effect, takes 13 to 20 s, and stays away from the ends of the
 //! stroke. Tests hold every file to that, with the baseline and with the controllers' own reader.
 
-/// An experiment of the menu.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Its title, and its file without `.toml`.
@@ -15,13 +14,10 @@ pub struct Entry {
 
 impl Entry {
     /// Name of the file in which it is proposed.
-    #[must_use]
     pub fn file(&self) -> String {
         format!("next-{}.toml", self.name)
     }
 
-    /// Whether it links the rods.
-    #[must_use]
     pub(crate) fn is_linked(&self) -> bool {
         self.toml.lines().any(|line| line.trim_end() == "linked = true")
     }
@@ -52,7 +48,6 @@ menu! {
 }
 
 /// Text of a shipped program that the menu uses.
-#[must_use]
 pub fn program(name: &str) -> Option<String> {
     let text = match name {
         "position-pid" => include_str!("../../../controller/programs/position-pid.toml"),

@@ -22,9 +22,6 @@ pub(crate) fn numbers() -> impl Iterator<Item = &'static Parameter> {
 }
 
 /// The rig with a number larger by one standard deviation.
-///
-/// # Errors
-/// [`ParameterError`] when it leaves its range.
 pub(crate) fn off(rig: &RigParameters, parameter: &Parameter) -> Result<RigParameters, ParameterError> {
     parameter.scaled(rig, 1.0 + TOLERANCE)
 }
@@ -38,7 +35,6 @@ pub(crate) struct Product<'a> {
 
 impl<'a> Product<'a> {
     /// The product for these changes of the readings.
-    #[must_use]
     pub(crate) fn new(numbers: &'a [Vec<f64>]) -> Self {
         let count = numbers.len();
         let gram = DMatrix::from_fn(count, count, |row, column| {
@@ -50,7 +46,6 @@ impl<'a> Product<'a> {
     }
 
     /// The product of two signatures.
-    #[must_use]
     pub(crate) fn of(&self, left: &[f64], right: &[f64]) -> f64 {
         let along = |signature: &[f64]| {
             DVector::from_iterator(

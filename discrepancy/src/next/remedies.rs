@@ -112,7 +112,6 @@ const REMEDIES: &[Remedy] = &[
 const ELSE: &str = "a larger amplitude: what differs here lies below the sensors' noise";
 
 /// Measurements for these pairs, each once; `None` without pairs.
-#[must_use]
 pub(crate) fn of_pairs(explanations: &[Explanation], pairs: &[(usize, usize)]) -> Option<String> {
     let mut remedies: Vec<&str> = Vec::new();
     for (one, other) in pairs {
@@ -125,7 +124,6 @@ pub(crate) fn of_pairs(explanations: &[Explanation], pairs: &[(usize, usize)]) -
 }
 
 /// Measurement for two explanations.
-#[must_use]
 pub(crate) fn of_pair(one: &[String], other: &[String]) -> &'static str {
     let only = |these: &[String], those: &[String]| -> Vec<String> {
         let effect = |name: &String| name.split(' ').next().unwrap_or_default().to_owned();

@@ -38,15 +38,12 @@ pub(crate) struct Bins {
 }
 
 impl Bins {
-    /// Bins of a variable.
-    #[must_use]
     pub(crate) fn of(sample: &Sample, variable: usize) -> Self {
         let values: Vec<f64> = sample.variables.iter().map(|variables| variables[variable]).collect();
         Bins { places: bins(&values), count: BINS }
     }
 
     /// Bins of equal width, which isolate a pulse of few windows.
-    #[must_use]
     pub(crate) fn even(sample: &Sample, variable: usize) -> Self {
         let values = || sample.variables.iter().map(|variables| variables[variable]);
         let least = values().fold(f64::INFINITY, f64::min);
@@ -55,8 +52,6 @@ impl Bins {
         Bins { places: values().map(|value| place(value).min(BINS - 1)).collect(), count: BINS }
     }
 
-    /// Bins of a pair of variables.
-    #[must_use]
     pub(crate) fn of_pair(sample: &Sample, left: usize, right: usize) -> Self {
         let of = |variable: usize| {
             few_bins(
@@ -74,7 +69,6 @@ impl Bins {
 
 impl Sample {
     /// Takes the sample of a series.
-    #[must_use]
     pub(crate) fn of(series: &UnknownSeries) -> Self {
         let points = &series.points;
         Sample {
@@ -95,7 +89,6 @@ impl Sample {
     }
 
     /// R2 over a variable, its p value, and its distance from the shifted ones in standard deviations.
-    #[must_use]
     pub(crate) fn test(&self, variable: usize) -> (f64, f64, f64) {
         let both = [Bins::of(self, variable), Bins::even(self, variable)];
         let most = |shift: usize| {
@@ -111,7 +104,6 @@ impl Sample {
     }
 
     /// Cross-validated R2 of bin means, with the input shifted by some windows.
-    #[must_use]
     pub(crate) fn explained(&self, bins: &Bins, shift: usize) -> f64 {
         let n = self.values.len();
         let from = |at: usize| (at + shift) % n;
@@ -140,27 +132,22 @@ impl Sample {
     }
 
     /// Weighted squares beyond their expectation.
-    #[must_use]
     pub(crate) fn excess(&self) -> f64 {
         self.squares() - self.values.len() as f64
     }
 
     /// The weighted mean over its standard error.
-    #[must_use]
     pub(crate) fn mean_over_error(&self) -> f64 {
         let (sum, weight) = self.mean();
         sum / weight.sqrt()
     }
 
     /// Share of the squares that the mean explains.
-    #[must_use]
     pub(crate) fn constant_share(&self) -> f64 {
         let (sum, weight) = self.mean();
         sum * sum / weight / self.squares()
     }
 
-    /// Weighted sum of squares.
-    #[must_use]
     pub(crate) fn squares(&self) -> f64 {
         self.values.iter().zip(&self.weights).map(|(value, weight)| weight * value * value).sum()
     }

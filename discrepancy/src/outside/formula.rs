@@ -32,7 +32,6 @@ struct Form {
 }
 
 /// The shortest formula that explains an unknown input, its numbers in the units of the report.
-#[must_use]
 pub(crate) fn formula(sample: &Sample, unit: &str) -> Option<String> {
     let fits: Vec<(Form, [f64; 2], f64)> = forms()
         .into_iter()

@@ -9,7 +9,6 @@ use crate::workflow::place_name;
 /// Candidates that are drawn; all stand in the table.
 const DRAWN: usize = 15;
 
-/// The section of the ranking.
 pub(super) fn candidates(report: &Report) -> String {
     if report.candidates.is_empty() {
         return String::new();
@@ -44,7 +43,6 @@ pub(super) fn candidates(report: &Report) -> String {
     charts(&[drawn]) + &folded(&format!("All {count} candidates, and what became of each"), &all)
 }
 
-/// The section of detection limits.
 pub(super) fn limits(report: &Report) -> String {
     let mut text = String::new();
     if !report.not_excited.is_empty() {
@@ -70,7 +68,6 @@ pub(super) fn limits(report: &Report) -> String {
     text
 }
 
-/// The detection limits.
 pub(super) fn limits_table(report: &Report) -> String {
     let rows = report.detection_limits.iter().map(|one| {
         vec![

@@ -171,7 +171,6 @@ impl Plot {
     }
 }
 
-/// A bar of a chart of bars.
 pub(super) struct Bar {
     /// What it is of.
     pub(super) label: String,

@@ -8,7 +8,6 @@ use crate::outside::SHIFTS;
 use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Surface, Verdict};
 use plant::effects::sheet;
 
-/// What the section is called.
 pub(super) fn title(report: &Report) -> &'static str {
     match report.verdict {
         Verdict::NothingMissing => "Nothing above these limits",
@@ -210,7 +209,6 @@ fn labelled(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
-/// A curve with its band.
 pub(super) fn curve_figure(identifier: &str, caption: &str, curve: &Curve) -> String {
     let (x_unit, x_factor) = words::shown(&curve.variable_unit);
     let (y_unit, y_factor) = words::shown_small(&curve.unit);
@@ -244,7 +242,6 @@ pub(super) fn curve_figure(identifier: &str, caption: &str, curve: &Curve) -> St
     )
 }
 
-/// The experiment that is proposed.
 pub(super) fn next(report: &Report) -> String {
     let Some(next) = &report.next else { return String::new() };
     let mut text = paragraph(&next.reason);

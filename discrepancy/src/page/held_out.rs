@@ -5,7 +5,6 @@ use super::words;
 use crate::report::{BeforeAfter, Gap, Report};
 use std::collections::BTreeMap;
 
-/// The table of gaps.
 pub(super) fn gap(report: &Report) -> String {
     let row = |(signal, gap): (&String, &Gap)| {
         let (unit, factor) = words::shown_small(words::unit_of(signal));
@@ -27,7 +26,6 @@ pub(super) fn gap(report: &Report) -> String {
     ) + &table
 }
 
-/// Verification on the held-out record.
 pub(super) fn verification(report: &Report) -> String {
     let Some(seen) = &report.verification else { return String::new() };
     let [low, high] = seen.chi2_null.map(words::short);

@@ -11,7 +11,6 @@ pub(super) fn table(label: &str, heads: &[&str], rows: impl IntoIterator<Item = 
     table.html().unwrap_or_default()
 }
 
-/// A heading within a section.
 pub(super) fn heading(text: &str) -> String {
     format!("<h3>{}</h3>\n", escaped(text))
 }

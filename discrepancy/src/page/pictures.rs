@@ -14,14 +14,12 @@ use std::ops::Range;
 /// Length of the stretch that is looked at closely, s.
 const CLOSE_S: f64 = 1.0;
 
-/// Which of both models.
 #[derive(Clone, Copy, PartialEq)]
 enum Model {
     Before,
     After,
 }
 
-/// The record against the baseline.
 pub(super) fn before(report: &Report, pictures: &Pictures) -> String {
     if report.verdict == Verdict::BadData {
         return String::new();
@@ -37,7 +35,6 @@ pub(super) fn before(report: &Report, pictures: &Pictures) -> String {
     all(report, pictures, Model::Before, &lead)
 }
 
-/// The record against the extended model.
 pub(super) fn after(report: &Report, pictures: &Pictures) -> String {
     let is_there = pictures.traces.iter().any(|trace| !trace.after.is_empty());
     if report.verdict == Verdict::BadData || !is_there {

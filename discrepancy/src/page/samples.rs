@@ -5,7 +5,6 @@ use crate::report::*;
 use plant::effects::SHEETS;
 use std::collections::BTreeMap;
 
-/// All verdicts.
 pub(super) const VERDICTS: [Verdict; 6] = [
     Verdict::NothingMissing,
     Verdict::ParametersOnly,

@@ -9,7 +9,6 @@ fn parsed(page: &str) -> roxmltree::Document<'_> {
     roxmltree::Document::parse_with_options(page, options).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// All text that a person sees, in one line.
 fn text(page: &str) -> String {
     let document = parsed(page);
     let body = document.descendants().find(|node| node.has_tag_name("body")).expect("there is a body");

@@ -4,7 +4,6 @@ use super::words;
 use crate::report::{NamedEffect, Report, Verdict};
 use pagekit::page::escaped;
 
-/// What the page is called.
 pub(super) fn title(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::NothingMissing => "Nothing is missing",

@@ -42,7 +42,6 @@ pub(super) fn fixed(value: f64, digits: usize) -> String {
     }
 }
 
-/// A share in percent.
 pub(super) fn percent(share: f64) -> String {
     let value = share * 100.0;
     let digits = if value.abs() < 99.95 && value.abs() > 99.0 || value.abs() < 9.95 { 1 } else { 0 };
@@ -107,12 +106,10 @@ const KEY_ENDS: [&str; 21] = [
     "_s",
 ];
 
-/// A text and its unit.
 pub(super) fn with_unit(text: &str, unit: &str) -> String {
     if unit.is_empty() { text.to_owned() } else { format!("{text} {}", spelt(unit)) }
 }
 
-/// A unit as it is printed.
 pub(super) fn spelt(unit: &str) -> String {
     let unit = unit.replace("^2", "\u{b2}").replace("^3", "\u{b3}");
     if unit == "um" { "\u{b5}m".to_owned() } else { unit }
@@ -158,7 +155,6 @@ pub(super) fn signal(signal: &str) -> String {
     name.replace('_', " ")
 }
 
-/// A balance in words.
 pub(super) fn balance(balance: &str) -> String {
     let Some((axis, what)) = balance.split_once('.') else { return balance.to_owned() };
     match what {
@@ -170,7 +166,6 @@ pub(super) fn balance(balance: &str) -> String {
     }
 }
 
-/// Where an effect is, in words.
 pub(super) fn place(effect: &str, place: &Where) -> String {
     let axis = match place.axis.as_str() {
         axis @ ("drive" | "load") => format!("{axis} axis"),

@@ -224,7 +224,6 @@ fn rows(
     Ok(())
 }
 
-/// Data of one cycle.
 #[derive(Default)]
 struct Row {
     line: Option<u64>,

@@ -3,7 +3,6 @@
 use plant::Axis;
 use std::fmt;
 
-/// Signals of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Signal {
     /// Valve command that acts over the row's period, -1 to 1.
@@ -20,10 +19,8 @@ pub enum Signal {
     AppliedForce,
 }
 
-/// One channel of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Channel {
-    /// Of an axis.
     Of(Axis, Signal),
     /// Absolute pressure of the supply node, Pa.
     SupplyPressure,
@@ -66,7 +63,6 @@ pub enum Quantity {
 }
 
 impl Channel {
-    /// How many there are.
     pub const COUNT: usize = 2 * Signal::ALL.len() + 1;
 
     /// All channels: the drive's, the load's, the supply.
@@ -97,13 +93,11 @@ impl Channel {
     }
 
     /// The channel of a column in `measurement.csv`; `None` for time, and for what that file does not hold.
-    #[must_use]
     pub(crate) fn of_column(name: &str) -> Option<Channel> {
         Self::of_mapping(name).filter(|channel| !channel.foreign_only())
     }
 
     /// The channel that a mapping calls so.
-    #[must_use]
     pub(crate) fn of_mapping(name: &str) -> Option<Channel> {
         Self::ALL.into_iter().find(|channel| channel.to_string() == name)
     }
@@ -114,7 +108,6 @@ impl Channel {
         matches!(self, Channel::Of(_, Signal::AppliedForce))
     }
 
-    /// What it measures.
     #[must_use]
     pub fn quantity(self) -> Quantity {
         match self {

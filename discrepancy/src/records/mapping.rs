@@ -13,7 +13,6 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A checked mapping.
 #[derive(Clone, Debug)]
 pub struct Mapping {
     pub(super) layout: Layout,
@@ -39,7 +38,6 @@ pub(super) enum Time {
     },
 }
 
-/// One channel and its column.
 #[derive(Clone, Debug)]
 pub(super) struct MappedChannel {
     pub(super) channel: Channel,

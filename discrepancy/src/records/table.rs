@@ -48,7 +48,6 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads a file.
     pub(super) fn read(file: &Path, layout: &Layout) -> Result<Self, ReadError> {
         let bytes = std::fs::read(file)
             .map_err(|error| ReadError::Open { file: file.into(), reason: error.to_string() })?;

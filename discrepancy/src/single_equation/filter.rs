@@ -34,13 +34,11 @@ struct Section {
 
 impl LowPass {
     /// A Butterworth low pass; `edge_ratio` is its -3 dB frequency over the Nyquist frequency, above 0 and below 1.
-    #[must_use]
     pub(crate) fn butterworth(order: usize, edge_ratio: f64) -> Self {
         Self::of(order, edge_ratio, 1.0, 1.0, 1.0)
     }
 
     /// A Chebyshev I low pass; `edge_ratio` is the frequency at which its ripple ends over the Nyquist frequency.
-    #[must_use]
     pub(crate) fn chebyshev(order: usize, ripple_db: f64, edge_ratio: f64) -> Self {
         let square = 10.0_f64.powf(ripple_db / 10.0) - 1.0;
         let bend = (1.0 / square.sqrt()).asinh() / order as f64;
@@ -68,7 +66,6 @@ impl LowPass {
     }
 
     /// The samples, run forth and back; as long as they were. Fewer than two samples come back as they are.
-    #[must_use]
     pub(crate) fn zero_phase(&self, samples: &[f64]) -> Vec<f64> {
         let Some((first, last)) = samples.first().zip(samples.last()).filter(|_| samples.len() > 1) else {
             return samples.to_vec();

@@ -131,7 +131,6 @@ impl Default for Baseline {
 /// A term that was added to the model; its numbers are for information and refitted with the others.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TermEntry {
-    /// Name in the catalogue.
     pub(crate) effect: String,
     /// Which form of it; empty where there is one.
     pub(crate) form: String,
@@ -192,9 +191,6 @@ fn needed(kind: Kind) -> &'static [(&'static str, &'static str)] {
 
 impl Model {
     /// Reads a model file.
-    ///
-    /// # Errors
-    /// [`BalanceError`] with the key, its value and what is allowed.
     pub(crate) fn read(file: &Path) -> Result<Self, BalanceError> {
         let text = std::fs::read_to_string(file).map_err(|error| DescriptionError::Open {
             what: "model",
@@ -205,9 +201,6 @@ impl Model {
     }
 
     /// The same from a text; paths in it are relative to `file`'s folder.
-    ///
-    /// # Errors
-    /// As [`Model::read`].
     pub(crate) fn from_toml(text: &str, file: &Path) -> Result<Self, BalanceError> {
         let read: File = toml::from_str(text)
             .map_err(|error| DescriptionError::Syntax { file: file.into(), reason: error.to_string() })?;

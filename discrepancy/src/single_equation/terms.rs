@@ -158,9 +158,6 @@ fn sign(v: f64) -> f64 {
 }
 
 /// The columns of a term over a run, at the full rate: one, or sine and cosine of a ripple.
-///
-/// # Errors
-/// [`BalanceError::Term`] for one that this kind of model does not have.
 pub(super) fn columns(model: &Model, entry: &TermEntry, run: &Run) -> Result<Vec<Vec<f64>>, BalanceError> {
     let unknown = || BalanceError::Term { effect: entry.effect.clone(), form: entry.form.clone() };
     let shape = |key: &str| entry.shape.get(key).copied().filter(|v| v.is_finite()).ok_or_else(unknown);

@@ -100,7 +100,6 @@ fn joint(power: &Power) -> f64 {
     pooled(&squares, &kept(&squares))
 }
 
-/// Mean and standard deviation.
 fn spread(values: &[f64]) -> (f64, f64) {
     let (mean, variance) = mean_and_variance(values);
     (mean, variance.sqrt())

@@ -24,7 +24,6 @@ pub struct ReferenceRun {
 
 impl ReferenceRun {
     /// Readings over their noise, as [`Windows::simulate_coarsely`] gives them.
-    #[must_use]
     pub fn simulated(&self) -> &[f64] {
         &self.simulated
     }
@@ -49,7 +48,6 @@ impl Reach {
     }
 
     /// Whether a variable of an axis lies between two values anywhere in the window.
-    #[must_use]
     pub fn meets(&self, axis: Axis, variable: Variable, between: [f64; 2]) -> bool {
         let place = Variable::ALL.iter().position(|known| *known == variable).expect("all of them");
         let [least, most] = self.0[axis.index()][place];
@@ -59,7 +57,6 @@ impl Reach {
 
 impl Windows<'_> {
     /// Simulates a rig with longer steps and keeps its states.
-    #[must_use]
     pub fn pass(&self, rig: &RigParameters) -> ReferenceRun {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
         let inverse = SensorInverse::of(rig);
@@ -95,7 +92,6 @@ impl Windows<'_> {
 
     /// Readings of a neighbour of the reference rig. They differ only in the windows where `differs` is true, and start states do
     /// not depend on the difference.
-    #[must_use]
     pub fn simulate_where(
         &self,
         rig: &RigParameters,

@@ -173,7 +173,6 @@ impl Windows<'_> {
 
     /// A synthetic record of this rig in the same windows: `simulated` plus drawn noise. Its start states are estimated anew from
     /// the record's points.
-    #[must_use]
     pub(crate) fn redrawn(&self, simulated: &[f64], random: &mut Pcg64) -> Self {
         let noise = self.raw_noise(random);
         let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + noise).collect();
@@ -247,7 +246,6 @@ impl Windows<'_> {
 }
 
 /// Initial state of a simulation of a record: that of a run with the record's set-up.
-#[must_use]
 pub(crate) fn first_state(record: &GriddedRecord, rig: &RigParameters) -> State {
     let stroke_m = rig.cylinder().stroke_m;
     let drive_m = if record.measured[0] { record.points[0][0].extension_m } else { 0.1 };
@@ -265,7 +263,6 @@ pub(crate) fn first_state(record: &GriddedRecord, rig: &RigParameters) -> State 
 }
 
 /// A plant's state with these points on the measured axes, otherwise unchanged.
-#[must_use]
 pub(crate) fn state_at(plant: &Plant, points: &[Point; 2], measured: [bool; 2]) -> State {
     let mut state = *plant.state();
     let truth = plant.truth(&Inputs::default());

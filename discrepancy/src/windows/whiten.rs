@@ -15,7 +15,6 @@ pub(super) const SPIKE: f64 = 6.0;
 
 impl Windows<'_> {
     /// A draw of noise, processed like a residual.
-    #[must_use]
     pub(crate) fn noise(&self, random: &mut Pcg64) -> Vec<f64> {
         let mut noise = self.raw_noise(random);
         self.reduce(&mut noise);

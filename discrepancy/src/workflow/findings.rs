@@ -235,7 +235,6 @@ pub(super) fn summary(report: &Report) -> String {
 }
 
 /// Name of a place in rig files.
-#[must_use]
 pub(crate) fn place_name(place: &Where) -> String {
     match &place.element {
         Some(element) => format!("{}.{element}", place.axis),

@@ -45,7 +45,6 @@ pub struct ReportedOutside {
 
 impl Reported {
     /// Which axes the training records showed.
-    #[must_use]
     pub fn measured(&self) -> [bool; 2] {
         Axis::ALL.map(|axis| self.inputs.axes.iter().any(|name| name == axis.name()))
     }

@@ -42,7 +42,6 @@ pub(super) struct AirLaws {
     pub(super) line_delay_s: f64,
 }
 
-/// One axis.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     pub(super) numbers: Numbers,
@@ -126,7 +125,6 @@ impl Axis {
         [self.dead_m3[0] + a * x, self.dead_m3[1] + b * (self.numbers.stroke_m - x)]
     }
 
-    /// The air at a state.
     #[inline(always)]
     pub(super) fn air(&self, y: &Y, supply_pa: f64) -> Air {
         let volume_m3 = self.volumes(y[X]);

@@ -135,9 +135,6 @@ pub(super) fn replay_with(
 
 /// The commands of a null record again with another number of steps in a millisecond, in windows of so many rows that each begin
 /// with the true state.
-///
-/// # Errors
-/// As [`simulate`].
 pub(super) fn replay_windows(
     record: &Record,
     rig: &RigParameters,
@@ -178,7 +175,6 @@ fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("two folders below the checkout")
 }
 
-/// File of an experiment.
 fn experiment_file(recipe: &Recipe) -> Result<PathBuf, MakeError> {
     let axes = match (recipe.both_axes, recipe.axis) {
         (true, _) => "linked",

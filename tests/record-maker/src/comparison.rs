@@ -22,7 +22,6 @@ pub const SIGNALS: [&str; 4] = ["position", "force", "pressure a", "pressure b"]
 /// Differences of one signal in units of its sensor's noise.
 #[derive(Debug, Clone, Default)]
 pub struct Difference {
-    /// Rms of each window.
     pub windows: Vec<f64>,
     /// Samples left out, of all.
     pub left_out: [usize; 2],
@@ -34,14 +33,11 @@ pub struct Difference {
 pub type Differences = [[Difference; 4]; 2];
 
 impl Difference {
-    /// Rms over all samples.
-    #[must_use]
     pub fn rms(&self) -> f64 {
         (self.squares / self.samples.max(1) as f64).sqrt()
     }
 
     /// The window's rms that so many per cent of the windows do not exceed.
-    #[must_use]
     pub fn percentile(&self, percent: f64) -> f64 {
         let mut sorted = self.windows.clone();
         sorted.sort_by(f64::total_cmp);

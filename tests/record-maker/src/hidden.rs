@@ -83,7 +83,6 @@ pub(super) fn rig(
     Ok((rig, laws.map(|laws| laws.sensing)))
 }
 
-/// The sheet of a hidden effect.
 pub(super) fn sheet(hidden: &Hidden) -> Result<&'static Sheet, MakeError> {
     let unknown = || MakeError::UnknownEffect { name: hidden.name.to_owned() };
     plant::effects::sheet(hidden.name).ok_or_else(unknown)

@@ -60,7 +60,6 @@ pub struct Recipe {
     pub axis: Axis,
     /// Both axes, linked: the drive positioned, the load pressing.
     pub both_axes: bool,
-    /// Effects that are on.
     pub hidden: Vec<Hidden>,
     /// Whether they have another functional form than the catalogue's.
     pub foreign_form: bool,
@@ -72,7 +71,6 @@ pub struct Recipe {
     pub jitter: bool,
     /// Rms of the noise in units of the rig file's; rounding stays.
     pub noise: f64,
-    /// What is driven.
     pub experiment: Experiment,
 }
 
@@ -94,12 +92,10 @@ impl Default for Recipe {
     }
 }
 
-/// An effect that is on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hidden {
     /// Name of its sheet.
     pub name: &'static str,
-    /// Where it is.
     pub place: Place,
     /// One number for each key of its sheet, in the file's units.
     pub numbers: Vec<f64>,
@@ -114,12 +110,9 @@ pub enum Experiment {
     HeldOut(u8),
 }
 
-/// A record and its truth.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// What it was made of.
     pub recipe: Recipe,
-    /// Whether the rods are linked.
     pub linked: bool,
     /// Weights on the carriage, kg.
     pub added_mass_kg: f64,
@@ -134,11 +127,9 @@ pub struct Row {
     pub time_s: f64,
     /// Valve commands acting over the millisecond that follows.
     pub valve: [f64; 2],
-    /// What the sensors read.
     pub readings: [AxisReadings; 2],
     /// The same at the nominal time without noise and rounding: position m, force N, pressures Pa. Sensor effects are in it.
     pub without_noise: [[f64; 4]; 2],
-    /// True states.
     pub axes: [TrueAxis; 2],
     /// True pressure of the supply node, Pa.
     pub supply_pressure_pa: f64,
@@ -149,13 +140,11 @@ pub struct Row {
 /// True state of one axis and what acts on it, in its own extension; flows into the chambers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TrueAxis {
-    /// How far the rod is out, m.
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 while friction holds it.
     pub rod_velocity_m_per_s: f64,
     /// And the rate of that, m/s^2.
     pub rod_acceleration_m_per_s2: f64,
-    /// Spool opening.
     pub spool: f64,
     /// Absolute pressures of a and b, Pa.
     pub pressure_pa: [f64; 2],
@@ -178,86 +167,56 @@ pub struct TrueAxis {
 /// Why a record cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
-    /// No such parameter, or a factor that is none of a few per cent.
     #[error("{name} = {factor}: allowed are the names {PARAMETERS:?}, with factors from 0.5 to 2")]
     WrongParameter {
-        /// As asked for.
         name: String,
-        /// As asked for.
         factor: f64,
     },
-    /// The catalogue has no such effect.
     #[error("{name}: the catalogue has no such effect; see plant::effects::SHEETS")]
     UnknownEffect {
-        /// As asked for.
         name: String,
     },
-    /// The effect cannot be there, or nobody would see it there.
     #[error("{name} at {place}: {rule}")]
     Place {
-        /// Name of the effect.
         name: &'static str,
-        /// As asked for.
         place: Place,
-        /// What is allowed.
         rule: &'static str,
     },
-    /// A number of an effect is out of its range, or there are more or fewer than keys.
     #[error("{name}: {numbers:?}: allowed is {allowed}")]
     Numbers {
-        /// Name of the effect.
         name: &'static str,
-        /// As asked for.
         numbers: Vec<f64>,
-        /// Keys and ranges.
         allowed: String,
     },
-    /// No such experiment.
     #[error("held-out experiment {number}: allowed are 0 and 1")]
     Experiment {
-        /// As asked for.
         number: u8,
     },
-    /// Experiment and programs do not go together.
     #[error(transparent)]
     Run(#[from] InputError),
-    /// The setup is none of the rig's.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// People or weights in the scene, which the record maker does not play.
     #[error("{file}: the record maker plays no [[rig.hand]] and no [[rig.event]]")]
     People {
-        /// The experiment's file.
         file: String,
     },
-    /// A controller stopped the rig.
     #[error("a controller tripped the emergency stop at {at_s} s")]
     Stopped {
-        /// When.
         at_s: f64,
     },
-    /// A proposed experiment does not come to its end.
     #[error("{file}: is not done after {length_s} s")]
     Unfinished {
-        /// The experiment's file.
         file: String,
-        /// How long it was run, s.
         length_s: f64,
     },
-    /// A number is no longer finite, or a pressure no longer positive.
     #[error("the {axis} axis is in no state of a rig at {at_s} s")]
     NoState {
-        /// Which axis.
         axis: &'static str,
-        /// When.
         at_s: f64,
     },
-    /// A file cannot be written.
     #[error("{path}: {error}")]
     File {
-        /// Which.
         path: String,
-        /// Why.
         error: std::io::Error,
     },
 }

@@ -6,7 +6,6 @@
 //!
 //! Source: Blackman, Vigna, "Scrambled linear pseudorandom number generators", ACM Trans. Math. Softw. 47(4), 2021.
 
-/// A stream of random numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Stream {
     state: [u64; 4],

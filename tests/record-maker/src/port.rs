@@ -24,7 +24,6 @@ pub(super) struct PortLaws {
     pub(super) cushion: Option<[f64; 2]>,
 }
 
-/// The ports of one axis.
 #[derive(Debug, Clone)]
 pub(super) struct Ports {
     laws: PortLaws,

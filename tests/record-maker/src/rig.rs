@@ -26,7 +26,6 @@ const CREEP_M_PER_S: f64 = 1e-5;
 /// Share of the foreign dead time that is a lag.
 const LATE_LAG_SHARE: f64 = 0.2;
 
-/// Constant parts of the rig.
 #[derive(Debug, Clone)]
 pub(super) struct Rig {
     pub(super) axes: [Axis; 2],
@@ -40,7 +39,6 @@ pub(super) struct Rig {
     pub(super) steps_per_ms: usize,
 }
 
-/// Everything that changes.
 #[derive(Debug, Clone)]
 pub(super) struct State {
     pub(super) y: [Y; 2],
@@ -246,7 +244,6 @@ impl Rig {
         evaluated
     }
 
-    /// Rates of x and v of one axis.
     #[inline(always)]
     fn move_axis(
         &self,

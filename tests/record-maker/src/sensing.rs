@@ -23,7 +23,6 @@ pub(super) struct SensingLaws {
     pub(super) offset: [f64; CHANNELS],
 }
 
-/// Sensors of one axis.
 #[derive(Debug, Clone)]
 pub(super) struct Sensing {
     laws: SensingLaws,

@@ -33,7 +33,6 @@ pub(super) struct Edges {
     pub(super) exhaust: [f64; 2],
 }
 
-/// The valve of one axis.
 #[derive(Debug, Clone)]
 pub(super) struct Valve {
     laws: ValveLaws,

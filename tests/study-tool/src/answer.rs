@@ -15,7 +15,6 @@ use crate::score::Case;
 use serde_json::{Map, Value, json};
 
 /// Of a draw that a program was let loose on.
-#[must_use]
 pub fn of_case(case: &Case) -> Value {
     let judgement = &case.judgement;
     let hidden = &judgement.hidden;
@@ -57,7 +56,6 @@ pub fn of_case(case: &Case) -> Value {
 }
 
 /// Of a draw that the program left open, or not.
-#[must_use]
 pub fn of_found(found: &Found, outcome: Option<resolve::Outcome>) -> Value {
     match found {
         Found::NotOpen => json!({"outcome": "not-open"}),

@@ -51,7 +51,6 @@ pub struct Member {
 #[serde(deny_unknown_fields)]
 pub struct HiddenClass {
     pub effect: String,
-    /// Where it is.
     #[serde(rename = "where")]
     pub place: String,
     /// |M J| in this record over what an ideal observer needs.
@@ -60,13 +59,10 @@ pub struct HiddenClass {
     pub members: Vec<Member>,
 }
 
-/// The classes of one draw.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DrawClasses {
-    /// Of [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Number of the draw.
     pub number: usize,
     /// One for each hidden effect.
     pub hidden: Vec<HiddenClass>,
@@ -76,7 +72,6 @@ pub struct DrawClasses {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Classes {
-    /// Which study.
     pub plan: Plan,
     /// One for each draw that hides something.
     pub draws: Vec<DrawClasses>,
@@ -87,7 +82,6 @@ impl Classes {
     ///
     /// Noise of another size scales all signatures alike, but for the rounding of the sensors: the classes stay, and a strength
     /// is the one at the noise of this study, as the committed limits are.
-    #[must_use]
     pub fn of_draws(&self, draws: &[Draw]) -> BTreeMap<usize, DrawClasses> {
         let own = self.plan.draws();
         let recipe_of = |number: usize| own.get(number).map(|draw| &draw.recipe);

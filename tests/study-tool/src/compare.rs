@@ -17,16 +17,13 @@ use std::fmt::Write;
 /// Why scores cannot stand side by side.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
-    /// There is none.
     #[error("nothing to compare: give LABEL@FOLDER, once for each program")]
     Nothing,
-    /// Effects were left out of the catalogue in one of them alone.
     #[error(
         "'{left}' and '{right}' are of different modes, one without the hidden effects: compare them apart"
     )]
     Modes {
         left: String,
-        /// Another one.
         right: String,
     },
 }

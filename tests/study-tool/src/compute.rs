@@ -17,26 +17,19 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Why limits or classes cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum ComputeError {
-    /// A record cannot be made.
     #[error("draw {number}: {error}")]
     Make {
-        /// Number of the draw.
         number: usize,
-        /// What the record maker says.
         error: MakeError,
     },
-    /// A sheet's own range is refused: a bug of the catalogue.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// A file of the study.
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error("no threads: {0}")]
     Threads(#[from] ThreadPoolBuildError),
-    /// Draws have no classes.
     #[error("{count} draws have no classes yet: run the command to its end")]
     Missing {
-        /// How many.
         count: usize,
     },
 }
@@ -59,7 +52,6 @@ pub fn limits(seed: u64, say: &(dyn Fn(&str) + Sync)) -> Result<Limits, ComputeE
 }
 
 /// The trajectory of a record for an observer with this rig file.
-#[must_use]
 pub fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory {
     let (both, axis) = (record.recipe.both_axes, record.recipe.axis);
     let row = &record.rows[0];
@@ -154,7 +146,6 @@ pub fn collected(study: &Study) -> Result<Classes, ComputeError> {
 }
 
 /// The text of committed classes: a line for each draw, so that a change is seen in a difference of files.
-#[must_use]
 pub fn classes_text(classes: &Classes) -> String {
     let draws: Vec<_> = classes.draws.iter().map(|draw| json!(draw).to_string()).collect();
     format!("{{\"plan\": {},\n\"draws\": [\n{}\n]}}\n", json!(classes.plan), draws.join(",\n"))

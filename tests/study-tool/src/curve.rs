@@ -26,16 +26,12 @@ const ENDS: [f64; 6] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 /// Why there are no curves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
-    /// There is no score.
     #[error("nothing to draw: give LABEL@FOLDER, once for each noise factor")]
     Nothing,
-    /// Effects were left out of the catalogue.
     #[error("'{0}' is of a run without the hidden effects: there are no names to draw")]
     LeftOut(String),
-    /// Two studies have the same noise and are as strong.
     #[error("two studies have noise times {0} and amplitudes over {1}: give one of each")]
     Doubled(f64, f64),
-    /// The drawing library refuses.
     #[error("the picture cannot be drawn: {0}")]
     Picture(String),
 }
@@ -90,8 +86,6 @@ impl<'a> Curves<'a> {
         factors.into_iter().map(of_factor).collect()
     }
 
-    /// Both as tables.
-    #[must_use]
     pub fn markdown(&self) -> String {
         let row = |name: &str, cell: &dyn Fn(&Score) -> String| {
             std::iter::once(name.to_owned())

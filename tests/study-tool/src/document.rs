@@ -9,7 +9,6 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// The table of limits: the drive's place of each effect, the rest in the file.
-#[must_use]
 pub fn limit_table(limits: &Limits) -> String {
     let mut table = String::from(
         "| effect | amplitude | limit | unit | drawn | signature of the most drawn, over the limit's | |\n|---|---|---|---|---|---|---|\n",
@@ -64,7 +63,6 @@ fn digits(value: f64) -> String {
 }
 
 /// The table of twins: for each effect with whom, in how many of its draws, and the largest cosine of all.
-#[must_use]
 pub fn twin_table(classes: &Classes) -> String {
     /// What is told of an effect.
     #[derive(Default)]

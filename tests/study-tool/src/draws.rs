@@ -27,7 +27,6 @@ use serde::{Deserialize, Serialize};
 pub const ALONE: [&str; 4] =
     ["parameter:mass", "parameter:viscous-friction", "parameter:supply-pressure", "parameter:kv-scale"];
 
-/// How many draws of what.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
@@ -81,18 +80,14 @@ pub enum Kind {
     Null,
     /// One parameter of the baseline off by much, no effect.
     Parameter,
-    /// Two effects.
     Pair,
-    /// Three effects.
     Triple,
 }
 
 /// One draw: the recipe of its records, but for the experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
-    /// Its number in the whole study.
     pub number: usize,
-    /// What it is about.
     pub kind: Kind,
     /// How its records are made; the experiment is the train one.
     pub recipe: Recipe,
@@ -100,20 +95,17 @@ pub struct Draw {
 
 impl Draw {
     /// The recipe of one of its three records.
-    #[must_use]
     pub fn recipe(&self, experiment: Experiment) -> Recipe {
         Recipe { experiment, ..self.recipe.clone() }
     }
 
     /// Which of the two held-out experiments the program is tested on: they take turns.
-    #[must_use]
     pub fn test(&self) -> Experiment {
         Experiment::HeldOut((self.number % 2) as u8)
     }
 }
 
 /// All draws of a study, in the order of their numbers.
-#[must_use]
 pub fn draws(seed: u64, shape: &Shape) -> Vec<Draw> {
     let mut drawn: Vec<(Kind, Recipe)> = Vec::new();
     for (place, sheet) in SHEETS.iter().enumerate() {
@@ -156,12 +148,10 @@ fn weaken(hidden: &mut Hidden, factor: f64) {
 }
 
 /// Whether an effect is seen only where the axes are linked, or both draw air.
-#[must_use]
 pub fn needs_both_axes(kind: PlaceKind) -> bool {
     matches!(kind, PlaceKind::Linkage | PlaceKind::Supply)
 }
 
-/// The random numbers of one draw.
 struct Generator(Pcg64);
 
 impl Generator {
@@ -289,7 +279,6 @@ impl Generator {
 }
 
 /// The axis of a place; none for linkage and supply.
-#[must_use]
 pub fn axis_of(place: Place) -> Option<Axis> {
     match place.part {
         Part::Drive => Some(Axis::Drive),

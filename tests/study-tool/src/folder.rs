@@ -26,35 +26,26 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A study with its folder.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// Where it is.
     pub root: PathBuf,
-    /// What defines it.
     pub plan: Plan,
     pub draws: Vec<Draw>,
 }
 
-/// What defines a study.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Of [`SCHEMA_VERSION`].
     pub schema_version: u32,
     /// Of all random numbers; below 2^53, as JSON is read.
     pub seed: u64,
-    /// How many draws of what.
     pub shape: Shape,
 }
 
 impl Plan {
-    /// The plan of a study.
-    #[must_use]
     pub fn new(seed: u64, shape: Shape) -> Self {
         Plan { schema_version: SCHEMA_VERSION, seed, shape }
     }
 
-    #[must_use]
     pub fn draws(&self) -> Vec<Draw> {
         draws(self.seed, &self.shape)
     }
@@ -69,20 +60,14 @@ impl Plan {
 /// Why a study's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// A file cannot be read or written.
     #[error("{path}: {error}")]
     File {
-        /// Which.
         path: String,
-        /// What the system says.
         error: io::Error,
     },
-    /// A file is not what this program writes.
     #[error("{path}: {what}")]
     Content {
-        /// Which.
         path: String,
-        /// What is wrong and what to do.
         what: String,
     },
 }
@@ -135,26 +120,19 @@ impl Study {
         Ok(Study { root: root.to_owned(), plan, draws: plan.draws() })
     }
 
-    /// Folder of a draw's records.
-    #[must_use]
     pub fn records(&self, number: usize) -> PathBuf {
         self.root.join("records").join(name(number))
     }
 
-    /// Folder of a draw's truth.
-    #[must_use]
     pub fn truth(&self, number: usize) -> PathBuf {
         self.root.join("truth").join(name(number))
     }
 
     /// Folder of what a program made of a draw.
-    #[must_use]
     pub fn run(&self, label: &str, number: usize) -> PathBuf {
         self.root.join("runs").join(label).join(name(number))
     }
 
-    /// File of a draw's classes.
-    #[must_use]
     pub fn class(&self, number: usize) -> PathBuf {
         self.root.join("classes").join(format!("{}.json", name(number)))
     }
@@ -165,7 +143,6 @@ fn name(number: usize) -> String {
 }
 
 /// A draw as `draws.json` and `score.json` hold it.
-#[must_use]
 pub fn draw_as_json(draw: &Draw) -> Value {
     let Recipe { seed, axis, both_axes, hidden, foreign_form, wrong_parameters, .. } = &draw.recipe;
     let wrong = |(name, factor): &(String, f64)| json!({"name": name, "factor": factor});

@@ -20,7 +20,6 @@ const CONFIDENCE: f64 = 0.95;
 /// So many of so many, with intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rate {
-    /// How many.
     pub count: usize,
     /// Of how many.
     pub of: usize,
@@ -34,7 +33,6 @@ pub struct Rate {
 
 impl Rate {
     /// The rate of so many of so many.
-    #[must_use]
     pub fn new(count: usize, of: usize) -> Self {
         let share = (of > 0).then(|| count as f64 / of as f64);
         Rate { count, of, share, interval: wilson(count, of), at_most: at_most(count, of) }

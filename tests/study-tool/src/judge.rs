@@ -87,7 +87,6 @@ fn as_text<S: Serializer>(place: &Place, out: S) -> Result<S::Ok, S::Error> {
 }
 
 /// Judges what a program said about a draw, given the class of each of its hidden effects.
-#[must_use]
 pub fn judge(
     draw: &Draw,
     classes: &[Vec<Member>],
@@ -272,7 +271,6 @@ fn hidden_judged(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> Hid
 
 impl Member {
     /// Whether it is in the class, and no parameter of the baseline.
-    #[must_use]
     pub fn is_twin(&self) -> bool {
         self.cosine > TWIN_COSINE && !self.effect.starts_with("parameter:")
     }

@@ -85,7 +85,6 @@ pub struct LeftOut {
 }
 
 /// Effects to leave out for a draw: those that are hidden, and all that are of their classes.
-#[must_use]
 pub fn left_out(draw: &Draw, classes: Option<&DrawClasses>) -> Vec<String> {
     let hidden = draw.recipe.hidden.iter().map(|hidden| hidden.name.to_owned());
     let members = classes.into_iter().flat_map(|classes| &classes.hidden).flat_map(|own| &own.members);
@@ -94,13 +93,11 @@ pub fn left_out(draw: &Draw, classes: Option<&DrawClasses>) -> Vec<String> {
 }
 
 /// The arguments of a program that has to do without effects.
-#[must_use]
 pub fn arguments(without: &[String]) -> Vec<String> {
     without.iter().flat_map(|name| ["--without".to_owned(), name.clone()]).collect()
 }
 
 /// Judges what a program said about a draw of one effect, if its report is good.
-#[must_use]
 pub fn judge(
     draw: &Draw,
     without: &[String],

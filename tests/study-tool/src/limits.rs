@@ -54,7 +54,6 @@ pub enum Scale {
 
 impl Scale {
     /// The scales of an amplitude: two where the drawn range lies on both sides of a number.
-    #[must_use]
     pub fn of(key: &EffectKey) -> Vec<Scale> {
         match key.neutral {
             None => vec![Scale::None],
@@ -113,7 +112,6 @@ impl Scale {
 }
 
 /// |M J| from which an effect is seen.
-#[must_use]
 pub fn threshold(two_sided: bool) -> f64 {
     let quantile = |share| Normal::standard().inverse_cdf(share);
     quantile(1.0 - if two_sided { FALSE_ALARMS / 2.0 } else { FALSE_ALARMS }) + quantile(SEEN)
@@ -125,7 +123,6 @@ pub fn threshold(two_sided: bool) -> f64 {
 pub struct Limit {
     /// Name of the effect.
     pub effect: String,
-    /// Where it is.
     #[serde(rename = "where")]
     pub place: String,
     /// Key of its amplitude.
@@ -159,7 +156,6 @@ pub struct Limits {
 
 impl Limits {
     /// How far the amplitude of an effect lies above its limit: 0 when no amplitude is seen, `None` when every one is.
-    #[must_use]
     pub fn ratio(&self, sheet: &Sheet, place: Place, amplitude: f64) -> Option<f64> {
         let key = &sheet.keys[0];
         Scale::of(key).into_iter().find_map(|scale| {
@@ -185,7 +181,6 @@ fn side(scale: Scale) -> Option<String> {
 /// Which records the limits are computed from: of each axis alone, and of both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
-    /// One axis.
     One(Axis),
     /// Both, linked.
     Both,
@@ -193,7 +188,6 @@ pub enum Measured {
 
 impl Measured {
     /// The record in which the limit of an effect at a place is looked for.
-    #[must_use]
     pub fn of(kind: PlaceKind, place: Place) -> Self {
         match axis_of(place) {
             Some(axis) if !needs_both_axes(kind) => Measured::One(axis),

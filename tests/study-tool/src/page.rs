@@ -12,7 +12,6 @@ use std::fmt::Write;
 
 mod leave_out;
 
-#[must_use]
 pub fn page(score: &Score) -> String {
     let title = format!("Study of {}: {}", score.program.name, score.label);
     let mut sections = vec![

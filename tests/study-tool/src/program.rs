@@ -57,7 +57,6 @@ pub struct Identity {
 
 impl Identity {
     /// Name and checksum in a table's cell.
-    #[must_use]
     pub fn told(&self) -> String {
         format!("{} {:08x}", self.name, self.crc32)
     }
@@ -117,7 +116,6 @@ impl Program {
     }
 
     /// Which program it is.
-    #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
     }

@@ -30,7 +30,6 @@ pub enum Verdict {
     BadData,
 }
 
-/// A good report.
 #[derive(Debug, Clone)]
 pub struct Report {
     pub verdict: Verdict,
@@ -57,11 +56,9 @@ pub struct Next {
     pub otherwise: Option<String>,
 }
 
-/// An effect at a place.
 #[derive(Debug, Clone)]
 pub struct Named {
     pub sheet: &'static Sheet,
-    /// Where it is.
     pub place: Place,
     pub parameters: Vec<Parameter>,
     /// What explains the record as well.
@@ -212,7 +209,6 @@ fn known(raw: RawNamed) -> Result<Named, String> {
 
 impl Report {
     /// File of the experiment that it proposes: a plain name beside it, else there is none.
-    #[must_use]
     pub fn proposed(&self) -> Option<&str> {
         let name = self.next.as_ref()?.experiment.as_deref()?;
         let plain = Path::new(name).file_name().is_some_and(|file| file == name);
@@ -220,7 +216,6 @@ impl Report {
     }
 
     /// Smallest share of the gap that the program claims to have closed, over the signals it tells one for.
-    #[must_use]
     pub fn claimed_closed(&self) -> Option<f64> {
         self.gap.values().filter_map(|gap| gap.closed_ratio).reduce(f64::min)
     }
@@ -232,7 +227,6 @@ impl Report {
     /// ```
     ///
     /// `None` when no signal has all three, or there was no gap.
-    #[must_use]
     pub fn claimed_joint(&self) -> Option<f64> {
         let mut excess = [0.0, 0.0];
         for gap in self.gap.values() {
@@ -245,7 +239,6 @@ impl Report {
     }
 
     /// Whether the program claims that its model leaves no more on the held-out record than nothing missing would.
-    #[must_use]
     pub fn claimed_white(&self) -> Option<bool> {
         let Verification { chi2_after_ratio, chi2_null_ratio: [low, high] } = self.verification?;
         Some((low..=high).contains(&chi2_after_ratio))

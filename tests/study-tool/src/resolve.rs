@@ -59,11 +59,8 @@ pub enum Outcome {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Resolution {
-    /// Of [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Number of the draw.
     pub number: usize,
-    /// Which program.
     pub program: Identity,
     /// File of the experiment.
     pub experiment: String,
@@ -74,13 +71,11 @@ pub struct Resolution {
 }
 
 /// Gives the label under which resolutions stand.
-#[must_use]
 pub fn label(label: &str) -> String {
     format!("{label}-resolve")
 }
 
 /// The entry of a report that leaves the truth ambiguous: it or one of its alternatives is the truth.
-#[must_use]
 pub fn ambiguous<'a>(draw: &Draw, report: &'a Report) -> Option<&'a Named> {
     let [hidden] = draw.recipe.hidden.as_slice() else { return None };
     let open = report.named.iter().filter(|entry| !entry.alternatives.is_empty());
@@ -88,13 +83,11 @@ pub fn ambiguous<'a>(draw: &Draw, report: &'a Report) -> Option<&'a Named> {
 }
 
 /// Whether a report leaves anything ambiguous.
-#[must_use]
 pub fn leaves_open(report: &Report) -> bool {
     report.verdict == Verdict::Ambiguous || report.named.iter().any(|entry| !entry.alternatives.is_empty())
 }
 
 /// Judges what the program said with both records.
-#[must_use]
 pub fn judge(hidden: &Hidden, taken: &Taken, report: &Result<Report, String>) -> Outcome {
     let report = match (taken.ended, report) {
         (Ended::Exited(_), Ok(report)) if report.verdict != Verdict::BadData => report,
@@ -123,7 +116,6 @@ fn is_truth(name: &Named, hidden: &Hidden) -> bool {
 }
 
 /// The recipe of a draw's new record: the same rig with noise of its own.
-#[must_use]
 pub fn recipe(draw: &Draw) -> Recipe {
     Recipe { seed: draw.recipe.seed ^ OWN_NOISE, ..draw.recipe.clone() }
 }

@@ -21,18 +21,12 @@ pub use tables::Tables;
 /// Multiple of its limit from which an effect must be named.
 pub const CLEAR: f64 = 3.0;
 
-/// A study that was scored.
 #[derive(Debug, Serialize)]
 pub struct Score {
-    /// Of [`crate::SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// What its results are called.
     pub label: String,
-    /// Which program.
     pub program: Identity,
-    /// Of all random numbers.
     pub seed: u64,
-    /// How many draws of what.
     pub shape: Shape,
     /// Draws whose classes are not known: there an effect is alone in its class.
     pub without_classes: usize,
@@ -44,30 +38,24 @@ pub struct Score {
     pub cases: Vec<Case>,
 }
 
-/// One draw and what became of it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Case {
-    /// Number of the draw.
     pub number: usize,
-    /// What it is about.
     pub kind: Kind,
     pub recipe: Value,
     /// For each hidden effect its amplitude over the committed limit, or its strength in this record where it has no limit.
     pub over_limit: Vec<Option<f64>>,
     /// Whether two or more hidden effects are of different classes, and all three times above their limits.
     pub separable: bool,
-    /// Whether its form is not the catalogue's.
     pub foreign_form: bool,
     /// Whether parameters are off besides.
     pub wrong_parameters: bool,
     /// Whether its noise is coloured and its sampling jitters.
     pub coloured_noise: bool,
-    /// What it came to.
     pub judgement: Judgement,
     /// What it came to when the hidden effect was left out of the program's catalogue.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<LeftOut>,
-    /// Wall time of the program, s.
     pub wall_s: f64,
     /// Largest resident set of the program, KiB.
     pub memory_kib: u64,
@@ -78,56 +66,38 @@ pub struct Case {
 /// Why a study cannot be scored.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
-    /// A file of a study.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// No folder was given.
     #[error("no study to score: give its folder")]
     Nothing,
-    /// The folders are of different studies.
     #[error("{left} and {right} are of different studies: score those of one")]
     Mixed {
-        /// One folder.
         left: String,
-        /// Another one.
         right: String,
     },
-    /// A result is there twice.
     #[error(
         "draw {number} has a result in {left} and in {right}: give each folder once, or delete one of them"
     )]
     Doubled {
-        /// Number of the draw.
         number: usize,
-        /// One folder.
         left: String,
-        /// Another one.
         right: String,
     },
-    /// Draws have no result.
     #[error(
         "{folders}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
     )]
     MissingRuns {
-        /// Folders of the study.
         folders: String,
-        /// Label of the results.
         label: String,
-        /// How many.
         count: usize,
-        /// The first of them.
         first: usize,
     },
-    /// Results are of different programs.
     #[error("draw {number} was run with {other:?}, the others with {program:?}: score one program at a time")]
     Programs {
-        /// Number of the draw.
         number: usize,
         other: Box<Identity>,
-        /// That of the first draw.
         program: Box<Identity>,
     },
-    /// Effects were left out, and what must show then is not known.
     #[error("effects were left out of the program's catalogue: tests/study/outside-expected.json is wanted")]
     NoExpectations,
 }
@@ -135,7 +105,6 @@ pub enum ScoreError {
 /// What a score is made with besides the results.
 #[derive(Debug, Clone, Copy)]
 pub struct Known<'a> {
-    /// The committed limits.
     pub limits: Option<&'a Limits>,
     /// Classes that are known beforehand, by the number of the draw.
     pub classes: Option<&'a BTreeMap<usize, DrawClasses>>,

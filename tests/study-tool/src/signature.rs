@@ -44,7 +44,6 @@ const FORCE: usize = 1;
 /// Slower than this a piston is at rest, m/s: bristles creep.
 const REST_M_PER_S: f64 = 1e-5;
 
-/// The observer of one record.
 #[derive(Debug)]
 pub struct Observer {
     trajectory: TrueTrajectory,
@@ -73,8 +72,6 @@ struct Window {
 }
 
 impl Observer {
-    /// The observer of a trajectory.
-    #[must_use]
     pub fn new(trajectory: TrueTrajectory) -> Self {
         let sensors = trajectory.rig.sensors();
         let with_rounding = |noise: f64, step: f64| (noise * noise + step * step / 12.0).sqrt();
@@ -93,7 +90,6 @@ impl Observer {
     }
 
     /// M J of a rig against the baseline.
-    #[must_use]
     pub fn signature(&self, rig: &RigParameters) -> Vec<f64> {
         let rows = self.rows();
         let (Run { mut readings, jumps }, _) = self.run(rig);
@@ -107,8 +103,6 @@ impl Observer {
         readings
     }
 
-    /// The baseline that this observer has.
-    #[must_use]
     pub fn rig(&self) -> &RigParameters {
         &self.trajectory.rig
     }
@@ -260,13 +254,11 @@ fn seated(plant: &Plant, points: &[Point; 2]) -> State {
 }
 
 /// Length of a signature: standard deviations of the matched filter.
-#[must_use]
 pub fn length(signature: &[f64]) -> f64 {
     dot(signature, signature).sqrt()
 }
 
 /// How alike two signatures are, 0 to 1, whatever their sign; 0 if one is nothing.
-#[must_use]
 pub fn alike(left: &[f64], right: &[f64]) -> f64 {
     let lengths = length(left) * length(right);
     if lengths > 0.0 { (dot(left, right) / lengths).abs().min(1.0) } else { 0.0 }

@@ -51,13 +51,9 @@ pub fn make_record(
     record_maker::make(recipe, rig, measurement, truth).map_err(|error| error.to_string())
 }
 
-/// How a step is taken.
 pub struct Step<'a> {
-    /// Study and folder.
     pub study: &'a Study,
-    /// What its results are called.
     pub label: &'a str,
-    /// Makes records.
     pub make: Make<'a>,
     /// Effects that are left out of the program's catalogue.
     pub without: Option<Vec<String>>,
@@ -69,48 +65,34 @@ pub struct Step<'a> {
     pub again: bool,
     /// Free space below which nothing is begun, MiB.
     pub least_free_mib: u64,
-    /// Set to stop.
     pub stop: &'a AtomicBool,
 }
 
 /// Why a step cannot be taken; what is done stays.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
-    /// The study's own files.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file could not be copied or read.
     #[error("draw {number}: {error}")]
     Files {
-        /// Which draw.
         number: usize,
-        /// What the system says.
         error: io::Error,
     },
-    /// A record could not be made.
     #[error("draw {number}: its record cannot be made: {reason}")]
     Make {
-        /// Which draw.
         number: usize,
-        /// What the maker says.
         reason: String,
     },
-    /// A record is none, or holds what could tell what is hidden.
     #[error("draw {number}: {error}")]
     Record {
-        /// Which draw.
         number: usize,
-        /// What the reader says.
         error: ReadError,
     },
-    /// The disk is nearly full.
     #[error(
         "{free_mib} MiB are left on the disk, {least_free_mib} are wanted: free some and start again, nothing is lost"
     )]
     Disk {
-        /// What is left.
         free_mib: u64,
-        /// What is wanted.
         least_free_mib: u64,
     },
 }
@@ -119,11 +101,8 @@ pub enum StepError {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunResult {
-    /// Of [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Number of the draw.
     pub number: usize,
-    /// Which program.
     pub program: Identity,
     /// How it ended, time, memory.
     pub taken: Taken,

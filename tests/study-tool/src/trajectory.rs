@@ -8,7 +8,6 @@ pub const WINDOW: usize = 100;
 /// The trajectory of a record, as only its maker knows it.
 #[derive(Debug, Clone)]
 pub struct TrueTrajectory {
-    /// The baseline that an observer has.
     pub rig: RigParameters,
     /// Which axes are measured, drive and load.
     pub measured: [bool; 2],
@@ -23,7 +22,6 @@ pub struct TrueTrajectory {
 /// What a window's free initial state is made of, for one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// How far the rod is out, m.
     pub extension_m: f64,
     /// Its rate, m/s.
     pub rod_velocity_m_per_s: f64,
@@ -36,7 +34,6 @@ pub const POINT_NUMBERS: usize = 4;
 
 impl Point {
     /// The points of both axes at an instant.
-    #[must_use]
     pub fn of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
         std::array::from_fn(|i| {
             let axis = &truth.axes[i];
@@ -65,7 +62,6 @@ impl Point {
 
 impl TrueTrajectory {
     /// Whole windows of the trajectory; what is left over at the end is not looked at.
-    #[must_use]
     pub fn windows(&self) -> usize {
         self.inputs.len().min(self.points.len()) / WINDOW
     }

@@ -15,9 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// An experiment with the programs that it is tried with.
 pub struct Case {
-    /// What was read.
     pub inputs: Inputs,
-    /// The rig's setup.
     pub scene: Scene,
 }
 
@@ -34,7 +32,6 @@ pub struct Made<'a> {
 }
 
 impl Case {
-    /// Reads the files.
     pub fn new(made: &Made) -> Result<Self, Box<dyn Error>> {
         let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../controller");
         let program = |name: Option<&str>| Some(room.join(format!("programs/{}.toml", name?)));
@@ -55,7 +52,6 @@ impl Case {
         Ok(Self { inputs, scene })
     }
 
-    /// Rehearses it.
     pub fn run(&self, trial: &Trial) -> Result<Run, TrialError> {
         rehearsed::rehearse(&self.inputs, &self.scene, trial)
     }

@@ -47,7 +47,6 @@ impl Default for Trial {
 
 impl Trial {
     /// All corners of mass and supply, row by row.
-    #[must_use]
     pub fn corners() -> Vec<Self> {
         let corner = |added_mass_kg, supply_bar| Self { added_mass_kg, supply_bar, ..Self::default() };
         let row = |mass_kg| SUPPLIES_BAR.map(|supply_bar| corner(mass_kg, supply_bar));
@@ -71,16 +70,12 @@ impl Trial {
 /// Why a trial could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
-    /// The conditions are none of the rig's.
     #[error(transparent)]
     Rig(#[from] ParameterError),
-    /// The setup is none of the rig's.
     #[error(transparent)]
     Setup(#[from] plant::SetupError),
-    /// The algorithm failed.
     #[error(transparent)]
     Algorithm(#[from] AlgorithmFault),
-    /// Experiment and programs do not go together.
     #[error(transparent)]
     Run(#[from] InputError),
 }

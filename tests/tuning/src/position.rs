@@ -71,8 +71,6 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Whether nothing oscillated.
-    #[must_use]
     pub fn is_still(&self) -> bool {
         self.rest_peak_to_peak_m < STILL_M && self.ripple_m < RIPPLE_M
     }

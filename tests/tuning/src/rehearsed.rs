@@ -34,18 +34,14 @@ const SMOOTH_M: usize = 10;
 const SMOOTH_N: usize = 5;
 const SLOW: usize = 100;
 
-/// A run as rehearsed.
 pub struct Run {
-    /// Each cycle.
     pub rows: Vec<Rehearsed>,
-    /// Whether the experiment came to its end.
     pub done: bool,
 }
 
 /// What of a run says whether it oscillated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unrest {
-    /// Whether the experiment came to its end.
     pub done: bool,
     /// Least peak to peak of the drive's position among the last three half seconds, m.
     pub position_m: f64,
@@ -56,8 +52,6 @@ pub struct Unrest {
 }
 
 impl Unrest {
-    /// Whether nothing oscillated.
-    #[must_use]
     pub fn is_still(&self) -> bool {
         self.done && self.position_m < STILL_M && self.force_n < STILL_N && self.ripple_n < RIPPLE_N
     }
@@ -116,7 +110,6 @@ fn is_still(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<bool, Trial
 
 impl Run {
     /// What says whether it oscillated.
-    #[must_use]
     pub fn unrest(&self) -> Unrest {
         let drive = |row: &Rehearsed| row.axes[Axis::Drive.index()];
         let in_experiment =

@@ -23,7 +23,6 @@ pub struct Tables {
 /// Rates of a part of the cases.
 #[derive(Debug, Clone, Serialize)]
 pub struct Split {
-    /// Which part.
     pub name: String,
     /// Nothing of the catalogue is named.
     pub no_wrong_name: Rate,
@@ -43,7 +42,6 @@ pub struct Split {
 
 impl Tables {
     /// The tables of all cases; those with the whole catalogue are none of them.
-    #[must_use]
     pub fn of(cases: &[Case]) -> Self {
         let pairs = || cases.iter().filter_map(|case| Some((case, case.left_out.as_ref()?)));
         let split = |name: &str, is: &dyn Fn(&Case, &LeftOut) -> bool| {
@@ -79,7 +77,6 @@ fn split(name: &str, cases: &[(&Case, &LeftOut)]) -> Split {
 }
 
 /// The lines that the targets are about.
-#[must_use]
 pub fn headline(cases: &[Case]) -> Vec<Line> {
     let left = || cases.iter().filter_map(|case| case.left_out.as_ref());
     let line = |name: &str, wanted, rate| Line { name: name.to_owned(), rate, wanted };

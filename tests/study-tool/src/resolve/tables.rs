@@ -20,15 +20,11 @@ const WANTED: &str = "at least 80 %";
 /// What became of the ambiguous draws of a label, as `resolve-LABEL.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Table {
-    /// Of [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// What the results are called.
     pub label: String,
     /// Which program; nothing when there are no results.
     pub program: Option<Identity>,
-    /// Of all random numbers.
     pub seed: u64,
-    /// How many draws of what.
     pub shape: Shape,
     /// Draws of one effect that have a result.
     pub singles: usize,
@@ -38,16 +34,13 @@ pub struct Table {
     pub truth_not_among: usize,
     /// Class by class, the most frequent first.
     pub classes: Vec<Class>,
-    /// All of them together.
     pub all: Class,
-    /// Draw by draw.
     pub cases: Vec<Case>,
 }
 
 /// An ambiguous draw and what became of it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Case {
-    /// Number of the draw.
     pub number: usize,
     /// The hidden effect and its place.
     pub truth: String,
@@ -72,7 +65,6 @@ pub struct Case {
 pub struct Class {
     /// The effects, in the order of the alphabet.
     pub name: String,
-    /// Draws.
     pub ambiguous: usize,
     /// Draws for which no experiment is proposed.
     pub no_experiment: usize,
@@ -82,11 +74,9 @@ pub struct Class {
     pub experiments: BTreeMap<String, usize>,
     /// Of the proposed experiments that were run: how many resolved.
     pub resolved: Rate,
-    /// Still ambiguous.
     pub still_ambiguous: usize,
     /// The right name was gone.
     pub wrong: usize,
-    /// No good report.
     pub errors: usize,
     /// Proposed, but not run yet.
     pub not_run: usize,
@@ -135,7 +125,6 @@ impl Table {
     }
 
     /// As a table in Markdown, with what it is of above it.
-    #[must_use]
     pub fn markdown(&self) -> String {
         let identity = self
             .program

@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 /// Columns of the confusion matrix beside the effects.
 pub const BESIDE: [&str; 5] = ["nothing", "parameter", "outside", "ambiguous", "error"];
 
-/// All tables.
 #[derive(Debug, Serialize)]
 pub struct Tables {
     /// The lines that the targets are about.
@@ -24,9 +23,7 @@ pub struct Tables {
     pub confusion: Vec<ConfusionRow>,
     /// What was called in cases with nothing hidden, and in those of a wrong parameter.
     pub nothing_hidden: Vec<ConfusionRow>,
-    /// Fitted numbers.
     pub numbers: Numbers,
-    /// Wall time of the program, s.
     pub wall_s: Spread,
     /// Largest resident set, MiB.
     pub memory_mib: Spread,
@@ -50,7 +47,6 @@ pub struct Line {
 
 impl Line {
     /// Whether the rate should be low: then its upper bound is told.
-    #[must_use]
     pub fn is_low(&self) -> bool {
         self.wanted == "none" || self.wanted.starts_with("at most")
     }
@@ -59,7 +55,6 @@ impl Line {
 /// Rates of a part of the single effects.
 #[derive(Debug, Clone, Serialize)]
 pub struct Split {
-    /// Which part.
     pub name: String,
     /// A name of the class.
     pub class_right: Rate,
@@ -71,18 +66,14 @@ pub struct Split {
     pub where_right: Rate,
 }
 
-/// A row of the confusion matrix.
 #[derive(Debug, Clone, Serialize)]
 pub struct ConfusionRow {
-    /// What was hidden.
     pub truth: String,
-    /// Cases.
     pub of: usize,
     /// How often it was called so: all, of its class, at the right place.
     pub called: BTreeMap<String, [usize; 3]>,
 }
 
-/// How good fitted numbers are.
 #[derive(Debug, Clone, Serialize)]
 pub struct Numbers {
     /// |fitted - true| / |true| of amplitudes, in the catalogue's form.
@@ -102,14 +93,12 @@ pub struct Numbers {
 /// Least, median, 90th percentile, largest.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Spread {
-    /// How many.
     pub of: usize,
     /// Least, median, 90th percentile, largest; `None` of nothing.
     pub quantiles: Option<[f64; 4]>,
 }
 
 impl Spread {
-    /// The spread of values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_by(f64::total_cmp);
@@ -120,8 +109,6 @@ impl Spread {
 }
 
 impl Tables {
-    /// The tables of these cases.
-    #[must_use]
     pub fn of(cases: &[Case]) -> Self {
         let singles: Vec<&Case> = of_kind(cases, Kind::Single).collect();
         let mut errors = BTreeMap::new();

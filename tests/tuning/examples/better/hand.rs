@@ -38,7 +38,6 @@ const SUBJECTS: [Subject; 5] = [
     Subject { name: "manual mode, with its distinction", load: "force-manual", set: &[] },
 ];
 
-/// Prints the table.
 pub(crate) fn table() -> Result<(), Box<dyn Error>> {
     println!("\n### {EXPERIMENT} (manual mode)\n");
     println!(

@@ -4,10 +4,8 @@ use std::error::Error;
 use tuning::cases::{Case, Made, figures};
 use tuning::{Trial, TrialError, in_parallel};
 
-/// Seeds of the sensors' noise.
 pub(crate) const SEEDS: [u64; 5] = [1, 2, 3, 4, 5];
 
-/// Programs that are compared.
 pub(crate) struct Subject {
     pub(crate) name: &'static str,
     pub(crate) drive: Option<&'static str>,

@@ -39,7 +39,6 @@ const SEEDS: [u64; 3] = [1, 2, 3];
 /// Programs of the drive that are tried beside each other.
 const DRIVES: [&str; 5] = [DRIVE, "position-paper-linked", "position-p", "position-pid", "position-cascade"];
 
-/// Prints them all.
 pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
     for ladder in &LADDERS {
         println!("\n### {}, drive: {DRIVE}\n", ladder.load);

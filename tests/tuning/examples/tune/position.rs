@@ -20,7 +20,6 @@ const PROGRAMS: [(&str, &[f64]); 3] = [
     ("position-cascade", &[5.0, 10.0, 15.0, 20.0, 25.0, 30.0]),
 ];
 
-/// Prints them all.
 pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
     for (name, gains) in PROGRAMS {
         let path =
