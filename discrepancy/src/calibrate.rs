@@ -12,14 +12,12 @@ pub mod finer;
 
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{Around, Refit, refit};
+use crate::refit::{Around, Refit, refit, relinearise};
 use crate::report::Quantity;
 use plant::RigParameters;
 
 /// Maximum number of iterates.
 const POINTS: usize = 8;
-/// Fall of the loss below which it has converged.
-const CONVERGED: f64 = 1.0;
 /// Share of the tolerance above which an error means that the records do not determine the parameter.
 const UNRESOLVED: f64 = 0.7;
 
@@ -30,20 +28,8 @@ pub struct Calibrated {
 }
 
 pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
-    let mut best = refit(engine, baseline, &[], 0.0).expect("the baseline is a rig");
-    for _ in 1..POINTS {
-        let columns = engine.parameter_columns(engine.rig(), &best.factors);
-        let next = Around { columns, factors: best.factors };
-        let Some(fit) = refit(engine, &next, &[], 0.0) else { break };
-        let converged = fit.loss > best.loss - CONVERGED;
-        if fit.loss < best.loss {
-            best = fit;
-        }
-        if converged {
-            break;
-        }
-    }
-    Calibrated { fit: best }
+    let first = refit(engine, baseline, &[], 0.0).expect("the baseline is a rig");
+    Calibrated { fit: relinearise(engine, first, 0.0, POINTS - 1) }
 }
 
 impl Calibrated {

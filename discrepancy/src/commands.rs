@@ -12,7 +12,6 @@ use crate::cli::{
 use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
-use crate::parameters::COUNT;
 use crate::refit::Around;
 use crate::report::{Gap, NamedEffect, Quantity, Report, Verdict, Verification, decimals};
 use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
@@ -36,22 +35,13 @@ pub enum CommandError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error("{file}: {why}")]
-    File {
-        file: PathBuf,
-        why: io::Error,
-    },
+    File { file: PathBuf, why: io::Error },
     #[error("{file}: {why}: give the report.json of a close")]
-    Report {
-        file: PathBuf,
-        why: serde_json::Error,
-    },
+    Report { file: PathBuf, why: serde_json::Error },
     #[error("{0}")]
     BadData(String),
     #[error("--without {name}: unknown effect; the catalogue has {known}")]
-    UnknownEffect {
-        name: String,
-        known: String,
-    },
+    UnknownEffect { name: String, known: String },
 }
 
 impl CommandError {
@@ -253,9 +243,7 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     let out = folder(arguments)?;
     let (rig_file, gridded) = gridded_records(arguments)?;
     let engine = Engine::new(&gridded, &rig_file.rig);
-    let ones = [1.0; COUNT];
-    let around = Around { columns: engine.parameter_columns(&rig_file.rig, &ones), factors: ones };
-    let calibrated = calibrate(&engine, &around);
+    let calibrated = calibrate(&engine, &Around::at_baseline(&engine));
     let finer = finer(&engine, &calibrated).ok_or_else(|| {
         CommandError::BadData("what fits these records best is out of the rig file's ranges".to_owned())
     })?;

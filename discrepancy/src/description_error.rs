@@ -7,21 +7,9 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum DescriptionError {
     #[error("cannot read the {what} {}: {reason}", file.display())]
-    Open {
-        what: &'static str,
-        file: PathBuf,
-        reason: String,
-    },
+    Open { what: &'static str, file: PathBuf, reason: String },
     #[error("{}: {reason}", file.display())]
-    Syntax {
-        file: PathBuf,
-        reason: String,
-    },
+    Syntax { file: PathBuf, reason: String },
     #[error("{}: {key} = {value}; allowed is {allowed}", file.display())]
-    Value {
-        file: PathBuf,
-        key: String,
-        value: String,
-        allowed: String,
-    },
+    Value { file: PathBuf, key: String, value: String, allowed: String },
 }

@@ -9,6 +9,7 @@
 //! All columns are whitened, with the start states of the windows projected out ([`crate::windows`]). Simulations run on all
 //! cores and are gathered in a fixed order, so that two runs have the same bits.
 
+use crate::fit::Products;
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
 use crate::stats::order_statistic;
@@ -51,7 +52,7 @@ impl<'a> Engine<'a> {
         let mut engine =
             Engine { windows, rig: rig.clone(), rows, freedom, level: 1.0, kept: Mutex::default() };
         let residual = engine.residual(&engine.simulate(rig));
-        engine.level = level(&residual, rows, &engine.freedom);
+        engine.level = level(&engine.squares(&residual), &engine.freedom);
         engine.freedom.iter_mut().for_each(|freedom| *freedom *= engine.level);
         engine
     }
@@ -176,6 +177,16 @@ impl<'a> Engine<'a> {
         all
     }
 
+    /// Squared residuals of each window.
+    pub(crate) fn squares(&self, residual: &[f64]) -> Vec<f64> {
+        residual.chunks_exact(self.rows).map(|window| dot(window, window)).collect()
+    }
+
+    /// The products of a residual with columns.
+    pub(crate) fn products<C: AsRef<[f64]>>(&self, residual: &[f64], columns: &[C]) -> Products {
+        Products::new(residual, columns, &self.freedom, self.rows)
+    }
+
     /// Sensitivities of a rig's readings to all parameter factors, by central differences at `factors`.
     ///
     /// # Panics
@@ -207,12 +218,8 @@ impl<'a> Engine<'a> {
 
 /// Noise level: the lowest decile of chi2 per degree of freedom over its expectation. The estimated noise is right to some per
 /// cent only, which over 200 windows would look like a large excess.
-fn level(residual: &[f64], rows: usize, freedom: &[f64]) -> f64 {
-    let mut quiet: Vec<f64> = residual
-        .chunks_exact(rows)
-        .zip(freedom)
-        .map(|(window, freedom)| dot(window, window) / freedom)
-        .collect();
+fn level(squares: &[f64], freedom: &[f64]) -> f64 {
+    let mut quiet: Vec<f64> = squares.iter().zip(freedom).map(|(square, freedom)| square / freedom).collect();
     let decile = quiet.len() / 10;
     let Some(quantile) = order_statistic(&mut quiet, decile) else { return 1.0 };
     let mean = freedom.iter().sum::<f64>() / freedom.len() as f64;

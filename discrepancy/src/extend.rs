@@ -41,52 +41,25 @@ pub enum ExtendError {
     #[error(transparent)]
     Rig(ParameterError),
     #[error("unknown effect {effect}; known: {known}")]
-    UnknownEffect {
-        effect: String,
-        known: String,
-    },
+    UnknownEffect { effect: String, known: String },
     #[error("{effect} cannot be at {place}; it can be at {known}")]
-    UnknownPlace {
-        effect: String,
-        place: String,
-        known: String,
-    },
+    UnknownPlace { effect: String, place: String, known: String },
     #[error("{effect} has no number {key}; it has {known}")]
-    UnknownKey {
-        effect: String,
-        key: String,
-        known: String,
-    },
+    UnknownKey { effect: String, key: String, known: String },
     #[error("{what} is to be changed twice")]
-    Twice {
-        what: String,
-    },
+    Twice { what: String },
     #[error("unknown parameter {name}; known: {known}")]
-    UnknownParameter {
-        name: String,
-        known: String,
-    },
+    UnknownParameter { name: String, known: String },
     #[error("{name} is in {unit:?}; the rig file has it in {wanted:?}, and a factor has no unit")]
-    Unit {
-        name: String,
-        unit: String,
-        wanted: String,
-    },
+    Unit { name: String, unit: String, wanted: String },
     #[error("{what} = {value} is no finite number")]
-    NotFinite {
-        what: String,
-        value: String,
-    },
+    NotFinite { what: String, value: String },
     #[error("the extended rig file would be refused: {0}")]
     Refused(ParameterError),
     #[error(
         "{file}: cannot add {what} to a file written like this: {reason}; write it as a table of its own"
     )]
-    Layout {
-        file: String,
-        what: String,
-        reason: String,
-    },
+    Layout { file: String, what: String, reason: String },
 }
 
 /// The rig file with these effects and parameters, `records` named as where they come from; `file` is only its name for messages.

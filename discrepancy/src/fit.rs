@@ -30,6 +30,27 @@ pub(crate) fn loss(squares: &[f64], freedom: &[f64]) -> f64 {
     squares.iter().zip(freedom).map(|(square, freedom)| freedom * (square / freedom).max(LEAST).ln()).sum()
 }
 
+/// Gauss-Newton: steps from an iterate to one of less loss, until `step` finds none, one lowers the loss by less than `converged`,
+/// or `steps` are done.
+pub(crate) fn descend<P>(
+    start: P,
+    steps: usize,
+    converged: f64,
+    loss: impl Fn(&P) -> f64,
+    mut step: impl FnMut(&P) -> Option<P>,
+) -> P {
+    let mut point = start;
+    for _ in 0..steps {
+        let Some(next) = step(&point) else { break };
+        let fall = loss(&point) - loss(&next);
+        point = next;
+        if fall < converged {
+            break;
+        }
+    }
+    point
+}
+
 /// Products of a residual and some columns, window by window.
 #[derive(Clone, Debug)]
 pub(crate) struct Products {
@@ -58,15 +79,20 @@ pub(crate) struct Fit {
 
 impl Products {
     /// The products of a residual with columns, all window by window of `rows` numbers.
-    pub(crate) fn new(residual: &[f64], columns: &[&[f64]], freedom: &[f64], rows: usize) -> Self {
+    pub(crate) fn new<C: AsRef<[f64]>>(
+        residual: &[f64],
+        columns: &[C],
+        freedom: &[f64],
+        rows: usize,
+    ) -> Self {
         let windows = freedom.len();
         let information = (0..windows)
             .map(|window| {
-                let part = |column: &'_ usize| &columns[*column][window * rows..][..rows];
+                let part = |column: usize| &columns[column].as_ref()[window * rows..][..rows];
                 let mut products = vec![0.0; columns.len() * columns.len()];
                 for left in 0..columns.len() {
                     for right in 0..=left {
-                        let product = dot(part(&left), part(&right));
+                        let product = dot(part(left), part(right));
                         products[left * columns.len() + right] = product;
                         products[right * columns.len() + left] = product;
                     }
@@ -85,13 +111,16 @@ impl Products {
         products
     }
 
-    pub(crate) fn set_residual(&mut self, residual: &[f64], columns: &[&[f64]], rows: usize) {
+    pub(crate) fn set_residual<C: AsRef<[f64]>>(&mut self, residual: &[f64], columns: &[C], rows: usize) {
         let windows = residual.chunks_exact(rows);
         self.squares = windows.clone().map(|residual| dot(residual, residual)).collect();
         self.scores = windows
             .enumerate()
             .map(|(window, residual)| {
-                columns.iter().map(|column| dot(residual, &column[window * rows..][..rows])).collect()
+                columns
+                    .iter()
+                    .map(|column| dot(residual, &column.as_ref()[window * rows..][..rows]))
+                    .collect()
             })
             .collect();
     }

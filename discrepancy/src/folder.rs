@@ -12,10 +12,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     #[error("{}: {why}: choose another folder, or make room", file.display())]
-    Write {
-        file: PathBuf,
-        why: io::Error,
-    },
+    Write { file: PathBuf, why: io::Error },
     #[error("{} is read here and would be written over: choose another --out", file.display())]
     Input { file: PathBuf },
 }

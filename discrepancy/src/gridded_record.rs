@@ -104,11 +104,7 @@ pub enum GriddingError {
     #[error("{file}: no axis is measured: a record needs the columns of drive or load")]
     NoAxis { file: String },
     #[error("{file}: {length_ms} ms: a record needs at least {least_ms} ms")]
-    Short {
-        file: String,
-        length_ms: usize,
-        least_ms: usize,
-    },
+    Short { file: String, length_ms: usize, least_ms: usize },
 }
 
 impl GriddingError {

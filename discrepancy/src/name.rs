@@ -24,8 +24,7 @@ mod start_states;
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::parameters::COUNT;
-use crate::refit::{Around, Placed, Refit, derivative, refit, rig_of};
+use crate::refit::{Around, Placed, Refit, around_of, derivative, rig_of};
 use crate::screen::{Columns, Screened};
 pub(crate) use elimination::same;
 use elimination::{alternatives, drop_unneeded, shares, swap};
@@ -40,9 +39,8 @@ use start_states::{Restarted, refit_with_starts};
 const MOST: usize = 3;
 /// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
-/// Maximum number of relinearisations of the parameter sensitivities, and the fall of the loss that ends them.
+/// Maximum number of relinearisations of the parameter sensitivities.
 const RELINEARISATIONS: usize = 4;
-const CONVERGED: f64 = 1.0;
 /// Mean log ratio of a window's chi2 to its degrees of freedom above which a model shows lack of fit (is inadequate).
 const EXCESS: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the eye meets the carriage: the true model leaves up to 0.2.
@@ -105,8 +103,7 @@ pub struct Found {
 
 /// Selects the effects that are missing from the baseline.
 pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn FnMut(&str)) -> Found {
-    let ones = [1.0; COUNT];
-    let around = Around { columns: engine.parameter_columns(engine.rig(), &ones), factors: ones };
+    let around = Around::at_baseline(engine);
     progress("parameters alone");
     let calibrated = calibrate(engine, &around);
     progress(&format!("screening {} candidates", candidates.len()));
@@ -197,26 +194,9 @@ pub(crate) fn on_all(engine: &Engine<'_>, found: &mut Found) {
     }
 }
 
-/// Parameter sensitivities linearised at a model.
-fn around_of(engine: &Engine<'_>, model: &Refit) -> Around {
-    let rig = rig_of(engine.rig(), &model.placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
-    Around { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
-}
-
-/// Refits a model with sensitivities relinearised at itself until the loss converges.
-fn relinearise(engine: &Engine<'_>, model: &Refit) -> Refit {
-    let mut best = model.clone();
-    for _ in 0..RELINEARISATIONS {
-        let Some(next) = refit(engine, &around_of(engine, &best), &best.placed, NUMBER_COSTS) else { break };
-        let converged = next.loss > best.loss - CONVERGED;
-        if next.loss < best.loss {
-            best = next;
-        }
-        if converged {
-            break;
-        }
-    }
-    best
+/// Refits a model with sensitivities relinearised at itself.
+fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
+    crate::refit::relinearise(engine, model, NUMBER_COSTS, RELINEARISATIONS)
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.

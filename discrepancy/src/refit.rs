@@ -10,10 +10,11 @@
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::fit::{Fit, Products};
+use crate::fit::{Fit, Products, descend};
 use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use plant::RigParameters;
+use std::iter::successors;
 
 /// Smallest step of finite differences, and its share of the coordinate.
 const CHANGE: f64 = 0.02;
@@ -24,6 +25,8 @@ const SHORTENINGS: usize = 3;
 const SHORTER: f64 = 0.4;
 /// Fall of the loss below which a fit has converged.
 const CONVERGED: f64 = 0.3;
+/// The same of relinearisations.
+pub(crate) const CONVERGED_RELINEARISED: f64 = 1.0;
 /// Prior standard deviations of coordinates: amplitudes, shapes.
 const AMPLITUDE_TOLERANCE: f64 = 3.0;
 const SHAPE_TOLERANCE: f64 = 0.7;
@@ -68,6 +71,12 @@ pub struct Around {
 }
 
 impl Around {
+    /// At the rig file's values.
+    pub fn at_baseline(engine: &Engine<'_>) -> Self {
+        let factors = [1.0; COUNT];
+        Around { columns: engine.parameter_columns(engine.rig(), &factors), factors }
+    }
+
     /// Deviations of the parameters from the prior means.
     pub fn off(&self) -> Vec<f64> {
         self.factors.iter().map(|factor| factor - 1.0).collect()
@@ -109,6 +118,20 @@ pub(crate) fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
     tolerance.powi(-2)
 }
 
+/// Prior precisions of the parameters, then of all coordinates of the effects.
+pub(crate) fn prior_precisions(placed: &[Placed]) -> Vec<f64> {
+    let of_effect = |effect: &Placed| {
+        (0..effect.coordinates.len()).map(|key| coordinate_ridge(&effect.candidate, key)).collect::<Vec<_>>()
+    };
+    parameter_ridges().into_iter().chain(placed.iter().flat_map(of_effect)).collect()
+}
+
+/// Deviations from the prior means in the same order.
+pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[Placed]) -> Vec<f64> {
+    let coordinates = placed.iter().flat_map(|effect| effect.coordinates.iter().copied());
+    factors.iter().map(|factor| factor - 1.0).chain(coordinates).collect()
+}
+
 /// All coordinates of the effects: place in `placed`, and key.
 fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
     placed
@@ -121,9 +144,7 @@ fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
 /// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
 pub(crate) fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
     let Some(rig) = rig_of(engine.rig(), placed, &around.factors) else { return f64::INFINITY };
-    let residual = engine.residual(&engine.simulate_coarsely(&rig));
-    let columns: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).collect();
-    let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
+    let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &around.columns);
     products.fit_from(&(0..COUNT).collect::<Vec<_>>(), &parameter_ridges(), &around.off()).loss
 }
 
@@ -151,20 +172,19 @@ pub(crate) fn refit_steps(
 ) -> Option<Refit> {
     let parameters: Vec<usize> = (0..COUNT).collect();
     let (ridges, off) = (parameter_ridges(), around.off());
+    let all_ridges = prior_precisions(start);
+    let chosen: Vec<usize> = (0..all_ridges.len()).collect();
     let moved = moved(start);
-    let parameter_columns: Vec<&[f64]> = around.columns.iter().map(Vec::as_slice).collect();
     let mut parameter_products: Option<Products> = None;
     let mut evaluate = |placed: Vec<Placed>| -> Option<Point> {
         let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &around.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
             Some(products) => {
-                products.set_residual(&residual, &parameter_columns, engine.rows());
+                products.set_residual(&residual, &around.columns, engine.rows());
                 products
             }
-            none => {
-                none.insert(Products::new(&residual, &parameter_columns, engine.freedom(), engine.rows()))
-            }
+            none => none.insert(engine.products(&residual, &around.columns)),
         };
         let fit = products.fit_from(&parameters, &ridges, &off);
         Some(Point { placed, simulated, residual, fit })
@@ -177,49 +197,30 @@ pub(crate) fn refit_steps(
             })
             .sum()
     };
-    let mut point = evaluate(start.to_vec())?;
-    let mut last = None;
-    for step in 0..=steps {
+    let total = |point: &Point| point.fit.loss + prior(&point.placed);
+    let first = evaluate(start.to_vec())?;
+    // The last linearisation; one more than steps are taken, for the errors.
+    let (mut last, mut left) = (None, steps);
+    let point = descend(first, steps + 1, CONVERGED, total, |point| {
+        last = None;
         let columns = coordinate_columns(engine, &around.factors, &point.placed, &point.simulated)?;
-        let all: Vec<&[f64]> =
-            parameter_columns.iter().copied().chain(columns.iter().map(Vec::as_slice)).collect();
-        let products = Products::new(&point.residual, &all, engine.freedom(), engine.rows());
-        let chosen: Vec<usize> = (0..all.len()).collect();
-        let mut all_ridges = ridges.clone();
-        all_ridges.extend(moved.iter().map(|(at, key)| coordinate_ridge(&point.placed[*at].candidate, *key)));
-        let places = moved.iter().map(|(at, key)| point.placed[*at].coordinates[*key]);
-        let from: Vec<f64> = off.iter().copied().chain(places).collect();
+        let all: Vec<&Vec<f64>> = around.columns.iter().chain(&columns).collect();
+        let products = last.insert(engine.products(&point.residual, &all));
+        left = left.checked_sub(1)?;
+        let from = prior_deviations(&around.factors, &point.placed);
         let joint = products.fit_from(&chosen, &all_ridges, &from);
-        let before = point.fit.loss + prior(&point.placed);
-        last = Some((products, all_ridges, chosen));
-        if step == steps {
-            break;
-        }
-        let mut share = 1.0;
-        let mut better = None;
-        for _ in 0..=SHORTENINGS {
+        let shares = successors(Some(1.0), |share| Some(share * SHORTER));
+        shares.take(SHORTENINGS + 1).find_map(|share| {
             let mut placed = point.placed.clone();
             for ((at, key), change) in moved.iter().zip(&joint.coefficients[COUNT..]) {
                 let [least, most] = placed[*at].candidate.reach(*key);
                 let coordinate = &mut placed[*at].coordinates[*key];
                 *coordinate = (*coordinate + share * change).clamp(least, most);
             }
-            if let Some(tried) = evaluate(placed)
-                && tried.fit.loss + prior(&tried.placed) < before
-            {
-                better = Some(tried);
-                break;
-            }
-            share *= SHORTER;
-        }
-        let Some(tried) = better else { break };
-        let converged = before - (tried.fit.loss + prior(&tried.placed)) < CONVERGED;
-        point = tried;
-        if converged {
-            break;
-        }
-    }
-    let (products, all_ridges, chosen) = last?;
+            evaluate(placed).filter(|tried| total(tried) < total(point))
+        })
+    });
+    let products = last?;
     // At the final iterate: parameters as fitted, coordinates unchanged.
     let mut at_point = point.fit.clone();
     at_point.coefficients.extend(std::iter::repeat_n(0.0, moved.len()));
@@ -241,6 +242,28 @@ pub(crate) fn refit_steps(
     }
     let loss = point.fit.loss + prior(&point.placed) + costs(moved.len(), &factors, penalty);
     Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
+}
+
+/// Parameter sensitivities linearised at a model.
+pub(crate) fn around_of(engine: &Engine<'_>, model: &Refit) -> Around {
+    let rig = rig_of(engine.rig(), &model.placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
+    Around { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
+}
+
+/// Refits a model with the parameters linearised anew at its own values, until the loss converges.
+pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, penalty: f64, times: usize) -> Refit {
+    let mut best = model;
+    for _ in 0..times {
+        let Some(next) = refit(engine, &around_of(engine, &best), &best.placed, penalty) else { break };
+        let converged = next.loss > best.loss - CONVERGED_RELINEARISED;
+        if next.loss < best.loss {
+            best = next;
+        }
+        if converged {
+            break;
+        }
+    }
+    best
 }
 
 /// Sensitivities to each coordinate of a model, in the order of effects and keys; `simulated` are its readings. `None` where a

@@ -71,9 +71,8 @@ impl Columns {
         beside: &[Vec<f64>],
     ) -> (f64, Vec<Screened>) {
         let always = COUNT + beside.len();
-        let all: Vec<&[f64]> =
-            around.columns.iter().chain(beside).chain(&self.columns).map(Vec::as_slice).collect();
-        let products = Products::new(residual, &all, engine.freedom(), engine.rows());
+        let all: Vec<&Vec<f64>> = around.columns.iter().chain(beside).chain(&self.columns).collect();
+        let products = engine.products(residual, &all);
         let (mut ridges, mut from) = (parameter_ridges(), around.off());
         ridges.resize(always, 1e-2);
         from.resize(always, 0.0);

@@ -59,52 +59,32 @@ pub enum BalanceError {
     #[error("this kind of model has no term '{effect}' of form '{form}', or its shape lacks a number")]
     Term { effect: String, form: String },
     #[error("{name}: a chamber needs rig = \"…/rig.toml\" for its area, volume, valve tables and lags")]
-    NoRig {
-        name: String,
-    },
+    NoRig { name: String },
     #[error("the model's rig: {reason}")]
-    Rig {
-        reason: String,
-    },
+    Rig { reason: String },
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error("{file}: no values of {column}, which the model's balance needs: see [channels] of the model")]
     Missing { file: String, column: String },
     #[error("{file}:{line}: time does not grow: sort the rows, or split the record there")]
-    Time {
-        file: String,
-        line: u64,
-    },
+    Time { file: String, line: u64 },
     #[error(
         "{file}: {rows} rows pass the model's [processing], {FEWEST_ROWS} are needed: are position_mm, speed_above_mm_per_s right?"
     )]
-    Few {
-        file: String,
-        rows: usize,
-    },
+    Few { file: String, rows: usize },
     #[error("{why}")]
-    Unusable {
-        why: String,
-    },
+    Unusable { why: String },
     #[error(
         "{file}:{line}: {time_s} s: {rows} rows cannot reach as far at a period of {period_s} s: mend the time, or \
              processing.period_s of the model"
     )]
-    Far {
-        file: String,
-        line: u64,
-        time_s: f64,
-        rows: usize,
-        period_s: f64,
-    },
+    Far { file: String, line: u64, time_s: f64, rows: usize, period_s: f64 },
     #[error("a balance needs one training record at least")]
     NoRecord,
     #[error(
         "the training records cannot tell {columns} apart: add one in which they differ, or switch one off under [baseline]"
     )]
-    NotExcited {
-        columns: String,
-    },
+    NotExcited { columns: String },
 }
 
 /// Whether a text is a model file: TOML with a `kind` at its top. A rig file has none.

@@ -65,10 +65,7 @@ pub struct Outcome {
 #[derive(Debug, thiserror::Error)]
 pub enum WorkflowError {
     #[error("{file}: {why}")]
-    Rig {
-        file: String,
-        why: std::io::Error,
-    },
+    Rig { file: String, why: std::io::Error },
     #[error(transparent)]
     Parameters(#[from] ParameterError),
     #[error(
@@ -78,18 +75,12 @@ pub enum WorkflowError {
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error("{file}: cannot be used: {why}")]
-    Unusable {
-        file: String,
-        why: String,
-    },
+    Unusable { file: String, why: String },
     #[error(
         "{first} and {other} do not show the same axes: records are judged on what all of them show, and of linked rods that \
          must be both"
     )]
-    Mixed {
-        first: String,
-        other: String,
-    },
+    Mixed { first: String, other: String },
     #[error(transparent)]
     Extend(#[from] ExtendError),
 }

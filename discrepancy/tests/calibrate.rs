@@ -5,16 +5,14 @@ use discrepancy::calibrate::finer::{Finer, finer};
 use discrepancy::calibrate::{calibrate, quantity};
 use discrepancy::engine::Engine;
 use discrepancy::extend::extend;
-use discrepancy::parameters::{COUNT, PARAMETERS};
+use discrepancy::parameters::PARAMETERS;
 use discrepancy::refit::Around;
 use plant::{Axis, RigParameters};
 
 const KV_SUPPLY: [f64; 6] = [0.0, 0.0, 0.123, 0.36, 0.57, 0.66];
 
 fn found(engine: &Engine<'_>) -> Finer {
-    let ones = [1.0; COUNT];
-    let around = Around { columns: engine.parameter_columns(engine.rig(), &ones), factors: ones };
-    finer(engine, &calibrate(engine, &around)).expect("a rig")
+    finer(engine, &calibrate(engine, &Around::at_baseline(engine))).expect("a rig")
 }
 
 #[test]
@@ -22,9 +20,7 @@ fn what_is_reported_of_a_parameter_is_what_was_simulated_and_a_rig_file() {
     let rig = RigParameters::baseline();
     let records = [gridded(&rig, &rig)];
     let engine = Engine::new(&records, &rig);
-    let ones = [1.0; COUNT];
-    let around = Around { columns: engine.parameter_columns(&rig, &ones), factors: ones };
-    let mut fit = calibrate(&engine, &around).fit;
+    let mut fit = calibrate(&engine, &Around::at_baseline(&engine)).fit;
     // A fit on lines may have rest below what slides.
     let [sliding, rest] = ["parameter:sliding-friction", "parameter:break-away-force"]
         .map(|name| PARAMETERS.iter().position(|parameter| parameter.name == name).expect("one of them"));

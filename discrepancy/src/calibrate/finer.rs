@@ -9,11 +9,11 @@
 //!
 //! Source: Neugebauer 2011, section 3.2: the valve's characteristic is measured point by point.
 
-use super::{CONVERGED, Calibrated, POINTS, UNRESOLVED};
+use super::{Calibrated, POINTS, UNRESOLVED};
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{MOST_OFF, Refit, parameter_ridges};
+use crate::refit::{CONVERGED_RELINEARISED, MOST_OFF, Refit, parameter_ridges};
 use crate::report::Quantity;
 use plant::RigParameters;
 use plant::parameters::table::KEYS;
@@ -65,8 +65,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
             break;
         };
         let residual = engine.residual(&engine.simulate(&tried));
-        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
+        let products = engine.products(&residual, &columns);
         let off: Vec<f64> = factors.iter().map(|factor| factor - 1.0).collect();
         let fit = products.fit_from(&all, &ridges, &off);
         let before = best.as_ref().map_or(f64::INFINITY, |(.., fit)| fit.loss);
@@ -75,7 +74,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
             let at = std::mem::replace(&mut factors, next);
             best = Some((at, products, fit.clone()));
         }
-        if fit.loss > before - CONVERGED {
+        if fit.loss > before - CONVERGED_RELINEARISED {
             break;
         }
     }

@@ -1,10 +1,10 @@
 //! Backward elimination of effects, swaps between rounds, and alternatives.
 
 use super::null_distribution::NullDistribution;
-use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, around_of, relinearise};
+use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
-use crate::refit::{Placed, Refit, refit_steps};
+use crate::refit::{Placed, Refit, around_of, refit_steps};
 use crate::screen::Columns;
 use rayon::prelude::*;
 
@@ -47,7 +47,7 @@ pub(super) fn swap(
         .into_iter()
         .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
     let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
-    let best = relinearise(engine, &best);
+    let best = relinearise(engine, best);
     // The replaced effect stays as an alternative where it fits as well.
     let refits = &mut rounds[at];
     let came = refits.remove(rank);

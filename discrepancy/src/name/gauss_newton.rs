@@ -8,14 +8,13 @@
 //! the simulator.
 
 use super::NUMBER_COSTS;
-use super::null_distribution::FAR_OFF;
+use super::null_distribution::above_far_off;
 use crate::engine::Engine;
-use crate::fit::{Fit, Products, loss};
+use crate::fit::{Fit, Products, descend, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
-    MOST_OFF, Placed, Refit, coordinate_columns, coordinate_ridge, costs, parameter_ridges, rig_of,
+    MOST_OFF, Placed, Refit, coordinate_columns, costs, prior_deviations, prior_precisions, rig_of,
 };
-use crate::windows::dot;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -49,7 +48,7 @@ pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
 /// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
-    fit.loss += costs(numbers(&fit.placed).len(), &fit.factors, NUMBER_COSTS);
+    fit.loss += costs(coordinates(&fit.placed), &fit.factors, NUMBER_COSTS);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 
@@ -72,27 +71,17 @@ pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; C
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
         *factor = 1.0;
     }
-    let mut point = point(engine, model.placed.clone(), factors)?;
+    let start = point(engine, model.placed.clone(), factors)?;
     let chosen: Vec<usize> =
-        (0..COUNT + numbers(&point.placed).len()).filter(|at| *at >= COUNT || needed[*at]).collect();
-    let mut last = None;
-    for step in 0..=STEPS {
-        let lines = around(engine, &point)?;
-        let tried = (step < STEPS).then(|| stepped(engine, &point, &lines, &chosen)).flatten();
-        last = Some(lines);
-        let Some(tried) = tried else { break };
-        let fell = point.loss - tried.loss;
-        point = tried;
-        if fell < CONVERGED {
-            last = None;
-            break;
-        }
-    }
-    let lines = match last {
-        Some(lines) => lines,
-        None => around(engine, &point)?,
-    };
-    let errors = errors(engine, &lines, &point);
+        (0..COUNT + coordinates(&start.placed)).filter(|at| *at >= COUNT || needed[*at]).collect();
+    let point = descend(
+        start,
+        STEPS,
+        CONVERGED,
+        |point| point.loss,
+        |point| stepped(engine, point, &around(engine, point)?, &chosen),
+    );
+    let errors = errors(engine, &around(engine, &point)?, &point);
     let Point { placed, factors, squares, loss, .. } = point;
     Some(Refit { placed, factors, loss, squares, errors, inflation: model.inflation })
 }
@@ -100,30 +89,18 @@ pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; C
 fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Option<Point> {
     let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
     let residual = engine.residual(&simulated);
-    let squares: Vec<f64> = residual.chunks_exact(engine.rows()).map(|window| dot(window, window)).collect();
-    let believed = |ridge: f64, off: f64| ridge * off * off;
+    let squares = engine.squares(&residual);
+    let (ridges, off) = (prior_precisions(&placed), prior_deviations(&factors, &placed));
+    let prior: Vec<f64> = ridges.iter().zip(&off).map(|(ridge, off)| ridge * off * off).collect();
     let loss = loss(&squares, engine.freedom())
-        + parameter_ridges()
-            .iter()
-            .zip(&factors)
-            .map(|(ridge, factor)| believed(*ridge, factor - 1.0))
-            .sum::<f64>()
-        + numbers(&placed).iter().map(|(ridge, z)| believed(*ridge, *z)).sum::<f64>();
+        + prior[..COUNT].iter().sum::<f64>()
+        + prior[COUNT..].iter().sum::<f64>();
     Some(Point { placed, factors, simulated, residual, squares, loss })
 }
 
-/// Prior precision and value of each coordinate of the effects.
-fn numbers(placed: &[Placed]) -> Vec<(f64, f64)> {
-    placed
-        .iter()
-        .flat_map(|effect| {
-            effect
-                .coordinates
-                .iter()
-                .enumerate()
-                .map(|(key, z)| (coordinate_ridge(&effect.candidate, key), *z))
-        })
-        .collect()
+/// Number of coordinates of the effects.
+fn coordinates(placed: &[Placed]) -> usize {
+    placed.iter().map(|effect| effect.coordinates.len()).sum()
 }
 
 /// Linearisation at a point.
@@ -145,8 +122,7 @@ impl Lines {
                 out.iter().for_each(|at| column[at * engine.rows()..][..engine.rows()].fill(0.0));
             }
         }
-        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        Products::new(&point.residual, &columns, engine.freedom(), engine.rows())
+        engine.products(&point.residual, &columns)
     }
 }
 
@@ -154,17 +130,13 @@ fn around(engine: &Engine<'_>, point: &Point) -> Option<Lines> {
     let rig = rig_of(engine.rig(), &point.placed, &[1.0; COUNT])?;
     let mut columns = engine.parameter_columns(&rig, &point.factors);
     columns.extend(coordinate_columns(engine, &point.factors, &point.placed, &point.simulated)?);
-    let (coordinate_ridges, places): (Vec<f64>, Vec<f64>) = numbers(&point.placed).into_iter().unzip();
-    let ridges = [parameter_ridges(), coordinate_ridges].concat();
-    let from = point.factors.iter().map(|factor| factor - 1.0).chain(places).collect();
+    let (ridges, from) = (prior_precisions(&point.placed), prior_deviations(&point.factors, &point.placed));
     Some(Lines { columns, ridges, from })
 }
 
 /// The better of two Gauss-Newton steps: with all windows, and without outlying windows, whose linearisation is unreliable.
 fn stepped(engine: &Engine<'_>, point: &Point, lines: &Lines, chosen: &[usize]) -> Option<Point> {
-    let far: Vec<usize> = (0..engine.freedom().len())
-        .filter(|window| point.squares[*window] > FAR_OFF * engine.freedom()[*window])
-        .collect();
+    let far: Vec<usize> = above_far_off(&point.squares, engine.freedom()).collect();
     let with_all = along(engine, point, lines, chosen, &[]);
     let without = if far.is_empty() { None } else { along(engine, point, lines, chosen, &far) };
     [with_all, without].into_iter().flatten().min_by(|left, right| left.loss.total_cmp(&right.loss))
@@ -208,7 +180,7 @@ fn along(
 /// The point after a fraction of a step.
 fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share: f64) -> Option<Point> {
     let (mut placed, mut factors) = (from.placed.clone(), from.factors);
-    let mut changes = vec![0.0; COUNT + numbers(&placed).len()];
+    let mut changes = vec![0.0; COUNT + coordinates(&placed)];
     chosen.iter().zip(&step.coefficients).for_each(|(at, coefficient)| changes[*at] = share * coefficient);
     for (factor, change) in factors.iter_mut().zip(&changes) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);

@@ -7,12 +7,10 @@
 //! Free parameters absorb noise, and of two correlated ones both move where one is off. The report, the extended rig file and the
 //! held-out test use the one refitted model.
 
-use super::around_of;
 use super::gauss_newton::fit_selected;
 use crate::engine::Engine;
-use crate::fit::Products;
 use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{Refit, coordinate_columns, coordinate_ridge, parameter_ridges, rig_of};
+use crate::refit::{Refit, around_of, coordinate_columns, prior_precisions, rig_of};
 
 /// Rise of the loss at which a parameter is kept: three and a half standard errors.
 const NEEDED: f64 = 12.0;
@@ -39,12 +37,9 @@ fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
     for (column, factor) in around.columns.iter().zip(model.factors) {
         residual.iter_mut().zip(column).for_each(|(value, column)| *value += (factor - 1.0) * column);
     }
-    let columns: Vec<&[f64]> = around.columns.iter().chain(&coordinates).map(Vec::as_slice).collect();
-    let products = Products::new(&residual, &columns, engine.freedom(), engine.rows());
-    let mut ridges = parameter_ridges();
-    for placed in &model.placed {
-        ridges.extend((0..placed.coordinates.len()).map(|key| coordinate_ridge(&placed.candidate, key)));
-    }
+    let columns: Vec<&Vec<f64>> = around.columns.iter().chain(&coordinates).collect();
+    let products = engine.products(&residual, &columns);
+    let ridges = prior_precisions(&model.placed);
     let loss = |needed: &[bool; COUNT]| {
         let chosen: Vec<usize> = (0..columns.len()).filter(|at| *at >= COUNT || needed[*at]).collect();
         let ridges: Vec<f64> = chosen.iter().map(|at| ridges[*at]).collect();

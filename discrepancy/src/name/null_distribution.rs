@@ -3,12 +3,10 @@
 //! Source: discrepancy-notes.md, 4 (thresholds from this very record) and pipeline 1.
 
 use crate::engine::Engine;
-use crate::fit::Products;
 use crate::parameters::COUNT;
 use crate::refit::{Around, Refit, parameter_ridges, rig_of};
 use crate::screen::Columns;
 use crate::stats::order_statistic;
-use crate::windows::dot;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -45,12 +43,12 @@ impl NullDistribution {
         let parameter_columns = around.columns.iter().map(Vec::as_slice);
         let all: Vec<&[f64]> =
             parameter_columns.chain(of.iter().map(|(_, _, place)| columns.column(*place))).collect();
-        let products = Products::new(&residual, &all, engine.freedom(), engine.rows());
+        let products = engine.products(&residual, &all);
         let ridges = parameter_ridges();
         let parameters: Vec<usize> = (0..COUNT).collect();
         let weights = &products.fit_from(&parameters, &ridges, &around.off()).weights;
         let scores = products.cleared_scores(&parameters, weights, &ridges);
-        let far = far_off(&residual, engine.rows(), engine.freedom());
+        let far = far_off(&engine.squares(&residual), engine.freedom());
         let probes = of
             .into_iter()
             .zip(scores)
@@ -107,13 +105,16 @@ impl NullDistribution {
 }
 
 /// Outlying windows; none where they are more than a few.
-fn far_off(residual: &[f64], rows: usize, freedom: &[f64]) -> Vec<usize> {
-    let squares = residual.chunks_exact(rows).map(|window| dot(window, window));
-    let off = squares.zip(freedom).enumerate();
-    let far: Vec<usize> =
-        off.filter(|(_, (square, freedom))| square > &(FAR_OFF * **freedom)).map(|(at, _)| at).collect();
+fn far_off(squares: &[f64], freedom: &[f64]) -> Vec<usize> {
+    let far: Vec<usize> = above_far_off(squares, freedom).collect();
     let most = (FEW * freedom.len() as f64).max(1.0);
     if far.len() as f64 <= most { far } else { Vec::new() }
+}
+
+/// Windows beyond [`FAR_OFF`], however many.
+pub(super) fn above_far_off(squares: &[f64], freedom: &[f64]) -> impl Iterator<Item = usize> {
+    let off = squares.iter().zip(freedom).enumerate();
+    off.filter(|(_, (square, freedom))| **square > FAR_OFF * **freedom).map(|(at, _)| at)
 }
 
 #[cfg(test)]
@@ -122,11 +123,9 @@ mod tests {
 
     #[test]
     fn windows_that_are_far_off_are_left_out_only_where_they_are_few() {
-        let (rows, windows) = (10, 40);
-        let made = |off: usize| -> Vec<f64> {
-            (0..rows * windows).map(|at| if at / rows < off { 2.0 } else { 1.0 }).collect()
-        };
-        let far = |off: usize| far_off(&made(off), rows, &vec![10.0; windows]);
+        let squares =
+            |off: usize| -> Vec<f64> { (0..40).map(|at| if at < off { 40.0 } else { 10.0 }).collect() };
+        let far = |off: usize| far_off(&squares(off), &[10.0; 40]);
         assert_eq!(far(0), Vec::<usize>::new());
         assert_eq!(far(2), [0, 1]);
         // A model that leaves so many is wrong in them.

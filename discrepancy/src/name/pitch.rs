@@ -6,11 +6,13 @@
 //!
 //! Over a travel D two pitches are indistinguishable while D (1/P_1 - 1/P_2) is well below one, so that the grid is even in 1/P.
 
-use super::{NUMBER_COSTS, STEPS, around_of};
+use super::{NUMBER_COSTS, STEPS};
 use crate::engine::Engine;
-use crate::fit::Products;
 use crate::parameters::COUNT;
-use crate::refit::{Refit, coordinate_columns, coordinate_ridge, parameter_ridges, refit_steps, rig_of};
+use crate::refit::{
+    Refit, around_of, coordinate_columns, coordinate_ridge, prior_deviations, prior_precisions, refit_steps,
+    rig_of,
+};
 use rayon::prelude::*;
 
 /// Grid points of the pitch.
@@ -51,16 +53,11 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
     let around = around_of(engine, model);
     let numbers = coordinate_columns(engine, &model.factors, &plain, &simulated)?;
     let always = COUNT + numbers.len();
-    let columns: Vec<&[f64]> =
-        around.columns.iter().chain(&numbers).chain(&ripples).map(Vec::as_slice).collect();
-    let products = Products::new(&engine.residual(&simulated), &columns, engine.freedom(), engine.rows());
-    let mut ridges = parameter_ridges();
-    for placed in &plain {
-        ridges.extend((0..placed.coordinates.len()).map(|key| coordinate_ridge(&placed.candidate, key)));
-    }
+    let columns: Vec<&Vec<f64>> = around.columns.iter().chain(&numbers).chain(&ripples).collect();
+    let products = engine.products(&engine.residual(&simulated), &columns);
+    let (mut ridges, mut from) = (prior_precisions(&plain), prior_deviations(&around.factors, &plain));
     ridges.push(coordinate_ridge(&candidate, ripple));
-    let places = plain.iter().flat_map(|placed| placed.coordinates.iter().copied());
-    let from: Vec<f64> = around.off().into_iter().chain(places).chain([0.0]).collect();
+    from.push(0.0);
     let fits = (0..pitches.len()).map(|at| {
         let chosen: Vec<usize> = (0..always).chain([always + at]).collect();
         (at, products.fit_from(&chosen, &ridges, &from))

@@ -103,7 +103,7 @@ impl<'a> Round<'a> {
         let restarted = fits[..near]
             .par_iter()
             .map(|fit| {
-                refit_with_starts(engine, &relinearise(engine, &at_best_pitch(engine, fit)), NUMBER_COSTS)
+                refit_with_starts(engine, &relinearise(engine, at_best_pitch(engine, fit)), NUMBER_COSTS)
             })
             .collect();
         let mut round = Self { fits, restarted };
@@ -138,7 +138,7 @@ impl<'a> Round<'a> {
     fn with_gap(&mut self, engine: &Engine<'a>, point: &Around, model: &Refit, gap: &Screened) {
         let start = gap_start(engine, point, &model.placed, &gap.start);
         let Some(fit) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
-        let restarted = refit_with_starts(engine, &relinearise(engine, &fit), NUMBER_COSTS);
+        let restarted = refit_with_starts(engine, &relinearise(engine, fit), NUMBER_COSTS);
         // The fit from the screened width is the same effect, not an alternative.
         let is_gap = |other: &Refit| other.placed.last().is_some_and(|placed| same(placed, &gap.start));
         if self.fits.iter().filter(|other| is_gap(other)).all(|other| restarted.fit.loss < other.loss) {

@@ -1,8 +1,7 @@
 //! Refits of models of linked rods with the window start states re-estimated under the model itself.
 
-use super::around_of;
 use crate::engine::Engine;
-use crate::refit::{Around, Placed, Refit, loss_at, refit, rig_of};
+use crate::refit::{Around, Placed, Refit, around_of, loss_at, refit, rig_of};
 use rayon::prelude::*;
 
 /// Starting amplitudes of the backlash.

@@ -10,11 +10,11 @@
 
 use super::with_tables;
 use crate::engine::{Engine, FACTOR_CHANGE};
-use crate::fit::{Products, loss};
+use crate::fit::{Products, descend, loss};
 use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};
-use crate::windows::{Reach, ReferenceRun, dot};
+use crate::windows::{Reach, ReferenceRun};
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
 use rayon::prelude::*;
@@ -146,6 +146,11 @@ impl Model {
         tolerance.powi(-2)
     }
 
+    /// Prior precisions of all free coordinates.
+    fn ridges(&self) -> Vec<f64> {
+        self.moved().iter().map(|coordinate| self.ridge(*coordinate)).collect()
+    }
+
     /// Deviation of a coordinate from its neutral value.
     fn off(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
@@ -177,18 +182,15 @@ impl Point {
     /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
-        let squares: Vec<f64> =
-            residual.chunks_exact(engine.rows()).map(|window| dot(window, window)).collect();
-        let loss = loss(&squares, engine.freedom()) + model.costs();
+        let loss = loss(&engine.squares(&residual), engine.freedom()) + model.costs();
         loss.is_finite().then_some(Point { model, residual, loss })
     }
 
     /// The parameters with standard errors, as a fit without effects; `lines` is the linearisation at the model.
     pub(super) fn as_refit(&self, engine: &Engine<'_>, lines: &Lines) -> Refit {
-        let moved = self.model.moved();
+        let (moved, ridges) = (self.model.moved(), self.model.ridges());
         let mut errors = vec![f64::INFINITY; COUNT];
-        let products = Products::new(&self.residual, &lines.with(&[]), engine.freedom(), engine.rows());
-        let ridges: Vec<f64> = moved.iter().map(|coordinate| self.model.ridge(*coordinate)).collect();
+        let products = engine.products(&self.residual, &lines.columns);
         let chosen: Vec<usize> = (0..moved.len()).collect();
         let fit = products.fit(&chosen, &ridges);
         if let Some(covariance) = products.covariance(&chosen, &fit, &ridges) {
@@ -273,12 +275,11 @@ impl Lines {
 
     /// Cross-validated loss of the linearised model, without penalties.
     pub(super) fn unseen_loss(&self, engine: &Engine<'_>, point: &Point) -> f64 {
-        let columns = self.with(&[]);
-        let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
+        let products = engine.products(&point.residual, &self.columns);
         let moved = self.model.moved();
-        let ridges: Vec<f64> = moved.iter().map(|coordinate| self.model.ridge(*coordinate)).collect();
+        let ridges = self.model.ridges();
         let from: Vec<f64> = moved.iter().map(|coordinate| self.model.off(*coordinate)).collect();
-        products.unseen_loss(&(0..columns.len()).collect::<Vec<_>>(), &ridges, &from, FOLDS)
+        products.unseen_loss(&(0..moved.len()).collect::<Vec<_>>(), &ridges, &from, FOLDS)
     }
 
     /// Predicted loss of the linearised model with further tables.
@@ -286,9 +287,8 @@ impl Lines {
         let mut model = self.model.clone();
         model.tables.extend(tables.iter().map(|beside| beside.tied.clone()));
         let columns = self.with(tables);
-        let products = Products::new(&point.residual, &columns, engine.freedom(), engine.rows());
-        let ridges: Vec<f64> = model.moved().iter().map(|coordinate| model.ridge(*coordinate)).collect();
-        products.fit(&(0..columns.len()).collect::<Vec<_>>(), &ridges).loss + model.costs()
+        let products = engine.products(&point.residual, &columns);
+        products.fit(&(0..columns.len()).collect::<Vec<_>>(), &model.ridges()).loss + model.costs()
     }
 }
 
@@ -297,7 +297,7 @@ pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain:
     let mut needed = [false; COUNT];
     let model = Model { free: [true; COUNT], ..point.model.clone() };
     let moved = model.moved();
-    let products = Products::new(&point.residual, lines, engine.freedom(), engine.rows());
+    let products = engine.products(&point.residual, lines);
     let loss_with = |needed: &[bool; COUNT]| {
         let is_in = |at: &usize| match moved[*at] {
             Coordinate::Factor(factor) => needed[factor],
@@ -324,34 +324,22 @@ pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain:
 
 /// Gauss-Newton until convergence.
 pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
-    let mut point = start;
-    for _ in 0..steps {
-        let Some(lines) = Lines::of(engine, point.model.clone()) else { break };
-        let before = point.loss;
-        point = self::steps(engine, point, &lines.with(&[]));
-        if before - point.loss < CONVERGED {
-            break;
-        }
-    }
-    point
+    let loss = |point: &Point| point.loss;
+    descend(start, steps, CONVERGED, loss, |point| {
+        let lines = Lines::of(engine, point.model.clone())?;
+        Some(self::steps(engine, point.clone(), &lines.with(&[])))
+    })
 }
 
 /// Steps with the same sensitivities, one column for each free coordinate.
 pub(super) fn steps(engine: &Engine<'_>, start: Point, lines: &[&[f64]]) -> Point {
-    let moved = start.model.moved();
-    let ridges: Vec<f64> = moved.iter().map(|coordinate| start.model.ridge(*coordinate)).collect();
-    let mut products = Products::new(&start.residual, lines, engine.freedom(), engine.rows());
-    let mut point = start;
-    for _ in 0..ALONG {
-        let Some(tried) = along(engine, &point, &moved, &products, &ridges) else { break };
-        let converged = point.loss - tried.loss < CONVERGED;
-        point = tried;
-        if converged {
-            break;
-        }
+    let (moved, ridges) = (start.model.moved(), start.model.ridges());
+    let mut products = engine.products(&start.residual, lines);
+    let loss = |point: &Point| point.loss;
+    descend(start, ALONG, CONVERGED, loss, |point| {
         products.set_residual(&point.residual, lines, engine.rows());
-    }
-    point
+        along(engine, point, &moved, &products, &ridges)
+    })
 }
 
 /// Backtracking line search: the longest step that lowers the loss.

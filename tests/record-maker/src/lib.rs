@@ -168,55 +168,27 @@ pub struct TrueAxis {
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
     #[error("{name} = {factor}: allowed are the names {PARAMETERS:?}, with factors from 0.5 to 2")]
-    WrongParameter {
-        name: String,
-        factor: f64,
-    },
+    WrongParameter { name: String, factor: f64 },
     #[error("{name}: the catalogue has no such effect; see plant::effects::SHEETS")]
-    UnknownEffect {
-        name: String,
-    },
+    UnknownEffect { name: String },
     #[error("{name} at {place}: {rule}")]
-    Place {
-        name: &'static str,
-        place: Place,
-        rule: &'static str,
-    },
+    Place { name: &'static str, place: Place, rule: &'static str },
     #[error("{name}: {numbers:?}: allowed is {allowed}")]
-    Numbers {
-        name: &'static str,
-        numbers: Vec<f64>,
-        allowed: String,
-    },
+    Numbers { name: &'static str, numbers: Vec<f64>, allowed: String },
     #[error("held-out experiment {number}: allowed are 0 and 1")]
-    Experiment {
-        number: u8,
-    },
+    Experiment { number: u8 },
     #[error(transparent)]
     Run(#[from] InputError),
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error("{file}: the record maker plays no [[rig.hand]] and no [[rig.event]]")]
-    People {
-        file: String,
-    },
+    People { file: String },
     #[error("a controller tripped the emergency stop at {at_s} s")]
-    Stopped {
-        at_s: f64,
-    },
+    Stopped { at_s: f64 },
     #[error("{file}: is not done after {length_s} s")]
-    Unfinished {
-        file: String,
-        length_s: f64,
-    },
+    Unfinished { file: String, length_s: f64 },
     #[error("the {axis} axis is in no state of a rig at {at_s} s")]
-    NoState {
-        axis: &'static str,
-        at_s: f64,
-    },
+    NoState { axis: &'static str, at_s: f64 },
     #[error("{path}: {error}")]
-    File {
-        path: String,
-        error: std::io::Error,
-    },
+    File { path: String, error: std::io::Error },
 }

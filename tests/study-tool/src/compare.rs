@@ -22,10 +22,7 @@ pub enum CompareError {
     #[error(
         "'{left}' and '{right}' are of different modes, one without the hidden effects: compare them apart"
     )]
-    Modes {
-        left: String,
-        right: String,
-    },
+    Modes { left: String, right: String },
 }
 
 /// The tables of several scores: targets and figures, parts of the draws, effect by effect.

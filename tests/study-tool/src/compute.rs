@@ -18,10 +18,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 #[derive(Debug, thiserror::Error)]
 pub enum ComputeError {
     #[error("draw {number}: {error}")]
-    Make {
-        number: usize,
-        error: MakeError,
-    },
+    Make { number: usize, error: MakeError },
     #[error(transparent)]
     Parameter(#[from] ParameterError),
     #[error(transparent)]
@@ -29,9 +26,7 @@ pub enum ComputeError {
     #[error("no threads: {0}")]
     Threads(#[from] ThreadPoolBuildError),
     #[error("{count} draws have no classes yet: run the command to its end")]
-    Missing {
-        count: usize,
-    },
+    Missing { count: usize },
 }
 
 /// The limits of all effects at all places, from train records with nothing hidden.

@@ -61,15 +61,9 @@ impl Plan {
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     #[error("{path}: {error}")]
-    File {
-        path: String,
-        error: io::Error,
-    },
+    File { path: String, error: io::Error },
     #[error("{path}: {what}")]
-    Content {
-        path: String,
-        what: String,
-    },
+    Content { path: String, what: String },
 }
 
 impl FolderError {

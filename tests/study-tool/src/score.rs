@@ -71,33 +71,17 @@ pub enum ScoreError {
     #[error("no study to score: give its folder")]
     Nothing,
     #[error("{left} and {right} are of different studies: score those of one")]
-    Mixed {
-        left: String,
-        right: String,
-    },
+    Mixed { left: String, right: String },
     #[error(
         "draw {number} has a result in {left} and in {right}: give each folder once, or delete one of them"
     )]
-    Doubled {
-        number: usize,
-        left: String,
-        right: String,
-    },
+    Doubled { number: usize, left: String, right: String },
     #[error(
         "{folders}: {count} draws have no result under the label '{label}', the first is {first}: run the study to its end"
     )]
-    MissingRuns {
-        folders: String,
-        label: String,
-        count: usize,
-        first: usize,
-    },
+    MissingRuns { folders: String, label: String, count: usize, first: usize },
     #[error("draw {number} was run with {other:?}, the others with {program:?}: score one program at a time")]
-    Programs {
-        number: usize,
-        other: Box<Identity>,
-        program: Box<Identity>,
-    },
+    Programs { number: usize, other: Box<Identity>, program: Box<Identity> },
     #[error("effects were left out of the program's catalogue: tests/study/outside-expected.json is wanted")]
     NoExpectations,
 }

@@ -74,27 +74,15 @@ pub enum StepError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error("draw {number}: {error}")]
-    Files {
-        number: usize,
-        error: io::Error,
-    },
+    Files { number: usize, error: io::Error },
     #[error("draw {number}: its record cannot be made: {reason}")]
-    Make {
-        number: usize,
-        reason: String,
-    },
+    Make { number: usize, reason: String },
     #[error("draw {number}: {error}")]
-    Record {
-        number: usize,
-        error: ReadError,
-    },
+    Record { number: usize, error: ReadError },
     #[error(
         "{free_mib} MiB are left on the disk, {least_free_mib} are wanted: free some and start again, nothing is lost"
     )]
-    Disk {
-        free_mib: u64,
-        least_free_mib: u64,
-    },
+    Disk { free_mib: u64, least_free_mib: u64 },
 }
 
 /// What a run leaves as `result.json`.
