@@ -44,12 +44,6 @@ pub enum CommandError {
     UnknownEffect { name: String, known: String },
 }
 
-impl CommandError {
-    pub fn exit(&self) -> Exit {
-        Exit::BadInput
-    }
-}
-
 /// Runs a command.
 ///
 /// # Errors

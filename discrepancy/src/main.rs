@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use discrepancy::cli::Cli;
+use protocol::exit::Exit;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -9,7 +10,7 @@ fn main() -> ExitCode {
     discrepancy::commands::end_when_asked();
     let exit = discrepancy::commands::run(&cli).unwrap_or_else(|error| {
         eprintln!("discrepancy: {error}");
-        error.exit()
+        Exit::BadInput
     });
     exit.into()
 }

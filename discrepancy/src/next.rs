@@ -27,7 +27,7 @@ pub mod menu;
 pub(crate) mod nuisance;
 pub(crate) mod remedies;
 
-use crate::report::Next;
+use crate::report::{Next, listed};
 use closed_loop::drive;
 use divergence::{Divergence, divergences};
 use menu::{Entry, MENU};
@@ -198,15 +198,6 @@ fn text(entry: &Entry, times: u32) -> String {
         entry.toml.to_owned()
     };
     format!("{how}{toml}")
-}
-
-/// `a, b and c`.
-fn listed(names: &[String]) -> String {
-    match names {
-        [] => "no explanations".to_owned(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 #[cfg(test)]

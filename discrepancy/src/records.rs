@@ -154,6 +154,12 @@ impl Record {
         *last.expect("the channel was added and a row pushed") = Some(value);
     }
 
+    fn warn_cut(&mut self, line: Option<u64>) {
+        if line.is_some() {
+            self.warn(line, "the last line is cut, and left out: its writer was killed");
+        }
+    }
+
     fn warn(&mut self, line: impl Into<Option<u64>>, text: impl Into<String>) {
         self.warnings.push(Warning { line: line.into(), text: text.into() });
     }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Version of the schema; a new optional field does not change it.
 pub const SCHEMA_VERSION: u32 = 1;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// No effect is missing above the detection limits.
@@ -382,6 +382,15 @@ pub struct ChannelCheck {
     pub quantum: Option<f64>,
     /// Share of samples that cannot be used.
     pub unusable: f64,
+}
+
+/// The words in a sentence: `a`, `a and b`, `a, b and c`.
+pub(crate) fn listed(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
 /// Decimals of a value that is rounded to the second digit of its standard error.

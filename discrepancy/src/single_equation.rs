@@ -328,11 +328,7 @@ fn read(model: &Model, rig: Option<&RigParameters>, file: &Path) -> Result<(Reco
 }
 
 fn read_rig(file: &Path) -> Result<RigParameters, BalanceError> {
-    let text = std::fs::read_to_string(file).map_err(|error| DescriptionError::Open {
-        what: "model",
-        file: file.into(),
-        reason: error.to_string(),
-    })?;
+    let text = DescriptionError::read("model", file)?;
     RigParameters::from_toml(&text, &file.display().to_string())
         .map_err(|error| BalanceError::Rig { reason: error.to_string() })
 }

@@ -5,7 +5,7 @@ use super::draw::{Plot, Sample, figure, range};
 use super::markup::{Cell, charts, heading, number, paragraph, table, words as said};
 use super::words;
 use crate::outside::SHIFTS;
-use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Surface, Verdict};
+use crate::report::{Curve, NamedEffect, Outside, Quantity, Report, Surface, Verdict, listed};
 use plant::effects::sheet;
 
 pub(super) fn title(report: &Report) -> &'static str {
@@ -172,7 +172,7 @@ fn table_added(outside: &Outside) -> String {
     let share = outside.share_explained.map_or(String::new(), |share| {
         format!("; that takes {} of the disagreement of the training records", words::percent(share))
     });
-    format!("It is added to the model as a table: {}{share}.", words::listed(&tables, "and"))
+    format!("It is added to the model as a table: {}{share}.", listed(&tables))
 }
 
 /// A surface as a curve for each value of its second variable.

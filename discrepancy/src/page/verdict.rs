@@ -1,7 +1,7 @@
 //! The box on top: verdict, effects with numbers, closed gap.
 
 use super::words;
-use crate::report::{NamedEffect, Report, Verdict};
+use crate::report::{NamedEffect, Report, Verdict, listed};
 use pagekit::page::escaped;
 
 pub(super) fn title(verdict: Verdict) -> &'static str {
@@ -18,7 +18,7 @@ pub(super) fn title(verdict: Verdict) -> &'static str {
 /// Heading, files and box.
 pub(super) fn head(report: &Report) -> String {
     let files = &report.inputs;
-    let mut from = format!("{} against {}", files.rig, words::listed(&files.train, "and"));
+    let mut from = format!("{} against {}", files.rig, listed(&files.train));
     if let Some(verification) = &report.verification {
         from += &format!(", verified on {}", verification.record);
     }

@@ -181,15 +181,6 @@ pub(super) fn place(effect: &str, place: &Where) -> String {
     }
 }
 
-/// The words in a sentence: `a`, `a and b`, `a, b and c`.
-pub(super) fn listed(words: &[String], last: &str) -> String {
-    match words {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., end] => format!("{} {last} {end}", first.join(", ")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -235,6 +226,6 @@ mod tests {
         assert_eq!(place("time-skew", &at("drive", Some("force"))), "drive axis, force sensor");
         assert_eq!(place("supply-droop", &at("supply", None)), "supply");
         assert_eq!((signal("drive_pressure_a_Pa"), signal("odd")), ("drive pressure a".into(), "odd".into()));
-        assert_eq!(listed(&["a".into(), "b".into(), "c".into()], "and"), "a, b and c");
+        assert_eq!(crate::report::listed(&["a".into(), "b".into(), "c".into()]), "a, b and c");
     }
 }

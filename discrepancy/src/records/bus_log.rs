@@ -68,12 +68,7 @@ fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, R
             Err(_) => malformed.push(line),
         }
     }
-    if whole.len() < text.len() {
-        record.warn(
-            whole.lines().count() as u64 + 1,
-            "the last line is cut, and left out: its writer was killed",
-        );
-    }
+    record.warn_cut((whole.len() < text.len()).then(|| whole.lines().count() as u64 + 1));
     for (lines, what) in [(unknown, "that rig.dbc does not know"), (malformed, "that rig.dbc does not allow")]
     {
         if let Some(first) = lines.first() {

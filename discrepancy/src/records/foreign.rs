@@ -55,9 +55,7 @@ pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> 
         }
         present.into_iter().for_each(|(channel, value)| record.put(channel, value));
     }
-    if let Some(line) = table.cut {
-        record.warn(line, "the last line is cut, and left out: its writer was killed");
-    }
+    record.warn_cut(table.cut);
     Ok(record)
 }
 

@@ -154,12 +154,7 @@ impl Mapping {
     /// # Errors
     /// [`DescriptionError`] with file, key, value and what is allowed.
     pub fn read(file: &Path) -> Result<Self, DescriptionError> {
-        let text = std::fs::read_to_string(file).map_err(|error| DescriptionError::Open {
-            what: "mapping",
-            file: file.into(),
-            reason: error.to_string(),
-        })?;
-        Self::from_toml(&text, file)
+        Self::from_toml(&DescriptionError::read("mapping", file)?, file)
     }
 
     /// The same from a text; `file` is only its name for messages.

@@ -26,9 +26,7 @@ pub(super) fn read(file: &Path, unknown: Unknown) -> Result<Record, ReadError> {
             }
         }
     }
-    if let Some(line) = table.cut {
-        record.warn(line, "the last line is cut, and left out: its writer was killed");
-    }
+    record.warn_cut(table.cut);
     Ok(record)
 }
 

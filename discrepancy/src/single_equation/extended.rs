@@ -18,7 +18,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, val
 /// [`BalanceError`] when the model file cannot be read.
 pub fn extended_model_text(model_file: &Path, reported: &Reported) -> Result<String, BalanceError> {
     let open = |reason: String| DescriptionError::Open { what: "model", file: model_file.into(), reason };
-    let text = std::fs::read_to_string(model_file).map_err(|error| open(error.to_string()))?;
+    let text = DescriptionError::read("model", model_file)?;
     let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| {
         DescriptionError::Syntax { file: model_file.into(), reason: error.to_string() }
     })?;

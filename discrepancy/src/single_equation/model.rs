@@ -192,12 +192,7 @@ fn needed(kind: Kind) -> &'static [(&'static str, &'static str)] {
 impl Model {
     /// Reads a model file.
     pub(crate) fn read(file: &Path) -> Result<Self, BalanceError> {
-        let text = std::fs::read_to_string(file).map_err(|error| DescriptionError::Open {
-            what: "model",
-            file: file.into(),
-            reason: error.to_string(),
-        })?;
-        Self::from_toml(&text, file)
+        Self::from_toml(&DescriptionError::read("model", file)?, file)
     }
 
     /// The same from a text; paths in it are relative to `file`'s folder.

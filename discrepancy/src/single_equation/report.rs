@@ -7,12 +7,12 @@
 use super::fit::{clustered_t, rms};
 use super::model::{Kind, TermEntry};
 use super::runs::Run;
-use super::select::{Judged, describe};
+use super::select::{Judged, Taken, describe};
 use super::terms::{self, shape_unit, shown};
 use super::{Fitted, Study};
 use crate::report::{
     BeforeAfter, Candidate, Curve, DetectionLimit, EffectPlace, Gap, InputFiles, Location, NamedEffect, Next,
-    Outside, Quantity, Report, SCHEMA_VERSION, Verdict, Verification, Where,
+    Outside, Quantity, Report, Verdict, Verification, Where,
 };
 use crate::workflow::empty;
 use std::collections::BTreeMap;
@@ -68,22 +68,17 @@ impl Study {
         );
         let next = self.next(&named);
         Report {
-            schema_version: SCHEMA_VERSION,
-            verdict,
-            summary,
             inputs: self.inputs(model_file),
             named,
             parameters,
-            carried: Vec::new(),
             outside: self.outside(),
-            gap: BTreeMap::new(),
-            verification: None,
             candidates: self.candidates(),
             not_excited: self.not_excited(),
             detection_limits: self.detection_limits(),
             location: Some(Location { maps: self.map().into_iter().collect(), ..Location::default() }),
             checks,
             next,
+            ..empty(verdict, summary)
         }
     }
 
@@ -162,34 +157,33 @@ impl Study {
     }
 
     fn named(&self) -> Vec<NamedEffect> {
-        let errors = self.errors(&self.extended, &self.extended_fit);
-        let (mut first, mut named) = (self.base.len(), Vec::new());
-        for taken in &self.found.taken {
+        let effect = |(taken, entry, numbers): (&Taken, &TermEntry, Vec<Quantity>)| {
             let judged = &taken.judged;
-            let prepared = &self.families[judged.place];
-            let entry = &prepared.family.variants[judged.variant];
-            let at = first;
-            first += prepared.columns[judged.variant].len();
-            if entry.effect.starts_with("parameter:") {
-                continue;
-            }
             let forms = judged.ties.iter().map(|variant| (judged.place, *variant));
-            let mut alternatives: Vec<_> =
-                forms.chain(taken.alternatives.iter().copied()).map(|twin| self.alternative(twin)).collect();
-            alternatives.extend(alias(
-                entry,
-                &self.quantities(entry, at, &self.extended_fit.numbers, &errors),
-                self,
-            ));
-            named.push(NamedEffect {
+            let twins = forms.chain(taken.alternatives.iter().copied()).map(|twin| self.alternative(twin));
+            NamedEffect {
                 effect: entry.effect.clone(),
                 place: place(&entry.effect),
-                parameters: finite(self.quantities(entry, at, &self.extended_fit.numbers, &errors)),
+                alternatives: twins.chain(alias(entry, &numbers, self)).collect(),
+                parameters: finite(numbers),
                 share_explained: judged.share,
-                alternatives,
-            });
-        }
-        named
+            }
+        };
+        self.taken(false).map(effect).collect()
+    }
+
+    /// The selected terms that are parameters, or those that are effects, with their numbers.
+    fn taken(&self, parameters: bool) -> impl Iterator<Item = (&Taken, &TermEntry, Vec<Quantity>)> {
+        let errors = self.errors(&self.extended, &self.extended_fit);
+        let mut next = self.base.len();
+        let all = self.found.taken.iter().map(move |taken| {
+            let prepared = &self.families[taken.judged.place];
+            let entry = &prepared.family.variants[taken.judged.variant];
+            let first = next;
+            next += prepared.columns[taken.judged.variant].len();
+            (taken, entry, self.quantities(entry, first, &self.extended_fit.numbers, &errors))
+        });
+        all.filter(move |(_, entry, _)| entry.effect.starts_with("parameter:") == parameters)
     }
 
     /// What explains the records as well, fitted beside the baseline alone.
@@ -212,20 +206,11 @@ impl Study {
     }
 
     fn parameters(&self) -> Vec<Quantity> {
-        let errors = self.errors(&self.extended, &self.extended_fit);
-        let (mut first, mut parameters) = (self.base.len(), Vec::new());
-        for taken in &self.found.taken {
-            let prepared = &self.families[taken.judged.place];
-            let entry = &prepared.family.variants[taken.judged.variant];
-            if entry.effect.starts_with("parameter:") {
-                let numbers = self.quantities(entry, first, &self.extended_fit.numbers, &errors);
-                let numbers = finite(numbers).into_iter().take(1);
-                parameters
-                    .extend(numbers.map(|quantity| Quantity { name: entry.effect.clone(), ..quantity }));
-            }
-            first += prepared.columns[taken.judged.variant].len();
-        }
-        parameters
+        self.taken(true)
+            .filter_map(|(_, entry, numbers)| {
+                Some(Quantity { name: entry.effect.clone(), ..finite(numbers).into_iter().next()? })
+            })
+            .collect()
     }
 
     fn candidates(&self) -> Vec<Candidate> {

@@ -18,7 +18,7 @@ use crate::records::{Channel, Record};
 use plant::{Inputs, Plant, RigParameters, Setup};
 
 /// Standard atmosphere, Pa [ISO 2533]: what readers add to gauge pressures.
-const ATMOSPHERE_PA: f64 = 101_325.0;
+pub(super) const ATMOSPHERE_PA: f64 = 101_325.0;
 
 /// A processed record, at the full rate; columns of terms are made of it and thinned by [`Run::rows`].
 #[derive(Clone, Debug)]
@@ -221,7 +221,7 @@ impl Grid {
 }
 
 /// Differences over two periods, over one at the ends; per second.
-fn gradient(samples: &[f64], period_s: f64) -> Vec<f64> {
+pub(super) fn gradient(samples: &[f64], period_s: f64) -> Vec<f64> {
     let last = samples.len() - 1;
     (0..samples.len())
         .map(|at| {

@@ -16,7 +16,7 @@
 
 use super::BalanceError;
 use super::model::{Kind, Model, TermEntry};
-use super::runs::Run;
+use super::runs::{ATMOSPHERE_PA, Run, gradient};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -164,24 +164,16 @@ pub(super) fn columns(model: &Model, entry: &TermEntry, run: &Run) -> Result<Vec
     let each = |of: &dyn Fn(usize) -> f64| vec![(0..run.x_m.len()).map(of).collect::<Vec<f64>>()];
     let (x, v) = (&run.x_m, &run.v_m_per_s);
     if let Some(chamber) = &run.chamber {
-        let absolute = |at: usize| run.gauge_pa[at] + 101_325.0;
+        let absolute = |at: usize| run.gauge_pa[at] + ATMOSPHERE_PA;
         let normal_pa = chamber.normal_pa;
-        let lag = || -> Vec<f64> {
-            let q = &chamber.flow_m3_per_s;
-            (0..q.len())
-                .map(|at| {
-                    let (from, to) = (at.saturating_sub(1), (at + 1).min(q.len() - 1));
-                    -(q[to] - q[from]) / ((to - from) as f64 * run.period_s)
-                })
-                .collect()
-        };
+        let lag = || gradient(&chamber.flow_m3_per_s, run.period_s).iter().map(|rate| -rate).collect();
         return Ok(match entry.effect.as_str() {
             "dead-volume" => each(&|at| -chamber.rate_pa_per_s[at] / normal_pa),
             "parameter:kv-scale" => vec![chamber.flow_m3_per_s.clone()],
             "parameter:flow-lag" => vec![lag()],
             // Leakage from 6 to 1 bar, m^3/s, as the catalogue's laminar gap.
             "piston-leakage" => each(&|at| -(absolute(at).powi(2) - chamber.other_pa[at].powi(2)) / 35e10),
-            "rod-leakage" => each(&|at| -(absolute(at).powi(2) - 101_325.0_f64.powi(2)) / 35e10),
+            "rod-leakage" => each(&|at| -(absolute(at).powi(2) - ATMOSPHERE_PA.powi(2)) / 35e10),
             "pressure-sensor-offset" => each(&|at| chamber.area_m2 * v[at] / normal_pa),
             "decoy:drift" => each(&|at| run.time_s[at]),
             "decoy:position" => each(&|at| x[at]),
