@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     // Numbers that are merely wrong, by twice their tolerance.
     let parameters = PARAMETERS.iter().flat_map(|parameter| {
-        [1.0 - 2.0 * parameter.tolerance, 1.0 + 2.0 * parameter.tolerance].map(|factor| {
+        [1.0 - 2.0 * parameter.prior_std, 1.0 + 2.0 * parameter.prior_std].map(|factor| {
             let head = format!("| {} | | times {factor} |", parameter.name);
             parameter.scaled(quiet, factor).map(|rig| (head, rig))
         })

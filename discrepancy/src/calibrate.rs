@@ -12,7 +12,7 @@ pub mod finer;
 
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{Around, Refit, refit, relinearise};
+use crate::refit::{Linearisation, Refit, refit, relinearise};
 use crate::report::Quantity;
 use plant::RigParameters;
 
@@ -27,7 +27,7 @@ pub struct Calibrated {
     pub fit: Refit,
 }
 
-pub fn calibrate(engine: &Engine<'_>, baseline: &Around) -> Calibrated {
+pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> Calibrated {
     let first = refit(engine, baseline, &[], 0.0).expect("the baseline is a rig");
     Calibrated { fit: relinearise(engine, first, 0.0, POINTS - 1) }
 }
@@ -53,7 +53,7 @@ pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
         name: parameter.name.to_owned(),
         value,
         unit: unit.to_owned(),
-        standard_error: (error < UNRESOLVED * parameter.tolerance).then_some(before * error),
+        standard_error: (error < UNRESOLVED * parameter.prior_std).then_some(before * error),
         before: Some(before),
     }
 }

@@ -12,7 +12,7 @@ use crate::cli::{
 use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
-use crate::refit::Around;
+use crate::refit::Linearisation;
 use crate::report::{Gap, NamedEffect, Quantity, Report, Verdict, Verification, decimals};
 use crate::workflow::{self, Outcome, Reported, RigFile, Task, WorkflowError, close, open};
 use crate::{locate, page, single_equation, verify};
@@ -237,7 +237,7 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     let out = folder(arguments)?;
     let (rig_file, gridded) = gridded_records(arguments)?;
     let engine = Engine::new(&gridded, &rig_file.rig);
-    let calibrated = calibrate(&engine, &Around::at_baseline(&engine));
+    let calibrated = calibrate(&engine, &Linearisation::at_baseline(&engine));
     let finer = finer(&engine, &calibrated).ok_or_else(|| {
         CommandError::BadData("what fits these records best is out of the rig file's ranges".to_owned())
     })?;

@@ -36,7 +36,7 @@ pub struct Engine<'a> {
     windows: Vec<Windows<'a>>,
     rig: RigParameters,
     rows: usize,
-    freedom: Vec<f64>,
+    scaled_dof: Vec<f64>,
     /// Common variance factor of the noise, by the quietest windows.
     level: f64,
     /// Cache of sensitivities, latest last.
@@ -48,12 +48,12 @@ impl<'a> Engine<'a> {
     pub fn new(records: &'a [GriddedRecord], rig: &RigParameters) -> Self {
         let windows: Vec<Windows<'a>> = records.par_iter().map(|record| Windows::new(record, rig)).collect();
         let rows = windows.first().map_or(0, Windows::rows);
-        let freedom = windows.iter().flat_map(Windows::freedom).collect();
+        let scaled_dof = windows.iter().flat_map(Windows::dof).collect();
         let mut engine =
-            Engine { windows, rig: rig.clone(), rows, freedom, level: 1.0, kept: Mutex::default() };
+            Engine { windows, rig: rig.clone(), rows, scaled_dof, level: 1.0, kept: Mutex::default() };
         let residual = engine.residual(&engine.simulate(rig));
-        engine.level = level(&engine.squares(&residual), &engine.freedom);
-        engine.freedom.iter_mut().for_each(|freedom| *freedom *= engine.level);
+        engine.level = level(&engine.squares(&residual), &engine.scaled_dof);
+        engine.scaled_dof.iter_mut().for_each(|scaled_dof| *scaled_dof *= engine.level);
         engine
     }
 
@@ -62,12 +62,13 @@ impl<'a> Engine<'a> {
     pub(crate) fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
         let windows: Vec<Windows<'a>> =
             self.windows.par_iter().map(|windows| Windows::new(windows.record(), rig)).collect();
-        let freedom = windows.iter().flat_map(Windows::freedom).map(|freedom| freedom * self.level).collect();
+        let scaled_dof =
+            windows.iter().flat_map(Windows::dof).map(|scaled_dof| scaled_dof * self.level).collect();
         Engine {
             windows,
             rig: self.rig.clone(),
             rows: self.rows,
-            freedom,
+            scaled_dof,
             level: self.level,
             kept: Mutex::default(),
         }
@@ -92,8 +93,8 @@ impl<'a> Engine<'a> {
     }
 
     /// Degrees of freedom of each window times the common variance factor.
-    pub fn freedom(&self) -> &[f64] {
-        &self.freedom
+    pub fn scaled_dof(&self) -> &[f64] {
+        &self.scaled_dof
     }
 
     /// Readings of a rig over their noise, all records.
@@ -184,7 +185,7 @@ impl<'a> Engine<'a> {
 
     /// The products of a residual with columns.
     pub(crate) fn products<C: AsRef<[f64]>>(&self, residual: &[f64], columns: &[C]) -> Products {
-        Products::new(residual, columns, &self.freedom, self.rows)
+        Products::new(residual, columns, &self.scaled_dof, self.rows)
     }
 
     /// Sensitivities of a rig's readings to all parameter factors, by central differences at `factors`.
@@ -196,7 +197,7 @@ impl<'a> Engine<'a> {
         if let Some((.., columns)) = kept().iter().find(|(at_rig, at, _)| at_rig == rig && at == factors) {
             return columns.clone();
         }
-        let around = |at: usize, change: f64| {
+        let perturbed = |at: usize, change: f64| {
             let mut factors = *factors;
             factors[at] += change;
             with_factors(rig, &factors)
@@ -204,7 +205,7 @@ impl<'a> Engine<'a> {
         // First all increments, then all decrements.
         let rigs: Vec<RigParameters> = [FACTOR_CHANGE, -FACTOR_CHANGE]
             .into_iter()
-            .flat_map(|change| (0..COUNT).map(move |at| around(at, change)))
+            .flat_map(|change| (0..COUNT).map(move |at| perturbed(at, change)))
             .collect();
         let columns = self.differences(&rigs, 2.0 * FACTOR_CHANGE);
         let mut kept = kept();
@@ -218,11 +219,12 @@ impl<'a> Engine<'a> {
 
 /// Noise level: the lowest decile of chi2 per degree of freedom over its expectation. The estimated noise is right to some per
 /// cent only, which over 200 windows would look like a large excess.
-fn level(squares: &[f64], freedom: &[f64]) -> f64 {
-    let mut quiet: Vec<f64> = squares.iter().zip(freedom).map(|(square, freedom)| square / freedom).collect();
+fn level(squares: &[f64], scaled_dof: &[f64]) -> f64 {
+    let mut quiet: Vec<f64> =
+        squares.iter().zip(scaled_dof).map(|(square, scaled_dof)| square / scaled_dof).collect();
     let decile = quiet.len() / 10;
     let Some(quantile) = order_statistic(&mut quiet, decile) else { return 1.0 };
-    let mean = freedom.iter().sum::<f64>() / freedom.len() as f64;
+    let mean = scaled_dof.iter().sum::<f64>() / scaled_dof.len() as f64;
     // The lowest tenth of chi2 / f ends 1.28 standard deviations below 1.
     (quantile / (1.0 - 1.28 * (2.0 / mean).sqrt())).clamp(LEVELS[0], LEVELS[1])
 }

@@ -26,8 +26,8 @@ const CONVERGED: f64 = 1e-3;
 pub(crate) const LEAST: f64 = 1e-3;
 
 /// The loss of windows with these squares and degrees of freedom.
-pub(crate) fn loss(squares: &[f64], freedom: &[f64]) -> f64 {
-    squares.iter().zip(freedom).map(|(square, freedom)| freedom * (square / freedom).max(LEAST).ln()).sum()
+pub(crate) fn loss(squares: &[f64], dof: &[f64]) -> f64 {
+    squares.iter().zip(dof).map(|(square, dof)| dof * (square / dof).max(LEAST).ln()).sum()
 }
 
 /// Gauss-Newton: steps from an iterate to one of less loss, until `step` finds none, one lowers the loss by less than `converged`,
@@ -56,7 +56,7 @@ pub(crate) fn descend<P>(
 pub(crate) struct Products {
     columns: usize,
     /// Degrees of freedom of each window.
-    freedom: Vec<f64>,
+    dof: Vec<f64>,
     /// |e|^2 of each window.
     squares: Vec<f64>,
     /// C'e of each window.
@@ -79,13 +79,8 @@ pub(crate) struct Fit {
 
 impl Products {
     /// The products of a residual with columns, all window by window of `rows` numbers.
-    pub(crate) fn new<C: AsRef<[f64]>>(
-        residual: &[f64],
-        columns: &[C],
-        freedom: &[f64],
-        rows: usize,
-    ) -> Self {
-        let windows = freedom.len();
+    pub(crate) fn new<C: AsRef<[f64]>>(residual: &[f64], columns: &[C], dof: &[f64], rows: usize) -> Self {
+        let windows = dof.len();
         let information = (0..windows)
             .map(|window| {
                 let part = |column: usize| &columns[column].as_ref()[window * rows..][..rows];
@@ -102,7 +97,7 @@ impl Products {
             .collect();
         let mut products = Products {
             columns: columns.len(),
-            freedom: freedom.to_vec(),
+            dof: dof.to_vec(),
             squares: Vec::new(),
             scores: Vec::new(),
             information,
@@ -131,13 +126,13 @@ impl Products {
 
     /// The loss of windows with these squares.
     pub(crate) fn loss(&self, squares: &[f64]) -> f64 {
-        loss(squares, &self.freedom)
+        loss(squares, &self.dof)
     }
 
     /// Weights of windows with these squares.
     pub(crate) fn weights(&self, squares: &[f64]) -> Vec<f64> {
-        let weight = |(square, freedom): (&f64, &f64)| freedom / square.max(LEAST * freedom);
-        squares.iter().zip(&self.freedom).map(weight).collect()
+        let weight = |(square, dof): (&f64, &f64)| dof / square.max(LEAST * dof);
+        squares.iter().zip(&self.dof).map(weight).collect()
     }
 
     /// |e - C a|^2 of each window for some columns.
@@ -162,7 +157,7 @@ impl Products {
         &self,
         chosen: &[usize],
         weights: &[f64],
-        ridges: &[f64],
+        precisions: &[f64],
     ) -> (DMatrix<f64>, DVector<f64>) {
         let count = chosen.len();
         let mut matrix = DMatrix::zeros(count, count);
@@ -179,37 +174,41 @@ impl Products {
             for column in 0..row {
                 matrix[(column, row)] = matrix[(row, column)];
             }
-            matrix[(row, row)] += ridges[row];
+            matrix[(row, row)] += precisions[row];
         }
         (matrix, vector)
     }
 
-    /// The best coefficients of some columns; `ridges` as in [`Products::normal`].
-    pub(crate) fn fit(&self, chosen: &[usize], ridges: &[f64]) -> Fit {
-        self.fit_from(chosen, ridges, &vec![0.0; chosen.len()])
+    /// The best coefficients of some columns; `precisions` as in [`Products::normal`].
+    pub(crate) fn fit(&self, chosen: &[usize], precisions: &[f64]) -> Fit {
+        self.fit_from(chosen, precisions, &vec![0.0; chosen.len()])
     }
 
     /// The same with prior means at `-from`: ridges act on the sums of `from` and the coefficients.
-    pub(crate) fn fit_from(&self, chosen: &[usize], ridges: &[f64], from: &[f64]) -> Fit {
+    pub(crate) fn fit_from(&self, chosen: &[usize], precisions: &[f64], from: &[f64]) -> Fit {
         let mut weights = self.weights(&self.squares);
         let mut coefficients = vec![0.0; chosen.len()];
         let mut squares = self.squares.clone();
-        let held = |coefficients: &[f64]| -> f64 {
+        let prior_loss = |coefficients: &[f64]| -> f64 {
             coefficients
                 .iter()
                 .zip(from)
-                .zip(ridges)
-                .map(|((value, from), ridge)| ridge * (value + from).powi(2))
+                .zip(precisions)
+                .map(|((value, from), precision)| precision * (value + from).powi(2))
                 .sum()
         };
-        let mut loss = self.loss(&squares) + held(&coefficients);
+        let mut loss = self.loss(&squares) + prior_loss(&coefficients);
         for _ in 0..PASSES {
-            let (matrix, mut vector) = self.normal(chosen, &weights, ridges);
-            vector.iter_mut().zip(ridges).zip(from).for_each(|((score, ridge), from)| *score -= ridge * from);
+            let (matrix, mut vector) = self.normal(chosen, &weights, precisions);
+            vector
+                .iter_mut()
+                .zip(precisions)
+                .zip(from)
+                .for_each(|((score, precision), from)| *score -= precision * from);
             let Some(solved) = solve(matrix, &vector) else { break };
             let tried: Vec<f64> = solved.iter().copied().collect();
             let tried_squares = self.squares(chosen, &tried);
-            let tried_loss = self.loss(&tried_squares) + held(&tried);
+            let tried_loss = self.loss(&tried_squares) + prior_loss(&tried);
             if tried_loss > loss - CONVERGED && tried_loss >= loss {
                 break;
             }
@@ -223,17 +222,27 @@ impl Products {
         Fit { coefficients, loss, squares, weights }
     }
 
-    /// Cross-validated loss: each fold, a contiguous stretch of windows, is judged with the coefficients of the others; `ridges`
+    /// Cross-validated loss: each fold, a contiguous stretch of windows, is judged with the coefficients of the others; `precisions`
     /// and `from` as in [`Products::fit_from`]. At a minimum, the difference to [`Products::loss`] is overfitting.
-    pub(crate) fn unseen_loss(&self, chosen: &[usize], ridges: &[f64], from: &[f64], folds: usize) -> f64 {
+    pub(crate) fn cross_validated_loss(
+        &self,
+        chosen: &[usize],
+        precisions: &[f64],
+        from: &[f64],
+        folds: usize,
+    ) -> f64 {
         let all = self.weights(&self.squares);
         let windows = self.squares.len();
         let of = |fold: usize| fold * windows / folds..(fold + 1) * windows / folds;
         let judged = (0..folds).flat_map(|fold| {
             let mut weights = all.clone();
             weights[of(fold)].fill(0.0);
-            let (matrix, mut vector) = self.normal(chosen, &weights, ridges);
-            vector.iter_mut().zip(ridges).zip(from).for_each(|((score, ridge), from)| *score -= ridge * from);
+            let (matrix, mut vector) = self.normal(chosen, &weights, precisions);
+            vector
+                .iter_mut()
+                .zip(precisions)
+                .zip(from)
+                .for_each(|((score, precision), from)| *score -= precision * from);
             let solution = solve(matrix, &vector)
                 .map_or(vec![0.0; chosen.len()], |solution| solution.iter().copied().collect());
             self.squares(chosen, &solution)[of(fold)].to_vec()
@@ -242,14 +251,14 @@ impl Products {
     }
 
     /// For each further column: its weighted window scores and its information, with the first columns projected out.
-    pub(crate) fn cleared_scores(
+    pub(crate) fn efficient_scores(
         &self,
         first: &[usize],
         weights: &[f64],
-        ridges: &[f64],
+        precisions: &[f64],
     ) -> Vec<(Vec<f64>, f64)> {
         let count = first.len();
-        let (matrix, _) = self.normal(first, weights, ridges);
+        let (matrix, _) = self.normal(first, weights, precisions);
         let inverse = matrix.try_inverse().unwrap_or_else(|| DMatrix::zeros(count, count));
         (count..self.columns)
             .map(|column| {
@@ -284,8 +293,8 @@ impl Products {
     }
 
     /// Sandwich covariance of the coefficients, clustered by windows: A^-1 (sum_k w_k^2 s_k s_k') A^-1.
-    pub(crate) fn covariance(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<DMatrix<f64>> {
-        let (matrix, _) = self.normal(chosen, &fit.weights, ridges);
+    pub(crate) fn covariance(&self, chosen: &[usize], fit: &Fit, precisions: &[f64]) -> Option<DMatrix<f64>> {
+        let (matrix, _) = self.normal(chosen, &fit.weights, precisions);
         let inverse = matrix.try_inverse()?;
         let count = chosen.len();
         let mut middle = DMatrix::zeros(count, count);
@@ -311,7 +320,7 @@ impl Products {
         }
         // The prior counts as one more window.
         for row in 0..count {
-            middle[(row, row)] += ridges[row];
+            middle[(row, row)] += precisions[row];
         }
         Some(&inverse * middle * &inverse)
     }
@@ -319,9 +328,9 @@ impl Products {
     /// Delete-one-window jackknife standard errors. Where few windows determine a number, residuals understate its error. Errors
     /// are scaled so that two of them cover as two of a normal distribution do. Source: Bell, McCaffrey 2002, Survey Methodology
     /// 28(2): jackknife variance with Student's distribution and Satterthwaite degrees of freedom.
-    pub(crate) fn jackknife(&self, chosen: &[usize], fit: &Fit, ridges: &[f64]) -> Option<Vec<f64>> {
+    pub(crate) fn jackknife(&self, chosen: &[usize], fit: &Fit, precisions: &[f64]) -> Option<Vec<f64>> {
         let each: Vec<[usize; 1]> = (0..chosen.len()).map(|at| [at]).collect();
-        self.jackknife_of_sums(chosen, fit, ridges, &each)
+        self.jackknife_of_sums(chosen, fit, precisions, &each)
     }
 
     /// The same for sums of coefficients, each given by places in `chosen`.
@@ -329,14 +338,15 @@ impl Products {
         &self,
         chosen: &[usize],
         fit: &Fit,
-        ridges: &[f64],
+        precisions: &[f64],
         sums: &[S],
     ) -> Option<Vec<f64>> {
-        let (matrix, _) = self.normal(chosen, &fit.weights, ridges);
+        let (matrix, _) = self.normal(chosen, &fit.weights, precisions);
         let inverse = matrix.clone().try_inverse()?;
         let count = chosen.len();
         let windows = fit.weights.len() as f64;
-        let believed = &inverse * DMatrix::from_diagonal(&DVector::from_column_slice(ridges)) * &inverse;
+        let prior_part =
+            &inverse * DMatrix::from_diagonal(&DVector::from_column_slice(precisions)) * &inverse;
         let mut changes = Vec::with_capacity(fit.weights.len());
         for (window, weight) in fit.weights.iter().enumerate() {
             let information = &self.information[window];
@@ -356,21 +366,22 @@ impl Products {
         let error = |places: &[usize]| {
             let change_of = |change: &DVector<f64>| places.iter().map(|at| change[*at]).sum::<f64>();
             let squares = changes.iter().map(|change| change_of(change).powi(2));
-            let believed: f64 =
-                places.iter().flat_map(|row| places.iter().map(|at| believed[(*row, *at)])).sum();
+            let prior_part: f64 =
+                places.iter().flat_map(|row| places.iter().map(|at| prior_part[(*row, *at)])).sum();
             let sum: f64 = squares.clone().sum();
             // For normal changes the fourth moment is three times the squared variance.
-            let telling = 3.0 * sum * sum / squares.map(|square| square * square).sum::<f64>().max(1e-300);
-            ((1.0 - 1.0 / windows) * sum * widened(telling).powi(2) + believed.max(0.0)).sqrt()
+            let satterthwaite_dof =
+                3.0 * sum * sum / squares.map(|square| square * square).sum::<f64>().max(1e-300);
+            ((1.0 - 1.0 / windows) * sum * t_factor(satterthwaite_dof).powi(2) + prior_part.max(0.0)).sqrt()
         };
         Some(sums.iter().map(|places| error(places.as_ref())).collect())
     }
 }
 
 /// Factor on a standard error of few degrees of freedom that gives two of them the coverage of two normal ones.
-fn widened(freedom: f64) -> f64 {
+fn t_factor(dof: f64) -> f64 {
     let share = Normal::standard().cdf(2.0);
-    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.0, |student| student.inverse_cdf(share) / 2.0)
+    StudentsT::new(0.0, 1.0, dof.max(1.0)).map_or(1.0, |student| student.inverse_cdf(share) / 2.0)
 }
 
 /// Solves nearly singular symmetric equations after diagonal scaling.
@@ -422,15 +433,15 @@ mod tests {
             .collect();
         let loss = |columns: &[&[f64]]| {
             let all: Vec<usize> = (0..columns.len()).collect();
-            let ridges = vec![1e-6; columns.len()];
+            let precisions = vec![1e-6; columns.len()];
             let products = Products::new(&residual, columns, &[50.0; 10], 50);
-            let fit = products.fit(&all, &ridges);
+            let fit = products.fit(&all, &precisions);
             let mut left = residual.clone();
             for (column, coefficient) in columns.iter().zip(&fit.coefficients) {
                 left.iter_mut().zip(*column).for_each(|(left, part)| *left -= coefficient * part);
             }
             let products = Products::new(&left, columns, &[50.0; 10], 50);
-            (fit.loss, products.unseen_loss(&all, &ridges, &fit.coefficients, 5))
+            (fit.loss, products.cross_validated_loss(&all, &precisions, &fit.coefficients, 5))
         };
         let null = loss(&[]).1;
         let (seen, unseen) = loss(&[&column]);

@@ -24,7 +24,7 @@ mod start_states;
 use crate::calibrate::{Calibrated, calibrate};
 use crate::candidates::Candidate;
 use crate::engine::Engine;
-use crate::refit::{Around, Placed, Refit, around_of, derivative, rig_of};
+use crate::refit::{Linearisation, Placed, Refit, derivative, linearise, rig_of};
 use crate::screen::{Columns, Screened};
 pub(crate) use elimination::same;
 use elimination::{alternatives, drop_unneeded, shares, swap};
@@ -52,16 +52,16 @@ pub(crate) const NUMBER_COSTS: f64 = 8.0;
 /// Multiple of the null threshold required of a single effect.
 const SAFETY: f64 = 2.0;
 /// Share of the loss after calibration that the first effect must remove.
-const TAKES_FIRST: f64 = 0.1;
+const LEAST_SHARE_OF_FIRST: f64 = 0.1;
 /// Share of the remaining loss that each further effect must remove.
-const TAKES: f64 = 0.3;
+const LEAST_SHARE: f64 = 0.3;
 /// Smallest amplitude, as a share of the smallest change that occurs.
 const FLOOR: f64 = 0.6;
 /// Share of the loss after calibration that an explanation may leave.
-const STAYS: f64 = 0.3;
+const MOST_LOSS_LEFT: f64 = 0.3;
 /// Fall of the loss per degree of freedom that makes a model adequate whatever it leaves (1.8: chi2 to a sixth). A law of a
 /// slightly different form leaves more than noise and is still this effect.
-const REDUCES: f64 = 1.8;
+const ENOUGH_FALL_PER_DOF: f64 = 1.8;
 /// Effects defined by their first number alone: a check valve without cracking pressure is a line resistance, and on linked rods
 /// damping alone absorbs the errors of the start states.
 const DEFINED_BY_FIRST: [&str; 3] = ["check-valve-restriction", "coupling-backlash", "coupling-compliance"];
@@ -103,13 +103,13 @@ pub struct Found {
 
 /// Selects the effects that are missing from the baseline.
 pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn FnMut(&str)) -> Found {
-    let around = Around::at_baseline(engine);
+    let linearisation = Linearisation::at_baseline(engine);
     progress("parameters alone");
-    let calibrated = calibrate(engine, &around);
+    let calibrated = calibrate(engine, &linearisation);
     progress(&format!("screening {} candidates", candidates.len()));
     let columns = Columns::new(engine, candidates);
     let baseline = engine.residual(&engine.simulate(engine.rig()));
-    let (null_loss, mut screened) = columns.screen(engine, &around, &baseline, &[]);
+    let (null_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
     let Restarted { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated.fit, 0.0);
@@ -125,7 +125,7 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
             if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, &model) };
         let Some(contenders) = Contenders::of(screening, here, &columns, &model, threshold) else { break };
         progress(&format!("fitting {} candidates, round {}", contenders.count(), number + 1));
-        let point = if number == 0 { around.clone() } else { around_of(here, &model) };
+        let point = if number == 0 { linearisation.clone() } else { linearise(here, &model) };
         let Some(mut round) = Round::fitted(here, &point, &model, &contenders, progress) else { break };
         fitted.extend(round.fits.iter().cloned());
         round.keep_large();
@@ -134,11 +134,11 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
         let Some(best) = round.fits.first_mut() else { break };
         // The null distribution is drawn from the residual of the best model, since explained signal is not noise. No threshold
         // applies here: an effect that turns out unnecessary is eliminated at the end.
-        if !takes(&model, best) {
+        if !gains_enough(&model, best) {
             break;
         }
         best.factors = backtrack(there, best);
-        threshold = NullDistribution::new(there, &columns, &around_of(there, best), best).threshold();
+        threshold = NullDistribution::new(there, &columns, &linearise(there, best), best).threshold();
         model = best.clone();
         rounds.push(round.fits);
         if number > 0 {
@@ -148,15 +148,17 @@ pub fn name(engine: &Engine<'_>, candidates: Vec<Candidate>, progress: &mut dyn 
     }
     let here = restarted.as_ref().unwrap_or(engine);
     drop_unneeded(here, &calibrated, &columns, &mut model, &mut rounds);
-    let null = NullDistribution::new(here, &columns, &around_of(here, &model), &model);
+    let null = NullDistribution::new(here, &columns, &linearise(here, &model), &model);
     threshold = null.threshold();
     let limits = limits_of(&null, &columns, threshold);
     let excess = (calibrated.fit.loss - model.loss).max(1e-9);
-    let freedom = here.freedom().iter().sum::<f64>();
-    let level = model.loss / freedom;
-    let excess_level = if engine.is_linked() { EXCESS_LINKED } else { EXCESS };
-    let reduced = (calibrated.fit.loss - model.loss) / freedom;
-    let inadequate = level > excess_level && model.loss > STAYS * calibrated.fit.loss && reduced < REDUCES;
+    let dof = here.scaled_dof().iter().sum::<f64>();
+    let loss_per_dof = model.loss / dof;
+    let most_loss_per_dof = if engine.is_linked() { EXCESS_LINKED } else { EXCESS };
+    let fall_per_dof = (calibrated.fit.loss - model.loss) / dof;
+    let inadequate = loss_per_dof > most_loss_per_dof
+        && model.loss > MOST_LOSS_LEFT * calibrated.fit.loss
+        && fall_per_dof < ENOUGH_FALL_PER_DOF;
     let reported = if inadequate {
         let restarted = engine.is_linked().then(|| engine.with_starts_under(&calibrated.rig(engine.rig())));
         with_needed(restarted.as_ref().unwrap_or(engine), &calibrated.fit)
@@ -200,9 +202,9 @@ fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.
-fn takes(before: &Refit, after: &Refit) -> bool {
+fn gains_enough(before: &Refit, after: &Refit) -> bool {
     let gain = before.loss - after.loss;
-    let share = if before.placed.is_empty() { TAKES_FIRST } else { TAKES };
+    let share = if before.placed.is_empty() { LEAST_SHARE_OF_FIRST } else { LEAST_SHARE };
     gain > (share * before.loss).max(WORTH_A_FIT)
 }
 
@@ -237,7 +239,7 @@ fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<
 
 /// Screens all candidates against a model's residual, with the derivatives of its effects as extra columns.
 fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<Screened>) {
-    let around = around_of(engine, model);
+    let linearisation = linearise(engine, model);
     let rig = rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);
     let residual = engine.residual(&simulated);
@@ -245,5 +247,5 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
         .into_par_iter()
         .filter_map(|at| derivative(engine, &model.factors, &model.placed, &simulated, at, 0))
         .collect();
-    columns.screen(engine, &around, &residual, &beside)
+    columns.screen(engine, &linearisation, &residual, &beside)
 }

@@ -14,7 +14,7 @@ pub struct Parameter {
     /// Keys of the rig file that it scales, the reported one first.
     pub keys: &'static [&'static str],
     /// Prior standard deviation of its factor.
-    pub tolerance: f64,
+    pub prior_std: f64,
 }
 
 /// All of them, in the order of effects.md.
@@ -22,31 +22,31 @@ pub const PARAMETERS: [Parameter; 9] = [
     Parameter {
         name: "parameter:mass",
         keys: &["mass.drive_kg", "mass.carriage_kg", "mass.load_kg"],
-        tolerance: 0.05,
+        prior_std: 0.05,
     },
     Parameter {
         name: "parameter:viscous-friction",
         keys: &["friction.viscous_n_per_mm_per_s"],
-        tolerance: 0.1,
+        prior_std: 0.1,
     },
-    Parameter { name: "parameter:sliding-friction", keys: &[SLIDING], tolerance: 0.1 },
-    Parameter { name: "parameter:break-away-force", keys: &[BREAK_AWAY], tolerance: 0.1 },
-    Parameter { name: "parameter:supply-pressure", keys: &["supply.pressure_bar"], tolerance: 0.05 },
+    Parameter { name: "parameter:sliding-friction", keys: &[SLIDING], prior_std: 0.1 },
+    Parameter { name: "parameter:break-away-force", keys: &[BREAK_AWAY], prior_std: 0.1 },
+    Parameter { name: "parameter:supply-pressure", keys: &["supply.pressure_bar"], prior_std: 0.05 },
     Parameter {
         name: "parameter:spool-time-constant",
         keys: &["valve.spool_time_constant_ms"],
-        tolerance: 0.1,
+        prior_std: 0.1,
     },
-    Parameter { name: "parameter:flow-lag", keys: &["valve.flow_lag_time_constant_ms"], tolerance: 0.1 },
+    Parameter { name: "parameter:flow-lag", keys: &["valve.flow_lag_time_constant_ms"], prior_std: 0.1 },
     Parameter {
         name: "parameter:kv-scale",
         keys: &["valve.kv_supply_m3_per_h", "valve.kv_exhaust_m3_per_h"],
-        tolerance: 0.05,
+        prior_std: 0.05,
     },
     Parameter {
         name: "parameter:piston-area",
         keys: &["cylinder.piston_area_mm2", "cylinder.annulus_area_mm2"],
-        tolerance: 0.02,
+        prior_std: 0.02,
     },
 ];
 

@@ -28,8 +28,8 @@ const CONVERGED: f64 = 0.3;
 /// The same of relinearisations.
 pub(crate) const CONVERGED_RELINEARISED: f64 = 1.0;
 /// Prior standard deviations of coordinates: amplitudes, shapes.
-const AMPLITUDE_TOLERANCE: f64 = 3.0;
-const SHAPE_TOLERANCE: f64 = 0.7;
+const AMPLITUDE_PRIOR_STD: f64 = 3.0;
+const SHAPE_PRIOR_STD: f64 = 0.7;
 /// Bound of the relative deviation of a parameter.
 pub(crate) const MOST_OFF: f64 = 0.3;
 /// Penalty for each parameter off its file value. A sensor that reads four per cent low is a better explanation than all masses,
@@ -58,27 +58,27 @@ pub struct Refit {
     /// Standard errors of all coordinates, in the order of the effects and their keys, then of the factors; clustered by windows.
     pub errors: Vec<f64>,
     /// Design effect: cluster-robust over model-based variance of the first amplitude; at least 1.
-    pub(crate) inflation: f64,
+    pub(crate) design_effect: f64,
 }
 
 /// Parameter sensitivities and the point of linearisation.
 #[derive(Clone, Debug)]
-pub struct Around {
+pub struct Linearisation {
     /// Sensitivities to the parameters.
     pub columns: Vec<Vec<f64>>,
     /// Factors at that point.
     pub factors: [f64; COUNT],
 }
 
-impl Around {
+impl Linearisation {
     /// At the rig file's values.
     pub fn at_baseline(engine: &Engine<'_>) -> Self {
         let factors = [1.0; COUNT];
-        Around { columns: engine.parameter_columns(engine.rig(), &factors), factors }
+        Linearisation { columns: engine.parameter_columns(engine.rig(), &factors), factors }
     }
 
     /// Deviations of the parameters from the prior means.
-    pub fn off(&self) -> Vec<f64> {
+    pub fn deviations(&self) -> Vec<f64> {
         self.factors.iter().map(|factor| factor - 1.0).collect()
     }
 }
@@ -95,8 +95,8 @@ pub(crate) fn rig_of(
 }
 
 /// Prior precisions of the parameter factors.
-pub(crate) fn parameter_ridges() -> Vec<f64> {
-    PARAMETERS.iter().map(|parameter| parameter.tolerance.powi(-2)).collect()
+pub(crate) fn parameter_precisions() -> Vec<f64> {
+    PARAMETERS.iter().map(|parameter| parameter.prior_std.powi(-2)).collect()
 }
 
 /// Number of parameters off their file values, small deviations counted in part.
@@ -108,22 +108,24 @@ fn parameters_off(factors: &[f64; COUNT]) -> f64 {
         .sum()
 }
 
-pub(crate) fn costs(numbers: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
+pub(crate) fn model_penalty(numbers: usize, factors: &[f64; COUNT], penalty: f64) -> f64 {
     penalty * numbers as f64 + PARAMETER_COSTS * parameters_off(factors)
 }
 
 /// Prior precision of a coordinate.
-pub(crate) fn coordinate_ridge(candidate: &Candidate, key: usize) -> f64 {
-    let tolerance = if candidate.is_shape(key) { SHAPE_TOLERANCE } else { AMPLITUDE_TOLERANCE };
-    tolerance.powi(-2)
+pub(crate) fn coordinate_precision(candidate: &Candidate, key: usize) -> f64 {
+    let prior_std = if candidate.is_shape(key) { SHAPE_PRIOR_STD } else { AMPLITUDE_PRIOR_STD };
+    prior_std.powi(-2)
 }
 
 /// Prior precisions of the parameters, then of all coordinates of the effects.
 pub(crate) fn prior_precisions(placed: &[Placed]) -> Vec<f64> {
     let of_effect = |effect: &Placed| {
-        (0..effect.coordinates.len()).map(|key| coordinate_ridge(&effect.candidate, key)).collect::<Vec<_>>()
+        (0..effect.coordinates.len())
+            .map(|key| coordinate_precision(&effect.candidate, key))
+            .collect::<Vec<_>>()
     };
-    parameter_ridges().into_iter().chain(placed.iter().flat_map(of_effect)).collect()
+    parameter_precisions().into_iter().chain(placed.iter().flat_map(of_effect)).collect()
 }
 
 /// Deviations from the prior means in the same order.
@@ -133,7 +135,7 @@ pub(crate) fn prior_deviations(factors: &[f64; COUNT], placed: &[Placed]) -> Vec
 }
 
 /// All coordinates of the effects: place in `placed`, and key.
-fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
+fn coordinates(placed: &[Placed]) -> Vec<(usize, usize)> {
     placed
         .iter()
         .enumerate()
@@ -142,10 +144,12 @@ fn moved(placed: &[Placed]) -> Vec<(usize, usize)> {
 }
 
 /// Loss of effects at fixed coordinates with the parameters fitted; infinite where no rig can have them.
-pub(crate) fn loss_at(engine: &Engine<'_>, around: &Around, placed: &[Placed]) -> f64 {
-    let Some(rig) = rig_of(engine.rig(), placed, &around.factors) else { return f64::INFINITY };
-    let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &around.columns);
-    products.fit_from(&(0..COUNT).collect::<Vec<_>>(), &parameter_ridges(), &around.off()).loss
+pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, placed: &[Placed]) -> f64 {
+    let Some(rig) = rig_of(engine.rig(), placed, &linearisation.factors) else { return f64::INFINITY };
+    let products = engine.products(&engine.residual(&engine.simulate_coarsely(&rig)), &linearisation.columns);
+    products
+        .fit_from(&(0..COUNT).collect::<Vec<_>>(), &parameter_precisions(), &linearisation.deviations())
+        .loss
 }
 
 struct Point {
@@ -158,42 +162,47 @@ struct Point {
 /// Fits effects from a start; `penalty` is due for each coordinate.
 ///
 /// `None` where no rig can have the start.
-pub fn refit(engine: &Engine<'_>, around: &Around, start: &[Placed], penalty: f64) -> Option<Refit> {
-    refit_steps(engine, around, start, penalty, STEPS)
+pub fn refit(
+    engine: &Engine<'_>,
+    linearisation: &Linearisation,
+    start: &[Placed],
+    penalty: f64,
+) -> Option<Refit> {
+    refit_steps(engine, linearisation, start, penalty, STEPS)
 }
 
 /// The same with another maximum of steps; 0 evaluates the start.
 pub(crate) fn refit_steps(
     engine: &Engine<'_>,
-    around: &Around,
+    linearisation: &Linearisation,
     start: &[Placed],
     penalty: f64,
     steps: usize,
 ) -> Option<Refit> {
     let parameters: Vec<usize> = (0..COUNT).collect();
-    let (ridges, off) = (parameter_ridges(), around.off());
-    let all_ridges = prior_precisions(start);
-    let chosen: Vec<usize> = (0..all_ridges.len()).collect();
-    let moved = moved(start);
+    let (precisions, off) = (parameter_precisions(), linearisation.deviations());
+    let all_precisions = prior_precisions(start);
+    let chosen: Vec<usize> = (0..all_precisions.len()).collect();
+    let coordinates = coordinates(start);
     let mut parameter_products: Option<Products> = None;
     let mut evaluate = |placed: Vec<Placed>| -> Option<Point> {
-        let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &around.factors)?);
+        let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
             Some(products) => {
-                products.set_residual(&residual, &around.columns, engine.rows());
+                products.set_residual(&residual, &linearisation.columns, engine.rows());
                 products
             }
-            none => none.insert(engine.products(&residual, &around.columns)),
+            none => none.insert(engine.products(&residual, &linearisation.columns)),
         };
-        let fit = products.fit_from(&parameters, &ridges, &off);
+        let fit = products.fit_from(&parameters, &precisions, &off);
         Some(Point { placed, simulated, residual, fit })
     };
     let prior = |placed: &[Placed]| -> f64 {
-        moved
+        coordinates
             .iter()
             .map(|(at, key)| {
-                coordinate_ridge(&placed[*at].candidate, *key) * placed[*at].coordinates[*key].powi(2)
+                coordinate_precision(&placed[*at].candidate, *key) * placed[*at].coordinates[*key].powi(2)
             })
             .sum()
     };
@@ -203,16 +212,16 @@ pub(crate) fn refit_steps(
     let (mut last, mut left) = (None, steps);
     let point = descend(first, steps + 1, CONVERGED, total, |point| {
         last = None;
-        let columns = coordinate_columns(engine, &around.factors, &point.placed, &point.simulated)?;
-        let all: Vec<&Vec<f64>> = around.columns.iter().chain(&columns).collect();
+        let columns = coordinate_columns(engine, &linearisation.factors, &point.placed, &point.simulated)?;
+        let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&columns).collect();
         let products = last.insert(engine.products(&point.residual, &all));
         left = left.checked_sub(1)?;
-        let from = prior_deviations(&around.factors, &point.placed);
-        let joint = products.fit_from(&chosen, &all_ridges, &from);
+        let from = prior_deviations(&linearisation.factors, &point.placed);
+        let joint = products.fit_from(&chosen, &all_precisions, &from);
         let shares = successors(Some(1.0), |share| Some(share * SHORTER));
         shares.take(SHORTENINGS + 1).find_map(|share| {
             let mut placed = point.placed.clone();
-            for ((at, key), change) in moved.iter().zip(&joint.coefficients[COUNT..]) {
+            for ((at, key), change) in coordinates.iter().zip(&joint.coefficients[COUNT..]) {
                 let [least, most] = placed[*at].candidate.reach(*key);
                 let coordinate = &mut placed[*at].coordinates[*key];
                 *coordinate = (*coordinate + share * change).clamp(least, most);
@@ -223,38 +232,38 @@ pub(crate) fn refit_steps(
     let products = last?;
     // At the final iterate: parameters as fitted, coordinates unchanged.
     let mut at_point = point.fit.clone();
-    at_point.coefficients.extend(std::iter::repeat_n(0.0, moved.len()));
-    let covariance = products.covariance(&chosen, &at_point, &all_ridges);
-    let (plain, _) = products.normal(&chosen, &at_point.weights, &all_ridges);
+    at_point.coefficients.extend(std::iter::repeat_n(0.0, coordinates.len()));
+    let covariance = products.covariance(&chosen, &at_point, &all_precisions);
+    let (plain, _) = products.normal(&chosen, &at_point.weights, &all_precisions);
     let plain = plain.try_inverse();
     let error =
         |at: usize| covariance.as_ref().map_or(f64::INFINITY, |matrix| matrix[(at, at)].max(0.0).sqrt());
-    let inflation = match (&covariance, &plain) {
-        (Some(clustered), Some(plain)) if !moved.is_empty() => {
+    let design_effect = match (&covariance, &plain) {
+        (Some(clustered), Some(plain)) if !coordinates.is_empty() => {
             (clustered[(COUNT, COUNT)] / plain[(COUNT, COUNT)]).max(1.0)
         }
         _ => 1.0,
     };
     let errors = (COUNT..chosen.len()).chain(0..COUNT).map(error).collect();
-    let mut factors = around.factors;
+    let mut factors = linearisation.factors;
     for (factor, change) in factors.iter_mut().zip(&point.fit.coefficients) {
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
-    let loss = point.fit.loss + prior(&point.placed) + costs(moved.len(), &factors, penalty);
-    Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, inflation })
+    let loss = point.fit.loss + prior(&point.placed) + model_penalty(coordinates.len(), &factors, penalty);
+    Some(Refit { placed: point.placed, factors, loss, squares: point.fit.squares, errors, design_effect })
 }
 
 /// Parameter sensitivities linearised at a model.
-pub(crate) fn around_of(engine: &Engine<'_>, model: &Refit) -> Around {
+pub(crate) fn linearise(engine: &Engine<'_>, model: &Refit) -> Linearisation {
     let rig = rig_of(engine.rig(), &model.placed, &[1.0; COUNT]).unwrap_or_else(|| engine.rig().clone());
-    Around { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
+    Linearisation { columns: engine.parameter_columns(&rig, &model.factors), factors: model.factors }
 }
 
 /// Refits a model with the parameters linearised anew at its own values, until the loss converges.
 pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, penalty: f64, times: usize) -> Refit {
     let mut best = model;
     for _ in 0..times {
-        let Some(next) = refit(engine, &around_of(engine, &best), &best.placed, penalty) else { break };
+        let Some(next) = refit(engine, &linearise(engine, &best), &best.placed, penalty) else { break };
         let converged = next.loss > best.loss - CONVERGED_RELINEARISED;
         if next.loss < best.loss {
             best = next;
@@ -274,7 +283,10 @@ pub(crate) fn coordinate_columns(
     placed: &[Placed],
     simulated: &[f64],
 ) -> Option<Vec<Vec<f64>>> {
-    moved(placed).iter().map(|(at, key)| derivative(engine, factors, placed, simulated, *at, *key)).collect()
+    coordinates(placed)
+        .iter()
+        .map(|(at, key)| derivative(engine, factors, placed, simulated, *at, *key))
+        .collect()
 }
 
 /// Sensitivity to a coordinate, by a one-sided difference that stays inside the range.
@@ -293,8 +305,8 @@ pub(crate) fn derivative(
     let change = if coordinate + size > most { -size } else { size };
     let mut placed = placed.to_vec();
     placed[at].coordinates[key] += change;
-    let moved = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);
-    let mut column = engine.difference(&moved, simulated);
+    let coordinates = engine.simulate(&rig_of(engine.rig(), &placed, factors)?);
+    let mut column = engine.difference(&coordinates, simulated);
     column.iter_mut().for_each(|value| *value /= change);
     Some(column)
 }

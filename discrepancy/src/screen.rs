@@ -8,7 +8,7 @@ use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::COUNT;
-use crate::refit::{Around, Placed, parameter_ridges};
+use crate::refit::{Linearisation, Placed, parameter_precisions};
 use rayon::prelude::*;
 
 #[derive(Debug)]
@@ -66,21 +66,21 @@ impl Columns {
     pub(crate) fn screen(
         &self,
         engine: &Engine<'_>,
-        around: &Around,
+        linearisation: &Linearisation,
         residual: &[f64],
         beside: &[Vec<f64>],
     ) -> (f64, Vec<Screened>) {
         let always = COUNT + beside.len();
-        let all: Vec<&Vec<f64>> = around.columns.iter().chain(beside).chain(&self.columns).collect();
+        let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(beside).chain(&self.columns).collect();
         let products = engine.products(residual, &all);
-        let (mut ridges, mut from) = (parameter_ridges(), around.off());
-        ridges.resize(always, 1e-2);
+        let (mut precisions, mut from) = (parameter_precisions(), linearisation.deviations());
+        precisions.resize(always, 1e-2);
         from.resize(always, 0.0);
         let basic: Vec<usize> = (0..always).collect();
-        let null_loss = products.fit_from(&basic, &ridges, &from).loss;
+        let null_loss = products.fit_from(&basic, &precisions, &from).loss;
         let screened = (0..self.candidates.len())
             .into_par_iter()
-            .filter_map(|at| self.screen_one(&products, at, &basic, &ridges, &from))
+            .filter_map(|at| self.screen_one(&products, at, &basic, &precisions, &from))
             .collect();
         (null_loss, screened)
     }
@@ -90,7 +90,7 @@ impl Columns {
         products: &Products,
         at: usize,
         basic: &[usize],
-        ridges: &[f64],
+        precisions: &[f64],
         from: &[f64],
     ) -> Option<Screened> {
         let always = basic.len();
@@ -103,13 +103,13 @@ impl Columns {
         for (probe, place) in &leading {
             for with in if joining.is_empty() { vec![&alone] } else { vec![&alone, &joining] } {
                 let mut chosen = basic.to_vec();
-                let mut chosen_ridges = ridges.to_vec();
+                let mut chosen_precisions = precisions.to_vec();
                 chosen.push(always + place);
                 chosen.extend(with.iter().map(|(_, place)| always + place));
-                chosen_ridges.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
+                chosen_precisions.extend(std::iter::repeat_n(1e-2, 1 + with.len()));
                 let mut chosen_from = from.to_vec();
                 chosen_from.resize(chosen.len(), 0.0);
-                let fit = products.fit_from(&chosen, &chosen_ridges, &chosen_from);
+                let fit = products.fit_from(&chosen, &chosen_precisions, &chosen_from);
                 let mut coordinates = probe.clone();
                 let [least, most] = candidate.range(0);
                 let coefficient = fit.coefficients[always];

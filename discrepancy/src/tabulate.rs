@@ -7,7 +7,7 @@
 //!
 //! The curve of an unknown input is shrunk by its prior, comes from independent windows of 20 ms, and parameters have absorbed a
 //! part of it. It only starts the fit. The loss, the windows and the penalty for each number are those of naming. A table is not
-//! added if it lowers the training loss, or the five-fold cross-validated loss of the linearised model, by less than [`TAKES`].
+//! added if it lowers the training loss, or the five-fold cross-validated loss of the linearised model, by less than [`LEAST_SHARE`].
 //!
 //! The parameters that were off in the calibration are fitted jointly. In the end all return to the rig file's values, and
 //! forward selection readmits those that the tables need.
@@ -24,7 +24,7 @@ use crate::name::WORTH_A_FIT;
 use crate::parameters::COUNT;
 use crate::refit::Refit;
 use crate::report::{Outside, Quantity, TableTerm};
-use fit::{Beside, Lines, Model, Point, Tied};
+use fit::{FittedTable, LinearisedTable, Model, Point, TableLinearisation};
 use plant::effects::tabulated::{self, Balance, Tabulated, Variable, interpolated};
 use plant::{Axis, RigParameters};
 
@@ -41,8 +41,8 @@ const MOST_POINTS: usize = tabulated::POINTS[1];
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
 /// Share of the loss that a table must remove, and a second one of the remaining loss.
-const TAKES: f64 = 0.05;
-const TAKES_MORE: f64 = 0.15;
+const LEAST_SHARE: f64 = 0.05;
+const LEAST_SHARE_OF_SECOND: f64 = 0.15;
 
 /// Tables and parameters.
 #[derive(Clone, Debug)]
@@ -78,22 +78,24 @@ pub(crate) fn tabulate(
     let mut best = seek.finer(first);
     progress("a table over a second variable");
     if let Some((second, _)) = seek.best(&best, Some(used))
-        && best.loss - second.loss > TAKES_MORE * best.loss.abs()
+        && best.loss - second.loss > LEAST_SHARE_OF_SECOND * best.loss.abs()
     {
         best = fit::fit(engine, second, STEPS);
     }
     let (best, off) = with_needed(engine, best);
     let share_explained = (parameters_alone.loss - best.loss) / parameters_alone.loss.max(1e-9);
-    if best.loss > parameters_alone.loss - TAKES * parameters_alone.loss.abs() {
+    if best.loss > parameters_alone.loss - LEAST_SHARE * parameters_alone.loss.abs() {
         return Err("its table leaves the windows of the training records no better".to_owned());
     }
-    let lines = Lines::of(engine, best.model.clone()).ok_or("no rig can have its neighbours")?;
-    let bare = Lines::of(engine, parameters_alone.model.clone()).ok_or("no rig can have its neighbours")?;
-    let unseen = bare.unseen_loss(engine, &parameters_alone);
-    if lines.unseen_loss(engine, &best) > unseen - TAKES * unseen.abs() {
+    let linearisation =
+        TableLinearisation::of(engine, best.model.clone()).ok_or("no rig can have its neighbours")?;
+    let bare = TableLinearisation::of(engine, parameters_alone.model.clone())
+        .ok_or("no rig can have its neighbours")?;
+    let unseen = bare.cross_validated_loss(engine, &parameters_alone);
+    if linearisation.cross_validated_loss(engine, &best) > unseen - LEAST_SHARE * unseen.abs() {
         return Err("its table leaves windows that it was not fitted on no better".to_owned());
     }
-    let refit = best.as_refit(engine, &lines);
+    let refit = best.as_refit(engine, &linearisation);
     Ok(Tables {
         terms: best.model.tables.iter().map(|table| term(&table.table)).collect(),
         parameters: (0..COUNT).filter(|at| off[*at]).map(|at| quantity(engine, at, &refit)).collect(),
@@ -105,16 +107,18 @@ pub(crate) fn tabulate(
 fn with_needed(engine: &Engine<'_>, best: Point) -> (Point, [bool; COUNT]) {
     let all = Model { free: [true; COUNT], ..best.model.clone() };
     let held = Point::of(engine, best.model.clone().held([false; COUNT]));
-    let Some((lines, held)) = Lines::of(engine, all).zip(held) else { return (best, [true; COUNT]) };
-    let lines = lines.with(&[]);
-    let bare = fit::steps(engine, held, &lines[COUNT..]);
-    let needed = fit::needed(engine, &bare, &lines, WORTH_A_FIT);
+    let Some((linearisation, held)) = TableLinearisation::of(engine, all).zip(held) else {
+        return (best, [true; COUNT]);
+    };
+    let linearisation = linearisation.with(&[]);
+    let bare = fit::steps(engine, held, &linearisation[COUNT..]);
+    let needed = fit::needed(engine, &bare, &linearisation, WORTH_A_FIT);
     let Some(start) = Point::of(engine, bare.model.clone().held(needed)) else {
         return (bare, [false; COUNT]);
     };
     // The known linearisation serves for the first steps.
     let is_in = |at: &usize| needed.get(*at).is_none_or(|needed| *needed);
-    let columns: Vec<&[f64]> = (0..lines.len()).filter(is_in).map(|at| lines[at]).collect();
+    let columns: Vec<&[f64]> = (0..linearisation.len()).filter(is_in).map(|at| linearisation[at]).collect();
     (fit::fit(engine, fit::steps(engine, start, &columns), STEPS), needed)
 }
 
@@ -149,27 +153,27 @@ impl Seek<'_> {
             Balance::FlowA => &[&[Balance::FlowA], &[Balance::FlowA, Balance::FlowB]],
             Balance::FlowB => &[&[Balance::FlowB], &[Balance::FlowA, Balance::FlowB]],
         };
-        let lines = Lines::of(self.engine, from.model.clone())?;
+        let linearisation = TableLinearisation::of(self.engine, from.model.clone())?;
         let all = Variable::ALL.into_iter().map(Over::Variable).chain([Over::Constant]);
         // Linearised once for each balance.
         let flat = |over: Over, balance: Balance| {
-            let mut tied = self.table(over, balance)?;
-            tied.table.value.fill(0.0);
-            lines.beside(self.engine, tied)
+            let mut fitted = self.table(over, balance)?;
+            fitted.table.value.fill(0.0);
+            linearisation.beside(self.engine, fitted)
         };
-        let flats: Vec<(Over, Vec<Beside>)> = all
+        let flats: Vec<(Over, Vec<LinearisedTable>)> = all
             .filter(|over| Some(*over) != used)
             .map(|over| {
                 (over, sets[sets.len() - 1].iter().filter_map(|balance| flat(over, *balance)).collect())
             })
             .collect();
-        let mut screened: Vec<(f64, Over, Vec<&Beside>)> = Vec::new();
+        let mut screened: Vec<(f64, Over, Vec<&LinearisedTable>)> = Vec::new();
         for (over, tables) in &flats {
             for balances in sets {
-                let beside: Vec<&Beside> =
+                let beside: Vec<&LinearisedTable> =
                     tables.iter().filter(|table| balances.contains(&table.balance())).collect();
                 if beside.len() == balances.len() {
-                    screened.push((lines.promised(self.engine, from, &beside), *over, beside));
+                    screened.push((linearisation.predicted_loss(self.engine, from, &beside), *over, beside));
                 }
             }
         }
@@ -181,7 +185,7 @@ impl Seek<'_> {
             let point = if from.model.tables.is_empty() {
                 fit::fit(self.engine, start, FIRST_STEPS)
             } else {
-                fit::steps(self.engine, start, &lines.with(beside))
+                fit::steps(self.engine, start, &linearisation.with(beside))
             };
             Some((point, *over))
         });
@@ -192,11 +196,11 @@ impl Seek<'_> {
     fn with(&self, model: &Model, over: Over, balances: &[Balance], is_flat: bool) -> Option<Model> {
         let mut model = model.clone();
         for balance in balances {
-            let mut tied = self.table(over, *balance)?;
+            let mut fitted = self.table(over, *balance)?;
             if is_flat {
-                tied.table.value.fill(0.0);
+                fitted.table.value.fill(0.0);
             }
-            model.tables.push(tied);
+            model.tables.push(fitted);
         }
         Some(model)
     }
@@ -226,7 +230,7 @@ impl Seek<'_> {
     }
 
     /// The curve of an unknown input as a table.
-    fn table(&self, over: Over, balance: Balance) -> Option<Tied> {
+    fn table(&self, over: Over, balance: Balance) -> Option<FittedTable> {
         let name = format!("{}.{}", self.axis.name(), balance.name());
         let series = self.unknowns.iter().find(|series| series.balance == name)?;
         let variable = match over {
@@ -261,7 +265,7 @@ impl Seek<'_> {
             }
         };
         let table = Tabulated { axis: self.axis, balance, variable, at, value };
-        Some(Tied { table, is_constant: over == Over::Constant, seen })
+        Some(FittedTable { table, is_constant: over == Over::Constant, seen })
     }
 
     /// Refines the table while the loss, penalty included, falls.
@@ -269,14 +273,14 @@ impl Seek<'_> {
         let mut best = fit::fit(self.engine, start, STEPS);
         for times in FINER {
             let mut model = best.model.clone();
-            for tied in model.tables.iter_mut().filter(|tied| tied.table.at.len() > 2) {
-                let is_directed = tied.table.variable == Variable::DirectedExtension;
+            for fitted in model.tables.iter_mut().filter(|fitted| fitted.table.at.len() > 2) {
+                let is_directed = fitted.table.variable == Variable::DirectedExtension;
                 let points = if is_directed { DIRECTED_POINTS } else { POINTS };
                 // One more may come at the end.
-                let at = knots(&tied.seen, (times * points).min(MOST_POINTS - 1));
-                tied.table.value =
-                    at.iter().map(|x| interpolated(&tied.table.at, &tied.table.value, *x)).collect();
-                tied.table.at = at;
+                let at = knots(&fitted.seen, (times * points).min(MOST_POINTS - 1));
+                fitted.table.value =
+                    at.iter().map(|x| interpolated(&fitted.table.at, &fitted.table.value, *x)).collect();
+                fitted.table.at = at;
             }
             let Some(point) = Point::of(self.engine, model) else { break };
             let tried = fit::fit(self.engine, point, FIRST_STEPS);
@@ -296,9 +300,9 @@ fn knots(seen: &[f64], count: usize) -> Vec<f64> {
     let width = most - least;
     let mut at = vec![*least];
     for (rank, value) in seen.iter().enumerate() {
-        let along = 0.5 * rank as f64 / seen.len() as f64 + 0.5 * (value - least) / width;
+        let line_search = 0.5 * rank as f64 / seen.len() as f64 + 0.5 * (value - least) / width;
         let apart = value - at[at.len() - 1] > 0.2 * width / count as f64;
-        if along >= at.len() as f64 / (count - 1) as f64 && apart {
+        if line_search >= at.len() as f64 / (count - 1) as f64 && apart {
             at.push(*value);
         }
     }
@@ -334,9 +338,9 @@ pub(crate) fn tables(terms: &[TableTerm]) -> Vec<Tabulated> {
 }
 
 /// The rig with additional tables.
-fn with_tables(rig: &RigParameters, tables: &[Tied]) -> Option<RigParameters> {
+fn with_tables(rig: &RigParameters, tables: &[FittedTable]) -> Option<RigParameters> {
     let mut all = rig.tabulated().to_vec();
-    all.extend(tables.iter().map(|tied| tied.table.clone()));
+    all.extend(tables.iter().map(|fitted| fitted.table.clone()));
     rig.with_tabulated(&all).ok()
 }
 

@@ -77,23 +77,23 @@ pub(crate) fn verify(
         || free_run::free_run(record, after.windows.rig()),
     );
 
-    let lanes = after.windows.lanes().len();
+    let outputs = after.windows.outputs().len();
     let models = [&before, &after]
-        .map(|model| Power::new(&power::sums(&model.residual, lanes), &null.expected, lanes));
+        .map(|model| Power::new(&power::sums(&model.residual, outputs), &null.expected, outputs));
     let [power_before, power_after] = &models;
     let levels = levels(&power_before.smaller(power_after), &null);
     let models = [power_before, power_after].map(|power| power.over(&levels));
     let [power_before, power_after] = &models;
 
-    let names: Vec<String> = after.windows.lanes().iter().map(|(axis, at)| column(*axis, *at)).collect();
+    let names: Vec<String> = after.windows.outputs().iter().map(|(axis, at)| column(*axis, *at)).collect();
     let mut gap = BTreeMap::new();
     let mut whiteness = BTreeMap::new();
     let all_kept = kept(&power_after.joint());
-    for (lane, name) in names.iter().enumerate() {
-        let (axis, at) = after.windows.lanes()[lane];
-        let noise = record.noise[axis][at] * levels[lane].sqrt();
-        gap.insert(name.clone(), signal_gap(&models, lane, noise, null.spreads[lane]));
-        let of = |model: &Model<'_>| power::neighbours(&model.residual, lane, lanes, &all_kept);
+    for (output, name) in names.iter().enumerate() {
+        let (axis, at) = after.windows.outputs()[output];
+        let noise = record.noise[axis][at] * levels[output].sqrt();
+        gap.insert(name.clone(), signal_gap(&models, output, noise, null.spreads[output]));
+        let of = |model: &Model<'_>| power::neighbours(&model.residual, output, outputs, &all_kept);
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
     let worse = gap.values().any(|gap| gap.after > WORSE * gap.before);
@@ -130,15 +130,15 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The column of a lane, `drive_position_m`.
+/// The column of a output, `drive_position_m`.
 fn column(axis: usize, at: usize) -> String {
     debug_assert!(at < CHANNELS);
     Channel::Of(Axis::ALL[axis], SIGNALS[at]).column()
 }
 
-/// Gap of a lane; `noise` in its unit, `spread` the null standard deviation of the pooled power.
-fn signal_gap(models: &[Power; 2], lane: usize, noise: f64, spread: f64) -> Gap {
-    let [before, after] = models.each_ref().map(|power| power.lane(lane));
+/// Gap of a output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
+fn signal_gap(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Gap {
+    let [before, after] = models.each_ref().map(|power| power.output(output));
     let kept = kept(&after);
     let [before_power, after_power] = [&before, &after].map(|squares| pooled(squares, &kept));
     let excess = before_power - 1.0;

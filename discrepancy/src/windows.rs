@@ -25,7 +25,7 @@ use plant::{Batch, Inputs, Plant, RigParameters};
 pub use reference_run::{Reach, ReferenceRun};
 use starts::START_PASSES;
 pub(crate) use starts::{first_state, set_state, state_at};
-use whiten::{SPIKE, drift};
+use whiten::{SPIKE, jitter_sensitivity_of};
 
 /// Periods of a window.
 pub(crate) const WINDOW: usize = 400;
@@ -43,13 +43,13 @@ pub struct Windows<'a> {
     starts: Vec<usize>,
     /// Start state of each window, unjudged ones included.
     points: Vec<[Point; 2]>,
-    /// Axis and channel of each lane.
-    lanes: Vec<(usize, usize)>,
-    /// Readings over their noise by window, period and lane; 0 where there is none.
+    /// Axis and channel of each output.
+    outputs: Vec<(usize, usize)>,
+    /// Readings over their noise by window, period and output; 0 where there is none.
     readings: Vec<f64>,
     valid: Vec<bool>,
     /// Change of each reading by one standard deviation of the sampling instant, over its noise.
-    drifts: Vec<f64>,
+    jitter_sensitivity: Vec<f64>,
     /// Orthonormal basis of the start sensitivities of each window.
     bases: Vec<Vec<Vec<f64>>>,
 }
@@ -70,17 +70,17 @@ impl<'a> Windows<'a> {
 
     fn with_recorded_starts(record: &'a GriddedRecord, rig: &RigParameters) -> Self {
         let measured = (0..2).filter(|axis| record.measured[*axis]);
-        let lanes: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
+        let outputs: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
         // The first window fills lags and memories and is not judged [rig-model.md: a record is judged after 0.1 s].
         let starts: Vec<usize> = (1..record.len() / WINDOW)
             .map(|window| window * WINDOW)
             .filter(|start| !record.gaps[*start..start + WINDOW].contains(&true))
             .collect();
-        let mut readings = Vec::with_capacity(starts.len() * WINDOW * lanes.len());
+        let mut readings = Vec::with_capacity(starts.len() * WINDOW * outputs.len());
         let mut valid = Vec::with_capacity(readings.capacity());
         for start in &starts {
             for samples in &record.samples[*start..start + WINDOW] {
-                for (axis, at) in &lanes {
+                for (axis, at) in &outputs {
                     let sample = samples[*axis][*at];
                     valid.push(sample.is_some());
                     readings.push(sample.map_or(0.0, |value| value / record.noise[*axis][*at]));
@@ -88,12 +88,14 @@ impl<'a> Windows<'a> {
             }
         }
         let points = (0..record.len() / WINDOW).map(|window| record.points[window * WINDOW]).collect();
-        let mut drifts = Vec::with_capacity(readings.len());
+        let mut jitter_sensitivity = Vec::with_capacity(readings.len());
         for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
-            drifts.extend(lanes.iter().map(|(axis, channel)| drift(record, at, *axis, *channel)));
+            jitter_sensitivity.extend(
+                outputs.iter().map(|(axis, channel)| jitter_sensitivity_of(record, at, *axis, *channel)),
+            );
         }
         let (rig, bases) = (rig.clone(), Vec::new());
-        Windows { record, rig, starts, points, lanes, readings, valid, drifts, bases }
+        Windows { record, rig, starts, points, outputs, readings, valid, jitter_sensitivity, bases }
     }
 
     /// The baseline rig.
@@ -115,18 +117,18 @@ impl<'a> Windows<'a> {
         &self.starts
     }
 
-    /// Axis and channel of each lane.
-    pub fn lanes(&self) -> &[(usize, usize)] {
-        &self.lanes
+    /// Axis and channel of each output.
+    pub fn outputs(&self) -> &[(usize, usize)] {
+        &self.outputs
     }
 
     /// Numbers in a window.
     pub fn rows(&self) -> usize {
-        WINDOW * self.lanes.len()
+        WINDOW * self.outputs.len()
     }
 
     /// Degrees of freedom of each window.
-    pub fn freedom(&self) -> Vec<f64> {
+    pub fn dof(&self) -> Vec<f64> {
         let rows = self.rows();
         let valid = self.valid.chunks_exact(rows).map(|valid| valid.iter().filter(|valid| **valid).count());
         valid.zip(&self.bases).map(|(valid, basis)| valid.saturating_sub(basis.len()).max(1) as f64).collect()
@@ -223,7 +225,7 @@ impl<'a> Windows<'a> {
 
     fn read(&self, plant: &Plant, inputs: &Inputs, into: &mut Vec<f64>) {
         let shown = plant.shown(&plant.truth(inputs));
-        into.extend(self.lanes.iter().map(|(axis, at)| shown[*axis][*at] / self.record.noise[*axis][*at]));
+        into.extend(self.outputs.iter().map(|(axis, at)| shown[*axis][*at] / self.record.noise[*axis][*at]));
     }
 }
 
@@ -235,7 +237,7 @@ pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
     }
 }
 
-/// Sum of products, in four lanes that are added in one order.
+/// Sum of products, in four outputs that are added in one order.
 pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (left_chunks, right_chunks) = (left.chunks_exact(4), right.chunks_exact(4));

@@ -6,13 +6,13 @@ use discrepancy::calibrate::{calibrate, quantity};
 use discrepancy::engine::Engine;
 use discrepancy::extend::extend;
 use discrepancy::parameters::PARAMETERS;
-use discrepancy::refit::Around;
+use discrepancy::refit::Linearisation;
 use plant::{Axis, RigParameters};
 
 const KV_SUPPLY: [f64; 6] = [0.0, 0.0, 0.123, 0.36, 0.57, 0.66];
 
 fn found(engine: &Engine<'_>) -> Finer {
-    finer(engine, &calibrate(engine, &Around::at_baseline(engine))).expect("a rig")
+    finer(engine, &calibrate(engine, &Linearisation::at_baseline(engine))).expect("a rig")
 }
 
 #[test]
@@ -20,7 +20,7 @@ fn what_is_reported_of_a_parameter_is_what_was_simulated_and_a_rig_file() {
     let rig = RigParameters::baseline();
     let records = [gridded(&rig, &rig)];
     let engine = Engine::new(&records, &rig);
-    let mut fit = calibrate(&engine, &Around::at_baseline(&engine)).fit;
+    let mut fit = calibrate(&engine, &Linearisation::at_baseline(&engine)).fit;
     // A fit on lines may have rest below what slides.
     let [sliding, rest] = ["parameter:sliding-friction", "parameter:break-away-force"]
         .map(|name| PARAMETERS.iter().position(|parameter| parameter.name == name).expect("one of them"));
@@ -90,7 +90,7 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
     let after = RigParameters::from_toml(&text, "rig.toml").expect("it was read once");
     let chi2 = |rig: &RigParameters| {
         let left = engine.residual(&engine.simulate(rig));
-        left.iter().map(|value| value * value).sum::<f64>() / engine.freedom().iter().sum::<f64>()
+        left.iter().map(|value| value * value).sum::<f64>() / engine.scaled_dof().iter().sum::<f64>()
     };
     assert!(chi2(&after) < 1.1 && chi2(&rig) > 10.0, "{} {}", chi2(&rig), chi2(&after));
 }

@@ -13,7 +13,7 @@ use super::{Calibrated, POINTS, UNRESOLVED};
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{CONVERGED_RELINEARISED, MOST_OFF, Refit, parameter_ridges};
+use crate::refit::{CONVERGED_RELINEARISED, MOST_OFF, Refit, parameter_precisions};
 use crate::report::Quantity;
 use plant::RigParameters;
 use plant::parameters::table::KEYS;
@@ -34,7 +34,7 @@ const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 struct Number {
     key: &'static str,
     place: usize,
-    tolerance: f64,
+    prior_std: f64,
 }
 
 /// Result for every number.
@@ -51,12 +51,12 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
     let rig = engine.rig();
     let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
     let numbers = numbers(rig, &calibrated.fit.factors);
-    let mut ridges = parameter_ridges();
-    ridges.extend(numbers.iter().map(|number| number.tolerance.powi(-2)));
-    let all: Vec<usize> = (0..ridges.len()).collect();
+    let mut precisions = parameter_precisions();
+    precisions.extend(numbers.iter().map(|number| number.prior_std.powi(-2)));
+    let all: Vec<usize> = (0..precisions.len()).collect();
 
     let mut factors: Vec<f64> = calibrated.fit.factors.to_vec();
-    factors.resize(ridges.len(), 1.0);
+    factors.resize(precisions.len(), 1.0);
     let mut best: Option<(Vec<f64>, Products, Fit)> = None;
     for _ in 0..POINTS {
         // At the end of a range the last iterate stands.
@@ -67,7 +67,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         let residual = engine.residual(&engine.simulate(&tried));
         let products = engine.products(&residual, &columns);
         let off: Vec<f64> = factors.iter().map(|factor| factor - 1.0).collect();
-        let fit = products.fit_from(&all, &ridges, &off);
+        let fit = products.fit_from(&all, &precisions, &off);
         let before = best.as_ref().map_or(f64::INFINITY, |(.., fit)| fit.loss);
         if fit.loss < before {
             let next = moved(rig, &numbers, &factors, &fit.coefficients)?;
@@ -85,7 +85,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         .zip(COUNT..)
         .map(|(number, at)| if rig.numbers(number.key).len() > 1 { vec![at, scale] } else { vec![at] });
     let sums: Vec<Vec<usize>> = all.iter().map(|at| vec![*at]).chain(in_file).collect();
-    let errors = products.jackknife_of_sums(&all, &fit, &ridges, &sums)?;
+    let errors = products.jackknife_of_sums(&all, &fit, &precisions, &sums)?;
     let (factor_errors, file_errors) = errors.split_at(all.len());
     let factors = moved(rig, &numbers, &at, &fit.coefficients)?;
 
@@ -105,7 +105,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Calibrated) -> Option<Finer> {
         .map(|(_, quantity)| quantity)
         .collect();
     changed.retain(|quantity| quantity.standard_error.is_some());
-    let is_resolved = |at: usize| factor_errors[COUNT + at] < UNRESOLVED * numbers[at].tolerance;
+    let is_resolved = |at: usize| factor_errors[COUNT + at] < UNRESOLVED * numbers[at].prior_std;
     // All points of a table change together, so that it stays monotonic.
     let is_changed = |key: &str| {
         let any = (0..numbers.len()).any(|at| numbers[at].key == key && is_resolved(at));
@@ -142,9 +142,9 @@ fn numbers(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<Number> {
             with(rig, std::slice::from_ref(number), &factors).is_some()
         })
     };
-    let of_key = |(key, tolerance): (&'static str, f64)| {
+    let of_key = |(key, prior_std): (&'static str, f64)| {
         let list = rig.numbers(key);
-        (0..list.len()).filter(|place| list[*place] > 0.0).map(move |place| Number { key, place, tolerance })
+        (0..list.len()).filter(|place| list[*place] > 0.0).map(move |place| Number { key, place, prior_std })
     };
     FINER.into_iter().flat_map(of_key).filter(has_neighbours).collect()
 }
@@ -182,13 +182,13 @@ fn moved(rig: &RigParameters, numbers: &[Number], factors: &[f64], step: &[f64])
 }
 
 fn columns(engine: &Engine<'_>, numbers: &[Number], factors: &[f64]) -> Option<Vec<Vec<f64>>> {
-    let around = |change: f64| {
+    let perturbed = |change: f64| {
         (0..factors.len()).map(move |at| {
             let mut factors = factors.to_vec();
             factors[at] += change;
             with(engine.rig(), numbers, &factors)
         })
     };
-    let rigs = around(FACTOR_CHANGE).chain(around(-FACTOR_CHANGE)).collect::<Option<Vec<_>>>()?;
+    let rigs = perturbed(FACTOR_CHANGE).chain(perturbed(-FACTOR_CHANGE)).collect::<Option<Vec<_>>>()?;
     Some(engine.differences(&rigs, 2.0 * FACTOR_CHANGE))
 }

@@ -24,7 +24,7 @@ const FEWEST: usize = 8;
 /// Lags, in samples.
 const LAGS: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 16, 24];
 /// Grid of correlation times of coloured noise, in samples.
-const MEMORIES: [f64; 7] = [2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0];
+const CORRELATION_TIMES: [f64; 7] = [2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0];
 /// Drift over a block, in standard deviations of the noise, up to which it is quiet.
 const DRIFT: f64 = 1.0;
 /// How far a quiet block's lags may lie above the mean of the quietest.
@@ -111,9 +111,9 @@ fn fitted(lags: &[f64; LAGS.len()]) -> f64 {
     let motion = LAGS.map(|lag| (lag as f64 / last).powi(4));
     let white = [1.0; LAGS.len()];
     let mut best = (f64::INFINITY, 0.0);
-    for memory in MEMORIES {
+    for correlation_time in CORRELATION_TIMES {
         let coloured = LAGS.map(|lag| {
-            let left = (-(lag as f64) / memory).exp();
+            let left = (-(lag as f64) / correlation_time).exp();
             (6.0 - 8.0 * left + 2.0 * left * left) / 6.0
         });
         // Sets of terms from the simplest on; a further term must improve the fit.

@@ -23,7 +23,7 @@ const SURELY: usize = 60;
 /// Share of a channel beyond which too little is left of it.
 const MOST: f64 = 0.5;
 /// Runs that are listed one by one.
-const TOLD: usize = 5;
+const LISTED: usize = 5;
 
 pub(super) fn check(notes: &mut Notes, rig: &RigParameters, grid: &Grid) {
     let channels = notes.open_channels();
@@ -56,15 +56,15 @@ fn add_finding(notes: &mut Notes, grid: &Grid, channel: Channel, values: &[Optio
     let fatal = samples as f64 > MOST * present as f64;
     for (number, run) in stuck.iter().enumerate() {
         let (Some(level), row) = (values[run.places.start], grid.rows[run.places.start]) else { continue };
-        if number < TOLD {
+        if number < LISTED {
             let text = format!(
                 "stuck at {level} for {:.0} ms, longer than its noise permits: {}",
                 1e3 * grid.period_s * run.places.len() as f64,
                 if fatal { "look at the sensor and its cable, and record again" } else { "left out there" }
             );
             notes.add("stuck", Subject { channel: Some(channel), row }, fatal, &text);
-        } else if number == TOLD {
-            let text = format!("stuck {} more times: left out there", stuck.len() - TOLD);
+        } else if number == LISTED {
+            let text = format!("stuck {} more times: left out there", stuck.len() - LISTED);
             notes.add("stuck", Subject { channel: Some(channel), row }, fatal, &text);
         }
         grid.rows[run.places.clone()].iter().flatten().for_each(|row| notes.leave_out(channel, *row));

@@ -44,7 +44,7 @@ const PRIORS: [f64; NUMBERS] = [1e-4, 2e-2, 5e3, 5e3, 300.0, 300.0, 2e-3, 2e-3, 
 /// Prior of the force sensor's offset in the solution without one, N.
 const NO_OFFSET_N: f64 = 1e-3;
 /// Ratio of posterior to prior above which an input is not observable.
-const NOTHING: f64 = 0.1;
+const OBSERVABLE_RATIO: f64 = 0.1;
 /// Largest asymmetry of the response to a nudge and its opposite.
 const KINK: f64 = 0.2;
 /// Windows skipped at the start and after a gap, in which memories fill [rig-model.md: judged after 0.1 s].
@@ -195,7 +195,7 @@ impl Seen<'_> {
             return None;
         }
         normal.fill_upper_triangle_with_lower_triangle();
-        let equations = Equations { normal, right, squares, freedom: (used - NUMBERS) as f64, pressure };
+        let equations = Equations { normal, right, squares, dof: (used - NUMBERS) as f64, pressure };
         let bound = equations.solve(NO_OFFSET_N)?;
         let forces_n = self.looks[0][self.axis].iter().map(|reading| reading[1]);
         let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
@@ -257,7 +257,7 @@ struct Equations {
     normal: Normal,
     right: Theta,
     squares: f64,
-    freedom: f64,
+    dof: f64,
     pressure: [Theta; 2],
 }
 
@@ -269,7 +269,7 @@ impl Equations {
         let theta = p * self.right;
         // Remaining residuals widen the deviations.
         let left = self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
-        let birge = (left / self.freedom).max(1.0).sqrt();
+        let birge = (left / self.dof).max(1.0).sqrt();
         let mut deviation = Theta::zeros();
         for number in 0..NUMBERS {
             // Under the null, unknown inputs are 0 and start values vary within their priors.
@@ -328,7 +328,7 @@ fn gather(
 
 /// Whether an unknown input is observable in a window.
 fn is_informative(solution: &Solution, number: usize) -> bool {
-    solution.posterior[number] < NOTHING * PRIORS[number] && solution.deviation[number] > 0.0
+    solution.posterior[number] < OBSERVABLE_RATIO * PRIORS[number] && solution.deviation[number] > 0.0
 }
 
 /// The variables of a window, in the order of [`VARIABLES`].

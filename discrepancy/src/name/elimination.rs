@@ -4,7 +4,7 @@ use super::null_distribution::NullDistribution;
 use super::{Alternative, NUMBER_COSTS, SAFETY, STEPS, relinearise};
 use crate::calibrate::Calibrated;
 use crate::engine::Engine;
-use crate::refit::{Placed, Refit, around_of, refit_steps};
+use crate::refit::{Placed, Refit, linearise, refit_steps};
 use crate::screen::Columns;
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ pub(super) fn swap(
     rounds: &mut [Vec<Refit>],
     progress: &mut dyn FnMut(&str),
 ) {
-    let point = around_of(engine, model);
+    let point = linearise(engine, model);
     let mut tried = Vec::new();
     for (at, refits) in rounds.iter().enumerate().take(model.placed.len() - 1) {
         for (rank, other) in refits.iter().enumerate().skip(1).take(SWAPPED) {
@@ -59,7 +59,7 @@ pub(super) fn swap(
 
 /// Largest difference in loss at which an explanation is indistinguishable from the best.
 fn alike(best: &Refit, calibrated: &Calibrated) -> f64 {
-    (ALIKE * best.inflation).max(ALIKE_SHARE * best.loss.min(calibrated.fit.loss - best.loss))
+    (ALIKE * best.design_effect).max(ALIKE_SHARE * best.loss.min(calibrated.fit.loss - best.loss))
 }
 
 /// Eliminates effects whose removal raises the loss by less than a multiple of the null threshold.
@@ -71,8 +71,8 @@ pub(super) fn drop_unneeded<'a>(
     rounds: &mut Vec<Vec<Refit>>,
 ) {
     while !model.placed.is_empty() {
-        let around = around_of(engine, model);
-        let left = NullDistribution::new(engine, columns, &around, model);
+        let linearisation = linearise(engine, model);
+        let left = NullDistribution::new(engine, columns, &linearisation, model);
         let threshold = left.threshold();
         let without: Vec<Option<Refit>> = (0..model.placed.len())
             .into_par_iter()
@@ -82,7 +82,7 @@ pub(super) fn drop_unneeded<'a>(
                 if placed.is_empty() {
                     return Some(calibrated.fit.clone());
                 }
-                refit_steps(engine, &around, &placed, NUMBER_COSTS, 4)
+                refit_steps(engine, &linearisation, &placed, NUMBER_COSTS, 4)
             })
             .collect();
         let least = without
@@ -91,10 +91,10 @@ pub(super) fn drop_unneeded<'a>(
             .filter_map(|(at, fit)| Some((at, fit?)))
             .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
         let Some((at, fit)) = least else { break };
-        let missed = left.missed(engine, &fit, model);
+        let loss_rise = left.loss_rise(engine, &fit, model);
         let safety = if fit.placed.is_empty() { SAFETY } else { SAFETY_BESIDE };
-        let share = missed / (calibrated.fit.loss - model.loss).max(1e-9);
-        if missed > safety * threshold && share > 0.002 {
+        let share = loss_rise / (calibrated.fit.loss - model.loss).max(1e-9);
+        if loss_rise > safety * threshold && share > 0.002 {
             break;
         }
         rounds.remove(at.min(rounds.len() - 1));

@@ -13,7 +13,7 @@ use crate::engine::Engine;
 use crate::fit::{Fit, Products, descend, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
-    MOST_OFF, Placed, Refit, coordinate_columns, costs, prior_deviations, prior_precisions, rig_of,
+    MOST_OFF, Placed, Refit, coordinate_columns, model_penalty, prior_deviations, prior_precisions, rig_of,
 };
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -24,23 +24,23 @@ const SHORTENINGS: i32 = 4;
 const SHORTER: f64 = 0.4;
 /// Maximum number of exclusions of windows from a step, and the excess over the predicted squares that excludes one, in standard
 /// deviations.
-const DOUBTS: usize = 4;
-const BROKEN: f64 = 6.0;
+const EXCLUSIONS: usize = 4;
+const NONLINEAR_EXCESS: f64 = 6.0;
 /// Fall of the loss below which a fit has converged.
 const CONVERGED: f64 = 0.3;
 
 /// Grid of fractions by which the deviations of the parameters are scaled.
-const WAYS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
+const SHRINK_FACTORS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
 /// Scales all deviations of the parameters from the rig file by the fraction with the smallest simulated loss. While an effect is
 /// missing, the linearised step may lead far off.
 pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
-    let tried = WAYS.map(|way| model.factors.map(|factor| 1.0 + way * (factor - 1.0)));
+    let tried = SHRINK_FACTORS.map(|shrink| model.factors.map(|factor| 1.0 + shrink * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {
         point(engine, model.placed.clone(), *factors).map_or(f64::INFINITY, |point| point.loss)
     };
     let losses: Vec<f64> = tried.par_iter().map(loss).collect();
-    let best = (0..WAYS.len()).min_by(|one, other| losses[*one].total_cmp(&losses[*other]));
+    let best = (0..SHRINK_FACTORS.len()).min_by(|one, other| losses[*one].total_cmp(&losses[*other]));
     tried[best.expect("one at least")]
 }
 
@@ -48,7 +48,7 @@ pub(super) fn backtrack(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
 /// does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(mut fit) = fit_selected(engine, model, &[true; COUNT]) else { return model.clone() };
-    fit.loss += costs(coordinates(&fit.placed), &fit.factors, NUMBER_COSTS);
+    fit.loss += model_penalty(coordinates(&fit.placed), &fit.factors, NUMBER_COSTS);
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 
@@ -79,20 +79,20 @@ pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; C
         STEPS,
         CONVERGED,
         |point| point.loss,
-        |point| stepped(engine, point, &around(engine, point)?, &chosen),
+        |point| stepped(engine, point, &linearised(engine, point)?, &chosen),
     );
-    let errors = errors(engine, &around(engine, &point)?, &point);
+    let errors = errors(engine, &linearised(engine, &point)?, &point);
     let Point { placed, factors, squares, loss, .. } = point;
-    Some(Refit { placed, factors, loss, squares, errors, inflation: model.inflation })
+    Some(Refit { placed, factors, loss, squares, errors, design_effect: model.design_effect })
 }
 
 fn point(engine: &Engine<'_>, placed: Vec<Placed>, factors: [f64; COUNT]) -> Option<Point> {
     let simulated = engine.simulate(&rig_of(engine.rig(), &placed, &factors)?);
     let residual = engine.residual(&simulated);
     let squares = engine.squares(&residual);
-    let (ridges, off) = (prior_precisions(&placed), prior_deviations(&factors, &placed));
-    let prior: Vec<f64> = ridges.iter().zip(&off).map(|(ridge, off)| ridge * off * off).collect();
-    let loss = loss(&squares, engine.freedom())
+    let (precisions, off) = (prior_precisions(&placed), prior_deviations(&factors, &placed));
+    let prior: Vec<f64> = precisions.iter().zip(&off).map(|(precision, off)| precision * off * off).collect();
+    let loss = loss(&squares, engine.scaled_dof())
         + prior[..COUNT].iter().sum::<f64>()
         + prior[COUNT..].iter().sum::<f64>();
     Some(Point { placed, factors, simulated, residual, squares, loss })
@@ -104,16 +104,16 @@ fn coordinates(placed: &[Placed]) -> usize {
 }
 
 /// Linearisation at a point.
-struct Lines {
+struct JointLinearisation {
     /// Sensitivities, parameters first.
     columns: Vec<Vec<f64>>,
     /// Prior precisions.
-    ridges: Vec<f64>,
+    precisions: Vec<f64>,
     /// Deviations from the prior means.
     from: Vec<f64>,
 }
 
-impl Lines {
+impl JointLinearisation {
     /// Normal equations with the sensitivities of some windows set to zero.
     fn products(&self, engine: &Engine<'_>, point: &Point, out: &[usize]) -> Products {
         let mut columns = Cow::from(&self.columns);
@@ -126,50 +126,57 @@ impl Lines {
     }
 }
 
-fn around(engine: &Engine<'_>, point: &Point) -> Option<Lines> {
+fn linearised(engine: &Engine<'_>, point: &Point) -> Option<JointLinearisation> {
     let rig = rig_of(engine.rig(), &point.placed, &[1.0; COUNT])?;
     let mut columns = engine.parameter_columns(&rig, &point.factors);
     columns.extend(coordinate_columns(engine, &point.factors, &point.placed, &point.simulated)?);
-    let (ridges, from) = (prior_precisions(&point.placed), prior_deviations(&point.factors, &point.placed));
-    Some(Lines { columns, ridges, from })
+    let (precisions, from) =
+        (prior_precisions(&point.placed), prior_deviations(&point.factors, &point.placed));
+    Some(JointLinearisation { columns, precisions, from })
 }
 
 /// The better of two Gauss-Newton steps: with all windows, and without outlying windows, whose linearisation is unreliable.
-fn stepped(engine: &Engine<'_>, point: &Point, lines: &Lines, chosen: &[usize]) -> Option<Point> {
-    let far: Vec<usize> = above_far_off(&point.squares, engine.freedom()).collect();
-    let with_all = along(engine, point, lines, chosen, &[]);
-    let without = if far.is_empty() { None } else { along(engine, point, lines, chosen, &far) };
+fn stepped(
+    engine: &Engine<'_>,
+    point: &Point,
+    linearisation: &JointLinearisation,
+    chosen: &[usize],
+) -> Option<Point> {
+    let far: Vec<usize> = above_far_off(&point.squares, engine.scaled_dof()).collect();
+    let with_all = line_search(engine, point, linearisation, chosen, &[]);
+    let without = if far.is_empty() { None } else { line_search(engine, point, linearisation, chosen, &far) };
     [with_all, without].into_iter().flatten().min_by(|left, right| left.loss.total_cmp(&right.loss))
 }
 
 /// A Gauss-Newton step that lowers the loss, without the windows `out`. Windows whose squares exceed the linearised prediction,
 /// as around a break-away, are excluded too; then the step is shortened.
-fn along(
+fn line_search(
     engine: &Engine<'_>,
     point: &Point,
-    lines: &Lines,
+    linearisation: &JointLinearisation,
     chosen: &[usize],
     out: &[usize],
 ) -> Option<Point> {
     let part = |of: &[f64]| chosen.iter().map(|at| of[*at]).collect::<Vec<_>>();
-    let (ridges, from) = (part(&lines.ridges), part(&lines.from));
+    let (precisions, from) = (part(&linearisation.precisions), part(&linearisation.from));
     let mut out = out.to_vec();
-    for _ in 0..DOUBTS {
-        let fit = lines.products(engine, point, &out).fit_from(chosen, &ridges, &from);
-        let tried = moved(engine, point, chosen, &fit, 1.0)?;
+    for _ in 0..EXCLUSIONS {
+        let fit = linearisation.products(engine, point, &out).fit_from(chosen, &precisions, &from);
+        let tried = step_by(engine, point, chosen, &fit, 1.0)?;
         if tried.loss < point.loss {
             return Some(tried);
         }
-        let broken = |window: &usize| {
-            tried.squares[*window] - fit.squares[*window] > BROKEN * engine.freedom()[*window].sqrt()
+        let nonlinear = |window: &usize| {
+            tried.squares[*window] - fit.squares[*window]
+                > NONLINEAR_EXCESS * engine.scaled_dof()[*window].sqrt()
         };
         let before = out.len();
-        out.extend((0..engine.freedom().len()).filter(broken));
+        out.extend((0..engine.scaled_dof().len()).filter(nonlinear));
         out.sort_unstable();
         out.dedup();
         if out.len() == before {
             return (1..=SHORTENINGS).find_map(|times| {
-                moved(engine, point, chosen, &fit, SHORTER.powi(times))
+                step_by(engine, point, chosen, &fit, SHORTER.powi(times))
                     .filter(|tried| tried.loss < point.loss)
             });
         }
@@ -178,7 +185,7 @@ fn along(
 }
 
 /// The point after a fraction of a step.
-fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share: f64) -> Option<Point> {
+fn step_by(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share: f64) -> Option<Point> {
     let (mut placed, mut factors) = (from.placed.clone(), from.factors);
     let mut changes = vec![0.0; COUNT + coordinates(&placed)];
     chosen.iter().zip(&step.coefficients).for_each(|(at, coefficient)| changes[*at] = share * coefficient);
@@ -197,13 +204,14 @@ fn moved(engine: &Engine<'_>, from: &Point, chosen: &[usize], step: &Fit, share:
 }
 
 /// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.
-fn errors(engine: &Engine<'_>, lines: &Lines, point: &Point) -> Vec<f64> {
-    let products = lines.products(engine, point, &[]);
+fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, point: &Point) -> Vec<f64> {
+    let products = linearisation.products(engine, point, &[]);
     let all: Vec<usize> = (0..products.columns()).collect();
     let weights = products.weights(&point.squares);
     let stays =
         Fit { coefficients: vec![0.0; all.len()], loss: point.loss, squares: point.squares.clone(), weights };
-    let errors =
-        products.jackknife(&all, &stays, &lines.ridges).unwrap_or_else(|| vec![f64::INFINITY; all.len()]);
+    let errors = products
+        .jackknife(&all, &stays, &linearisation.precisions)
+        .unwrap_or_else(|| vec![f64::INFINITY; all.len()]);
     [&errors[COUNT..], &errors[..COUNT]].concat()
 }

@@ -10,7 +10,7 @@
 use super::gauss_newton::fit_selected;
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{Refit, around_of, coordinate_columns, prior_precisions, rig_of};
+use crate::refit::{Refit, coordinate_columns, linearise, prior_precisions, rig_of};
 
 /// Rise of the loss at which a parameter is kept: three and a half standard errors.
 const NEEDED: f64 = 12.0;
@@ -29,21 +29,21 @@ pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
 
 /// Needed parameters by the linearised model; `None` where all are needed, or where no derivative exists.
 fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
-    let around = around_of(engine, model);
+    let linearisation = linearise(engine, model);
     let simulated = engine.simulate(&rig_of(engine.rig(), &model.placed, &model.factors)?);
     let coordinates = coordinate_columns(engine, &model.factors, &model.placed, &simulated)?;
     let mut residual = engine.residual(&simulated);
     // Shifts the residual to the rig file's values, so that the coefficients are deviations from them.
-    for (column, factor) in around.columns.iter().zip(model.factors) {
+    for (column, factor) in linearisation.columns.iter().zip(model.factors) {
         residual.iter_mut().zip(column).for_each(|(value, column)| *value += (factor - 1.0) * column);
     }
-    let columns: Vec<&Vec<f64>> = around.columns.iter().chain(&coordinates).collect();
+    let columns: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&coordinates).collect();
     let products = engine.products(&residual, &columns);
-    let ridges = prior_precisions(&model.placed);
+    let precisions = prior_precisions(&model.placed);
     let loss = |needed: &[bool; COUNT]| {
         let chosen: Vec<usize> = (0..columns.len()).filter(|at| *at >= COUNT || needed[*at]).collect();
-        let ridges: Vec<f64> = chosen.iter().map(|at| ridges[*at]).collect();
-        products.fit(&chosen, &ridges).loss
+        let precisions: Vec<f64> = chosen.iter().map(|at| precisions[*at]).collect();
+        products.fit(&chosen, &precisions).loss
     };
     let mut needed = [true; COUNT];
     let mut current = loss(&needed);

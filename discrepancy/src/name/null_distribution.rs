@@ -4,7 +4,7 @@
 
 use crate::engine::Engine;
 use crate::parameters::COUNT;
-use crate::refit::{Around, Refit, parameter_ridges, rig_of};
+use crate::refit::{Linearisation, Refit, parameter_precisions, rig_of};
 use crate::screen::Columns;
 use crate::stats::order_statistic;
 use rand_core::{Rng, SeedableRng};
@@ -30,7 +30,12 @@ pub(super) struct NullDistribution {
 }
 
 impl NullDistribution {
-    pub(super) fn new(engine: &Engine<'_>, columns: &Columns, around: &Around, model: &Refit) -> Self {
+    pub(super) fn new(
+        engine: &Engine<'_>,
+        columns: &Columns,
+        linearisation: &Linearisation,
+        model: &Refit,
+    ) -> Self {
         let rig =
             rig_of(engine.rig(), &model.placed, &model.factors).expect("a model that was fitted is a rig");
         let residual = engine.residual(&engine.simulate(&rig));
@@ -40,15 +45,15 @@ impl NullDistribution {
             .enumerate()
             .flat_map(|(at, probes)| probes.iter().map(move |(probe, place)| (at, probe[0], *place)))
             .collect();
-        let parameter_columns = around.columns.iter().map(Vec::as_slice);
+        let parameter_columns = linearisation.columns.iter().map(Vec::as_slice);
         let all: Vec<&[f64]> =
             parameter_columns.chain(of.iter().map(|(_, _, place)| columns.column(*place))).collect();
         let products = engine.products(&residual, &all);
-        let ridges = parameter_ridges();
+        let precisions = parameter_precisions();
         let parameters: Vec<usize> = (0..COUNT).collect();
-        let weights = &products.fit_from(&parameters, &ridges, &around.off()).weights;
-        let scores = products.cleared_scores(&parameters, weights, &ridges);
-        let far = far_off(&engine.squares(&residual), engine.freedom());
+        let weights = &products.fit_from(&parameters, &precisions, &linearisation.deviations()).weights;
+        let scores = products.efficient_scores(&parameters, weights, &precisions);
+        let far = far_off(&engine.squares(&residual), engine.scaled_dof());
         let probes = of
             .into_iter()
             .zip(scores)
@@ -61,10 +66,10 @@ impl NullDistribution {
     }
 
     /// Rise of the loss of a reduced model, without the outlying windows.
-    pub(super) fn missed(&self, engine: &Engine<'_>, without: &Refit, model: &Refit) -> f64 {
+    pub(super) fn loss_rise(&self, engine: &Engine<'_>, without: &Refit, model: &Refit) -> f64 {
         let of = |window: &usize| {
             let [without, with] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
-            engine.freedom()[*window] * (without / with).ln()
+            engine.scaled_dof()[*window] * (without / with).ln()
         };
         without.loss - model.loss - self.far.iter().map(of).sum::<f64>()
     }
@@ -105,16 +110,16 @@ impl NullDistribution {
 }
 
 /// Outlying windows; none where they are more than a few.
-fn far_off(squares: &[f64], freedom: &[f64]) -> Vec<usize> {
-    let far: Vec<usize> = above_far_off(squares, freedom).collect();
-    let most = (FEW * freedom.len() as f64).max(1.0);
+fn far_off(squares: &[f64], dof: &[f64]) -> Vec<usize> {
+    let far: Vec<usize> = above_far_off(squares, dof).collect();
+    let most = (FEW * dof.len() as f64).max(1.0);
     if far.len() as f64 <= most { far } else { Vec::new() }
 }
 
 /// Windows beyond [`FAR_OFF`], however many.
-pub(super) fn above_far_off(squares: &[f64], freedom: &[f64]) -> impl Iterator<Item = usize> {
-    let off = squares.iter().zip(freedom).enumerate();
-    off.filter(|(_, (square, freedom))| **square > FAR_OFF * **freedom).map(|(at, _)| at)
+pub(super) fn above_far_off(squares: &[f64], dof: &[f64]) -> impl Iterator<Item = usize> {
+    let off = squares.iter().zip(dof).enumerate();
+    off.filter(|(_, (square, dof))| **square > FAR_OFF * **dof).map(|(at, _)| at)
 }
 
 #[cfg(test)]

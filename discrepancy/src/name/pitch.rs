@@ -10,8 +10,8 @@ use super::{NUMBER_COSTS, STEPS};
 use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{
-    Refit, around_of, coordinate_columns, coordinate_ridge, prior_deviations, prior_precisions, refit_steps,
-    rig_of,
+    Refit, coordinate_columns, coordinate_precision, linearise, prior_deviations, prior_precisions,
+    refit_steps, rig_of,
 };
 use rayon::prelude::*;
 
@@ -50,20 +50,21 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
             Some(engine.difference(&engine.simulate_coarsely(&rig), &coarse))
         })
         .collect::<Option<_>>()?;
-    let around = around_of(engine, model);
+    let linearisation = linearise(engine, model);
     let numbers = coordinate_columns(engine, &model.factors, &plain, &simulated)?;
     let always = COUNT + numbers.len();
-    let columns: Vec<&Vec<f64>> = around.columns.iter().chain(&numbers).chain(&ripples).collect();
+    let columns: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&numbers).chain(&ripples).collect();
     let products = engine.products(&engine.residual(&simulated), &columns);
-    let (mut ridges, mut from) = (prior_precisions(&plain), prior_deviations(&around.factors, &plain));
-    ridges.push(coordinate_ridge(&candidate, ripple));
+    let (mut precisions, mut from) =
+        (prior_precisions(&plain), prior_deviations(&linearisation.factors, &plain));
+    precisions.push(coordinate_precision(&candidate, ripple));
     from.push(0.0);
     let fits = (0..pitches.len()).map(|at| {
         let chosen: Vec<usize> = (0..always).chain([always + at]).collect();
-        (at, products.fit_from(&chosen, &ridges, &from))
+        (at, products.fit_from(&chosen, &precisions, &from))
     });
     let (at, fit) = fits.min_by(|left, right| left.1.loss.total_cmp(&right.1.loss))?;
     let [smallest, largest] = candidate.reach(ripple);
     let amplitude = (PROBE * fit.coefficients[always]).clamp(smallest, largest);
-    refit_steps(engine, &around, &with(amplitude, pitches[at]), NUMBER_COSTS, STEPS)
+    refit_steps(engine, &linearisation, &with(amplitude, pitches[at]), NUMBER_COSTS, STEPS)
 }

@@ -11,22 +11,22 @@ use super::pitch::at_best_pitch;
 use super::start_states::{Restarted, gap_start, refit_with_starts};
 use super::{EXCESS, NUMBER_COSTS, STEPS, WORTH_A_FIT, is_large, relinearise};
 use crate::engine::Engine;
-use crate::refit::{Around, Placed, Refit, loss_at, refit_steps};
+use crate::refit::{Linearisation, Placed, Refit, loss_at, refit_steps};
 use crate::screen::{Columns, Screened};
 use rayon::prelude::*;
 
 /// Maximum number of candidates refitted in the simulator in each round.
 const CONTENDERS: usize = 6;
 /// Smallest screened gain of a refitted candidate, as a share of the best.
-const CONTENDS: f64 = 0.35;
+const CONTENDER_SHARE: f64 = 0.35;
 /// Smallest screened gain of a further effect, as a share of the last round's threshold.
-const LOOKED_FOR: f64 = 0.5;
+const SEARCHED_SHARE: f64 = 0.5;
 /// Share of the predicted gain that the simulator may lack before other starting amplitudes are tried.
-const BELIEVED: f64 = 0.2;
+const MOST_SHORTFALL: f64 = 0.2;
 /// Those amplitudes.
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
 /// Number of contenders that are relinearised.
-const REFINED: usize = 3;
+const RELINEARISED: usize = 3;
 /// Fits are close when their losses differ by less than this share of the best gain.
 const CLOSE: f64 = 0.02;
 /// The backlash of the linkage. Screening underrates it, since the start states were estimated without it.
@@ -56,13 +56,13 @@ impl Contenders {
         let mut best: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
         best.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let most = null_loss - best.first()?.loss;
-        if most < WORTH_A_FIT.max(LOOKED_FOR * threshold) {
+        if most < WORTH_A_FIT.max(SEARCHED_SHARE * threshold) {
             return None;
         }
         let is_gap = |screened: &&Screened| columns.candidates[screened.at].sheet.name == BACKLASH;
         let gap = if engine.is_linked() { best.iter().find(is_gap).cloned() } else { None };
         best.truncate(CONTENDERS);
-        best.retain(|screened| null_loss - screened.loss > CONTENDS * most);
+        best.retain(|screened| null_loss - screened.loss > CONTENDER_SHARE * most);
         Some(Self { null_loss, best, gap })
     }
 
@@ -82,7 +82,7 @@ impl<'a> Round<'a> {
     /// Fits the model with each contender; `point` holds the parameter sensitivities. `None` where no fit is possible.
     pub(super) fn fitted(
         engine: &Engine<'a>,
-        point: &Around,
+        point: &Linearisation,
         model: &Refit,
         contenders: &Contenders,
         progress: &mut dyn FnMut(&str),
@@ -99,7 +99,8 @@ impl<'a> Round<'a> {
         // These fits used the sensitivities of the model without the effect; the best are relinearised. Gains compare with the
         // null loss of the same sensitivities.
         let gain = null_loss - fits.first()?.loss;
-        let near = fits.iter().take(REFINED).filter(|fit| null_loss - fit.loss >= 0.5 * gain).count().max(1);
+        let near =
+            fits.iter().take(RELINEARISED).filter(|fit| null_loss - fit.loss >= 0.5 * gain).count().max(1);
         let restarted = fits[..near]
             .par_iter()
             .map(|fit| {
@@ -110,7 +111,7 @@ impl<'a> Round<'a> {
         round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
         let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
         if let Some(gap) = gap
-            && least > EXCESS * engine.freedom().iter().sum::<f64>()
+            && least > EXCESS * engine.scaled_dof().iter().sum::<f64>()
         {
             progress("trying other gaps");
             round.with_gap(engine, point, model, gap);
@@ -125,7 +126,7 @@ impl<'a> Round<'a> {
     fn run_off(&mut self, engine: &Engine<'a>, model: &Refit) {
         let Some(best) = self.fits.first().map(|fit| fit.loss) else { return };
         let is_close = |fit: &&Refit| fit.loss - best < CLOSE * (model.loss - best);
-        let close = self.fits.iter().take(REFINED).filter(is_close).count();
+        let close = self.fits.iter().take(RELINEARISED).filter(is_close).count();
         if close < 2 || engine.is_linked() {
             return;
         }
@@ -135,7 +136,7 @@ impl<'a> Round<'a> {
     }
 
     /// Fits the backlash from other starting widths than the screened one.
-    fn with_gap(&mut self, engine: &Engine<'a>, point: &Around, model: &Refit, gap: &Screened) {
+    fn with_gap(&mut self, engine: &Engine<'a>, point: &Linearisation, model: &Refit, gap: &Screened) {
         let start = gap_start(engine, point, &model.placed, &gap.start);
         let Some(fit) = refit_steps(engine, point, &start, NUMBER_COSTS, STEPS) else { return };
         let restarted = refit_with_starts(engine, &relinearise(engine, fit), NUMBER_COSTS);
@@ -171,7 +172,7 @@ fn sort(fits: &mut [Refit]) {
 /// above the predicted one.
 fn best_start(
     engine: &Engine<'_>,
-    point: &Around,
+    point: &Linearisation,
     model: &[Placed],
     screened: &Screened,
     null_loss: f64,
@@ -185,7 +186,7 @@ fn best_start(
     };
     let screened_z = screened.start.coordinates[0];
     let loss = loss_at(engine, point, &with(screened_z));
-    if loss < screened.loss + BELIEVED * (null_loss - screened.loss) {
+    if loss < screened.loss + MOST_SHORTFALL * (null_loss - screened.loss) {
         return with(screened_z);
     }
     let [least, most] = screened.start.candidate.range(0);

@@ -1,7 +1,7 @@
 //! Refits of models of linked rods with the window start states re-estimated under the model itself.
 
 use crate::engine::Engine;
-use crate::refit::{Around, Placed, Refit, around_of, loss_at, refit, rig_of};
+use crate::refit::{Linearisation, Placed, Refit, linearise, loss_at, refit, rig_of};
 use rayon::prelude::*;
 
 /// Starting amplitudes of the backlash.
@@ -22,7 +22,7 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty:
     for _ in 0..if engine.is_linked() { MOVES } else { 0 } {
         let Some(rig) = rig_of(engine.rig(), &best.fit.placed, &best.fit.factors) else { break };
         let restarted = engine.with_starts_under(&rig);
-        let Some(fit) = refit(&restarted, &around_of(&restarted, &best.fit), &best.fit.placed, penalty)
+        let Some(fit) = refit(&restarted, &linearise(&restarted, &best.fit), &best.fit.placed, penalty)
         else {
             break;
         };
@@ -41,7 +41,7 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit, penalty:
 /// of another backlash even the true one fits badly.
 pub(super) fn gap_start(
     engine: &Engine<'_>,
-    point: &Around,
+    point: &Linearisation,
     model: &[Placed],
     start: &Placed,
 ) -> Vec<Placed> {

@@ -194,11 +194,11 @@ impl<'a> Observer<'a> {
         let end = plant.truth(&Inputs::default());
         phases.push([phase(&end, 0), phase(&end, 1)]);
         jumps.resize(readings.len(), false);
-        for (lane, axis) in self.measured.iter().enumerate() {
+        for (output, axis) in self.measured.iter().enumerate() {
             for at in 0..WINDOW {
                 let now = phases[at][*axis];
                 let jump = phases[at.saturating_sub(1)][*axis] != now || phases[at + 1][*axis] != now;
-                jumps[from + at * self.width() + lane * CHANNELS + FORCE] = jump;
+                jumps[from + at * self.width() + output * CHANNELS + FORCE] = jump;
             }
         }
     }
@@ -237,7 +237,7 @@ impl<'a> Observer<'a> {
                 if self.driven.linked {
                     columns.push(change);
                 } else {
-                    columns.extend((0..self.measured.len()).map(|lane| self.lane(&change, lane)));
+                    columns.extend((0..self.measured.len()).map(|output| self.output(&change, output)));
                 }
             }
         }
@@ -245,9 +245,9 @@ impl<'a> Observer<'a> {
     }
 
     /// The readings of one measured axis, 0 for the other.
-    fn lane(&self, readings: &[f64], lane: usize) -> Vec<f64> {
+    fn output(&self, readings: &[f64], output: usize) -> Vec<f64> {
         let of = |at: usize| (at % self.width()) / CHANNELS;
-        readings.iter().enumerate().map(|(at, value)| if of(at) == lane { *value } else { 0.0 }).collect()
+        readings.iter().enumerate().map(|(at, value)| if of(at) == output { *value } else { 0.0 }).collect()
     }
 }
 

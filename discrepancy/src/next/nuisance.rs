@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use plant::{ParameterError, RigParameters};
 
 /// One prior standard deviation of a number, relative.
-const TOLERANCE: f64 = 0.03;
+const PRIOR_STD: f64 = 0.03;
 
 /// All but the area, which is known from the drawing.
 pub(crate) fn numbers() -> impl Iterator<Item = &'static Parameter> {
@@ -23,7 +23,7 @@ pub(crate) fn numbers() -> impl Iterator<Item = &'static Parameter> {
 
 /// The rig with a number larger by one standard deviation.
 pub(crate) fn off(rig: &RigParameters, parameter: &Parameter) -> Result<RigParameters, ParameterError> {
-    parameter.scaled(rig, 1.0 + TOLERANCE)
+    parameter.scaled(rig, 1.0 + PRIOR_STD)
 }
 
 /// Inner product of signatures with nuisance parameters marginalised.

@@ -95,7 +95,7 @@ impl Rows {
     }
 
     /// Squared residuals of each held-out fold, judged rows only; `None` where the other folds do not determine columns apart.
-    pub(super) fn left_out(&self, columns: &Columns, cut: &Cut) -> Option<Vec<f64>> {
+    pub(super) fn fold_rss(&self, columns: &Columns, cut: &Cut) -> Option<Vec<f64>> {
         let scales = scales(columns);
         let all = normal(columns, &scales, &self.target, 0..self.target.len());
         let each = cut.folds.iter().map(|fold| {
@@ -135,21 +135,21 @@ impl Rows {
     }
 
     /// Sum of squares of judged rows.
-    pub(super) fn power(&self, residual: &[f64]) -> f64 {
+    pub(super) fn rss(&self, residual: &[f64]) -> f64 {
         residual.iter().zip(&self.judged).filter(|(_, judged)| **judged).map(|(r, _)| r * r).sum()
     }
 
     /// How many independent rows a residual is worth.
-    pub(super) fn effective(&self, residual: &[f64]) -> f64 {
+    pub(super) fn effective_sample_size(&self, residual: &[f64]) -> f64 {
         let judged = self.judged.iter().filter(|judged| **judged).count() as f64;
-        let power = residual.iter().map(|r| r * r).sum::<f64>().max(f64::MIN_POSITIVE);
+        let rss = residual.iter().map(|r| r * r).sum::<f64>().max(f64::MIN_POSITIVE);
         let longest = self.records.iter().map(ExactSizeIterator::len).max().unwrap_or(0) / 4;
         let mut sum = 0.0;
         for lag in 1..longest {
             let products = |range: &std::ops::Range<usize>| -> f64 {
                 range.clone().skip(lag).map(|row| residual[row] * residual[row - lag]).sum()
             };
-            let rho = self.records.iter().map(products).sum::<f64>() / power;
+            let rho = self.records.iter().map(products).sum::<f64>() / rss;
             if rho <= 0.0 {
                 break;
             }
@@ -222,7 +222,7 @@ mod tests {
         let (rows, columns) = line();
         let fit = rows.fit(&columns).unwrap();
         assert!((fit.numbers[0] - 3.0).abs() < 1e-9 && (fit.numbers[1] - 2e-3).abs() < 1e-9, "{fit:?}");
-        let left = rows.left_out(&columns, &rows.in_time(5)).unwrap();
+        let left = rows.fold_rss(&columns, &rows.in_time(5)).unwrap();
         assert!(left.len() == 5 && left.iter().all(|squares| *squares < 1e-12), "{left:?}");
     }
 
@@ -233,7 +233,7 @@ mod tests {
         assert!(rows.fit(&columns).is_none());
         // And a band that alone has a column's values leaves a rest that cannot tell it.
         let step: Vec<f64> = (0..100).map(|at| if at < 20 { 1.0 } else { 0.0 }).collect();
-        assert!(rows.left_out(&vec![vec![1.0; 100], step], &rows.in_time(5)).is_none());
+        assert!(rows.fold_rss(&vec![vec![1.0; 100], step], &rows.in_time(5)).is_none());
     }
 
     #[test]
@@ -241,7 +241,7 @@ mod tests {
         // Ten values, each ten times, of alternating signs that sum up to nothing.
         let residual: Vec<f64> = (0..1000).map(|at| if (at / 10) % 2 == 0 { 1.0 } else { -1.0 }).collect();
         let rows = rows(residual.clone());
-        let effective = rows.effective(&residual);
+        let effective = rows.effective_sample_size(&residual);
         assert!((100.0..300.0).contains(&effective), "{effective}");
     }
 

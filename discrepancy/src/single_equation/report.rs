@@ -265,7 +265,7 @@ impl Study {
 
     /// Detection limit: the number that would remove the required share of the remaining power.
     fn detection_limits(&self) -> Vec<DetectionLimit> {
-        let power = self.rows.power(&self.extended_fit.residual);
+        let rss = self.rows.rss(&self.extended_fit.residual);
         let mut limits = Vec::new();
         for judged in &self.found.last {
             let prepared = &self.families[judged.place];
@@ -277,9 +277,9 @@ impl Study {
             let column =
                 super::Rows { target: prepared.columns[judged.variant][0].clone(), ..self.rows.clone() };
             let Some(alone) = column.fit(&self.extended) else { continue };
-            let alone_power = column.power(&alone.residual);
-            if alone_power > 0.0 {
-                let value = (self.model.selection.share_floor * power / alone_power).sqrt() * factor;
+            let alone_rss = column.rss(&alone.residual);
+            if alone_rss > 0.0 {
+                let value = (self.model.selection.share_floor * rss / alone_rss).sqrt() * factor;
                 limits.push(DetectionLimit {
                     effect: entry.effect.clone(),
                     place: place(&entry.effect),
@@ -387,7 +387,7 @@ impl Study {
             .time
             .folds
             .iter()
-            .map(|fold| fold_power(&self.extended_fit.residual, fold) / trained)
+            .map(|fold| fold_mean_square(&self.extended_fit.residual, fold) / trained)
             .collect();
         folds.sort_by(f64::total_cmp);
         report.verification = Some(Verification {
@@ -403,7 +403,7 @@ impl Study {
     }
 }
 
-fn fold_power(residual: &[f64], fold: &[usize]) -> f64 {
+fn fold_mean_square(residual: &[f64], fold: &[usize]) -> f64 {
     fold.iter().map(|row| residual[*row].powi(2)).sum::<f64>() / fold.len().max(1) as f64
 }
 

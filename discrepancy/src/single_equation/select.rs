@@ -68,7 +68,7 @@ pub(super) struct Judged {
     /// Squares left out of each fold in time.
     left: Vec<f64>,
     /// Power that its fit leaves, and how many rows that is worth.
-    power: f64,
+    rss: f64,
     effective: f64,
     /// Other forms that do no worse.
     pub(super) ties: Vec<usize>,
@@ -139,21 +139,21 @@ struct Excess(Vec<(&'static str, f64)>);
 impl Excess {
     fn of(rows: &Rows, cuts: &Cuts, plain: &Columns) -> Self {
         let all = [Some(&cuts.time), Some(&cuts.position), cuts.speed.as_ref()];
-        let power = |cut: &Cut| Some((cut.name, rows.left_out(plain, cut)?.iter().sum()));
-        Excess(all.into_iter().flatten().filter_map(power).collect())
+        let rss = |cut: &Cut| Some((cut.name, rows.fold_rss(plain, cut)?.iter().sum()));
+        Excess(all.into_iter().flatten().filter_map(rss).collect())
     }
 
     /// A power as a share of it; of `left` where the baseline's own columns cannot be told on this cut.
-    fn share(&self, cut: &Cut, power: f64, left: f64) -> f64 {
+    fn share(&self, cut: &Cut, rss: f64, left: f64) -> f64 {
         let reference =
             self.0.iter().find(|(name, _)| *name == cut.name).map_or(left, |(_, reference)| *reference);
-        power / reference.max(f64::MIN_POSITIVE)
+        rss / reference.max(f64::MIN_POSITIVE)
     }
 }
 
 /// Whether one is better than the other beyond doubt: on the same folds, or by its likelihood.
 fn apart(best: &Judged, other: &Judged) -> bool {
-    if best.effective * (other.power / best.power).ln() > GAIN_APART {
+    if best.effective * (other.rss / best.rss).ln() > GAIN_APART {
         return true;
     }
     let differences: Vec<f64> = other.left.iter().zip(&best.left).map(|(other, best)| other - best).collect();
@@ -186,7 +186,7 @@ fn judge(
         passes: false,
         is_excited: true,
         left: Vec::new(),
-        power: f64::INFINITY,
+        rss: f64::INFINITY,
         effective: 0.0,
         ties: Vec::new(),
     };
@@ -197,8 +197,8 @@ fn judge(
     let tried: Vec<_> = (0..variants.len())
         .filter_map(|variant| {
             let fit = rows.fit(&with(variant))?;
-            let power = rows.power(&fit.residual);
-            Some((variant, fit, power))
+            let rss = rows.rss(&fit.residual);
+            Some((variant, fit, rss))
         })
         .collect();
     if tried.is_empty() {
@@ -211,7 +211,7 @@ fn judge(
         let (variant, fit, _) = &tried[0];
         return refused("its number would be negative".into(), *variant, number_of(fit));
     };
-    let effective = rows.effective(&best_fit.residual);
+    let effective = rows.effective_sample_size(&best_fit.residual);
     let same = |other: f64| effective * (other / least).ln() < 2.0;
     let mut ties: Vec<usize> = if family.ordered {
         let no_worse =
@@ -221,13 +221,13 @@ fn judge(
         vec![*best]
     };
     let variant = ties.remove(0);
-    let (_, fit, power) = tried.iter().find(|(place, ..)| *place == variant).expect("it was tried");
+    let (_, fit, rss) = tried.iter().find(|(place, ..)| *place == variant).expect("it was tried");
     let number = amplitude(&family.variants[variant], &fit.numbers[columns.len()..]);
-    let power_before = rows.power(&before.residual);
+    let rss_before = rows.rss(&before.residual);
     let more = variants[variant].len() as f64;
     let all: usize = families.iter().map(|family| family.columns.len()).sum();
     let tried_in_all = if family.variants.len() > 1 { all } else { families.len() };
-    let gain = effective * (power_before / power.max(f64::MIN_POSITIVE)).ln();
+    let gain = effective * (rss_before / rss.max(f64::MIN_POSITIVE)).ln();
     let penalty = more * effective.ln() + 2.0 * (tried_in_all as f64).ln();
     let mut gates = vec![(gain / penalty, format!("likelihood gain {gain:.1}, penalty {penalty:.1}"))];
     let extended = with(variant);
@@ -240,7 +240,7 @@ fn judge(
     ];
     for (cut, applies, floor, t_floor) in asked {
         let Some(cut) = cut.filter(|_| applies) else { continue };
-        let (Some(before), Some(after)) = (rows.left_out(columns, cut), rows.left_out(&extended, cut)) else {
+        let (Some(before), Some(after)) = (rows.fold_rss(columns, cut), rows.fold_rss(&extended, cut)) else {
             gates.push((0.0, format!("folds in {}: the rest cannot tell it", cut.name)));
             continue;
         };
@@ -270,7 +270,7 @@ fn judge(
         passes: score > 1.0,
         is_excited: true,
         left,
-        power: *power,
+        rss: *rss,
         effective,
         ties,
     }

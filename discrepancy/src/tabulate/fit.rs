@@ -24,10 +24,10 @@ const FORCE_CHANGE_N: f64 = 1.0;
 const FLOW_CHANGE_NL_PER_MIN: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.05;
 /// Prior standard deviations of values, beyond what occurs.
-const FORCE_TOLERANCE_N: f64 = 200.0;
-const FLOW_TOLERANCE_NL_PER_MIN: f64 = 200.0;
+const FORCE_PRIOR_STD_N: f64 = 200.0;
+const FLOW_PRIOR_STD_NL_PER_MIN: f64 = 200.0;
 /// Steps with the same derivatives, which cost many times a step.
-const ALONG: usize = 3;
+const STEPS_PER_LINEARISATION: usize = 3;
 /// Step fractions of the line search.
 const SHARES: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 /// Fall of the loss below which a fit has converged.
@@ -37,7 +37,7 @@ const FOLDS: usize = 5;
 
 /// A table with fitted values.
 #[derive(Clone, Debug)]
-pub(super) struct Tied {
+pub(super) struct FittedTable {
     pub(super) table: Tabulated,
     /// Whether all values are equal.
     pub(super) is_constant: bool,
@@ -45,7 +45,7 @@ pub(super) struct Tied {
     pub(super) seen: Vec<f64>,
 }
 
-impl Tied {
+impl FittedTable {
     /// Whether a point acts in a window.
     fn acts(&self, point: usize, reach: &Reach) -> bool {
         let Tabulated { axis, variable, at, .. } = &self.table;
@@ -61,7 +61,7 @@ pub(super) struct Model {
     pub(super) factors: [f64; COUNT],
     /// Which of them are free.
     pub(super) free: [bool; COUNT],
-    pub(super) tables: Vec<Tied>,
+    pub(super) tables: Vec<FittedTable>,
 }
 
 /// A free number.
@@ -91,29 +91,29 @@ impl Model {
         with_tables(&with_factors(engine.rig(), &self.factors), &self.tables)
     }
 
-    fn moved(&self) -> Vec<Coordinate> {
+    fn coordinates(&self) -> Vec<Coordinate> {
         let factors = (0..COUNT).filter(|at| self.free[*at]).map(Coordinate::Factor);
-        let values = self.tables.iter().enumerate().flat_map(|(at, tied)| {
-            (0..if tied.is_constant { 1 } else { tied.table.at.len() })
+        let values = self.tables.iter().enumerate().flat_map(|(at, fitted)| {
+            (0..if fitted.is_constant { 1 } else { fitted.table.at.len() })
                 .map(move |point| Coordinate::Value(at, point))
         });
         factors.chain(values).collect()
     }
 
-    fn moved_by(&self, coordinate: Coordinate, change: f64) -> Self {
+    fn perturbed(&self, coordinate: Coordinate, change: f64) -> Self {
         let mut model = self.clone();
         match coordinate {
             Coordinate::Factor(at) => {
                 model.factors[at] = (model.factors[at] + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
             }
             Coordinate::Value(at, point) => {
-                let tied = &mut model.tables[at];
-                let most = tied.table.balance.most();
-                let value = (tied.table.value[point] + change).clamp(-most, most);
-                if tied.is_constant {
-                    tied.table.value.fill(value);
+                let fitted = &mut model.tables[at];
+                let most = fitted.table.balance.most();
+                let value = (fitted.table.value[point] + change).clamp(-most, most);
+                if fitted.is_constant {
+                    fitted.table.value.fill(value);
                 } else {
-                    tied.table.value[point] = value;
+                    fitted.table.value[point] = value;
                 }
             }
         }
@@ -135,20 +135,20 @@ impl Model {
         }
     }
 
-    fn ridge(&self, coordinate: Coordinate) -> f64 {
-        let tolerance = match coordinate {
-            Coordinate::Factor(at) => PARAMETERS[at].tolerance,
+    fn precision(&self, coordinate: Coordinate) -> f64 {
+        let prior_std = match coordinate {
+            Coordinate::Factor(at) => PARAMETERS[at].prior_std,
             Coordinate::Value(at, _) => match self.tables[at].table.balance {
-                Balance::Force => FORCE_TOLERANCE_N,
-                Balance::FlowA | Balance::FlowB => FLOW_TOLERANCE_NL_PER_MIN,
+                Balance::Force => FORCE_PRIOR_STD_N,
+                Balance::FlowA | Balance::FlowB => FLOW_PRIOR_STD_NL_PER_MIN,
             },
         };
-        tolerance.powi(-2)
+        prior_std.powi(-2)
     }
 
     /// Prior precisions of all free coordinates.
-    fn ridges(&self) -> Vec<f64> {
-        self.moved().iter().map(|coordinate| self.ridge(*coordinate)).collect()
+    fn precisions(&self) -> Vec<f64> {
+        self.coordinates().iter().map(|coordinate| self.precision(*coordinate)).collect()
     }
 
     /// Deviation of a coordinate from its neutral value.
@@ -160,11 +160,14 @@ impl Model {
     }
 
     /// Prior penalty of the factors and penalty for the points.
-    fn costs(&self) -> f64 {
+    fn penalty(&self) -> f64 {
         let factors: f64 =
-            (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].tolerance).powi(2)).sum();
-        let points =
-            self.moved().iter().filter(|coordinate| matches!(coordinate, Coordinate::Value(..))).count();
+            (0..COUNT).map(|at| (self.off(Coordinate::Factor(at)) / PARAMETERS[at].prior_std).powi(2)).sum();
+        let points = self
+            .coordinates()
+            .iter()
+            .filter(|coordinate| matches!(coordinate, Coordinate::Value(..)))
+            .count();
         factors + NUMBER_COSTS * points as f64
     }
 }
@@ -182,47 +185,54 @@ impl Point {
     /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
-        let loss = loss(&engine.squares(&residual), engine.freedom()) + model.costs();
+        let loss = loss(&engine.squares(&residual), engine.scaled_dof()) + model.penalty();
         loss.is_finite().then_some(Point { model, residual, loss })
     }
 
-    /// The parameters with standard errors, as a fit without effects; `lines` is the linearisation at the model.
-    pub(super) fn as_refit(&self, engine: &Engine<'_>, lines: &Lines) -> Refit {
-        let (moved, ridges) = (self.model.moved(), self.model.ridges());
+    /// The parameters with standard errors, as a fit without effects; `linearisation` is the linearisation at the model.
+    pub(super) fn as_refit(&self, engine: &Engine<'_>, linearisation: &TableLinearisation) -> Refit {
+        let (coordinates, precisions) = (self.model.coordinates(), self.model.precisions());
         let mut errors = vec![f64::INFINITY; COUNT];
-        let products = engine.products(&self.residual, &lines.columns);
-        let chosen: Vec<usize> = (0..moved.len()).collect();
-        let fit = products.fit(&chosen, &ridges);
-        if let Some(covariance) = products.covariance(&chosen, &fit, &ridges) {
-            for (at, coordinate) in moved.iter().enumerate() {
+        let products = engine.products(&self.residual, &linearisation.columns);
+        let chosen: Vec<usize> = (0..coordinates.len()).collect();
+        let fit = products.fit(&chosen, &precisions);
+        if let Some(covariance) = products.covariance(&chosen, &fit, &precisions) {
+            for (at, coordinate) in coordinates.iter().enumerate() {
                 if let Coordinate::Factor(factor) = coordinate {
                     errors[*factor] = covariance[(at, at)].max(0.0).sqrt();
                 }
             }
         }
         let factors = self.model.factors;
-        Refit { placed: Vec::new(), factors, loss: self.loss, squares: Vec::new(), errors, inflation: 1.0 }
+        Refit {
+            placed: Vec::new(),
+            factors,
+            loss: self.loss,
+            squares: Vec::new(),
+            errors,
+            design_effect: 1.0,
+        }
     }
 }
 
-/// Sensitivities of a model to some coordinates; `passed` is its reference run.
+/// Sensitivities of a model to some coordinates; `reference_runs` is its reference run.
 fn columns(
     engine: &Engine<'_>,
     model: &Model,
-    moved: &[Coordinate],
-    passed: &[ReferenceRun],
+    coordinates: &[Coordinate],
+    reference_runs: &[ReferenceRun],
 ) -> Option<Vec<Vec<f64>>> {
-    let from: Vec<f64> = passed.iter().flat_map(ReferenceRun::simulated).copied().collect();
-    moved
+    let from: Vec<f64> = reference_runs.iter().flat_map(ReferenceRun::simulated).copied().collect();
+    coordinates
         .par_iter()
         .map(|coordinate| {
             let change = model.change(*coordinate);
-            let rig = model.moved_by(*coordinate, change).rig(engine)?;
+            let rig = model.perturbed(*coordinate, change).rig(engine)?;
             let simulated = match coordinate {
                 Coordinate::Factor(_) => engine.simulate_coarsely(&rig),
                 Coordinate::Value(at, point) => {
-                    let tied = &model.tables[*at];
-                    engine.simulate_where(&rig, passed, |reach| tied.acts(*point, reach))
+                    let fitted = &model.tables[*at];
+                    engine.simulate_where(&rig, reference_runs, |reach| fitted.acts(*point, reach))
                 }
             };
             let mut column = engine.difference(&simulated, &from);
@@ -233,79 +243,92 @@ fn columns(
 }
 
 /// Linearisation of a model.
-pub(super) struct Lines {
+pub(super) struct TableLinearisation {
     model: Model,
-    passed: Vec<ReferenceRun>,
+    reference_runs: Vec<ReferenceRun>,
     columns: Vec<Vec<f64>>,
 }
 
 /// A table of zeros with the sensitivities to its values.
-pub(super) struct Beside {
-    tied: Tied,
+pub(super) struct LinearisedTable {
+    fitted: FittedTable,
     columns: Vec<Vec<f64>>,
 }
 
-impl Beside {
+impl LinearisedTable {
     pub(super) fn balance(&self) -> Balance {
-        self.tied.table.balance
+        self.fitted.table.balance
     }
 }
 
-impl Lines {
+impl TableLinearisation {
     /// Linearises a model; `None` where no rig can have it.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
-        let passed = engine.pass(&model.rig(engine)?);
-        let columns = columns(engine, &model, &model.moved(), &passed)?;
-        Some(Lines { model, passed, columns })
+        let reference_runs = engine.pass(&model.rig(engine)?);
+        let columns = columns(engine, &model, &model.coordinates(), &reference_runs)?;
+        Some(TableLinearisation { model, reference_runs, columns })
     }
 
     /// Columns of the model and of further tables.
-    pub(super) fn with<'a>(&'a self, tables: &[&'a Beside]) -> Vec<&'a [f64]> {
+    pub(super) fn with<'a>(&'a self, tables: &[&'a LinearisedTable]) -> Vec<&'a [f64]> {
         let more = tables.iter().flat_map(|beside| &beside.columns);
         self.columns.iter().chain(more).map(Vec::as_slice).collect()
     }
 
     /// Linearises one more table of zeros; `None` where no rig can have it.
-    pub(super) fn beside(&self, engine: &Engine<'_>, tied: Tied) -> Option<Beside> {
+    pub(super) fn beside(&self, engine: &Engine<'_>, fitted: FittedTable) -> Option<LinearisedTable> {
         let mut model = self.model.clone();
-        model.tables.push(tied.clone());
-        let moved = model.moved().split_off(self.columns.len());
-        Some(Beside { tied, columns: columns(engine, &model, &moved, &self.passed)? })
+        model.tables.push(fitted.clone());
+        let coordinates = model.coordinates().split_off(self.columns.len());
+        Some(LinearisedTable {
+            fitted,
+            columns: columns(engine, &model, &coordinates, &self.reference_runs)?,
+        })
     }
 
     /// Cross-validated loss of the linearised model, without penalties.
-    pub(super) fn unseen_loss(&self, engine: &Engine<'_>, point: &Point) -> f64 {
+    pub(super) fn cross_validated_loss(&self, engine: &Engine<'_>, point: &Point) -> f64 {
         let products = engine.products(&point.residual, &self.columns);
-        let moved = self.model.moved();
-        let ridges = self.model.ridges();
-        let from: Vec<f64> = moved.iter().map(|coordinate| self.model.off(*coordinate)).collect();
-        products.unseen_loss(&(0..moved.len()).collect::<Vec<_>>(), &ridges, &from, FOLDS)
+        let coordinates = self.model.coordinates();
+        let precisions = self.model.precisions();
+        let from: Vec<f64> = coordinates.iter().map(|coordinate| self.model.off(*coordinate)).collect();
+        products.cross_validated_loss(&(0..coordinates.len()).collect::<Vec<_>>(), &precisions, &from, FOLDS)
     }
 
     /// Predicted loss of the linearised model with further tables.
-    pub(super) fn promised(&self, engine: &Engine<'_>, point: &Point, tables: &[&Beside]) -> f64 {
+    pub(super) fn predicted_loss(
+        &self,
+        engine: &Engine<'_>,
+        point: &Point,
+        tables: &[&LinearisedTable],
+    ) -> f64 {
         let mut model = self.model.clone();
-        model.tables.extend(tables.iter().map(|beside| beside.tied.clone()));
+        model.tables.extend(tables.iter().map(|beside| beside.fitted.clone()));
         let columns = self.with(tables);
         let products = engine.products(&point.residual, &columns);
-        products.fit(&(0..columns.len()).collect::<Vec<_>>(), &model.ridges()).loss + model.costs()
+        products.fit(&(0..columns.len()).collect::<Vec<_>>(), &model.precisions()).loss + model.penalty()
     }
 }
 
 /// Forward selection of parameters beside the tables on the linearised model, while the loss falls by `gain`.
-pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain: f64) -> [bool; COUNT] {
+pub(super) fn needed(
+    engine: &Engine<'_>,
+    point: &Point,
+    linearisation: &[&[f64]],
+    gain: f64,
+) -> [bool; COUNT] {
     let mut needed = [false; COUNT];
     let model = Model { free: [true; COUNT], ..point.model.clone() };
-    let moved = model.moved();
-    let products = engine.products(&point.residual, lines);
+    let coordinates = model.coordinates();
+    let products = engine.products(&point.residual, linearisation);
     let loss_with = |needed: &[bool; COUNT]| {
-        let is_in = |at: &usize| match moved[*at] {
+        let is_in = |at: &usize| match coordinates[*at] {
             Coordinate::Factor(factor) => needed[factor],
             Coordinate::Value(..) => true,
         };
-        let chosen: Vec<usize> = (0..moved.len()).filter(is_in).collect();
-        let ridges: Vec<f64> = chosen.iter().map(|at| model.ridge(moved[*at])).collect();
-        products.fit(&chosen, &ridges).loss
+        let chosen: Vec<usize> = (0..coordinates.len()).filter(is_in).collect();
+        let precisions: Vec<f64> = chosen.iter().map(|at| model.precision(coordinates[*at])).collect();
+        products.fit(&chosen, &precisions).loss
     };
     let mut loss = loss_with(&needed);
     for _ in 0..COUNT {
@@ -326,35 +349,35 @@ pub(super) fn needed(engine: &Engine<'_>, point: &Point, lines: &[&[f64]], gain:
 pub(super) fn fit(engine: &Engine<'_>, start: Point, steps: usize) -> Point {
     let loss = |point: &Point| point.loss;
     descend(start, steps, CONVERGED, loss, |point| {
-        let lines = Lines::of(engine, point.model.clone())?;
-        Some(self::steps(engine, point.clone(), &lines.with(&[])))
+        let linearisation = TableLinearisation::of(engine, point.model.clone())?;
+        Some(self::steps(engine, point.clone(), &linearisation.with(&[])))
     })
 }
 
 /// Steps with the same sensitivities, one column for each free coordinate.
-pub(super) fn steps(engine: &Engine<'_>, start: Point, lines: &[&[f64]]) -> Point {
-    let (moved, ridges) = (start.model.moved(), start.model.ridges());
-    let mut products = engine.products(&start.residual, lines);
+pub(super) fn steps(engine: &Engine<'_>, start: Point, linearisation: &[&[f64]]) -> Point {
+    let (coordinates, precisions) = (start.model.coordinates(), start.model.precisions());
+    let mut products = engine.products(&start.residual, linearisation);
     let loss = |point: &Point| point.loss;
-    descend(start, ALONG, CONVERGED, loss, |point| {
-        products.set_residual(&point.residual, lines, engine.rows());
-        along(engine, point, &moved, &products, &ridges)
+    descend(start, STEPS_PER_LINEARISATION, CONVERGED, loss, |point| {
+        products.set_residual(&point.residual, linearisation, engine.rows());
+        line_search(engine, point, &coordinates, &products, &precisions)
     })
 }
 
 /// Backtracking line search: the longest step that lowers the loss.
-fn along(
+fn line_search(
     engine: &Engine<'_>,
     point: &Point,
-    moved: &[Coordinate],
+    coordinates: &[Coordinate],
     products: &Products,
-    ridges: &[f64],
+    precisions: &[f64],
 ) -> Option<Point> {
-    let joint = products.fit(&(0..moved.len()).collect::<Vec<_>>(), ridges);
+    let joint = products.fit(&(0..coordinates.len()).collect::<Vec<_>>(), precisions);
     SHARES.iter().find_map(|share| {
-        let changes = moved.iter().zip(&joint.coefficients);
+        let changes = coordinates.iter().zip(&joint.coefficients);
         let model = changes.fold(point.model.clone(), |model, (coordinate, change)| {
-            model.moved_by(*coordinate, share * change)
+            model.perturbed(*coordinate, share * change)
         });
         Point::of(engine, model).filter(|tried| tried.loss < point.loss)
     })

@@ -20,11 +20,11 @@ const TWO_SIDED: f64 = 1.96;
 /// Null figures.
 #[derive(Debug)]
 pub(super) struct NullPower {
-    /// Mean sum of squares of each window and lane, window by window.
+    /// Mean sum of squares of each window and output, window by window.
     pub(super) expected: Vec<f64>,
-    /// Mean of [`Power::quiet`], of each lane.
+    /// Mean of [`Power::quiet`], of each output.
     pub(super) quiet: Vec<f64>,
-    /// Standard deviation of each lane's pooled power.
+    /// Standard deviation of each output's pooled power.
     pub(super) spreads: Vec<f64>,
     /// 95 % range of chi2 per degree of freedom.
     pub(super) range: [f64; 2],
@@ -49,29 +49,29 @@ impl NullPower {
 
     /// All but the range, and the standard deviation of the joint power of noise.
     fn of_noise(windows: &Windows<'_>) -> (Self, f64) {
-        let lanes = windows.lanes().len();
+        let outputs = windows.outputs().len();
         let draws: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
-            .map(|draw| sums(&windows.noise(&mut Pcg64::seed_from_u64(SEED ^ draw)), lanes))
+            .map(|draw| sums(&windows.noise(&mut Pcg64::seed_from_u64(SEED ^ draw)), outputs))
             .collect();
-        // Windows differ in their degrees of freedom; lanes without samples have none.
-        let mut expected = vec![0.0; windows.count() * lanes];
+        // Windows differ in their degrees of freedom; outputs without samples have none.
+        let mut expected = vec![0.0; windows.count() * outputs];
         for draw in &draws {
             expected.iter_mut().zip(draw).for_each(|(sum, value)| *sum += value / DRAWS as f64);
         }
-        let powers: Vec<Power> = draws.iter().map(|draw| Power::new(draw, &expected, lanes)).collect();
-        let quiet = (0..lanes)
-            .map(|lane| powers.iter().map(|power| power.quiet()[lane]).sum::<f64>() / DRAWS as f64)
+        let powers: Vec<Power> = draws.iter().map(|draw| Power::new(draw, &expected, outputs)).collect();
+        let quiet = (0..outputs)
+            .map(|output| powers.iter().map(|power| power.quiet()[output]).sum::<f64>() / DRAWS as f64)
             .collect();
         let mut null = NullPower { expected, quiet, spreads: Vec::new(), range: [1.0; 2] };
         // Each draw is processed like a record: level correction and trimming.
         let powers: Vec<Power> = powers.iter().map(|power| power.over(&levels(power, &null))).collect();
-        let of_lane = |power: &Power, lane: usize| {
-            let squares = power.lane(lane);
+        let of_lane = |power: &Power, output: usize| {
+            let squares = power.output(output);
             pooled(&squares, &kept(&squares))
         };
-        null.spreads = (0..lanes)
-            .map(|lane| spread(&powers.iter().map(|power| of_lane(power, lane)).collect::<Vec<_>>()).1)
+        null.spreads = (0..outputs)
+            .map(|output| spread(&powers.iter().map(|power| of_lane(power, output)).collect::<Vec<_>>()).1)
             .collect();
         let (_, of_noise) = spread(&powers.iter().map(joint).collect::<Vec<_>>());
         (null, of_noise)
@@ -80,14 +80,14 @@ impl NullPower {
     /// Mean and standard deviation of the joint power of synthetic records. Around a stop or a break-away even the true model
     /// leaves more than noise, since start states are known to micrometres only.
     fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
-        let lanes = model.windows.lanes().len();
+        let outputs = model.windows.outputs().len();
         let left: Vec<f64> = (0..RECORDS)
             .into_par_iter()
             .map(|draw| {
                 let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw));
                 let windows = model.windows.redrawn(&model.simulated, &mut random);
                 let residual = windows.residual(&windows.simulate(windows.rig()));
-                let power = Power::new(&sums(&residual, lanes), &self.expected, lanes);
+                let power = Power::new(&sums(&residual, outputs), &self.expected, outputs);
                 joint(&power.over(&levels(&power, self)))
             })
             .collect();

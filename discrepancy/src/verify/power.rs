@@ -1,4 +1,4 @@
-//! Residual power of each window and lane over its null expectation.
+//! Residual power of each window and output over its null expectation.
 
 use super::LEVELS;
 use super::null_power::NullPower;
@@ -25,36 +25,37 @@ impl Squares {
     }
 }
 
-/// Squares of all windows and lanes, window by window.
+/// Squares of all windows and outputs, window by window.
 #[derive(Clone, Debug)]
 pub(super) struct Power {
-    lanes: usize,
+    outputs: usize,
     squares: Vec<Squares>,
 }
 
-/// Sums of squares of each window and lane.
-pub(super) fn sums(residual: &[f64], lanes: usize) -> Vec<f64> {
+/// Sums of squares of each window and output.
+pub(super) fn sums(residual: &[f64], outputs: usize) -> Vec<f64> {
     let mut sums = Vec::with_capacity(residual.len() / WINDOW);
-    for window in residual.chunks_exact(WINDOW * lanes) {
-        let lane =
-            |lane: usize| window.iter().skip(lane).step_by(lanes).map(|value| value * value).sum::<f64>();
-        sums.extend((0..lanes).map(lane));
+    for window in residual.chunks_exact(WINDOW * outputs) {
+        let output = |output: usize| {
+            window.iter().skip(output).step_by(outputs).map(|value| value * value).sum::<f64>()
+        };
+        sums.extend((0..outputs).map(output));
     }
     sums
 }
 
 impl Power {
     /// Sums of squares and their null expectations.
-    pub(super) fn new(sums: &[f64], expected: &[f64], lanes: usize) -> Self {
+    pub(super) fn new(sums: &[f64], expected: &[f64], outputs: usize) -> Self {
         let squares = sums
             .iter()
             .zip(expected)
             .map(|(sum, expected)| Squares { sum: *sum, expected: *expected })
             .collect();
-        Power { lanes, squares }
+        Power { outputs, squares }
     }
 
-    /// The smaller of two in each window and lane.
+    /// The smaller of two in each window and output.
     pub(super) fn smaller(&self, other: &Power) -> Power {
         let squares = self
             .squares
@@ -62,10 +63,10 @@ impl Power {
             .zip(&other.squares)
             .map(|(one, other)| Squares { sum: one.sum.min(other.sum), ..*one })
             .collect();
-        Power { lanes: self.lanes, squares }
+        Power { outputs: self.outputs, squares }
     }
 
-    /// The same with the level of each lane divided out.
+    /// The same with the level of each output divided out.
     pub(super) fn over(&self, levels: &[f64]) -> Power {
         let squares = self
             .squares
@@ -73,30 +74,30 @@ impl Power {
             .zip(levels.iter().cycle())
             .map(|(squares, level)| Squares { sum: squares.sum / level, ..*squares })
             .collect();
-        Power { lanes: self.lanes, squares }
+        Power { outputs: self.outputs, squares }
     }
 
-    /// One lane, window by window.
-    pub(super) fn lane(&self, lane: usize) -> Vec<Squares> {
-        self.squares.iter().skip(lane).step_by(self.lanes).copied().collect()
+    /// One output, window by window.
+    pub(super) fn output(&self, output: usize) -> Vec<Squares> {
+        self.squares.iter().skip(output).step_by(self.outputs).copied().collect()
     }
 
-    /// All lanes together, window by window.
+    /// All outputs together, window by window.
     pub(super) fn joint(&self) -> Vec<Squares> {
-        let sum = |lanes: &[Squares]| {
-            lanes.iter().fold(Squares::default(), |total, lane| Squares {
-                sum: total.sum + lane.sum,
-                expected: total.expected + lane.expected,
+        let sum = |outputs: &[Squares]| {
+            outputs.iter().fold(Squares::default(), |total, output| Squares {
+                sum: total.sum + output.sum,
+                expected: total.expected + output.expected,
             })
         };
-        self.squares.chunks_exact(self.lanes).map(sum).collect()
+        self.squares.chunks_exact(self.outputs).map(sum).collect()
     }
 
-    /// The quantile of each lane's windows that measures its level.
+    /// The quantile of each output's windows that measures its level.
     pub(super) fn quiet(&self) -> Vec<f64> {
-        (0..self.lanes)
-            .map(|lane| {
-                let squares = self.lane(lane);
+        (0..self.outputs)
+            .map(|output| {
+                let squares = self.output(output);
                 let mut ratios: Vec<f64> =
                     squares.into_iter().filter(|window| window.expected > 0.0).map(Squares::over).collect();
                 let rank = (QUIET * ratios.len() as f64) as usize;
@@ -106,7 +107,7 @@ impl Power {
     }
 }
 
-/// Level of each lane's noise, as a factor on its power.
+/// Level of each output's noise, as a factor on its power.
 pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
     let quiet = power.quiet();
     quiet
@@ -140,11 +141,11 @@ pub(super) fn pooled(squares: &[Squares], kept: &[bool]) -> f64 {
     if expected > 0.0 { sum / expected } else { 0.0 }
 }
 
-/// Lag-1 autocorrelation of a lane in the remaining windows.
-pub(super) fn neighbours(residual: &[f64], lane: usize, lanes: usize, kept: &[bool]) -> f64 {
+/// Lag-1 autocorrelation of a output in the remaining windows.
+pub(super) fn neighbours(residual: &[f64], output: usize, outputs: usize, kept: &[bool]) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
-    for (window, _) in residual.chunks_exact(WINDOW * lanes).zip(kept).filter(|(_, kept)| **kept) {
-        let series: Vec<f64> = window.iter().skip(lane).step_by(lanes).copied().collect();
+    for (window, _) in residual.chunks_exact(WINDOW * outputs).zip(kept).filter(|(_, kept)| **kept) {
+        let series: Vec<f64> = window.iter().skip(output).step_by(outputs).copied().collect();
         products += series.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
         squares += series.iter().map(|value| value * value).sum::<f64>();
     }

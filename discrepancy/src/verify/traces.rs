@@ -5,27 +5,28 @@ use crate::page::Trace;
 use crate::windows::WINDOW;
 use plant::{Axis, PERIOD_S};
 
-/// One trace for each lane, over the whole record; what no window has is NaN.
+/// One trace for each output, over the whole record; what no window has is NaN.
 pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {
     let windows = &after.windows;
     let record = windows.record();
-    let lanes = windows.lanes();
+    let outputs = windows.outputs();
     let load_offset_m = windows.rig().sensors().load_position_offset_m;
-    lanes
+    outputs
         .iter()
         .enumerate()
-        .map(|(lane, (axis, at))| {
+        .map(|(output, (axis, at))| {
             let noise = record.noise[*axis][*at];
             // As the record has it.
             let offset = if *at == 0 && Axis::ALL[*axis] == Axis::Load { load_offset_m } else { 0.0 };
             let joined = |values: &[f64], offset: f64| {
                 let mut series = vec![f64::NAN; record.len()];
-                for (start, window) in windows.starts().iter().zip(values.chunks_exact(WINDOW * lanes.len()))
+                for (start, window) in
+                    windows.starts().iter().zip(values.chunks_exact(WINDOW * outputs.len()))
                 {
-                    let lane = window.iter().skip(lane).step_by(lanes.len());
+                    let output = window.iter().skip(output).step_by(outputs.len());
                     series[*start..]
                         .iter_mut()
-                        .zip(lane)
+                        .zip(output)
                         .for_each(|(entry, value)| *entry = value * noise + offset);
                 }
                 series

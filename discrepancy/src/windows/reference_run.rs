@@ -34,7 +34,7 @@ impl ReferenceRun {
 pub struct Reach([[[f64; 2]; Variable::ALL.len()]; 2]);
 
 impl Reach {
-    const NOTHING: Reach = Reach([[[f64::INFINITY, f64::NEG_INFINITY]; Variable::ALL.len()]; 2]);
+    const EMPTY: Reach = Reach([[[f64::INFINITY, f64::NEG_INFINITY]; Variable::ALL.len()]; 2]);
 
     fn add(&mut self, plant: &Plant) {
         let truth = plant.truth(&plant::Inputs::default());
@@ -71,7 +71,7 @@ impl Windows<'_> {
             super::set_state(&mut plant, self.record, &points);
             let judged = self.starts.get(reference_run.reaches.len()) == Some(&start);
             let state = *plant.state();
-            let mut reach = Reach::NOTHING;
+            let mut reach = Reach::EMPTY;
             for inputs in &self.record.inputs[start..start + WINDOW] {
                 if judged {
                     self.read(&plant, inputs, &mut reference_run.simulated);

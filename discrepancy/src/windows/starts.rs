@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use std::iter::once;
 
 /// Largest move of a start state in one step where the rods are linked.
-const FARTHEST: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
+const MOST_STEP: [f64; 4] = [1e-4, 0.02, 2e3, 2e3];
 /// Backtracking factor.
 const SHORTER: f64 = 0.3;
 /// Speeds of a piston that seems at rest, m/s: too slow to measure, but sliding pistons need no break-away force.
@@ -24,7 +24,7 @@ pub(super) const START_PASSES: usize = 2;
 /// Largest change of a force reading by a nudge, in standard deviations; more is a jump.
 const JUMP: f64 = 0.5;
 /// Prior standard deviations of the start state: m, m/s, Pa, Pa.
-const DOUBT: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
+const PRIOR_STD: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
 
 /// Lower bound of a chamber's absolute pressure, Pa.
 const LEAST_PA: f64 = 1e4;
@@ -120,9 +120,9 @@ impl Windows<'_> {
             let Some(moved) = matrix.cholesky().map(|factor| factor.solve(&right)) else { continue };
             for (place, axis) in measured.iter().enumerate() {
                 let part = |number: usize| {
-                    let most = if self.record.linked { FARTHEST[number] } else { DOUBT[number] };
+                    let most = if self.record.linked { MOST_STEP[number] } else { PRIOR_STD[number] };
                     shares[at]
-                        * (moved[place * Point::NUDGES.len() + number] * DOUBT[number]).clamp(-most, most)
+                        * (moved[place * Point::NUDGES.len() + number] * PRIOR_STD[number]).clamp(-most, most)
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
                 point.extension_m += part(0);
@@ -182,10 +182,10 @@ impl Windows<'_> {
             rig: self.rig.clone(),
             starts: self.starts.clone(),
             points,
-            lanes: self.lanes.clone(),
+            outputs: self.outputs.clone(),
             readings,
             valid: self.valid.clone(),
-            drifts: self.drifts.clone(),
+            jitter_sensitivity: self.jitter_sensitivity.clone(),
             bases: Vec::new(),
         };
         windows.estimate_starts(START_PASSES)
@@ -233,7 +233,7 @@ impl Windows<'_> {
                 }
                 // Removes jumps that moved by a sample before the difference is scaled up.
                 self.flatten(&mut column, JUMP);
-                let scale = DOUBT[*number] / Point::NUDGES[*number];
+                let scale = PRIOR_STD[*number] / Point::NUDGES[*number];
                 column.iter_mut().for_each(|value| *value *= scale);
                 self.whiten(all.len(), &mut column);
                 column

@@ -23,19 +23,24 @@ impl Windows<'_> {
 
     /// A draw of noise with the autocorrelation and the jitter of the record.
     pub(super) fn raw_noise(&self, random: &mut Pcg64) -> Vec<f64> {
-        let width = self.lanes.len();
+        let width = self.outputs.len();
         let memories: Vec<f64> =
-            self.lanes.iter().map(|(axis, channel)| self.record.memory[*axis][*channel]).collect();
+            self.outputs.iter().map(|(axis, channel)| self.record.memory[*axis][*channel]).collect();
         let mut noise = Vec::with_capacity(self.readings.len());
-        for drifts in self.drifts.chunks_exact(self.rows().max(1)) {
+        for jitter_sensitivity in self.jitter_sensitivity.chunks_exact(self.rows().max(1)) {
             let mut coloured = vec![0.0; width];
-            for (period, drifts) in drifts.chunks_exact(width).enumerate() {
+            for (period, jitter_sensitivity) in jitter_sensitivity.chunks_exact(width).enumerate() {
                 for (coloured, memory) in coloured.iter_mut().zip(&memories) {
                     let kept = if period == 0 { 0.0 } else { *memory };
                     *coloured = kept * *coloured + (1.0 - kept * kept).sqrt() * gaussian(random);
                 }
                 let instant = gaussian(random);
-                noise.extend(coloured.iter().zip(drifts).map(|(coloured, drift)| coloured + drift * instant));
+                noise.extend(
+                    coloured
+                        .iter()
+                        .zip(jitter_sensitivity)
+                        .map(|(coloured, jitter_sensitivity_of)| coloured + jitter_sensitivity_of * instant),
+                );
             }
         }
         noise
@@ -44,27 +49,33 @@ impl Windows<'_> {
     /// Whitens a window: jitter, common to all readings of an instant, by (I + d d')^(-1/2) with d their rates times the jitter
     /// over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
-        let width = self.lanes.len();
-        let drifts = &self.drifts[at * self.rows()..][..self.rows()];
-        for (readings, drift) in window.chunks_exact_mut(width).zip(drifts.chunks_exact(width)) {
-            let square = dot(drift, drift);
+        let width = self.outputs.len();
+        let jitter_sensitivity = &self.jitter_sensitivity[at * self.rows()..][..self.rows()];
+        for (readings, jitter_sensitivity_of) in
+            window.chunks_exact_mut(width).zip(jitter_sensitivity.chunks_exact(width))
+        {
+            let square = dot(jitter_sensitivity_of, jitter_sensitivity_of);
             if square > 1e-6 {
-                let share = dot(readings, drift) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
-                readings.iter_mut().zip(drift).for_each(|(reading, drift)| *reading -= share * drift);
+                let share =
+                    dot(readings, jitter_sensitivity_of) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
+                readings
+                    .iter_mut()
+                    .zip(jitter_sensitivity_of)
+                    .for_each(|(reading, jitter_sensitivity_of)| *reading -= share * jitter_sensitivity_of);
             }
         }
-        for (lane, (axis, channel)) in self.lanes.iter().enumerate() {
+        for (output, (axis, channel)) in self.outputs.iter().enumerate() {
             let memory = self.record.memory[*axis][*channel];
             if memory == 0.0 {
                 continue;
             }
             for period in (1..WINDOW).rev() {
-                let (place, before) = (period * width + lane, (period - 1) * width + lane);
+                let (place, before) = (period * width + output, (period - 1) * width + output);
                 if !(self.valid[at * self.rows() + place] && self.valid[at * self.rows() + before]) {
                     continue;
                 }
                 // Jitter lowers the correlation of neighbours.
-                let correlation = memory / (1.0 + drifts[place] * drifts[place]);
+                let correlation = memory / (1.0 + jitter_sensitivity[place] * jitter_sensitivity[place]);
                 window[place] =
                     (window[place] - correlation * window[before]) / (1.0 - correlation * correlation).sqrt();
             }
@@ -73,9 +84,9 @@ impl Windows<'_> {
 
     /// Hampel-type filter: force readings that differ from the median of their neighbours by more than `limit` become it.
     pub(super) fn flatten(&self, values: &mut [f64], limit: f64) {
-        let width = self.lanes.len();
-        for lane in (0..width).filter(|lane| self.lanes[*lane].1 == FORCE) {
-            let series: Vec<f64> = values.iter().skip(lane).step_by(width).copied().collect();
+        let width = self.outputs.len();
+        for output in (0..width).filter(|output| self.outputs[*output].1 == FORCE) {
+            let series: Vec<f64> = values.iter().skip(output).step_by(width).copied().collect();
             for at in 0..series.len() {
                 let mut near = [0.0; 2 * SPIKE_REACH + 1];
                 let from = at.saturating_sub(SPIKE_REACH);
@@ -84,7 +95,7 @@ impl Windows<'_> {
                 near.copy_from_slice(&series[from..to]);
                 let Some(median) = median(near) else { continue };
                 if (series[at] - median).abs() > limit {
-                    values[at * width + lane] = median;
+                    values[at * width + output] = median;
                 }
             }
         }
@@ -92,7 +103,7 @@ impl Windows<'_> {
 }
 
 /// Rate of a reading times the jitter, over its noise.
-pub(super) fn drift(record: &GriddedRecord, at: usize, axis: usize, channel: usize) -> f64 {
+pub(super) fn jitter_sensitivity_of(record: &GriddedRecord, at: usize, axis: usize, channel: usize) -> f64 {
     if record.jitter_s == 0.0 {
         return 0.0;
     }
