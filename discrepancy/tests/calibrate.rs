@@ -1,6 +1,6 @@
 //! A record tells the numbers of a rig that nothing is missing from: its volumes and the points of its valve's tables too.
 
-use crate::gridded::gridded;
+use crate::record::gridded;
 use discrepancy::calibrate::finer::{Finer, finer};
 use discrepancy::calibrate::{calibrate, quantity};
 use discrepancy::engine::Engine;

@@ -1,6 +1,6 @@
 //! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
 
-use crate::gridded::gridded;
+use crate::record::gridded;
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
 use discrepancy::report::Outside;

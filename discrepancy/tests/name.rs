@@ -1,6 +1,6 @@
 //! Claims about naming, on records that the plant makes here with something hidden in it.
 
-use crate::gridded::gridded;
+use crate::record::gridded;
 use discrepancy::candidates::Candidate;
 use discrepancy::engine::Engine;
 use discrepancy::name::{Found, name};

@@ -1,6 +1,6 @@
 //! A neighbour of a rig is simulated only where it differs, and shows the same as if it were simulated everywhere.
 
-use crate::gridded::gridded;
+use crate::record::gridded;
 use discrepancy::windows::Windows;
 use plant::effects::tabulated::{Balance, Tabulated, Variable};
 use plant::{Axis, RigParameters};

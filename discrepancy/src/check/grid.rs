@@ -22,10 +22,8 @@ impl Grid {
         let times = record.time_s();
         let period_s = period_s(times).unwrap_or(1e-3);
         let any = record.channels().next();
-        let bad = |row: usize| {
-            any.is_some_and(|any| notes.unusable[any.index()].get(row).copied().unwrap_or(false))
-        };
-        let good: Vec<usize> = (0..times.len()).filter(|row| !bad(*row)).collect();
+        let bad = |row: &usize| any.is_some_and(|any| notes.is_left_out(any, *row));
+        let good: Vec<usize> = (0..times.len()).filter(|row| !bad(row)).collect();
         let [Some(first), Some(last)] = [good.first().copied(), good.last().copied()] else {
             return Grid { period_s, rows: Vec::new() };
         };

@@ -60,8 +60,11 @@ impl<'a> Notes<'a> {
 
     /// A sample, if it is there and not left out.
     pub(super) fn value(&self, channel: Channel, row: usize) -> Option<f64> {
-        let bad = self.unusable[channel.index()].get(row).copied().unwrap_or(false);
-        self.record.value(channel, row).filter(|_| !bad)
+        self.record.value(channel, row).filter(|_| !self.is_left_out(channel, row))
+    }
+
+    pub(super) fn is_left_out(&self, channel: Channel, row: usize) -> bool {
+        self.unusable[channel.index()].get(row).copied().unwrap_or(false)
     }
 
     /// Share of a channel's samples that cannot be used, absent ones included.

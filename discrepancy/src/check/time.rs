@@ -157,7 +157,9 @@ fn growing(values: &[f64], same: f64) -> Vec<bool> {
 
 fn lost(notes: &mut Notes, period_s: f64) {
     let times = notes.record.time_s();
-    let rows: Vec<usize> = (0..times.len()).filter(|row| !all_left_out(notes, *row)).collect();
+    let rows: Vec<usize> = (0..times.len())
+        .filter(|row| !notes.record.channels().all(|channel| notes.is_left_out(channel, *row)))
+        .collect();
     let (mut singles, mut first, mut holes, mut missing) = (0, None, Vec::new(), 0);
     for pair in rows.windows(2) {
         let step = ((times[pair[1]] - times[pair[0]]) / period_s).round();
@@ -208,11 +210,6 @@ fn lost(notes: &mut Notes, period_s: f64) {
         );
         notes.add_time("gap", Some(*row), fatal, &text);
     }
-}
-
-fn all_left_out(notes: &Notes, row: usize) -> bool {
-    let mut channels = notes.record.channels();
-    channels.all(|channel| notes.unusable[channel.index()].get(row).copied().unwrap_or(false))
 }
 
 /// Spread of the sampling instants.

@@ -27,9 +27,9 @@ impl Windows<'_> {
         let memories: Vec<f64> =
             self.outputs.iter().map(|(axis, channel)| self.record.memory[*axis][*channel]).collect();
         let mut noise = Vec::with_capacity(self.readings.len());
-        for jitter_sensitivity in self.jitter_sensitivity.chunks_exact(self.rows().max(1)) {
+        for sensitivities in self.jitter_sensitivity.chunks_exact(self.rows().max(1)) {
             let mut coloured = vec![0.0; width];
-            for (period, jitter_sensitivity) in jitter_sensitivity.chunks_exact(width).enumerate() {
+            for (period, sensitivities) in sensitivities.chunks_exact(width).enumerate() {
                 for (coloured, memory) in coloured.iter_mut().zip(&memories) {
                     let kept = if period == 0 { 0.0 } else { *memory };
                     *coloured = kept * *coloured + (1.0 - kept * kept).sqrt() * gaussian(random);
@@ -38,8 +38,8 @@ impl Windows<'_> {
                 noise.extend(
                     coloured
                         .iter()
-                        .zip(jitter_sensitivity)
-                        .map(|(coloured, jitter_sensitivity_of)| coloured + jitter_sensitivity_of * instant),
+                        .zip(sensitivities)
+                        .map(|(coloured, sensitivity)| coloured + sensitivity * instant),
                 );
             }
         }
@@ -50,18 +50,15 @@ impl Windows<'_> {
     /// over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
         let width = self.outputs.len();
-        let jitter_sensitivity = &self.jitter_sensitivity[at * self.rows()..][..self.rows()];
-        for (readings, jitter_sensitivity_of) in
-            window.chunks_exact_mut(width).zip(jitter_sensitivity.chunks_exact(width))
-        {
-            let square = dot(jitter_sensitivity_of, jitter_sensitivity_of);
+        let sensitivities = &self.jitter_sensitivity[at * self.rows()..][..self.rows()];
+        for (readings, sensitivity) in window.chunks_exact_mut(width).zip(sensitivities.chunks_exact(width)) {
+            let square = dot(sensitivity, sensitivity);
             if square > 1e-6 {
-                let share =
-                    dot(readings, jitter_sensitivity_of) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
+                let share = dot(readings, sensitivity) * (1.0 - 1.0 / (1.0 + square).sqrt()) / square;
                 readings
                     .iter_mut()
-                    .zip(jitter_sensitivity_of)
-                    .for_each(|(reading, jitter_sensitivity_of)| *reading -= share * jitter_sensitivity_of);
+                    .zip(sensitivity)
+                    .for_each(|(reading, sensitivity)| *reading -= share * sensitivity);
             }
         }
         for (output, (axis, channel)) in self.outputs.iter().enumerate() {
@@ -75,7 +72,7 @@ impl Windows<'_> {
                     continue;
                 }
                 // Jitter lowers the correlation of neighbours.
-                let correlation = memory / (1.0 + jitter_sensitivity[place] * jitter_sensitivity[place]);
+                let correlation = memory / (1.0 + sensitivities[place] * sensitivities[place]);
                 window[place] =
                     (window[place] - correlation * window[before]) / (1.0 - correlation * correlation).sqrt();
             }

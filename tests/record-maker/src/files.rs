@@ -3,7 +3,7 @@
 //! The measurement holds time and the columns of the recorded axes, no others [rig-model.md, Measurement file]. Numbers have the
 //! fewest digits that read back to the same bits.
 
-use super::{Experiment, MakeError, Recipe, Record, Row, TrueAxis, hidden, simulate};
+use super::{Experiment, MakeError, Recipe, Record, Row, hidden, simulate};
 use plant::{Axis, RigParameters};
 use serde_json::{Value, json};
 use std::io::Write as _;
@@ -12,28 +12,28 @@ use std::path::Path;
 /// Columns of an axis after its prefix, as in every measurement file.
 const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
 /// Columns of an axis in the truth.
-const TRUE: [&str; 21] = [
-    "extension_m",
-    "rod_velocity_m_per_s",
-    "rod_acceleration_m_per_s2",
-    "spool",
-    "pressure_a_Pa",
-    "pressure_b_Pa",
-    "stored_air_a_J",
-    "stored_air_b_J",
-    "temperature_a_K",
-    "temperature_b_K",
-    "flow_a_m3_per_s",
-    "flow_b_m3_per_s",
-    "edge_flow_a_m3_per_s",
-    "edge_flow_b_m3_per_s",
-    "exhaust_pressure_Pa",
-    "pneumatic_force_N",
-    "friction_N",
-    "position_without_noise_m",
-    "force_without_noise_N",
-    "pressure_a_without_noise_Pa",
-    "pressure_b_without_noise_Pa",
+const TRUE: [(&str, fn(&Row, usize) -> f64); 21] = [
+    ("extension_m", |row, i| row.axes[i].extension_m),
+    ("rod_velocity_m_per_s", |row, i| row.axes[i].rod_velocity_m_per_s),
+    ("rod_acceleration_m_per_s2", |row, i| row.axes[i].rod_acceleration_m_per_s2),
+    ("spool", |row, i| row.axes[i].spool),
+    ("pressure_a_Pa", |row, i| row.axes[i].pressure_pa[0]),
+    ("pressure_b_Pa", |row, i| row.axes[i].pressure_pa[1]),
+    ("stored_air_a_J", |row, i| row.axes[i].stored_air_j[0]),
+    ("stored_air_b_J", |row, i| row.axes[i].stored_air_j[1]),
+    ("temperature_a_K", |row, i| row.axes[i].temperature_k[0]),
+    ("temperature_b_K", |row, i| row.axes[i].temperature_k[1]),
+    ("flow_a_m3_per_s", |row, i| row.axes[i].flow_m3_per_s[0]),
+    ("flow_b_m3_per_s", |row, i| row.axes[i].flow_m3_per_s[1]),
+    ("edge_flow_a_m3_per_s", |row, i| row.axes[i].edge_flow_m3_per_s[0]),
+    ("edge_flow_b_m3_per_s", |row, i| row.axes[i].edge_flow_m3_per_s[1]),
+    ("exhaust_pressure_Pa", |row, i| row.axes[i].exhaust_pressure_pa),
+    ("pneumatic_force_N", |row, i| row.axes[i].pneumatic_force_n),
+    ("friction_N", |row, i| row.axes[i].friction_n),
+    ("position_without_noise_m", |row, i| row.without_noise[i][0]),
+    ("force_without_noise_N", |row, i| row.without_noise[i][1]),
+    ("pressure_a_without_noise_Pa", |row, i| row.without_noise[i][2]),
+    ("pressure_b_without_noise_Pa", |row, i| row.without_noise[i][3]),
 ];
 
 /// Makes a record and writes it: `measurement.csv` into one folder, `truth.csv` and `truth.json` into another.
@@ -100,61 +100,19 @@ fn truth_csv(record: &Record) -> Vec<u8> {
     let mut out = Vec::with_capacity(record.rows.len() * 400);
     put(&mut out, format_args!("time_s"));
     for axis in recorded(record) {
-        TRUE.iter().for_each(|column| put(&mut out, format_args!(",{}_{column}", axis.name())));
+        TRUE.iter().for_each(|(column, _)| put(&mut out, format_args!(",{}_{column}", axis.name())));
     }
     put(&mut out, format_args!(",supply_pressure_Pa,linkage_contact_force_N"));
     for (cycle, row) in record.rows.iter().enumerate() {
         put(&mut out, format_args!("\n{}.{:03}", cycle / 1000, cycle % 1000));
         for axis in recorded(record) {
             // Debug, for tiny numbers with an exponent: Display would spell out their zeros.
-            values(row, axis).iter().for_each(|value| put(&mut out, format_args!(",{value:?}")));
+            TRUE.iter().for_each(|(_, of)| put(&mut out, format_args!(",{:?}", of(row, axis.index()))));
         }
         put(&mut out, format_args!(",{:?},{:?}", row.supply_pressure_pa, row.contact_force_n));
     }
     out.push(b'\n');
     out
-}
-
-/// In the order of [`TRUE`].
-fn values(row: &Row, axis: Axis) -> [f64; TRUE.len()] {
-    let TrueAxis {
-        extension_m,
-        rod_velocity_m_per_s,
-        rod_acceleration_m_per_s2,
-        spool,
-        pressure_pa,
-        stored_air_j,
-        temperature_k,
-        flow_m3_per_s,
-        edge_flow_m3_per_s,
-        exhaust_pressure_pa,
-        pneumatic_force_n,
-        friction_n,
-    } = row.axes[axis.index()];
-    let [position, force, a, b] = row.without_noise[axis.index()];
-    [
-        extension_m,
-        rod_velocity_m_per_s,
-        rod_acceleration_m_per_s2,
-        spool,
-        pressure_pa[0],
-        pressure_pa[1],
-        stored_air_j[0],
-        stored_air_j[1],
-        temperature_k[0],
-        temperature_k[1],
-        flow_m3_per_s[0],
-        flow_m3_per_s[1],
-        edge_flow_m3_per_s[0],
-        edge_flow_m3_per_s[1],
-        exhaust_pressure_pa,
-        pneumatic_force_n,
-        friction_n,
-        position,
-        force,
-        a,
-        b,
-    ]
 }
 
 /// The recipe, complete: effects with their place and numbers as reports name them.

@@ -244,15 +244,7 @@ mod tests {
         let classes: Classes = serde_json::from_str(text).unwrap();
         let of = |seed, shape| classes.of_draws(&Plan::new(seed, shape).draws());
         // Fewer of each effect, more of others, other noise: all single draws are still those of the committed study.
-        let shape = Shape {
-            each: 2,
-            nulls: 3,
-            parameters: 1,
-            pairs: 2,
-            triples: 1,
-            noise_factor: 4.0,
-            weaker_factor: 1.0,
-        };
+        let shape = Shape { each: 2, nulls: 3, pairs: 2, noise_factor: 4.0, ..Shape::SMALL };
         let found = of(1, shape);
         assert_eq!(found.keys().copied().collect::<Vec<_>>(), (0..2 * SHEETS.len()).collect::<Vec<_>>());
         for (number, own) in &found {

@@ -56,6 +56,22 @@ fn is_one(factor: &f64) -> bool {
     *factor == one()
 }
 
+#[cfg(test)]
+impl Shape {
+    pub(crate) const NO_DRAW: Shape = Shape {
+        each: 0,
+        nulls: 0,
+        parameters: 0,
+        pairs: 0,
+        triples: 0,
+        noise_factor: 1.0,
+        weaker_factor: 1.0,
+    };
+    /// Something of each kind.
+    pub(crate) const SMALL: Shape =
+        Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, ..Shape::NO_DRAW };
+}
+
 impl Default for Shape {
     fn default() -> Self {
         Shape {

@@ -18,6 +18,7 @@ use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, Shape, draws};
 use campaign::parts;
 use record_maker::{Hidden, Recipe};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::fs;
@@ -174,6 +175,20 @@ pub fn read(path: &Path) -> Result<String, FolderError> {
     fs::read_to_string(path).map_err(FolderError::file(path))
 }
 
+/// What a program left of a draw, of this version.
+pub(crate) fn read_left<T: DeserializeOwned>(
+    path: &Path,
+    what: &str,
+    version: impl Fn(&T) -> u32,
+) -> Result<T, FolderError> {
+    let refuse = |why: String| FolderError::content(path, format!("is no {what} of this version: {why}"));
+    let left: T = serde_json::from_str(&read(path)?).map_err(|error| refuse(error.to_string()))?;
+    match version(&left) {
+        SCHEMA_VERSION => Ok(left),
+        other => Err(refuse(format!("schema version {other}"))),
+    }
+}
+
 /// Writes a file so that it is whole or absent.
 ///
 /// # Errors
@@ -224,31 +239,21 @@ fn beside(path: &Path) -> io::Result<TempDir> {
 mod tests {
     use super::*;
 
-    const SHAPE: Shape = Shape {
-        each: 1,
-        nulls: 2,
-        parameters: 1,
-        pairs: 1,
-        triples: 1,
-        noise_factor: 1.0,
-        weaker_factor: 1.0,
-    };
-
     #[test]
     fn a_study_opens_as_it_was_begun_and_no_other_begins_in_its_folder() {
         let folder = tempfile::tempdir().unwrap();
-        let plan = Plan::new(7, SHAPE);
+        let plan = Plan::new(7, Shape::SMALL);
         let begun = Study::begin(folder.path(), &plan).unwrap();
         assert_eq!(Study::open(folder.path()).unwrap().draws, begun.draws);
         assert_eq!(Study::begin(folder.path(), &plan).unwrap().draws, begun.draws);
-        let other = Study::begin(folder.path(), &Plan::new(8, SHAPE)).unwrap_err();
+        let other = Study::begin(folder.path(), &Plan::new(8, Shape::SMALL)).unwrap_err();
         assert!(other.to_string().contains("another folder"), "{other}");
     }
 
     #[test]
     fn draws_that_this_program_does_not_draw_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        Study::begin(folder.path(), &Plan::new(7, SHAPE)).unwrap();
+        Study::begin(folder.path(), &Plan::new(7, Shape::SMALL)).unwrap();
         let path = folder.path().join("draws.json");
         let text =
             fs::read_to_string(&path).unwrap().replace("\"foreign_form\": false", "\"foreign_form\": true");

@@ -169,15 +169,7 @@ mod tests {
 
     /// A draw of this effect at its first place, or at one of the load.
     fn draw(effect: &str, place: &str) -> Draw {
-        let shape = Shape {
-            each: 1,
-            nulls: 0,
-            parameters: 0,
-            pairs: 0,
-            triples: 0,
-            noise_factor: 1.0,
-            weaker_factor: 1.0,
-        };
+        let shape = Shape { each: 1, ..Shape::NO_DRAW };
         let sheet = plant::effects::sheet(effect).unwrap();
         let mut draw = draws(1, &shape).into_iter().find(|draw| draw.kind == Kind::Single).unwrap();
         let numbers = sheet.keys.iter().map(|key| key.drawn[1]).collect();

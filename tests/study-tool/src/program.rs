@@ -176,20 +176,21 @@ fn how(status: ExitStatus) -> Ended {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
 
-    fn script(folder: &Path, text: &str, limit: Duration) -> Program {
+    /// A shell script as the program under study.
+    pub(crate) fn script(folder: &Path, text: &str, arguments: &[&str], limit: Duration) -> Program {
         let path = folder.join("program");
         fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
         fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
-        Program::new(&path, vec![], limit).unwrap()
+        Program::new(&path, arguments.iter().map(|word| (*word).to_owned()).collect(), limit).unwrap()
     }
 
     fn run(text: &str, limit: Duration, stop: bool) -> Result<Taken, Interrupted> {
         let folder = tempfile::tempdir().unwrap();
-        let program = script(folder.path(), text, limit);
+        let program = script(folder.path(), text, &[], limit);
         let said = File::create(folder.path().join("said")).unwrap();
         let start = Start { folder: folder.path(), train: &["train.csv"], own: &[] };
         program.run(&start, said, &AtomicBool::new(stop))
@@ -220,8 +221,8 @@ mod tests {
     #[test]
     fn another_executable_is_another_program() {
         let folder = tempfile::tempdir().unwrap();
-        let one = script(folder.path(), "exit 0", PATIENCE).identity().clone();
-        let two = script(folder.path(), "exit 1", PATIENCE).identity().clone();
+        let one = script(folder.path(), "exit 0", &[], PATIENCE).identity().clone();
+        let two = script(folder.path(), "exit 1", &[], PATIENCE).identity().clone();
         assert_ne!(one, two);
     }
 }

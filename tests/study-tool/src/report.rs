@@ -6,29 +6,12 @@
 //!
 //! Source: the schema in issue 6, Output.
 
+pub use discrepancy::report::Verdict;
 use plant::effects::sheet::{Place, Sheet};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-
-/// What a program says in the end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Nothing is missing.
-    NothingMissing,
-    /// Only numbers of the baseline are off.
-    ParametersOnly,
-    /// Effects are missing, and these are they.
-    Named,
-    /// Effects are missing, and several explain the record alike.
-    Ambiguous,
-    /// Something is missing that the catalogue does not have.
-    OutsideCatalogue,
-    /// The record cannot be used.
-    BadData,
-}
 
 #[derive(Debug, Clone)]
 pub struct Report {

@@ -25,10 +25,10 @@ pub mod tables;
 
 use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, Kind};
-use crate::folder::{FolderError, make_whole, read};
+use crate::folder::{FolderError, read, read_left};
 use crate::program::{Ended, Identity, Program, Start, Taken};
 use crate::report::{self, Named, Report, Verdict};
-use crate::step::{Step, StepEnd, StepError, check_blind, read_result};
+use crate::step::{Step, StepError, check_blind, check_program, read_result, whole_run};
 use plant::RigParameters;
 use record_maker::{self, Hidden, Recipe};
 use serde::{Deserialize, Serialize};
@@ -145,12 +145,12 @@ pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Fou
         return Ok(Some(Found::NotOpen));
     };
     let path = folder.join("result.json");
-    check_program(&path, &read_result(&path)?.program, program)?;
+    check_program(&path, &read_result(&path)?.program, program.identity(), SAME_PROGRAM)?;
     let done = step.study.run(&label(step.label), draw.number);
     if done.exists() {
         let path = done.join("resolution.json");
         let resolution = read_resolution(&path)?;
-        check_program(&path, &resolution.program, program)?;
+        check_program(&path, &resolution.program, program.identity(), SAME_PROGRAM)?;
         if !step.again {
             return Ok(Some(Found::Measured(resolution)));
         }
@@ -160,28 +160,12 @@ pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Fou
     }
     step.check_disk()?;
     step.records(draw)?;
-    let ran = make_whole(&done, |folder| {
-        let resolution = resolve(step, program, draw, folder).map_err(StepEnd::Error)?;
-        resolution.ok_or(StepEnd::Interrupted)
-    });
-    match ran {
-        Ok(resolution) => Ok(Some(Found::Measured(resolution))),
-        Err(StepEnd::Interrupted) => Ok(None),
-        Err(StepEnd::Error(error)) => Err(error),
-    }
+    let resolution = whole_run(&done, |folder| resolve(step, program, draw, folder))?;
+    Ok(resolution.map(Found::Measured))
 }
 
-/// What is proposed is run by whoever proposed it.
-fn check_program(path: &Path, own: &Identity, program: &Program) -> Result<(), FolderError> {
-    if own == program.identity() {
-        return Ok(());
-    }
-    let what = format!(
-        "is of another program ({own:?}) than this one ({:?}): give the one that was run, with its arguments",
-        program.identity()
-    );
-    Err(FolderError::content(path, what))
-}
+/// What to do where a proposal is another program's.
+const SAME_PROGRAM: &str = "give the one that was run, with its arguments";
 
 /// Fills the folder of a draw; `None` when the study was told to stop.
 fn resolve(
@@ -256,13 +240,7 @@ fn measure(draw: &Draw, name: &str, toml: &str, empty: &Path, folder: &Path) -> 
 /// # Errors
 /// [`FolderError`] when it is none of this version.
 pub fn read_resolution(path: &Path) -> Result<Resolution, FolderError> {
-    serde_json::from_str::<Resolution>(&read(path)?)
-        .map_err(|error| error.to_string())
-        .and_then(|own| {
-            let good = own.schema_version == SCHEMA_VERSION;
-            if good { Ok(own) } else { Err(format!("schema version {}", own.schema_version)) }
-        })
-        .map_err(|what| FolderError::content(path, format!("is no resolution of this version: {what}")))
+    read_left(path, "resolution", |resolution: &Resolution| resolution.schema_version)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 
 use crate::SCHEMA_VERSION;
 use crate::draws::Draw;
-use crate::folder::{FolderError, Study, make_whole, read};
+use crate::folder::{FolderError, Study, make_whole, read_left};
 use crate::leave_out;
 use crate::program::{Identity, Interrupted, Program, Start, Taken};
 use crate::report::{self, Report};
@@ -124,19 +124,12 @@ impl Step<'_> {
         }
         self.check_disk()?;
         self.records(draw)?;
-        let ran = make_whole(&path, |folder| {
-            self.let_loose(draw, program, folder).map_err(StepEnd::Error)?.ok_or(StepEnd::Interrupted)
-        });
-        let result = match ran {
-            Ok(result) => result,
-            Err(StepEnd::Interrupted) => return Ok(None),
-            Err(StepEnd::Error(error)) => return Err(error),
-        };
-        if self.drop_records {
+        let result = whole_run(&path, |folder| self.let_loose(draw, program, folder))?;
+        if self.drop_records && result.is_some() {
             fs::remove_dir_all(self.study.records(number))
                 .map_err(|error| StepError::Files { number, error })?;
         }
-        Ok(Some(result))
+        Ok(result)
     }
 
     fn identity(&self, program: &Program) -> Identity {
@@ -145,13 +138,8 @@ impl Step<'_> {
 
     /// Results of another program under the same label are never mixed with its own.
     fn done(&self, path: &Path, program: &Program) -> Result<RunResult, StepError> {
-        let (result, identity) = (read_result(path)?, self.identity(program));
-        if result.program != identity {
-            let own = &result.program;
-            let what =
-                format!("is of another program ({own:?}) than this one ({identity:?}): give another --label");
-            return Err(FolderError::content(path, what).into());
-        }
+        let result = read_result(path)?;
+        check_program(path, &result.program, &self.identity(program), "give another --label")?;
         Ok(result)
     }
 
@@ -269,8 +257,35 @@ fn keep(out: &Path, folder: &Path, name: &str, largest: u64) -> io::Result<()> {
     Ok(())
 }
 
+/// Refuses what another program left.
+pub(crate) fn check_program(
+    path: &Path,
+    own: &Identity,
+    identity: &Identity,
+    advice: &str,
+) -> Result<(), FolderError> {
+    if own == identity {
+        return Ok(());
+    }
+    let what = format!("is of another program ({own:?}) than this one ({identity:?}): {advice}");
+    Err(FolderError::content(path, what))
+}
+
+/// Makes the folder of a run, whole or absent; `None` when the study was told to stop in its midst.
+pub(crate) fn whole_run<T>(
+    path: &Path,
+    fill: impl FnOnce(&Path) -> Result<Option<T>, StepError>,
+) -> Result<Option<T>, StepError> {
+    let ran = make_whole(path, |folder| fill(folder).map_err(StepEnd::Error)?.ok_or(StepEnd::Interrupted));
+    match ran {
+        Ok(left) => Ok(Some(left)),
+        Err(StepEnd::Interrupted) => Ok(None),
+        Err(StepEnd::Error(error)) => Err(error),
+    }
+}
+
 /// Why a run's folder is not finished.
-pub(crate) enum StepEnd {
+enum StepEnd {
     Interrupted,
     Error(StepError),
 }
@@ -286,13 +301,7 @@ impl From<FolderError> for StepEnd {
 /// # Errors
 /// [`FolderError`] when it is none of this version.
 pub fn read_result(path: &Path) -> Result<RunResult, FolderError> {
-    serde_json::from_str::<RunResult>(&read(path)?)
-        .map_err(|error| error.to_string())
-        .and_then(|result| {
-            let good = result.schema_version == SCHEMA_VERSION;
-            if good { Ok(result) } else { Err(format!("schema version {}", result.schema_version)) }
-        })
-        .map_err(|what| FolderError::content(path, format!("is no result of this version: {what}")))
+    read_left(path, "result", |result: &RunResult| result.schema_version)
 }
 
 #[cfg(test)]

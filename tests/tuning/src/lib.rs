@@ -17,7 +17,7 @@ pub mod rehearsed;
 use algorithms::guard::AlgorithmFault;
 use axis_control::setup::InputError;
 use plant::{ParameterError, RigParameters};
-use std::sync::Mutex;
+use rayon::prelude::*;
 
 /// Factors that a gain margin is looked for in.
 pub const FACTORS: [f64; 8] = [1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0];
@@ -102,17 +102,8 @@ pub fn largest_factor(
 ///
 /// # Panics
 /// When `work` does.
-pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let next = Mutex::new(items.iter().enumerate());
-    let take = || next.lock().expect("no holder panics").next();
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    let part = || std::iter::from_fn(take).map(|(place, item)| (place, work(item))).collect::<Vec<_>>();
-    let mut done: Vec<(usize, R)> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(part)).collect();
-        threads.into_iter().flat_map(|thread| thread.join().expect("work does not panic")).collect()
-    });
-    done.sort_by_key(|(place, _)| *place);
-    done.into_iter().map(|(_, result)| result).collect()
+pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    items.par_iter().map(work).collect()
 }
 
 /// Means of all windows of so many values.

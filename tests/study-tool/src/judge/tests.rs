@@ -8,16 +8,7 @@ pub(crate) const TAKEN: Taken = Taken { ended: Ended::Exited(0), wall_s: 1.0, me
 
 /// The first draw of a kind that hides these effects.
 pub(crate) fn draw(kind: Kind, effects: &[&str]) -> Draw {
-    let shape = Shape {
-        each: 1,
-        nulls: 1,
-        parameters: 1,
-        pairs: 1,
-        triples: 0,
-        noise_factor: 1.0,
-        weaker_factor: 1.0,
-    };
-    let mut draw = draws(1, &shape).into_iter().find(|draw| draw.kind == kind).unwrap();
+    let mut draw = draws(1, &Shape::SMALL).into_iter().find(|draw| draw.kind == kind).unwrap();
     draw.recipe.hidden = effects
         .iter()
         .map(|name| {

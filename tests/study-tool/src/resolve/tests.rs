@@ -4,9 +4,9 @@ use super::*;
 use crate::draws::Shape;
 use crate::folder::{Plan, Study};
 use crate::judge::tests::{TAKEN, draw, said};
+use crate::program::tests::script;
 use crate::step::make_record;
 use discrepancy::next::menu::MENU;
-use std::os::unix::fs::PermissionsExt;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -131,7 +131,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let shape = Shape { each: 1, nulls: 0, parameters: 0, pairs: 0, triples: 0, ..Shape::default() };
+        let shape = Shape { each: 1, ..Shape::NO_DRAW };
         let study = Study::begin(&folder.path().join("study"), &Plan::new(5, shape)).unwrap();
         let draw =
             study.draws.iter().find(|draw| draw.recipe.hidden[0].name == "inclination").unwrap().clone();
@@ -151,9 +151,8 @@ impl Bench {
             format!(r#"{{"effect": "{effect}", "where": {{"axis": "{axis}", "element": null}}"#)
         };
         let (truth, twin) = (place("inclination"), place("friction-asymmetry"));
-        let script = format!(
-            r#"#!/bin/sh
-mkdir out
+        let text = format!(
+            r#"mkdir out
 if [ -e next.csv ]; then
     [ "$*" = "close --rig rig.toml --train train.csv next.csv --test test.csv --out out --more" ] || exit 9
     [ "$(ls | tr '\n' ' ')" = "next.csv out rig.toml test.csv train.csv " ] || exit 8
@@ -162,15 +161,11 @@ else
     echo '{{"verdict": "ambiguous", "named": [{twin}, "alternatives": [{truth}}}]}}], {proposes}}}' >out/report.json
     cat >out/next-short.toml <<'TOML'
 {SHORT}TOML
-fi
-"#
+fi"#
         )
         .replace("TRUTH", &truth)
         .replace("TWIN", &twin);
-        let path = self.folder.path().join("program");
-        fs::write(&path, script).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
-        Program::new(&path, vec!["--more".to_owned()], Duration::from_secs(60)).unwrap()
+        script(self.folder.path(), &text, &["--more"], Duration::from_secs(60))
     }
 
     fn step<'a>(&'a self, label: &'a str, again: bool) -> Step<'a> {

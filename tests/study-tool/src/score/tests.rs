@@ -7,9 +7,6 @@ use serde_json::json;
 use std::fs;
 use std::path::Path;
 
-const SHAPE: Shape =
-    Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, noise_factor: 1.0, weaker_factor: 1.0 };
-
 fn identity(name: &str) -> Identity {
     Identity { name: name.to_owned(), crc32: 7, arguments: vec![], leave_out: false }
 }
@@ -21,24 +18,23 @@ fn study(root: &Path, program: &str) -> Study {
 
 /// The same with the results of some draws.
 fn part_of_study(root: &Path, program: &str, holds: impl Fn(usize) -> bool) -> Study {
-    let study = Study::begin(root, &Plan::new(3, SHAPE)).unwrap();
+    let study = Study::begin(root, &Plan::new(3, Shape::SMALL)).unwrap();
     for draw in study.draws.iter().filter(|draw| holds(draw.number)) {
-        let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
-        let result = RunResult {
-            schema_version: 1,
-            number: draw.number,
-            program: identity(program),
-            taken,
-            without: vec![],
-        };
-        make_whole(&study.run("truth", draw.number), |folder| {
-            fs::write(folder.join("result.json"), json!(result).to_string()).unwrap();
-            fs::write(folder.join("report.json"), truth_of(draw).to_string()).unwrap();
-            Ok::<_, FolderError>(())
-        })
-        .unwrap();
+        leave(&study, draw.number, identity(program), vec![], &truth_of(draw));
     }
     study
+}
+
+/// What a program left of a draw.
+fn leave(study: &Study, number: usize, program: Identity, without: Vec<String>, report: &Value) {
+    let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
+    let result = RunResult { schema_version: 1, number, program, taken, without };
+    make_whole(&study.run("truth", number), |folder| {
+        fs::write(folder.join("result.json"), json!(result).to_string()).unwrap();
+        fs::write(folder.join("report.json"), report.to_string()).unwrap();
+        Ok::<_, FolderError>(())
+    })
+    .unwrap();
 }
 
 fn truth_of(draw: &Draw) -> Value {
@@ -96,13 +92,10 @@ pub(crate) fn scored_without(label: &str) -> Score {
 fn without(root: &Path) -> Expectations {
     let expectations: Expectations =
         serde_json::from_str(include_str!("../../../study/outside-expected.json")).unwrap();
-    let study = Study::begin(root, &Plan::new(3, SHAPE)).unwrap();
+    let study = Study::begin(root, &Plan::new(3, Shape::SMALL)).unwrap();
     for draw in study.draws.iter().filter(|draw| draw.kind == Kind::Single) {
         let hidden = &draw.recipe.hidden[0];
-        let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
         let program = Identity { leave_out: true, ..identity("humble") };
-        let (number, without) = (draw.number, vec![hidden.name.to_owned()]);
-        let result = RunResult { schema_version: 1, number, program, taken, without };
         let expected = &expectations[hidden.name];
         let axis = crate::draws::axis_of(hidden.place).unwrap_or(plant::Axis::Load).name();
         let balance = match expected.balances[0].as_str() {
@@ -112,12 +105,7 @@ fn without(root: &Path) -> Expectations {
         let variables = json!([{"variable": expected.variables[0], "r2": 0.9, "p_value": 0.005}]);
         let report = json!({"verdict": "outside-catalogue", "outside": {"balance": balance, "variables": variables},
             "gap": {"x": {"before": 3.0, "after": 2.0, "floor": 1.0, "closed": 0.625}}});
-        make_whole(&study.run("truth", number), |folder| {
-            fs::write(folder.join("result.json"), json!(result).to_string()).unwrap();
-            fs::write(folder.join("report.json"), report.to_string()).unwrap();
-            Ok::<_, FolderError>(())
-        })
-        .unwrap();
+        leave(&study, draw.number, program, vec![hidden.name.to_owned()], &report);
     }
     expectations
 }
@@ -233,7 +221,7 @@ fn folders_are_scored_together_when_each_result_is_there_once() {
     let again = part("again", 1, "p");
     let foreign = part("foreign", 2, "q");
     let other = folder.path().join("other");
-    Study::begin(&other, &Plan::new(4, SHAPE)).unwrap();
+    Study::begin(&other, &Plan::new(4, Shape::SMALL)).unwrap();
     let of = |folders: &[&PathBuf]| {
         let folders: Vec<PathBuf> = folders.iter().map(|folder| (*folder).clone()).collect();
         score(&folders, "truth", UNKNOWN)

@@ -4,16 +4,15 @@ use super::*;
 use crate::draws::{Kind, Shape};
 use crate::folder::Plan;
 use crate::program::Ended;
+use crate::program::tests::script;
 use crate::report;
-use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 use tempfile::TempDir;
 
 /// Two nulls and a pair: three draws.
-const SHAPE: Shape =
-    Shape { each: 0, nulls: 2, parameters: 0, pairs: 1, triples: 0, noise_factor: 1.0, weaker_factor: 1.0 };
+const SHAPE: Shape = Shape { nulls: 2, pairs: 1, ..Shape::NO_DRAW };
 const HEAD: &str = "# linked=false added_mass_kg=0\ntime_s,drive_valve,drive_position_m\n";
 
 struct Bench {
@@ -78,11 +77,8 @@ impl Bench {
     }
 }
 
-fn program(folder: &TempDir, script: &str) -> Program {
-    let path = folder.path().join("program");
-    fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
-    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
-    Program::new(&path, vec!["--more".to_owned()], Duration::from_secs(60)).unwrap()
+fn program(folder: &TempDir, text: &str) -> Program {
+    script(folder.path(), text, &["--more"], Duration::from_secs(60))
 }
 
 /// Sees what a program may see, and answers.

@@ -1,5 +1,7 @@
-//! A record that the plant makes, as text.
+//! A record that the plant makes, as text and on its grid.
 
+use discrepancy::gridded_record::GriddedRecord;
+use discrepancy::workflow::{Task, open};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use std::fmt::Write;
 
@@ -26,4 +28,12 @@ pub(crate) fn measurement(hidden: &RigParameters, seed: u64, strokes_rad_per_s: 
         plant.step(&Inputs { valve: [valve, 0.0], ..Inputs::default() });
     }
     text
+}
+
+/// Strokes of a rig, read beside the rig file that is thought to be its.
+pub(crate) fn gridded(hidden: &RigParameters, rig: &RigParameters) -> GriddedRecord {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("train.csv");
+    std::fs::write(&path, measurement(hidden, 11, STROKES_RAD_PER_S)).expect("the folder is ours");
+    open(&path, &Task::default().options, rig).expect("readable").gridded.expect("a good record")
 }
