@@ -67,24 +67,16 @@ const END_PATIENCE: Duration = Duration::from_secs(2);
 /// What keeps the check from being made.
 #[derive(Debug, thiserror::Error)]
 pub enum ConformanceError {
-    /// The bus cannot be had.
     #[error("{0}; the check is the rig itself: end the emulator on this bus first")]
     Bus(#[from] BusError),
-    /// The controller's command line does not start.
     #[error("the controller '{command}' does not start: {reason}")]
-    Command {
-        /// What was to be started.
-        command: String,
-        /// What the system said.
-        reason: String,
-    },
+    Command { command: String, reason: String },
     /// The system gave no signal handler, or no folder for a bus.
     #[error("{0}")]
     System(io::Error),
     /// The result cannot be written.
     #[error(transparent)]
     Write(SummaryError),
-    /// Somebody asked for the end.
     #[error("interrupted before the last check; nothing was written")]
     Interrupted,
 }
@@ -376,7 +368,6 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The controller's process.
 struct Controller(Child);
 
 impl Controller {

@@ -18,7 +18,6 @@ pub const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub const VERMILION: RGBColor = RGBColor(213, 94, 0);
 /// A second measured value.
 pub const GREEN: RGBColor = RGBColor(0, 158, 115);
-/// A third one.
 pub const PURPLE: RGBColor = RGBColor(204, 121, 167);
 const ORANGE: RGBColor = RGBColor(230, 159, 0);
 const SKY: RGBColor = RGBColor(86, 180, 233);
@@ -71,7 +70,6 @@ pub struct Band {
     pub is_main: bool,
 }
 
-/// A whole picture.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// What stands on top, large.
@@ -82,7 +80,6 @@ pub struct Picture {
     pub time_name: String,
     /// What is shown of it.
     pub range: Span,
-    /// An instant that is marked.
     pub mark_s: Option<f64>,
     /// Strip above the panels; none when empty.
     pub bands: Vec<Band>,
@@ -237,7 +234,6 @@ fn draw_line(chart: &mut Chart<'_, '_>, curve: &Curve, samples: Vec<(f64, f64)>)
     Ok(())
 }
 
-/// Height of the font of legends.
 const LEGEND_FONT: f64 = 14.0;
 
 /// Where each curve's entry of the legend stands, in pixels from the left and in rows: behind the title as far as there is room.

@@ -33,27 +33,15 @@ pub enum ExportError {
     /// The log is none.
     #[error(transparent)]
     Log(#[from] RecordedLogError),
-    /// The file cannot be written.
     #[error("cannot write {file}: {reason}")]
-    Write {
-        file: PathBuf,
-        /// Why not.
-        reason: String,
-    },
-    /// The python that python-can runs in did not do it.
+    Write { file: PathBuf, reason: String },
     #[error(
         "{python}: {reason}; asc and blf want a python with python-can 4 ('python3 -m venv VENV', \
          'VENV/bin/pip install python-can==4.6.1'): name it with --python VENV/bin/python, or in AIRBENCH_PYTHON"
     )]
-    Python {
-        python: PathBuf,
-        /// What it said.
-        reason: String,
-    },
-    /// An option that another format has.
+    Python { python: PathBuf, reason: String },
     #[error("--every-ms goes with --to csv: the others hold every frame with its own time")]
     EveryMs,
-    /// A table without end.
     #[error(
         "a row every {every_ms} ms makes more than {MOST_HELD_ROWS} rows of this log: cut it, or take a longer time"
     )]

@@ -31,34 +31,18 @@ pub struct ExportFmuArguments {
 /// What keeps an FMU from being written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportFmuError {
-    /// A file cannot be read.
     #[error("cannot read {file}: {reason}")]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
+    Read { file: PathBuf, reason: String },
     /// The rig file is none.
     #[error("{0}")]
     Rig(String),
-    /// The shared library is not there.
     #[error(
         "no {name} beside {program}: build it with 'cargo build --release -p plant-fmu', or name it with --library",
         name = library_name()
     )]
-    NoLibrary {
-        /// This program.
-        program: PathBuf,
-    },
-    /// The FMU cannot be written.
+    NoLibrary { program: PathBuf },
     #[error("cannot write {file}: {reason}")]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
+    Write { file: PathBuf, reason: String },
 }
 
 /// Writes the FMU and tells where it is.

@@ -53,15 +53,12 @@ pub enum GatewayError {
     /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// Nothing can be listened at.
     #[error("cannot listen at {address}: {reason}; choose another with --listen, port 0 for a free one")]
     Listen {
         /// Where it was to listen.
         address: SocketAddr,
-        /// What the system said.
         reason: String,
     },
-    /// The bus has no name that a client could write.
     #[error("{0} has no name of 1 to 64 printable characters: give one with --name")]
     Name(String),
     /// The system gave no signal handler, or no poll.

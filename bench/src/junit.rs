@@ -7,15 +7,11 @@ use crate::soak::model::CheckResult;
 use std::fmt::Write;
 
 pub(crate) struct Case {
-    /// What it belongs to.
     pub(crate) class: String,
-    /// What was checked.
     pub(crate) name: String,
     /// How long it took, s.
     pub(crate) time_s: f64,
-    /// How it ended.
     pub(crate) result: CheckResult,
-    /// What was seen.
     pub(crate) detail: String,
 }
 

@@ -40,27 +40,15 @@ const SILENCE: Duration = Duration::from_secs(10);
 /// What keeps a ping-pong from being played.
 #[derive(Debug, thiserror::Error)]
 pub enum PingPongError {
-    /// The system gave no sockets, no process, no handler.
     #[error("{what}: {reason}")]
-    System {
-        /// What was asked for.
-        what: &'static str,
-        /// What the system said.
-        reason: String,
-    },
+    System { what: &'static str, reason: String },
     /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The other process does not answer.
     #[error("no answer {0}; an embedded bus needs a host: 'emulator bus --bus URL'")]
     Silent(String),
-    /// A file cannot be written, or is something else.
     #[error("cannot write {file}: {reason}")]
-    Write {
-        file: String,
-        /// Why not.
-        reason: String,
-    },
+    Write { file: String, reason: String },
 }
 
 impl PingPongError {

@@ -54,7 +54,6 @@ const MOST_ROWS: u64 = 2_000_000;
 /// What keeps the probe from watching.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeError {
-    /// `--cpus` is no list of CPUs.
     #[error("--cpus {0}: not a list of CPUs such as 0-3,8")]
     Cpus(String),
     /// A thread does not get its CPU, or no idle priority: its gaps would say nothing.
@@ -64,10 +63,8 @@ pub enum ProbeError {
         /// What was refused, and what to do.
         reason: String,
     },
-    /// The table cannot be written.
     #[error("cannot write the gaps: {0}; choose another file with --out")]
     Write(io::Error),
-    /// No handler for signals.
     #[error("cannot watch for signals: {0}")]
     Signals(io::Error),
 }

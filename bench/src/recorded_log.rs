@@ -15,39 +15,29 @@ const LOG_NAME: &str = "bus.log";
 /// A summary whose cycle 0 lies farther from the log's first frame is of another run, s.
 const NEAR_ZERO_S: f64 = 60.0;
 
-/// Most interfaces of one log.
 const MOST_INTERFACES: usize = 64;
 
 /// What keeps a log from being read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedLogError {
-    /// The file cannot be opened.
     #[error("cannot read {file}: {reason}; give a run's folder, or a log of 'candump -L'")]
-    Open {
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
-    /// A line that is none.
+    Open { file: PathBuf, reason: String },
     #[error("{file}:{error}")]
     Line {
         file: PathBuf,
         /// Line, column and what is wrong.
         error: LogError,
     },
-    /// Names of interfaces without end.
     #[error("{file}:{line}: more than {MOST_INTERFACES} interfaces: is this a log of 'candump -L'?")]
     ManyInterfaces {
         file: PathBuf,
         /// Line of the first that is too many.
         line: u64,
     },
-    /// No frame in it.
     #[error("{0} holds no frame")]
     Empty(PathBuf),
 }
 
-/// A log that was read.
 #[derive(Clone, Debug)]
 pub struct RecordedLog {
     pub file: PathBuf,

@@ -37,16 +37,12 @@ pub enum ReplayError {
     /// The log is none.
     #[error(transparent)]
     Log(#[from] RecordedLogError),
-    /// The log has several interfaces.
     #[error("{file} holds frames of {names}: choose one with --interface NAME")]
     Interfaces { file: PathBuf, names: String },
-    /// The log lasts too long.
     #[error("{file}:{line}: this frame is more than {} days after the first one: cut the log", LONGEST.as_secs() / 86400)]
     TooLong { file: PathBuf, line: u64 },
-    /// Everything was left out.
     #[error("nothing of {0} is left to be sent")]
     Nothing(PathBuf),
-    /// A rig is live, and the log would disturb it.
     #[error(
         "a rig is live on {bus} ({heard} of its frames in {listened_ms} ms), and the log holds {commands} commands and \
          {of_the_rig} frames of a rig, all of the past: leave them out with --leave-out commands,rig, or take another bus"
@@ -65,19 +61,12 @@ pub enum ReplayError {
     /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The bus is not there.
     #[error("{0} is not there; an embedded bus needs a host: 'emulator bus --bus URL'")]
     NoBus(String),
-    /// The system gave no signal handler.
     #[error("signals cannot be watched: {0}")]
     Signals(io::Error),
-    /// A file cannot be written.
     #[error("cannot write {file}: {reason}")]
-    Write {
-        file: PathBuf,
-        /// Why not.
-        reason: String,
-    },
+    Write { file: PathBuf, reason: String },
 }
 
 impl ReplayError {

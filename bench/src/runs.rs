@@ -22,7 +22,6 @@ pub enum RunsError {
     /// A folder cannot be read, or a page not written.
     #[error(transparent)]
     Summary(#[from] SummaryError),
-    /// They are of different experiments.
     #[error(
         "{one} is of '{title_one}' and {other} of '{title_other}', which ask the rig for different things; --anyway lays them side by side all the same"
     )]
@@ -48,14 +47,12 @@ pub struct Run {
 }
 
 impl Run {
-    /// The title of its experiment.
     #[must_use]
     pub fn title(&self) -> String {
         let title = self.record.experiment.get("title").and_then(toml::Value::as_str);
         title.unwrap_or("no experiment").to_owned()
     }
 
-    /// The figure of this name.
     #[must_use]
     pub fn figure(&self, name: &str) -> Option<f64> {
         self.figures.iter().find(|(own, _)| *own == name).map(|(_, value)| *value)

@@ -57,40 +57,18 @@ const GIVE_UP_AFTER: usize = 3;
 /// What keeps a soak from going on.
 #[derive(Debug, thiserror::Error)]
 pub enum SoakError {
-    /// A file that cannot be read, or says what is not allowed.
     #[error("cannot read {file}: {reason}")]
-    Input {
-        file: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A file that cannot be written.
+    Input { file: PathBuf, reason: String },
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
-    Output {
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
-    /// A program that does not start.
+    Output { file: PathBuf, reason: String },
     #[error("cannot start {program}: {reason}; build it, or say where it is with --bin-dir")]
-    Program {
-        program: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
-    /// The folder is another soak's at this moment.
+    Program { program: PathBuf, reason: String },
     #[error("{0}: another soak is at work in this folder; choose another --out")]
     Busy(PathBuf),
-    /// The folder holds a soak that was begun otherwise.
     #[error(
         "{out} holds a soak with other settings: {differences}; choose another --out, or go on with --anyway"
     )]
-    OtherSettings {
-        out: PathBuf,
-        /// What differs.
-        differences: String,
-    },
-    /// No handler for Ctrl-C.
+    OtherSettings { out: PathBuf, differences: String },
     #[error("cannot watch for Ctrl-C: {0}")]
     Signals(io::Error),
 }
@@ -188,7 +166,6 @@ fn load(arguments: &SoakArguments) -> (Option<Vec<String>>, Option<String>) {
     }
 }
 
-/// A soak at work.
 struct Soaking {
     plan: Plan,
     common: Common,

@@ -43,7 +43,6 @@ fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
     rows().filter_map(spread).collect()
 }
 
-/// The spreads as a table.
 #[must_use]
 pub fn table(runs: &[Run]) -> Grid {
     let head = ["figure", "n", "mean", "standard deviation", "least", "most"].map(str::to_owned).to_vec();

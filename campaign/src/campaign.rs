@@ -47,18 +47,14 @@ pub enum CampaignError {
     /// A file that it names.
     #[error(transparent)]
     Shelf(#[from] ShelfError),
-    /// It is too large.
     #[error("{0}: {1}")]
     TooMany(String, TooMany),
-    /// A run's values go into no file.
     #[error("{0}: {1}")]
     Condition(String, ConditionError),
     #[error("{0}: {1}")]
     Program(String, io::Error),
-    /// A run of a program that is no result: program, run, reason.
     #[error("{0}: run {1}: {2}")]
     Command(String, u64, CommandError),
-    /// A run of processes.
     #[error(transparent)]
     Processes(ProcessesError),
 }
@@ -194,7 +190,6 @@ impl Campaign {
         }
     }
 
-    /// The row of a run.
     #[must_use]
     pub fn row(&self, point: &Point, outcome: &Outcome) -> String {
         let passed = outcome.passed.map_or("", |passed| if passed { "1" } else { "0" });
@@ -226,7 +221,6 @@ fn push_cell(row: &mut String, text: &str) {
     }
 }
 
-/// The figures that are collected.
 fn collected(file: &CampaignFile) -> Vec<String> {
     if file.figures.is_empty() { figures::all() } else { file.figures.clone() }
 }

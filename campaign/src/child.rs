@@ -21,10 +21,8 @@ pub struct Own {
 /// Why a process did not come to its own end.
 #[derive(Debug, thiserror::Error)]
 pub enum Cut {
-    /// The campaign was told to stop.
     #[error("stopped")]
     Stopped,
-    /// It took too long.
     #[error("took longer than {0} s, and was ended")]
     TooLong(f64),
     /// The system says so.
@@ -87,7 +85,6 @@ impl Drop for Own {
 /// How long a run may take.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit<'a> {
-    /// When it began.
     pub began: Instant,
     /// Longest time, s of the wall clock.
     pub longest_s: f64,

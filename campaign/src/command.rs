@@ -45,7 +45,6 @@ pub enum CommandError {
     /// The program cannot be started, or not be waited for.
     #[error(transparent)]
     System(#[from] io::Error),
-    /// It says that it tried nothing.
     #[error("nothing was tried (exit code {NOT_TRIED}): {0}; what is done is kept")]
     NotTried(String),
 }

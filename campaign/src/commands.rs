@@ -32,14 +32,8 @@ pub enum CommandError {
     Merge(#[from] MergeError),
     #[error("{0}: {1}")]
     File(String, io::Error),
-    /// A run that there is not.
     #[error("run {run}: the campaign has runs 0 to {last}")]
-    NoSuchRun {
-        /// Asked for.
-        run: u64,
-        /// The last one.
-        last: u64,
-    },
+    NoSuchRun { run: u64, last: u64 },
 }
 
 /// Does what the command line asks.

@@ -18,7 +18,6 @@ use std::fmt::Write as _;
 pub struct Condition<'s> {
     /// The rig that controllers know.
     pub nominal: &'s RigFile,
-    /// The rig that is simulated.
     pub rig: RigParameters,
     pub rig_toml: String,
     /// The experiment, with its path.
@@ -41,7 +40,6 @@ pub struct Condition<'s> {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("run {run}: {message}")]
 pub struct ConditionError {
-    /// Which run.
     pub run: u64,
     /// What the file's reader says.
     pub message: String,

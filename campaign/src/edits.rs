@@ -19,13 +19,10 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 /// Why a path leads nowhere.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EditError {
-    /// The text is no TOML.
     #[error("is no TOML: {0}")]
     Form(String),
-    /// A part of the path is not what the next part would need.
     #[error("{path}: {part} is {what}")]
     Path {
-        /// The whole path.
         path: String,
         /// The part that leads nowhere.
         part: String,

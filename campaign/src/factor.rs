@@ -26,12 +26,10 @@ use std::fmt;
 pub struct Factor {
     /// Name of its column.
     pub name: String,
-    /// What it changes.
     pub changes: Changes,
     pub values: Values,
 }
 
-/// What a factor changes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Changes {
     /// A number of the rig file, by its path.
@@ -53,7 +51,6 @@ pub enum Changes {
 /// A number of a fault, and when it acts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultNumber {
-    /// Which fault.
     pub fault: String,
     /// Where; none for a fault that has one place.
     pub at: Option<String>,
@@ -78,7 +75,6 @@ pub enum FileChoice {
     LoadProgram,
 }
 
-/// The values of a factor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
     /// Gone through.
@@ -111,7 +107,6 @@ impl Range {
     }
 }
 
-/// A value of a factor.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(untagged)]
 pub enum Value {

@@ -11,7 +11,6 @@ pub fn is_known(name: &str) -> bool {
     TOP.contains(&name) || of_runs::definition(name).is_some()
 }
 
-/// All of them.
 #[must_use]
 pub fn all() -> Vec<String> {
     let definitions = of_runs::definitions().map(|definition| definition.name);

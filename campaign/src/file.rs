@@ -37,7 +37,6 @@ pub struct CampaignFile {
     pub text: String,
     /// What it is about.
     pub title: String,
-    /// What a run is.
     pub kind: Kind,
     /// Programs that a command starts.
     pub programs: Vec<String>,
@@ -57,7 +56,6 @@ pub struct CampaignFile {
     pub confusion: Vec<[String; 2]>,
 }
 
-/// What a run is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
     /// An experiment on the simulated rig.
@@ -95,9 +93,7 @@ pub enum Pace {
 #[error("{file}:{line}: {message}")]
 pub struct FileError {
     pub file: String,
-    /// Line, from 1.
     pub line: usize,
-    /// What is wrong.
     pub message: String,
 }
 

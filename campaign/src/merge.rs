@@ -15,28 +15,22 @@ use std::path::{Path, PathBuf};
 /// Why parts are not merged.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
-    /// Not all parts are there.
     #[error(
         "{missing} of {all} parts are missing, the first is part {first} (runs {from} to {to}); the same 'run' does only what is missing"
     )]
     Missing {
-        /// How many.
         missing: u64,
-        /// Of how many.
         all: u64,
-        /// The first of them.
         first: u64,
         /// Its first run.
         from: u64,
         /// Its last run.
         to: u64,
     },
-    /// A part is there twice.
     #[error(
         "part {part} is in {one} and in {other}: one run would count twice; name one folder once, or delete one of them"
     )]
     Doubled {
-        /// Which.
         part: u64,
         /// In this folder.
         one: String,
@@ -46,10 +40,8 @@ pub enum MergeError {
     /// A part is none of ours, or not whole.
     #[error(transparent)]
     Part(#[from] PartError),
-    /// The table cannot be written.
     #[error("{path}: {error}")]
     Write {
-        /// Which file.
         path: String,
         /// What the system says.
         error: io::Error,
@@ -59,7 +51,6 @@ pub enum MergeError {
 /// The table of all runs, column by column, as far as the page needs it.
 #[derive(Debug, Default)]
 pub struct Results {
-    /// How many runs.
     pub runs: u64,
     /// Of the rig's time, s.
     pub simulated_s: f64,
@@ -74,11 +65,9 @@ pub struct Results {
 /// A run that did not come to its end.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Unfinished {
-    /// Which run.
     pub run: u64,
     /// How it ended instead.
     pub ended: String,
-    /// Why.
     pub because: String,
 }
 
@@ -131,7 +120,6 @@ pub fn merge(campaign: &Campaign, folders: &[PathBuf], to: &Path) -> Result<Resu
     Ok(results)
 }
 
-/// The folder of each part.
 fn places<'f>(parts: &Parts, folders: &'f [PathBuf]) -> Result<Vec<&'f Path>, MergeError> {
     let mut places = Vec::new();
     let mut absent = Vec::new();

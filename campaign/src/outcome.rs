@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 /// What a run came to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// How it ended.
     pub ended: Ended,
     /// Why, in words; empty for a run that is done.
     pub because: String,
@@ -18,7 +17,6 @@ pub struct Outcome {
     pub figures: BTreeMap<String, Value>,
 }
 
-/// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// It came to its end.
@@ -45,7 +43,6 @@ impl Ended {
 }
 
 impl Outcome {
-    /// A run that failed.
     #[must_use]
     pub fn failed(because: String) -> Self {
         Outcome { ended: Ended::Failed, because, simulated_s: 0.0, passed: None, figures: BTreeMap::new() }

@@ -29,7 +29,6 @@ pub struct Parts {
     pub campaign: String,
     /// Which program: the hash of its executables.
     pub program: String,
-    /// Names of the columns.
     pub columns: Vec<String>,
     /// How many runs there are.
     pub runs: u64,
@@ -40,12 +39,10 @@ pub struct Parts {
 /// What is wrong with a part that is there.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PartError {
-    /// It is of another campaign.
     #[error(
         "{path}: is of another campaign, or the file or one that it names has changed since; give another --out"
     )]
     OtherCampaign { path: String },
-    /// Another version made it.
     #[error(
         "{path}: was made by another version of the programs ({theirs}, this is {ours}); use that version, or another --out"
     )]
@@ -56,13 +53,8 @@ pub enum PartError {
         /// Who reads it.
         ours: String,
     },
-    /// It cannot be read, or is not whole.
     #[error("{path}: {what}; delete it, and run the campaign again: it does only what is missing")]
-    Unreadable {
-        path: String,
-        /// What is wrong.
-        what: String,
-    },
+    Unreadable { path: String, what: String },
 }
 
 /// A part that cannot be written.
@@ -91,7 +83,6 @@ impl Parts {
         self.runs.div_ceil(self.runs_per_part)
     }
 
-    /// The runs of a part.
     #[must_use]
     pub fn runs_of(&self, part: u64) -> Range<u64> {
         part * self.runs_per_part..((part + 1) * self.runs_per_part).min(self.runs)

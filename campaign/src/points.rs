@@ -24,12 +24,10 @@ pub struct Points {
     combinations: u64,
 }
 
-/// One run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// Its number, from 0.
     pub run: u64,
-    /// Which draw.
     pub draw: u64,
     /// Seed of the sensors' noise.
     pub seed: u64,
@@ -44,7 +42,6 @@ pub struct Point {
 #[error("the lists and draws make more than {MOST_RUNS} runs; shorten a list, or draw from a range instead")]
 pub struct TooMany;
 
-/// Most runs of a campaign.
 pub const MOST_RUNS: u64 = 1_000_000_000;
 
 impl Points {

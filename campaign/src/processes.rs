@@ -29,16 +29,13 @@ pub struct Programs {
 /// How a run of processes went wrong for a reason that is not the run's.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcessesError {
-    /// The campaign was told to stop.
     #[error("stopped")]
     Stopped,
     /// Values and files do not go together.
     #[error(transparent)]
     Condition(#[from] ConditionError),
-    /// A file or a program.
     #[error("run {run}: {what}: {error}")]
     System {
-        /// Which run.
         run: u64,
         /// Which file or program.
         what: String,

@@ -6,40 +6,30 @@ use std::str::FromStr;
 /// One of several starts that share a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    /// Which, from 0.
     pub index: u32,
-    /// Of how many.
     pub count: u32,
 }
 
-/// A shard that cannot be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ShardError {
-    /// The text is none.
     #[error(
         "shard '{0}': write INDEX/COUNT with INDEX from 0 and below COUNT, as 0/4, or COUNT alone where a batch system gives the index"
     )]
     Form(String),
-    /// Only the number of shards was given, and no batch system tells which.
     #[error(
         "--shard {count}: which one? write INDEX/{count}, or start it as an array of Slurm or an indexed job of Kubernetes ({names})"
     )]
     NoIndex {
-        /// Of how many.
         count: u32,
         /// Where the index is looked for.
         names: String,
     },
-    /// The batch system tells an index that is none.
     #[error(
         "{name}={value}: allowed is 0 to {most} with --shard {count}; an array of Slurm begins at 0 with --array=0-{most}"
     )]
     Index {
-        /// Name of the variable.
         name: &'static str,
-        /// What it holds.
         value: String,
-        /// Of how many.
         count: u32,
         /// Largest index.
         most: u32,

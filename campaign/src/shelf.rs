@@ -20,7 +20,6 @@ pub struct Shelf {
     experiments: BTreeMap<String, Text>,
     /// Rigs likewise.
     rigs: BTreeMap<String, RigFile>,
-    /// Programs by their paths.
     programs: BTreeMap<PathBuf, Source>,
     /// Hashes of what experiments and programs name in their turn, tables of set-points and libraries, by their names there.
     further: BTreeSet<(String, String)>,
@@ -67,11 +66,9 @@ impl Folders {
 #[derive(Clone, Debug)]
 pub struct Text {
     pub path: PathBuf,
-    /// What it holds.
     pub text: String,
 }
 
-/// A rig file and what it says.
 #[derive(Debug)]
 pub struct RigFile {
     pub file: Text,

@@ -51,7 +51,6 @@ impl Worst {
     }
 }
 
-/// What a figure is.
 #[derive(Clone, Copy, Debug)]
 pub struct Definition {
     /// Its key, unit included; without a unit it is a number or a ratio.
@@ -60,7 +59,6 @@ pub struct Definition {
     pub unit: &'static str,
     /// Which repetition's value is the run's.
     pub(crate) worst: Worst,
-    /// What it is, in words.
     pub meaning: &'static str,
 }
 
@@ -93,7 +91,6 @@ pub const FAMILIES: &[Family] = &[
     emergency_stop::FAMILY,
 ];
 
-/// Figures by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Figures {
     values: BTreeMap<&'static str, f64>,
@@ -110,7 +107,6 @@ impl Figures {
         }
     }
 
-    /// The figure of this name.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied()
@@ -149,12 +145,10 @@ pub fn of(record: &Record) -> Figures {
     figures
 }
 
-/// All definitions, family by family.
 pub fn definitions() -> impl Iterator<Item = &'static Definition> {
     FAMILIES.iter().flat_map(|family| family.definitions)
 }
 
-/// The definition of the figure of this name.
 #[must_use]
 pub fn definition(name: &str) -> Option<&'static Definition> {
     definitions().find(|definition| definition.name == name)

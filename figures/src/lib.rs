@@ -30,26 +30,14 @@ use std::path::{Path, PathBuf};
 /// What keeps a run's folder from being summed up.
 #[derive(Debug, thiserror::Error)]
 pub enum SummaryError {
-    /// A file is missing or cannot be read.
     #[error("cannot read {file}: {reason}")]
-    Read {
-        file: PathBuf,
-        /// What the system or the parser said.
-        reason: String,
-    },
-    /// A file cannot be written.
+    Read { file: PathBuf, reason: String },
     #[error("cannot write {file}: {reason}")]
-    Write {
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
-    /// The emulator left no summary: it was killed, or is still running.
+    Write { file: PathBuf, reason: String },
     #[error(
         "{0} has no summary.json: the emulator was killed or is still running; the rows that it recorded are readable"
     )]
     NoSummary(PathBuf),
-    /// `[passed]` names something that is no figure, or a bound that is no number.
     #[error("[passed] {key} = {value}: {problem}")]
     Threshold {
         /// Key in the experiment file.

@@ -24,7 +24,6 @@ pub struct Median {
     pub value: f64,
     /// Its interval, least and most.
     pub interval: Option<(f64, f64)>,
-    /// The interval's confidence, from 0 to 1.
     pub confidence: Option<f64>,
 }
 

@@ -52,7 +52,6 @@ pub const TRUE: &[&str] = &[
 /// Laws of the load's set-point that follow from the motion.
 const STATE_DEPENDENT: &[&str] = &["spring", "damper", "mass", "dry-friction"];
 
-/// A run as recorded.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     /// The drive controller's table.
@@ -192,9 +191,7 @@ pub fn common(these: &[Span], those: &[Span]) -> Vec<Span> {
 pub struct Step {
     /// First instant of the new value.
     pub at_s: f64,
-    /// Value before.
     pub before_value: f64,
-    /// Value after.
     pub after_value: f64,
     /// Until when the new value stays.
     pub until_s: f64,

@@ -9,7 +9,6 @@ use crate::join::read_object;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// The reports of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reports {
     /// No controller left one.

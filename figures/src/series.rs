@@ -37,7 +37,6 @@ impl Span {
         time_s >= self.from_s - SAME_S && time_s < self.to_s - SAME_S
     }
 
-    /// What both have in common.
     #[must_use]
     pub fn common(&self, other: &Self) -> Option<Self> {
         let both = Self { from_s: self.from_s.max(other.from_s), to_s: self.to_s.min(other.to_s) };
@@ -73,7 +72,6 @@ impl Series {
         self.time_s.iter().copied().zip(self.values.iter().copied())
     }
 
-    /// The values alone.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
@@ -203,7 +201,6 @@ impl Series {
         slopes.filter_map(|(time, window)| Some((*time, slope(window)?))).collect()
     }
 
-    /// Mean of the values.
     #[must_use]
     pub fn mean(&self) -> Option<f64> {
         (!self.is_empty()).then(|| self.values.iter().sum::<f64>() / self.len() as f64)
@@ -215,7 +212,6 @@ impl Series {
         self.map(|value| value * value).mean().map(f64::sqrt)
     }
 
-    /// Least value.
     #[must_use]
     pub fn least(&self) -> Option<f64> {
         self.values.iter().copied().reduce(f64::min)

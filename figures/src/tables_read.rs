@@ -62,12 +62,10 @@ impl Table {
         Self { numbers: numbers.collect(), states: states.collect() }
     }
 
-    /// Puts a column of numbers in.
     pub fn set_numbers(&mut self, name: &'static str, column: Series) {
         self.numbers.insert(name, column);
     }
 
-    /// Puts a column of states in.
     pub fn set_states(&mut self, name: &'static str, column: Vec<StateSpan>) {
         self.states.insert(name, column);
     }

@@ -27,21 +27,16 @@ const NAMED: usize = 12;
 /// What is wrong with a threshold file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BoundsError {
-    /// No TOML.
     #[error("{0}")]
     Toml(String),
-    /// No such table, or something else beside it.
     #[error("it holds a table [bounds] and nothing else")]
     NoTable,
-    /// A bound that is none.
     #[error("[bounds] {figure}: write it as {{ max = 50000 }}, {{ min = 1 }} or with both")]
     Shape { figure: String },
-    /// No such figure.
     #[error("[bounds] {figure}: no such figure; there are {known}")]
     Unknown {
         /// What the file says.
         figure: String,
-        /// What there is.
         known: String,
     },
 }

@@ -22,7 +22,6 @@ const SAME_LENGTH: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Interval of the reference: the cycle's.
 const INTERVAL_US: &str = "1000";
 
-/// Judges the runs.
 #[must_use]
 pub fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
     let reasons = reasons(runs, conditions);

@@ -26,7 +26,6 @@ pub const PROCESSES: [&str; 4] = ["emulator", "controller", "controller-drive", 
 /// Longest interval of a log whose maximum is one of a second; older logs hold the run in one interval.
 const LONGEST_SECOND_S: f64 = 1.5;
 
-/// One run as it was read.
 #[derive(Clone, Debug, Default)]
 pub struct RunFiles {
     pub folder: PathBuf,
@@ -68,7 +67,6 @@ pub fn is_run(folder: &Path) -> bool {
 }
 
 impl RunFiles {
-    /// Reads what is in `folder`.
     #[must_use]
     pub fn read(folder: &Path) -> Self {
         let mut run = Self { folder: folder.into(), ..Self::default() };
@@ -146,7 +144,6 @@ impl RunFiles {
         }
     }
 
-    /// An interval of a log.
     pub fn take_interval(&mut self, passing: Passing<'_>) {
         let Passing { tag, start_s, duration_s, histogram } = passing;
         // Logs from before the load axis had a round trip of its own name the drive's without its axis.

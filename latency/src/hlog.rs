@@ -26,7 +26,6 @@ pub struct Interval {
     pub tag: String,
     /// Start, s from the log's base time.
     pub start_s: f64,
-    /// Length, s.
     pub duration_s: f64,
     pub samples: Samples,
 }
@@ -35,9 +34,7 @@ pub struct Interval {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
 pub struct LogError {
-    /// Line, from 1.
     pub line: usize,
-    /// What is wrong.
     pub reason: String,
 }
 
@@ -48,7 +45,6 @@ pub struct Passing<'a> {
     pub tag: &'a str,
     /// Start, s from the log's base time.
     pub start_s: f64,
-    /// Length, s.
     pub duration_s: f64,
     pub histogram: &'a Histogram<u64>,
 }

@@ -12,7 +12,6 @@ use super::samples::Samples;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// Version of the format.
 const VERSION: u32 = 2;
 
 /// The file's contents: wake-up latencies of all processes over all runs.

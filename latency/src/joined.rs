@@ -42,7 +42,6 @@ pub struct OneWay {
     pub below_zero: u64,
 }
 
-/// Picks the exchange of an axis.
 type OfAxis = fn(&CycleTiming) -> Exchange;
 
 /// One-way latencies of a run with rows of both sides.

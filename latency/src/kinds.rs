@@ -40,13 +40,11 @@ const PROCESSES: [(&str, Source, &str); 4] = [
     ("controller", Source::Controller, "controller"),
 ];
 
-/// One kind of distribution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kind {
     pub tag: String,
     /// Where it comes from.
     pub source: Source,
-    /// What it is, for a person.
     pub about: String,
 }
 

@@ -77,34 +77,21 @@ const WORST: usize = 10;
 /// What keeps a report from being made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// A folder without a run.
     #[error(
         "{0} holds no run, nor do the folders in it: name a folder with summary.json, run.json, emulator.hlog or \
          emulator-timing.csv"
     )]
     NoRun(PathBuf),
-    /// A comparison of one run.
     #[error(
         "--compare: one run cannot be compared; name another folder, or put folders into groups with --group NAME=FOLDER"
     )]
     OneRun,
-    /// A group that says no folder.
     #[error("--group {0}: write it as NAME=FOLDER")]
     Group(String),
-    /// A file cannot be read.
     #[error("cannot read {file}: {reason}")]
-    Read {
-        file: PathBuf,
-        /// What the system or the parser said.
-        reason: String,
-    },
-    /// A file cannot be written.
+    Read { file: PathBuf, reason: String },
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
-    Write {
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
+    Write { file: PathBuf, reason: String },
 }
 
 impl ReportError {
@@ -120,7 +107,6 @@ impl ReportError {
 /// A report with what its files are made of.
 #[derive(Debug)]
 pub struct Made {
-    /// What it says.
     pub report: Report,
     /// The runs as they were read.
     pub runs: Vec<RunFiles>,

@@ -8,7 +8,6 @@ use super::tallies;
 use pagekit::grid::Grid;
 use std::fmt::Write as _;
 
-/// The whole summary.
 #[must_use]
 pub fn summary(report: &Report) -> String {
     let mut out = String::new();

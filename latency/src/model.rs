@@ -7,19 +7,14 @@ use super::resolution::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Name of the schema.
 pub const SCHEMA: &str = "airbench-latency-report";
 /// Goes up when a key changes its meaning or goes.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// The whole report.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Report {
-    /// [`SCHEMA`].
     pub schema: String,
-    /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Heading.
     pub title: String,
     /// When the report was made, s since 1970.
     pub made_unix_s: f64,
@@ -35,7 +30,6 @@ pub struct Report {
     pub worst: Vec<Event>,
     /// What disturbed the runs, the most telling first; empty when nothing was found.
     pub findings: Vec<Finding>,
-    /// The runs one by one.
     pub runs: Vec<RunPart>,
     /// Groups of runs side by side, when several were compared.
     pub comparison: Option<Comparison>,
@@ -48,11 +42,9 @@ pub struct Report {
 pub struct Claim {
     /// Whether they do.
     pub supported: bool,
-    /// One plain sentence.
     pub sentence: String,
     /// Why not, or what weakens it, a sentence each.
     pub reasons: Vec<String>,
-    /// What was not controlled, a sentence each.
     pub not_controlled: Vec<String>,
 }
 
@@ -78,7 +70,6 @@ pub struct Conditions {
 /// A name and what stands behind it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fact {
-    /// What it is.
     pub name: String,
     pub value: String,
 }
@@ -89,7 +80,6 @@ pub struct Fact {
 pub enum Source {
     /// The rig's process.
     Emulator,
-    /// A controller's process.
     Controller,
     /// Both, joined on one clock.
     Joined,
@@ -104,7 +94,6 @@ pub struct Distribution {
     pub name: String,
     /// Where it comes from.
     pub source: Source,
-    /// What it is, for a person.
     pub about: String,
     pub percentiles_ns: PercentilesNs,
     /// Bins on a logarithmic axis, those that are not empty, rising.
@@ -126,7 +115,6 @@ pub struct PercentilesNs {
     pub p999: Option<u64>,
     /// 99.99 %.
     pub p9999: Option<u64>,
-    /// Largest.
     pub max: Option<u64>,
     /// Samples.
     pub count: u64,
@@ -145,9 +133,7 @@ pub struct Bin {
 /// The largest value of a second.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Maximum {
-    /// Which run, from 0.
     pub run: usize,
-    /// Second of that run.
     pub second: u64,
     /// Largest value, ns.
     pub max_ns: u64,
@@ -197,7 +183,6 @@ pub enum Cause {
 /// One late cycle, or several in a row.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Event {
-    /// Which run, from 0.
     pub run: usize,
     /// Which process: `emulator`, `controller`, `controller-drive`, `controller-load`.
     pub process: String,
@@ -205,21 +190,17 @@ pub struct Event {
     pub cycle: u64,
     /// The rig's time, s.
     pub at_s: f64,
-    /// How late it woke, ns.
     pub late_ns: u64,
     /// How much later than usual it was done after waking, ns.
     pub slow_ns: u64,
     /// Cycles missed.
     pub skipped: u64,
-    /// Why.
     pub cause: Cause,
-    /// One sentence for a person.
     pub sentence: String,
     /// What speaks for it, and what against, a sentence each.
     pub evidence: Vec<String>,
     /// Rows of both processes around it, by process.
     pub around: BTreeMap<String, Vec<AroundRow>>,
-    /// Gaps of the probe around it.
     pub probe: Vec<ProbeGap>,
     /// How long it was ready and waited for a CPU, over all its cycles, ns.
     #[serde(default)]
@@ -253,20 +234,16 @@ pub struct AroundRow {
     pub run_delay_us: f64,
     /// Page faults, minor and major.
     pub faults: u64,
-    /// Involuntary context switches.
     pub involuntary_switches: u64,
-    /// CPU.
     pub cpu: u64,
 }
 
 /// A gap that a spinning thread saw.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProbeGap {
-    /// CPU.
     pub cpu: u64,
     /// Its beginning, us from the event's due time.
     pub from_us: f64,
-    /// Its length, us.
     pub length_us: f64,
     /// Whether another thread had that CPU; if not, the CPU itself stood still.
     pub another_ran: bool,
@@ -275,7 +252,6 @@ pub struct ProbeGap {
 /// Something that disturbed the runs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Finding {
-    /// What.
     pub cause: Cause,
     /// How often, in events or frames.
     pub count: u64,
@@ -285,19 +261,15 @@ pub struct Finding {
     /// Whether machines do this by themselves, as far as was seen; then it is not named as what was done to the runs.
     #[serde(default)]
     pub by_itself: bool,
-    /// One sentence for a person.
     pub sentence: String,
 }
 
-/// One run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RunPart {
     pub folder: String,
     /// Group, for comparisons.
     pub group: String,
-    /// Start, s since 1970.
     pub started_unix_s: f64,
-    /// Length, s.
     pub duration_s: f64,
     /// Figures that are counts: cycles, skipped, frames lost and the like, by their keys in summary.json.
     pub counts: BTreeMap<String, u64>,
@@ -319,7 +291,6 @@ pub struct ArrivalRow {
     pub receiver: String,
     /// The frame, such as `DriveSensors`.
     pub frame: String,
-    /// Its period, ms.
     pub period_ms: u64,
     /// Frames that came.
     pub count: u64,
@@ -328,7 +299,6 @@ pub struct ArrivalRow {
     /// Intervals shorter than half a period; none of a frame that is sent on change too.
     #[serde(default)]
     pub bursts: Option<u64>,
-    /// Percentiles of the intervals.
     pub interval_ns: PercentilesNs,
 }
 
@@ -337,7 +307,6 @@ pub struct ArrivalRow {
 pub struct Comparison {
     /// Names of the groups, the first being what the others are held against.
     pub groups: Vec<String>,
-    /// A row for each figure.
     pub rows: Vec<ComparisonRow>,
 }
 
@@ -346,7 +315,6 @@ pub struct Comparison {
 pub struct ComparisonRow {
     /// Such as `emulator-wakeup p99`.
     pub figure: String,
-    /// A cell for each group.
     pub cells: Vec<ComparisonCell>,
 }
 

@@ -4,7 +4,6 @@
 //! host of a virtual machine took it away, or its firmware did. A row without length says that the probe watches that CPU
 //! from there on; older tables have none, and do not tell of a CPU without gaps whether it was watched.
 
-/// Columns of the table.
 const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,9 +29,7 @@ impl Gap {
 /// Whether a probe watched a CPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Watched {
-    /// It did.
     Yes,
-    /// It did not.
     No,
     /// Its table does not say.
     NotTold,
@@ -53,9 +50,7 @@ pub fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
 pub struct ProbeError {
-    /// Line, from 1.
     line: usize,
-    /// What is wrong.
     reason: String,
 }
 

@@ -18,7 +18,6 @@ pub const TAG: &str = "cyclictest";
 /// A run of cyclictest.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// How it was started.
     pub command_line: String,
     /// Whether its samples are whole us.
     pub whole_us: bool,
@@ -73,10 +72,8 @@ pub enum ReferenceError {
     /// No such JSON.
     #[error("{0}")]
     Json(#[from] serde_json::Error),
-    /// A bin that is no number.
     #[error("histogram: bin \"{0}\" is no whole number")]
     Bin(String),
-    /// Started without `-h`.
     #[error("it holds no histogram: start cyclictest with -h")]
     NoHistogram,
 }

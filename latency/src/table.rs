@@ -32,7 +32,6 @@ pub struct LatencyTableArguments {
     pub made_by: Option<String>,
 }
 
-/// The rig's wake-up.
 const WAKE_UP: &str = "emulator-wakeup";
 /// What is claimed of plain runs and of those that spin: the files that `scripts/latency --claims` judges by.
 const CLAIMS: [&str; 2] = [include_str!("../bounds.toml"), include_str!("../bounds-spin.toml")];

@@ -10,7 +10,6 @@ use pagekit::page;
 pub struct Asset {
     /// Its type, as HTTP tells it.
     pub content_type: &'static str,
-    /// What it holds.
     pub body: &'static [u8],
 }
 

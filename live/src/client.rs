@@ -57,7 +57,6 @@ pub(super) struct Client {
 }
 
 impl Client {
-    /// One that has come.
     pub(super) fn new(stream: TcpStream, number: u64, now_ms: u64) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
         stream.set_nodelay(true)?;

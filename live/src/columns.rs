@@ -47,7 +47,6 @@ pub struct Column {
     pub source: Source,
 }
 
-/// All columns.
 pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let mut columns: Vec<_> = (0..AXES.len()).flat_map(of_axis).collect();
     let truth = |name: &str| Source::Truth(vec![name.to_owned()], 1.0);

@@ -50,25 +50,15 @@ pub enum Progress {
 /// What a request led to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// 200.
     Good,
-    /// 400.
     BadRequest,
-    /// 401.
     Unauthorized,
-    /// 403.
     Forbidden,
-    /// 404.
     NotFound,
-    /// 405.
     MethodNotAllowed,
-    /// 413.
     TooLarge,
-    /// 431.
     HeadTooLarge,
-    /// 503.
     Busy,
-    /// 504.
     NoAnswer,
 }
 
@@ -149,7 +139,6 @@ pub fn is_ours(host: &str, port: u16) -> bool {
     told.parse() == Ok(port) && (name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok())
 }
 
-/// A whole response.
 #[must_use]
 pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     let head = format!(
@@ -161,7 +150,6 @@ pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     [head.as_bytes(), body].concat()
 }
 
-/// A response as JSON.
 #[must_use]
 pub fn json_response(status: Status, value: &Value) -> Vec<u8> {
     response(status, "application/json", value.to_string().as_bytes())

@@ -57,12 +57,10 @@ pub enum LiveError {
     /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// Nothing can be listened at.
     #[error("cannot listen at {address}: {reason}; choose another with --http, port 0 for a free one")]
     Listen {
         /// Where it was to listen.
         address: SocketAddr,
-        /// What the system said.
         reason: String,
     },
     /// The system gave no signal handler, no poll, or no random numbers.

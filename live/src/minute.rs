@@ -21,7 +21,6 @@ struct Measured {
     values: [f64; MEASURED_COUNT],
 }
 
-/// The last minute.
 #[derive(Debug, Default)]
 pub struct Minute {
     cycles: VecDeque<Measured>,

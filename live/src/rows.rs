@@ -27,7 +27,6 @@ struct Row {
     values: Vec<Option<f32>>,
 }
 
-/// Rows of a run.
 #[derive(Debug, Default)]
 pub struct Rows {
     /// Those that wait for the controllers.

@@ -37,11 +37,8 @@ pub struct View {
     cycle: Option<u64>,
     /// Frames of the bus.
     pub wire: Wire,
-    /// Rows of the charts.
     pub rows: Rows,
-    /// Histograms.
     pub rhythm: Rhythm,
-    /// The last minute.
     pub minute: Minute,
     light: Light,
     claim: Value,
@@ -274,7 +271,6 @@ impl View {
         self.claim = self.light.judge(newest, self.skipped);
     }
 
-    /// The run's folder.
     #[must_use]
     pub fn run_folder(&self) -> Option<PathBuf> {
         self.folder.clone().or_else(|| self.description["out"].as_str().map(PathBuf::from))

@@ -42,7 +42,6 @@ impl Phase<'_> {
     }
 }
 
-/// A case of `class`.
 pub(super) fn case(class: &str, name: &str, result: CheckResult, detail: String) -> Case {
     Case { class: format!("controller.{class}"), name: name.into(), time_s: 0.0, result, detail }
 }

@@ -11,10 +11,8 @@ use protocol::frames::{ALIVE_RANGE, DecodeError, ECHO_RANGE, EmergencyStop, Fram
 /// Frames that are kept of one controller; one that babbles is cut off here.
 const MOST_FRAMES: usize = 500_000;
 
-/// What a frame was.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum What {
-    /// A command as it should be.
     Command {
         /// Opening that it asks for, 0 without its enable bit.
         opening: f64,
@@ -25,7 +23,6 @@ pub(super) enum What {
     },
     /// A command that the rig would not take.
     Broken(Wrong),
-    /// Its own emergency stop.
     Stop(EmergencyStop),
     /// Another frame that it may send.
     Own,
@@ -33,7 +30,6 @@ pub(super) enum What {
     NotItsOwn(String),
 }
 
-/// What is wrong with a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wrong {
     /// It has not five bytes.
@@ -53,7 +49,6 @@ pub(super) struct Heard {
     pub(super) cycle: u64,
     /// When it came, ns.
     pub(super) stamp_ns: u64,
-    /// What it was.
     pub(super) what: What,
 }
 
@@ -71,7 +66,6 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// Of the controller of an axis, or of `both_axes`.
     pub(super) fn new(axis: CheckedAxis, both_axes: bool) -> Self {
         let axes = [CheckedAxis::Drive, CheckedAxis::Load];
         let nodes = axes.into_iter().filter(|one| *one == axis || both_axes);

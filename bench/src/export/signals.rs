@@ -14,7 +14,6 @@ pub(super) struct Course {
     pub(super) frames: Vec<(u64, u64)>,
 }
 
-/// The signals of a log.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Signals {
     /// Messages that are in it, by identifier.
@@ -26,9 +25,7 @@ pub(super) struct Signals {
 /// Frames that are no signals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct LeftOut {
-    /// How many.
     pub(super) frames: u64,
-    /// Line of the first.
     pub(super) first_line: u64,
 }
 

@@ -33,14 +33,12 @@ pub(super) enum Ended {
     ByClient,
     /// It read nothing for 30 s, or asked without reading the answers.
     ReadsNothing,
-    /// The gateway ended.
     WithGateway,
     /// The session ended it.
     #[serde(untagged)]
     Parted(Parting),
 }
 
-/// What was counted of a client.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct ClientReport {
     /// Where it came from.
@@ -53,7 +51,6 @@ pub(super) struct ClientReport {
     pub(super) frames_from_client: u64,
     /// Frames that it sent and the bus did not take.
     pub(super) frames_not_taken: u64,
-    /// Requests that were refused.
     pub(super) requests_refused: u64,
     /// Why it is gone; none while it is here.
     pub(super) ended: Option<Ended>,
@@ -69,7 +66,6 @@ pub(super) struct Client {
     last_progress_ms: u64,
     pub(super) report: ClientReport,
     announced: bool,
-    /// Losses that were told.
     pub(super) told_lost: u64,
 }
 

@@ -155,7 +155,6 @@ fn hexadecimal(digits: &str, most: usize) -> Option<u32> {
 mod tests {
     use super::*;
 
-    /// All that a stream holds.
     fn all(stream: &[u8]) -> Vec<Result<Request, Refusal>> {
         let mut parser = Parser::default();
         stream.iter().filter_map(|byte| parser.push(*byte)).collect()

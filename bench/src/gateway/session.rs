@@ -41,7 +41,6 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parting {
-    /// Bytes that are not the protocol's.
     NotTheProtocol,
     /// A bus that is not here.
     UnknownBus,
@@ -60,7 +59,6 @@ enum State {
     Parted,
 }
 
-/// One conversation.
 #[derive(Clone, Debug)]
 pub struct Session {
     state: State,

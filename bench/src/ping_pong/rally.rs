@@ -15,12 +15,9 @@ const FIRST_ANSWER: Duration = Duration::from_secs(5);
 /// Time between two tries for it.
 const TRY_PERIOD: Duration = Duration::from_millis(50);
 
-/// What was measured.
 #[derive(Debug, Default)]
 pub(super) struct Rally {
-    /// Pings sent.
     pub(super) sent: u64,
-    /// Answers that came.
     pub(super) answered: u64,
     /// Pings left out because the one before them was not back in time.
     pub(super) skipped: u64,

@@ -77,7 +77,6 @@ impl GapWatch {
 /// Gaps of one kind, added up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Total {
-    /// How many.
     pub count: u64,
     /// The longest, ns.
     pub longest_ns: u64,

@@ -15,20 +15,16 @@ use std::str::FromStr;
 /// The node of `rig.dbc` that the emulator is.
 const RIG: &str = "Rig";
 
-/// Whose a frame is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Sent by a controller, the console or the bench.
     Command,
-    /// Sent by the rig.
     Rig,
     /// Unknown to `rig.dbc`.
     Other,
-    /// An error frame.
     Error,
 }
 
-/// What is left out of a replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LeftOut {
     /// All of [`Kind::Command`].

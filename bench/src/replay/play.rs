@@ -15,7 +15,6 @@ const PIECE: Duration = Duration::from_millis(5);
 /// Time from the decision to begin until the first frame is due.
 const LEAD: Duration = Duration::from_millis(20);
 
-/// How a replay ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
     /// With the last frame.
@@ -26,7 +25,6 @@ pub(super) enum End {
     LiveRig,
 }
 
-/// What was done.
 pub(super) struct Played {
     pub(super) end: End,
     /// Frames that the bus took.

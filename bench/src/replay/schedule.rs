@@ -25,7 +25,6 @@ pub(super) struct Schedule {
     pub(super) frames: Vec<Due>,
     /// Left out because told so.
     pub(super) left_out: u64,
-    /// Error frames.
     pub(super) error_frames: u64,
     /// Stamps before an earlier line's.
     pub(super) disordered: u64,

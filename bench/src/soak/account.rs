@@ -32,17 +32,14 @@ impl Counts {
         self.0.get(id).copied().unwrap_or(0)
     }
 
-    /// Adds frames of an identifier.
     pub fn add(&mut self, id: &str, frames: u64) {
         *self.0.entry(id.to_owned()).or_default() += frames;
     }
 
-    /// Adds all of another.
     pub fn add_all(&mut self, other: &Self) {
         other.0.iter().for_each(|(id, frames)| self.add(id, *frames));
     }
 
-    /// Frames in all.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.0.values().sum()
@@ -86,7 +83,6 @@ pub enum Gaps {
         lost: u64,
         /// Counter of the first command that came; a sender's first has 1.
         first: u8,
-        /// Counter of the last.
         last: u8,
         /// Times that a command expired, came too late to be taken, or jumped: what was lost there, four bits cannot tell.
         pauses: u64,
@@ -147,7 +143,6 @@ pub struct Wire {
     pub injected: Counts,
     /// Frames that a modelled wire never sent: at a full transmit queue, or in bus-off.
     pub never_sent: Counts,
-    /// Frames that passed it.
     pub passed: Counts,
     /// Peers that are none of ours, which may have sent.
     pub others: Vec<Seen>,
@@ -158,7 +153,6 @@ pub struct Wire {
 pub struct Row {
     /// Identifier, as candump names it.
     pub id: String,
-    /// Who sent it.
     pub sender: String,
     /// Who should have received it.
     pub receiver: String,
@@ -183,7 +177,6 @@ pub struct Row {
     pub pauses: u64,
 }
 
-/// The account of a segment.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Account {
     /// Each identifier at each receiver.

@@ -15,7 +15,6 @@ use std::path::Path;
 
 /// The files of a segment; empty where there is none.
 pub struct Evidence {
-    /// `summary.json`.
     pub summary: Summary,
     /// `run.json`; the machine as it stands, which goes into `soak.json`.
     pub run: RunDescription,
@@ -48,7 +47,6 @@ pub fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts {
 }
 
 impl Evidence {
-    /// Reads what is in `folder`.
     #[must_use]
     pub fn read(spec: &Spec, folder: &Path) -> Self {
         let names: &[&str] =
@@ -145,7 +143,6 @@ impl Evidence {
         Ok(wire)
     }
 
-    /// Figures of the run.
     #[must_use]
     pub fn figures(&self) -> Figures {
         let axes = self.controllers.values().flat_map(|told| told.axes.values());
@@ -164,7 +161,6 @@ impl Evidence {
         }
     }
 
-    /// The report of the drive axis.
     #[must_use]
     pub fn drive(&self) -> Option<&AxisReport> {
         self.controllers.values().find_map(|told| told.axes.get("drive"))

@@ -12,7 +12,6 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
-/// What a log tells.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FrameLog {
     /// Frames by the name of their identifier.

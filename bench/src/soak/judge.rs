@@ -15,14 +15,10 @@ use std::path::Path;
 /// Standard deviations that the injected loss may be away from its probability.
 const LOSS_DEVIATIONS: f64 = 5.0;
 
-/// What was found.
 pub struct Judged {
-    /// Every check.
     pub checks: Vec<Check>,
-    /// Figures of the run.
     pub figures: Figures,
     pub account: Account,
-    /// Memory by process.
     pub memory: BTreeMap<String, Memory>,
     /// `machine` of `run.json`.
     pub machine: Value,

@@ -3,7 +3,6 @@
 use super::model::{CheckResult, Segment, Soak};
 use crate::junit::Case;
 
-/// The file's text.
 #[must_use]
 pub fn text(soak: &Soak) -> String {
     let mut cases: Vec<_> = soak.segments.iter().flat_map(cases).collect();

@@ -16,7 +16,6 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// A soak and its folder.
 pub struct Keeping {
-    /// What is known.
     pub soak: Soak,
     /// Distributions of all segments.
     pub merged: Merged,
@@ -95,7 +94,6 @@ impl Keeping {
         &self.out
     }
 
-    /// Number of the next segment.
     #[must_use]
     pub fn next_number(&self) -> u32 {
         self.soak.segments.iter().map(|segment| segment.spec.number).max().unwrap_or(0) + 1

@@ -43,7 +43,6 @@ pub struct Sample {
 /// What a process's memory did.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    /// Samples taken.
     pub samples: usize,
     /// Resident memory, first sample.
     pub rss_first_kib: u64,

@@ -26,16 +26,11 @@ pub struct Merged(BTreeMap<String, Histogram<u64>>);
 pub struct Kept {
     /// Half of the samples were at most this, ns.
     pub p50_ns: u64,
-    /// 90 %.
     pub p90_ns: u64,
-    /// 99 %.
     pub p99_ns: u64,
-    /// 99.9 %.
     pub p999_ns: u64,
-    /// 99.99 %.
     pub p9999_ns: u64,
     pub max_ns: u64,
-    /// Samples.
     pub count: u64,
     /// The histogram: HdrHistogram V2, deflated, in base64.
     pub hdr_v2_base64: String,

@@ -30,7 +30,6 @@ pub struct Soak {
     pub elapsed_s: f64,
     /// Why the last start ended; null while it runs, or when it was killed.
     pub ended_because: Option<String>,
-    /// How it was asked for.
     pub settings: Settings,
     /// Why there is no load generator although one was asked for; null otherwise.
     pub load_missing_because: Option<String>,
@@ -40,7 +39,6 @@ pub struct Soak {
     pub totals: Totals,
     /// Distributions of all segments together, by tag.
     pub distributions: BTreeMap<String, Kept>,
-    /// Bytes of the soak's folder.
     pub folder_bytes: u64,
     /// Resident memory of the soak itself after the last segment.
     pub own_rss_kib: u64,
@@ -51,9 +49,7 @@ pub struct Soak {
 /// What must be the same when a soak goes on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// The bus by its URL.
     pub bus: String,
-    /// Experiments in turn.
     pub experiments: Vec<String>,
     /// Length of a segment with all around it.
     pub segment_s: f64,
@@ -61,11 +57,8 @@ pub struct Settings {
     pub load: Option<String>,
     /// Probability of loss in the segments that lose; null when none does.
     pub loss: Option<f64>,
-    /// More options of the emulator.
     pub emulator_options: String,
-    /// More options of the controllers.
     pub controller_options: String,
-    /// The rig file.
     pub rig: String,
     /// Whether bounds on position errors are judged.
     pub positions_judged: bool,
@@ -114,7 +107,6 @@ pub struct Totals {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
-    /// As it was planned.
     pub spec: Spec,
     /// Its folder below the soak's.
     pub folder: String,
@@ -126,17 +118,13 @@ pub struct Segment {
     pub rig_s: f64,
     /// False when the soak was killed while it ran: then only its folder tells of it.
     pub finished: bool,
-    /// How it ended, in words.
     pub ended: String,
     /// The load generator that ran beside it, by its command line.
     pub load: Option<String>,
-    /// What was checked.
     pub checks: Vec<Check>,
-    /// Figures of the run.
     pub figures: Figures,
     /// Each identifier at each receiver.
     pub account: Vec<Row>,
-    /// Memory by process.
     pub memory: BTreeMap<String, Memory>,
     /// Bytes of its folder at its end.
     pub file_bytes: u64,
@@ -146,23 +134,18 @@ pub struct Segment {
     pub rotated: bool,
 }
 
-/// A check of a segment.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Check {
     pub name: String,
-    /// How it went.
     pub result: CheckResult,
     /// What was found, in a line or more.
     pub detail: String,
 }
 
-/// How a check went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CheckResult {
-    /// Kept.
     Passed,
-    /// Broken.
     Failed,
     /// Nothing to judge.
     Skipped,
@@ -220,14 +203,12 @@ impl Segment {
         self.checks.iter().any(|check| check.result == CheckResult::Failed)
     }
 
-    /// Checks that were broken.
     pub fn broken(&self) -> impl Iterator<Item = &Check> {
         self.checks.iter().filter(|check| check.result == CheckResult::Failed)
     }
 }
 
 impl Totals {
-    /// Of these segments.
     #[must_use]
     pub fn of(segments: &[Segment]) -> Self {
         let mut totals = Self::default();

@@ -25,7 +25,6 @@ const AROUND_S: f64 = 2.5;
 pub struct Spec {
     /// Its number, from 1.
     pub number: u32,
-    /// The experiment's name.
     pub experiment: String,
     /// Whether each axis has a controller process of its own.
     pub two_processes: bool,
@@ -38,7 +37,6 @@ pub struct Spec {
 /// What segments are made of.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Experiments in turn.
     pub experiments: Vec<String>,
     /// Whether there is a load generator.
     pub load: bool,
@@ -47,7 +45,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The segment with this number, from 1.
     #[must_use]
     pub fn segment(&self, number: u32) -> Spec {
         let place = number - 1;
@@ -64,7 +61,6 @@ impl Plan {
 }
 
 impl Spec {
-    /// Name of its folder.
     #[must_use]
     pub fn folder(&self) -> String {
         format!("{:04}-{}", self.number, self.experiment)

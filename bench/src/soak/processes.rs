@@ -17,7 +17,6 @@ const POLL: Duration = Duration::from_millis(20);
 
 /// A program that a soak started.
 pub struct Running {
-    /// What it is called.
     pub name: String,
     child: Child,
     ended: Option<ExitStatus>,
@@ -105,7 +104,6 @@ impl Drop for Running {
     }
 }
 
-/// How a program ended, in words.
 #[must_use]
 pub fn end_in_words(status: Option<ExitStatus>) -> String {
     match status.map(|status| (status.code(), status.signal())) {

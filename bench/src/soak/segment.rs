@@ -30,17 +30,13 @@ const SAVE: Duration = Duration::from_secs(20);
 /// What all segments of a soak have in common.
 pub struct Common {
     pub bus: BusUrl,
-    /// The rig file.
     pub rig: PathBuf,
-    /// Folder of the experiment files.
     pub experiment_folder: PathBuf,
     /// Folder of the programs.
     pub bin_dir: PathBuf,
     /// Command line of the load generator, its program first; empty for none.
     pub load: Vec<String>,
-    /// More options of the emulator.
     pub emulator_options: Vec<String>,
-    /// More options of the controllers.
     pub controller_options: Vec<String>,
     /// Ends the segment while so much of the disk is still free.
     pub min_free_bytes: u64,
@@ -49,7 +45,6 @@ pub struct Common {
 /// Why a segment ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Its time was up.
     TimeUp,
     /// Somebody asked the soak to end.
     Interrupted,
@@ -61,11 +56,9 @@ pub enum End {
 
 /// What a segment leaves besides its files.
 pub struct Outcome {
-    /// Why it ended.
     pub end: End,
     /// Each program's process number, and its exit code, `None` when it has none; by name.
     pub exits: BTreeMap<String, (u32, Option<i32>, String)>,
-    /// Memory of each program.
     pub memory: BTreeMap<String, Vec<Sample>>,
     /// Frames that the interface sent meanwhile; `None` on the embedded bus, and where the system does not tell.
     pub sent_by_interface: Option<u64>,

@@ -31,26 +31,20 @@ const MAJOR_FAULT_NS: u64 = 100_000;
 /// Whether the kernel tells something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Known {
-    /// It does.
     Yes,
-    /// It does not.
     No,
 }
 
 /// What was seen of an event, at its worst cycle.
 #[derive(Clone, Debug)]
 pub struct Seen {
-    /// Which process.
     pub process: String,
-    /// How late, ns.
     pub late_ns: u64,
     /// How much slower than usual, ns.
     pub slow_ns: u64,
-    /// Cycles missed.
     pub missed: u64,
     /// Lengths of the stages receive, step, send, ns.
     pub stages_ns: [u64; 3],
-    /// What the kernel counted.
     pub vitals: VitalCounts,
     /// SIGCONTs in the event's cycles and right after.
     pub continued: u64,
@@ -77,15 +71,12 @@ pub struct Seen {
 /// A cause with its reasons.
 #[derive(Clone, Debug)]
 pub struct Told {
-    /// What it was.
     pub cause: Cause,
-    /// One sentence.
     pub sentence: String,
     /// What speaks for it, and what against.
     pub evidence: Vec<String>,
 }
 
-/// Names the cause.
 #[must_use]
 pub fn cause(seen: &Seen) -> Told {
     let cause = first_that_holds(seen);

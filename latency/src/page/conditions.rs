@@ -47,7 +47,6 @@ fn table(title: &str, facts: &[Fact]) -> String {
     )
 }
 
-/// What was not controlled.
 pub(super) fn not_controlled(report: &Report) -> String {
     list(&report.claim.not_controlled, "Nothing is known that was left uncontrolled.")
 }

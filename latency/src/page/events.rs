@@ -15,7 +15,6 @@ const HATCH: &str = "<svg width=\"0\" height=\"0\" style=\"position:absolute;wid
 <defs><pattern id=\"hatch\" width=\"5\" height=\"5\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
 <line class=\"hatch\" x1=\"0\" y1=\"0\" x2=\"0\" y2=\"5\"/></pattern></defs></svg>\n";
 
-/// All cards.
 pub(super) fn worst(report: &Report) -> String {
     if report.worst.is_empty() {
         return none(&nothing(report));

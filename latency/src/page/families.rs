@@ -8,9 +8,7 @@ use pagekit::svg::Look;
 
 /// Distributions that answer one question.
 pub(super) struct Family<'a> {
-    /// Identifier in the page.
     pub(super) identifier: String,
-    /// Heading.
     pub(super) title: String,
     /// What its numbers are, in a sentence.
     pub(super) about: &'static str,

@@ -7,10 +7,8 @@ use pagekit::markup::{Cell, Table, folded, none, number, paragraph, words as tex
 use pagekit::number::{self, NOTHING};
 use pagekit::svg::{Drawing, Look, Scale, stroke, text as label};
 
-/// Columns of percentiles.
 pub(super) const PERCENTILES: [&str; 7] = ["p50", "p90", "p99", "p99.9", "p99.99", "max", "count"];
 
-/// Cells under [`PERCENTILES`].
 pub(super) fn percentiles(of: &PercentilesNs) -> Vec<Cell> {
     let lengths = [of.p50, of.p90, of.p99, of.p999, of.p9999, of.max].map(|ns| number(number::maybe_us(ns)));
     lengths.into_iter().chain([number(number::count(of.count))]).collect()

@@ -36,7 +36,6 @@ pub(super) const RIGHT: f64 = 30.0;
 const TOP: f64 = 12.0;
 pub(super) const FOOT: f64 = 46.0;
 
-/// All histograms.
 pub(super) fn histograms(families: &[Family<'_>]) -> String {
     let charts = families.iter().enumerate().map(|(place, family)| {
         // What comes first is looked at first.

@@ -75,7 +75,6 @@ fn arrival_cells(frame: &str, of: &Arrivals) -> Vec<Cell> {
     [text(frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
 }
 
-/// The runs, what each counted, and each one's percentiles.
 pub(super) fn counts(runs: &[RunPart]) -> String {
     let mut table =
         Table::new("Runs", ["run", "folder", "group", "started", "length, s", "the rig's verdict"]);
