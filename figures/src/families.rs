@@ -10,6 +10,18 @@
 //!
 //! Smoothing is a centred moving mean, velocity a centred least-squares slope: both shift nothing in time.
 
+/// Definitions as a table: name, unit, which repetition's value is the run's, meaning.
+macro_rules! definitions {
+    ($($name:ident: $unit:literal, $worst:ident, $meaning:literal;)+) => {
+        &[$($crate::families::Definition {
+            name: stringify!($name),
+            unit: $unit,
+            worst: $crate::families::Worst::$worst,
+            meaning: $meaning,
+        }),+]
+    };
+}
+
 pub mod emergency_stop;
 mod force;
 mod force_step;

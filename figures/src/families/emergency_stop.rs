@@ -3,7 +3,7 @@
 //! The supply tells all of it: it falls from the trip on, the check valves shut below their pilot pressure, and it rises again
 //! from the release on. Source: rig-model.md, Emergency stop.
 
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::Record;
 use crate::series::{Series, Span};
 
@@ -22,63 +22,25 @@ const CHAMBERS: [&str; 4] =
 
 pub(super) const FAMILY: Family = Family {
     title: "emergency stop (the first of the run, from truth.csv)",
-    definitions: &[
-        Definition {
-            name: "stop_speed_m_per_s",
-            unit: "m/s",
-            worst: Worst::Run,
-            meaning: "speed of the carriage at the trip: the instant from which the supply falls",
-        },
-        Definition {
-            name: "stop_time_s",
-            unit: "s",
-            worst: Worst::Run,
-            meaning: "from the trip until the carriage stays below 1 mm/s for 0.1 s; only when it moved at the trip",
-        },
-        Definition {
-            name: "stop_way_m",
-            unit: "m",
-            worst: Worst::Run,
-            meaning: "way from the trip to that standstill, both signs",
-        },
-        Definition {
-            name: "stop_way_to_turn_m",
-            unit: "m",
-            worst: Worst::Run,
-            meaning: "way from the trip until the carriage first turns back or stands still",
-        },
-        Definition {
-            name: "check_valves_shut_after_s",
-            unit: "s",
-            worst: Worst::Run,
-            meaning: "from the trip until the check valves are shut",
-        },
-        Definition {
-            name: "air_mass_change_while_shut_ratio",
-            unit: "1",
-            worst: Worst::Run,
-            meaning: "largest relative change of the stored air p V of any chamber while the check valves are shut",
-        },
-        Definition {
-            name: "release_jump_m",
-            unit: "m",
-            worst: Worst::Run,
-            meaning: "largest change of the drive's position from the opening of the check valves until the valves are \
-                commanded again, 0.2 s at most",
-        },
-        Definition {
-            name: "restart_jump_m",
-            unit: "m",
-            worst: Worst::Run,
-            meaning: "largest change of the drive's position in the 0.2 s after its valve is commanded again",
-        },
-        Definition {
-            name: "supply_recovery_s",
-            unit: "s",
-            worst: Worst::Run,
-            meaning: "from the release until the supply is back at 95 % of its pressure before the trip",
-        },
-    ],
+    definitions: definitions! {
+        stop_speed_m_per_s: "m/s", Run,
+            "speed of the carriage at the trip: the instant from which the supply falls";
+        stop_time_s: "s", Run,
+            "from the trip until the carriage stays below 1 mm/s for 0.1 s; only when it moved at the \
+             trip";
+        stop_way_m: "m", Run, "way from the trip to that standstill, both signs";
+        stop_way_to_turn_m: "m", Run, "way from the trip until the carriage first turns back or stands still";
+        check_valves_shut_after_s: "s", Run, "from the trip until the check valves are shut";
+        air_mass_change_while_shut_ratio: "1", Run,
+            "largest relative change of the stored air p V of any chamber while the check valves are shut";
+        release_jump_m: "m", Run,
+            "largest change of the drive's position from the opening of the check valves until the valves \
+             are commanded again, 0.2 s at most";
+        restart_jump_m: "m", Run,
+            "largest change of the drive's position in the 0.2 s after its valve is commanded again";
+        supply_recovery_s: "s", Run,
+            "from the release until the supply is back at 95 % of its pressure before the trip";
+    },
     compute,
 };
 

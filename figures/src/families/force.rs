@@ -3,7 +3,7 @@
 //! A step of the set-point has figures of its own (`force_step.rs`); half a second from it on is left out here.
 
 use super::position::still;
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::{Record, common};
 use crate::series::{Series, Span};
 
@@ -18,52 +18,21 @@ const INITIAL_S: f64 = 0.2;
 
 pub(super) const FAMILY: Family = Family {
     title: "force, over the whole experiment (load sensor smoothed over 5 ms)",
-    definitions: &[
-        Definition {
-            name: "force_error_motion_rms_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "rms of force less set-point while the drive's set-point moves, 0.5 s from a step of the force on left out",
-        },
-        Definition {
-            name: "force_error_motion_largest_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "largest |force less set-point| of the same samples",
-        },
-        Definition {
-            name: "force_rest_peak_to_peak_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "largest peak to peak of the force in the last 0.5 s of the rests of the drive's set-point, the \
-                force's set-point being constant",
-        },
-        Definition {
-            name: "force_initial_settled_n",
-            unit: "N",
-            worst: Worst::Farthest,
-            meaning: "mean force in the last 0.2 s before the experiment",
-        },
-        Definition {
-            name: "force_initial_error_n",
-            unit: "N",
-            worst: Worst::Farthest,
-            meaning: "that mean less the set-point's",
-        },
-        Definition {
-            name: "load_law_error_rms_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "rms of force less set-point in the experiment, for a load that follows from the motion (spring, \
-                damper, mass, dry friction)",
-        },
-        Definition {
-            name: "load_law_error_largest_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "largest |force less set-point| of the same samples",
-        },
-    ],
+    definitions: definitions! {
+        force_error_motion_rms_n: "N", Largest,
+            "rms of force less set-point while the drive's set-point moves, 0.5 s from a step of the \
+             force on left out";
+        force_error_motion_largest_n: "N", Largest, "largest |force less set-point| of the same samples";
+        force_rest_peak_to_peak_n: "N", Largest,
+            "largest peak to peak of the force in the last 0.5 s of the rests of the drive's set-point, \
+             the force's set-point being constant";
+        force_initial_settled_n: "N", Farthest, "mean force in the last 0.2 s before the experiment";
+        force_initial_error_n: "N", Farthest, "that mean less the set-point's";
+        load_law_error_rms_n: "N", Largest,
+            "rms of force less set-point in the experiment, for a load that follows from the motion \
+             (spring, damper, mass, dry friction)";
+        load_law_error_largest_n: "N", Largest, "largest |force less set-point| of the same samples";
+    },
     compute,
 };
 

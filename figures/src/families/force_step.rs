@@ -11,7 +11,7 @@
 //! a moment, the position error rises past 10 mm and is evened out).
 
 use super::force::NOISE_S;
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::{Record, Step, largest_step};
 use crate::series::{Series, Span};
 
@@ -38,76 +38,25 @@ const BEFORE_S: f64 = 0.05;
 
 pub(super) const FAMILY: Family = Family {
     title: "step of the force (the largest in the experiment, 10 N at least; load sensor smoothed over 5 ms)",
-    definitions: &[
-        Definition {
-            name: "force_step_n",
-            unit: "N",
-            worst: Worst::Farthest,
-            meaning: "height of the step, signed",
-        },
-        Definition {
-            name: "force_rise_s",
-            unit: "s",
-            worst: Worst::Largest,
-            meaning: "from 10 % to 90 % of the way to the final value",
-        },
-        Definition {
-            name: "force_settling_s",
-            unit: "s",
-            worst: Worst::Latest,
-            meaning: "from the step until the force stays within 5 % of it around the final value (mean over the last 0.2 \
-                s of the 0.5 s that are looked at); absent when it does not",
-        },
-        Definition {
-            name: "force_settling_to_set_point_s",
-            unit: "s",
-            worst: Worst::Latest,
-            meaning: "the same around the set-point",
-        },
-        Definition {
-            name: "force_error_final_n",
-            unit: "N",
-            worst: Worst::Farthest,
-            meaning: "final value less set-point",
-        },
-        Definition {
-            name: "force_overshoot_ratio",
-            unit: "1",
-            worst: Worst::Largest,
-            meaning: "largest excess beyond the final value, by height of the step",
-        },
-        Definition {
-            name: "force_aperiodic",
-            unit: "1",
-            worst: Worst::Smallest,
-            meaning: "1 when the force, once within 5 % of the final value, leaves that band at most once; else 0",
-        },
-        Definition {
-            name: "drive_speed_ratio_least",
-            unit: "1",
-            worst: Worst::Smallest,
-            meaning: "least of drive velocity (slope over 20 ms) by set-point velocity within 0.3 s from the step",
-        },
-        Definition {
-            name: "position_error_before_step_m",
-            unit: "m",
-            worst: Worst::Largest,
-            meaning: "largest |position error| in the 50 ms before the step",
-        },
-        Definition {
-            name: "position_error_peak_after_step_m",
-            unit: "m",
-            worst: Worst::Largest,
-            meaning: "largest |position error| within 0.5 s from the step",
-        },
-        Definition {
-            name: "position_error_recovered_s",
-            unit: "s",
-            worst: Worst::Latest,
-            meaning: "from the step until |position error| stays below 5 mm or its level before, whichever is larger, \
-                within 1.5 s; absent when it does not",
-        },
-    ],
+    definitions: definitions! {
+        force_step_n: "N", Farthest, "height of the step, signed";
+        force_rise_s: "s", Largest, "from 10 % to 90 % of the way to the final value";
+        force_settling_s: "s", Latest,
+            "from the step until the force stays within 5 % of it around the final value (mean over the \
+             last 0.2 s of the 0.5 s that are looked at); absent when it does not";
+        force_settling_to_set_point_s: "s", Latest, "the same around the set-point";
+        force_error_final_n: "N", Farthest, "final value less set-point";
+        force_overshoot_ratio: "1", Largest, "largest excess beyond the final value, by height of the step";
+        force_aperiodic: "1", Smallest,
+            "1 when the force, once within 5 % of the final value, leaves that band at most once; else 0";
+        drive_speed_ratio_least: "1", Smallest,
+            "least of drive velocity (slope over 20 ms) by set-point velocity within 0.3 s from the step";
+        position_error_before_step_m: "m", Largest, "largest |position error| in the 50 ms before the step";
+        position_error_peak_after_step_m: "m", Largest, "largest |position error| within 0.5 s from the step";
+        position_error_recovered_s: "s", Latest,
+            "from the step until |position error| stays below 5 mm or its level before, whichever is \
+             larger, within 1.5 s; absent when it does not";
+    },
     compute,
 };
 

@@ -5,7 +5,7 @@
 //! without a distinction of cases are judged alike.
 
 use super::force::NOISE_S;
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::{Record, common};
 use crate::series::{Series, Span};
 
@@ -24,34 +24,17 @@ const BY_HAND: &[&str] = &["limited", "standstill", "moving"];
 
 pub(super) const FAMILY: Family = Family {
     title: "hand (manual mode in the experiment; load sensor smoothed over 5 ms)",
-    definitions: &[
-        Definition {
-            name: "hand_force_mean_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "mean |force| of the load sensor while the load axis moves faster than 10 mm/s, \
-                      more than 5 mm from the carriage",
-        },
-        Definition {
-            name: "hand_force_largest_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "largest |force| of the same samples",
-        },
-        Definition {
-            name: "hand_force_breakaway_n",
-            unit: "N",
-            worst: Worst::Largest,
-            meaning: "largest |force| until the load axis is 1 mm from where it stood",
-        },
-        Definition {
-            name: "hand_valve_unrest_ratio",
-            unit: "1",
-            worst: Worst::Largest,
-            meaning: "share of the cycles in which the load's valve is moved, in the last 0.3 s of the experiment, \
-                      the hand being gone",
-        },
-    ],
+    definitions: definitions! {
+        hand_force_mean_n: "N", Largest,
+            "mean |force| of the load sensor while the load axis moves faster than 10 mm/s, more than 5 \
+             mm from the carriage";
+        hand_force_largest_n: "N", Largest, "largest |force| of the same samples";
+        hand_force_breakaway_n: "N", Largest,
+            "largest |force| until the load axis is 1 mm from where it stood";
+        hand_valve_unrest_ratio: "1", Largest,
+            "share of the cycles in which the load's valve is moved, in the last 0.3 s of the experiment, \
+             the hand being gone";
+    },
     compute,
 };
 

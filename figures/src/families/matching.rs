@@ -1,6 +1,6 @@
 //! The matching chain: the offset that it found between both measured positions, and what is left of it.
 
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::Record;
 use crate::series::Span;
 
@@ -9,20 +9,11 @@ const AFTER_S: f64 = 0.5;
 
 pub(super) const FAMILY: Family = Family {
     title: "matching of positions",
-    definitions: &[
-        Definition {
-            name: "matching_offset_m",
-            unit: "m",
-            worst: Worst::Farthest,
-            meaning: "offset taken off the load's position sensor, as last matched",
-        },
-        Definition {
-            name: "matching_residual_m",
-            unit: "m",
-            worst: Worst::Farthest,
-            meaning: "mean of load position (offset taken off) less drive position in the 0.5 s after matching",
-        },
-    ],
+    definitions: definitions! {
+        matching_offset_m: "m", Farthest, "offset taken off the load's position sensor, as last matched";
+        matching_residual_m: "m", Farthest,
+            "mean of load position (offset taken off) less drive position in the 0.5 s after matching";
+    },
     compute,
 };
 

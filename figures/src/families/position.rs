@@ -2,7 +2,7 @@
 //!
 //! Source: bus.md, A run's folder (dynamic and static error); the paper, Fig. 8 ("two maxima of the control error").
 
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::Record;
 use crate::series::{Series, Span};
 
@@ -22,34 +22,18 @@ const FALL_SHARE: f64 = 0.25;
 
 pub(super) const FAMILY: Family = Family {
     title: "position, over the whole experiment",
-    definitions: &[
-        Definition {
-            name: "position_error_rms_m",
-            unit: "m",
-            worst: Worst::Largest,
-            meaning: "rms of set-point less position while the drive's set-point moves",
-        },
-        Definition {
-            name: "position_error_maxima",
-            unit: "1",
-            worst: Worst::Largest,
-            meaning: "maxima of |error| above half the largest in the longest move, smoothed over 20 ms, the error falling by \
-                      a quarter of the largest between them",
-        },
-        Definition {
-            name: "position_rest_peak_to_peak_m",
-            unit: "m",
-            worst: Worst::Largest,
-            meaning: "largest peak to peak of the position sensor in the last 0.5 s of the rests of the set-point, waiting \
-                      before and after included",
-        },
-        Definition {
-            name: "position_rest_peak_to_peak_smoothed_m",
-            unit: "m",
-            worst: Worst::Largest,
-            meaning: "the same with the sensor's noise removed by a moving mean over 10 ms",
-        },
-    ],
+    definitions: definitions! {
+        position_error_rms_m: "m", Largest,
+            "rms of set-point less position while the drive's set-point moves";
+        position_error_maxima: "1", Largest,
+            "maxima of |error| above half the largest in the longest move, smoothed over 20 ms, the error \
+             falling by a quarter of the largest between them";
+        position_rest_peak_to_peak_m: "m", Largest,
+            "largest peak to peak of the position sensor in the last 0.5 s of the rests of the set-point, \
+             waiting before and after included";
+        position_rest_peak_to_peak_smoothed_m: "m", Largest,
+            "the same with the sensor's noise removed by a moving mean over 10 ms";
+    },
     compute,
 };
 

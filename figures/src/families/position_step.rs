@@ -2,7 +2,7 @@
 //!
 //! Source: the paper, Fig. 7 (the manipulated variable is in its limit at first; settling without lasting oscillation).
 
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::{Record, largest_step};
 use crate::series::{Series, Span};
 
@@ -21,46 +21,21 @@ const NOISE_S: f64 = 0.01;
 
 pub(super) const FAMILY: Family = Family {
     title: "step of the position (the largest in the experiment, 2 mm at least)",
-    definitions: &[
-        Definition {
-            name: "position_step_m",
-            unit: "m",
-            worst: Worst::Farthest,
-            meaning: "height of the step, signed",
-        },
-        Definition {
-            name: "position_rise_s",
-            unit: "s",
-            worst: Worst::Largest,
-            meaning: "from 10 % to 90 % of the step, by the position sensor",
-        },
-        Definition {
-            name: "position_settling_s",
-            unit: "s",
-            worst: Worst::Latest,
-            meaning: "from the step until |error| stays within 1 % of it or 1 mm, whichever is larger; absent when it does not",
-        },
-        Definition {
-            name: "position_overshoot_ratio",
-            unit: "1",
-            worst: Worst::Largest,
-            meaning: "largest way beyond the new set-point, by height of the step; sensor smoothed over 10 ms",
-        },
-        Definition {
-            name: "valve_saturated_s",
-            unit: "s",
-            worst: Worst::Smallest,
-            meaning: "how long |opening| of the drive's valve stays at 0.99 or more from the step on; 0 when it never \
-                gets there within 20 ms",
-        },
-        Definition {
-            name: "position_oscillation_after_settling_m",
-            unit: "m",
-            worst: Worst::Largest,
-            meaning: "peak to peak of the position, smoothed over 10 ms, from 0.2 s after settling until the set-point \
-                changes again",
-        },
-    ],
+    definitions: definitions! {
+        position_step_m: "m", Farthest, "height of the step, signed";
+        position_rise_s: "s", Largest, "from 10 % to 90 % of the step, by the position sensor";
+        position_settling_s: "s", Latest,
+            "from the step until |error| stays within 1 % of it or 1 mm, whichever is larger; absent when \
+             it does not";
+        position_overshoot_ratio: "1", Largest,
+            "largest way beyond the new set-point, by height of the step; sensor smoothed over 10 ms";
+        valve_saturated_s: "s", Smallest,
+            "how long |opening| of the drive's valve stays at 0.99 or more from the step on; 0 when it \
+             never gets there within 20 ms";
+        position_oscillation_after_settling_m: "m", Largest,
+            "peak to peak of the position, smoothed over 10 ms, from 0.2 s after settling until the \
+             set-point changes again";
+    },
     compute,
 };
 

@@ -4,7 +4,7 @@
 //! brought in later while preparing. Of all reliefs of a run the one counts that began with the highest force.
 
 use super::force::NOISE_S;
-use super::{Definition, Family, Figures, Worst};
+use super::{Family, Figures};
 use crate::record::{Record, common};
 use crate::series::Span;
 
@@ -20,27 +20,13 @@ const BEFORE_EXPERIMENT: &[&str] = &["initial-positioning", "preparing"];
 
 pub(super) const FAMILY: Family = Family {
     title: "relieving (force chain at work before an experiment; the relief that begins with the highest force)",
-    definitions: &[
-        Definition {
-            name: "relieve_force_before_n",
-            unit: "N",
-            worst: Worst::Run,
-            meaning: "mean force of the load sensor in the 20 ms before",
-        },
-        Definition {
-            name: "relieve_force_after_n",
-            unit: "N",
-            worst: Worst::Run,
-            meaning: "mean force of the load sensor in the last 50 ms",
-        },
-        Definition {
-            name: "relieve_s",
-            unit: "s",
-            worst: Worst::Run,
-            meaning: "until |force| (smoothed over 5 ms) stays below a tenth of that before or 10 N, whichever is larger; \
-                      absent when it does not",
-        },
-    ],
+    definitions: definitions! {
+        relieve_force_before_n: "N", Run, "mean force of the load sensor in the 20 ms before";
+        relieve_force_after_n: "N", Run, "mean force of the load sensor in the last 50 ms";
+        relieve_s: "s", Run,
+            "until |force| (smoothed over 5 ms) stays below a tenth of that before or 10 N, whichever is \
+             larger; absent when it does not";
+    },
     compute,
 };
 
