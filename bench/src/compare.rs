@@ -12,6 +12,7 @@ use figures::SummaryError;
 use pagekit::grid::Grid;
 use pagekit::number::{in_use, without_unit};
 use pagekit::page::{document, escaped};
+use runlog::run_folder::FileError;
 use std::path::{Path, PathBuf};
 
 /// The table: a row for each figure that any run has, and the change against the first run.
@@ -62,10 +63,10 @@ pub fn pictures(runs: &[Run]) -> Vec<Picture> {
 /// The page: heading, runs, table, pictures, all in one file.
 ///
 /// # Errors
-/// [`SummaryError::Write`] when a picture cannot be drawn.
+/// [`SummaryError::File`] when a picture cannot be drawn.
 pub fn page(runs: &[Run], grid: &Grid, pictures: &[Picture]) -> Result<String, SummaryError> {
     let pictures = pictures.iter().map(|picture| {
-        picture.svg().map_err(|error| SummaryError::write(Path::new("the page's picture"), error))
+        picture.svg().map_err(|error| FileError::write(Path::new("the page's picture"), error))
     });
     let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
     let title = runs.first().map(Run::title).unwrap_or_default();
@@ -91,15 +92,15 @@ fn entry(run: &Run) -> String {
 /// Writes the page to `out`, or to `compare.html` in it when that is a folder, with `compare.md` beside it.
 ///
 /// # Errors
-/// [`SummaryError::Write`]
+/// [`SummaryError::File`]
 pub fn write(runs: &[Run], grid: &Grid, pictures: &[Picture], out: &Path) -> Result<PathBuf, SummaryError> {
     let is_page = out.extension().is_some_and(|extension| extension == "html");
     let page_path = if is_page { out.into() } else { out.join("compare.html") };
     let folder = page_path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).map_err(|error| SummaryError::write(folder, error))?;
+    std::fs::create_dir_all(folder).map_err(|error| FileError::write(folder, error))?;
     let markdown_path = page_path.with_extension("md");
     for (path, text) in [(&page_path, page(runs, grid, pictures)?), (&markdown_path, grid.markdown())] {
-        std::fs::write(path, text).map_err(|error| SummaryError::write(path, error))?;
+        std::fs::write(path, text).map_err(|error| FileError::write(path, error))?;
     }
     Ok(page_path)
 }

@@ -26,13 +26,13 @@ mod watch;
 use crate::junit::{self, Case};
 use crate::soak::model::CheckResult;
 use cli::{CheckPace, ConformanceArguments};
-use figures::SummaryError;
 use judge::{Phase, case};
 use line::{Broken, Line};
 use protocol::bus::{BusError, BusUrl, WireOptions};
 use protocol::can::CanFrame;
 use protocol::exit::Exit;
 use realtime::{Interrupt, Request};
+use runlog::run_folder::FileError;
 use rustix::process::{Pid, Signal, kill_process};
 use stand_in::{Disturbance, StandIn};
 use std::io::{self, Write};
@@ -76,7 +76,7 @@ pub enum ConformanceError {
     System(io::Error),
     /// The result cannot be written.
     #[error(transparent)]
-    Write(SummaryError),
+    Write(#[from] FileError),
     #[error("interrupted before the last check; nothing was written")]
     Interrupted,
 }
@@ -123,8 +123,7 @@ pub fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
     tell(&cases);
     if let Some(file) = &arguments.junit {
         let text = junit::text("controller", &cases, began.elapsed().as_secs_f64());
-        std::fs::write(file, text)
-            .map_err(|error| ConformanceError::Write(SummaryError::write(file, error)))?;
+        std::fs::write(file, text).map_err(|error| FileError::write(file, error))?;
     }
     let failed = cases.iter().any(|case| case.result == CheckResult::Failed);
     Ok(if failed { Exit::BoundBroken } else { Exit::Good })

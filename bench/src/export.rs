@@ -18,6 +18,7 @@ mod table;
 use crate::recorded_log::{RecordedLog, RecordedLogError};
 use cli::{ExportArguments, Format};
 use protocol::exit::Exit;
+use runlog::run_folder::FileError;
 use signals::{LEFT_OUT, Signals};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -33,8 +34,8 @@ pub enum ExportError {
     /// The log is none.
     #[error(transparent)]
     Log(#[from] RecordedLogError),
-    #[error("cannot write {file}: {reason}")]
-    Write { file: PathBuf, reason: String },
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error(
         "{python}: {reason}; asc and blf want a python with python-can 4 ('python3 -m venv VENV', \
          'VENV/bin/pip install python-can==4.6.1'): name it with --python VENV/bin/python, or in AIRBENCH_PYTHON"
@@ -68,7 +69,8 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
         Format::Asc | Format::Blf => as_frames(&part, &log, *to, arguments.python.as_deref()),
     };
     let renamed = done.and_then(|told| {
-        std::fs::rename(&part, out).map_err(|error| ExportError::write(out, error)).map(|()| told)
+        std::fs::rename(&part, out).map_err(|error| FileError::write(out, error))?;
+        Ok(told)
     });
     match renamed {
         Ok((told, exit)) => {
@@ -101,7 +103,7 @@ fn as_signals(
     let channels: usize = signals.courses.iter().map(|course| course.spec.signals.len()).sum();
     let origin = if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" };
     let origin_ns = log.origin_ns();
-    let written = |error: &dyn std::fmt::Display| ExportError::write(part, error);
+    let written = |error: &dyn std::fmt::Display| FileError::write(part, error);
     let rows = if format == Format::Csv {
         let stamps = || log.frames.iter().map(|logged| logged.record.stamp_ns);
         let length_ns = stamps().max().unwrap_or(0) - stamps().min().unwrap_or(0);
@@ -131,7 +133,7 @@ fn as_frames(
     python: Option<&Path>,
 ) -> Result<Told, ExportError> {
     // Whether the place can be written is found out here, in words of our own.
-    create(part).map_err(|error| ExportError::write(part, error))?;
+    create(part).map_err(|error| FileError::write(part, error))?;
     let named = std::env::var_os("AIRBENCH_PYTHON").map(PathBuf::from);
     let python = python.map(Path::to_owned).or(named).unwrap_or_else(|| "python3".into());
     let told = format!("{} frames", log.frames.len());
@@ -163,10 +165,4 @@ fn say(text: &str) {
 
 fn warn(text: &str) {
     let _ = writeln!(io::stderr(), "bench: {text}");
-}
-
-impl ExportError {
-    fn write(file: &Path, reason: impl ToString) -> Self {
-        Self::Write { file: file.into(), reason: reason.to_string() }
-    }
 }

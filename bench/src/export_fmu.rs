@@ -6,6 +6,7 @@
 use clap::Args;
 use plant_fmu::{MODEL_IDENTIFIER, RIG_FILE, description};
 use protocol::exit::Exit;
+use runlog::run_folder::FileError;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -31,8 +32,8 @@ pub struct ExportFmuArguments {
 /// What keeps an FMU from being written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportFmuError {
-    #[error("cannot read {file}: {reason}")]
-    Read { file: PathBuf, reason: String },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The rig file is none.
     #[error("{0}")]
     Rig(String),
@@ -41,8 +42,6 @@ pub enum ExportFmuError {
         name = library_name()
     )]
     NoLibrary { program: PathBuf },
-    #[error("cannot write {file}: {reason}")]
-    Write { file: PathBuf, reason: String },
 }
 
 /// Writes the FMU and tells where it is.
@@ -51,10 +50,7 @@ pub enum ExportFmuError {
 /// [`ExportFmuError`]; there is no file then, or the one that was there before.
 pub fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
     let ExportFmuArguments { rig, out, library } = arguments;
-    let rig_toml = String::from_utf8(read(rig)?).map_err(|error| ExportFmuError::Read {
-        file: rig.clone(),
-        reason: error.utf8_error().to_string(),
-    })?;
+    let rig_toml = String::from_utf8(read(rig)?).map_err(|error| FileError::read(rig, error.utf8_error()))?;
     let described =
         description::of_file(&rig_toml, &rig.display().to_string()).map_err(ExportFmuError::Rig)?;
     let library = match library {
@@ -67,7 +63,7 @@ pub fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
     written.map_err(|error| {
         // What is half is of no use; that it cannot be removed either changes nothing.
         let _ = std::fs::remove_file(&part);
-        ExportFmuError::Write { file: out.clone(), reason: error.to_string() }
+        FileError::write(out, error)
     })?;
     // A reader that has gone has seen enough.
     let _ =
@@ -104,6 +100,6 @@ fn write(file: &Path, description: &str, library: &[u8], rig_toml: &str) -> io::
     archive.finish()?.sync_all()
 }
 
-fn read(file: &Path) -> Result<Vec<u8>, ExportFmuError> {
-    std::fs::read(file).map_err(|error| ExportFmuError::Read { file: file.into(), reason: error.to_string() })
+fn read(file: &Path) -> Result<Vec<u8>, FileError> {
+    std::fs::read(file).map_err(|error| FileError::read(file, error))
 }

@@ -25,12 +25,11 @@ pub mod session;
 
 use cli::GatewayArguments;
 use client::{Client, ClientReport, Ended, LONGEST_FRAME};
-use figures::SummaryError;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, Received};
 use protocol::can::CanFrame;
 use protocol::exit::Exit;
 use realtime::Interrupt;
-use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::Serialize;
 use session::write_frame;
@@ -66,7 +65,7 @@ pub enum GatewayError {
     System(io::Error),
     /// The report cannot be written.
     #[error(transparent)]
-    Report(SummaryError),
+    Report(#[from] FileError),
 }
 
 impl GatewayError {
@@ -126,7 +125,7 @@ pub fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
         report.connections_refused
     );
     if let Some(file) = &arguments.report {
-        write_json(file, &report).map_err(|error| GatewayError::Report(SummaryError::write(file, error)))?;
+        write_json(file, &report).map_err(|error| FileError::write(file, error))?;
     }
     Ok(Exit::Interrupted)
 }

@@ -16,7 +16,7 @@ use figures::{SummaryError, join, table, thresholds};
 use latency::ReportError;
 use live::LiveError;
 use protocol::exit::Exit;
-use runlog::run_folder::write_json;
+use runlog::run_folder::{FileError, read_text, write_json};
 use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -118,9 +118,9 @@ fn spread_runs(arguments: &SpreadArguments) -> Result<Exit, RunsError> {
     print(&markdown);
     if let Some(out) = &arguments.out {
         let (table, json) = (out.join("spread.md"), out.join("spread.json"));
-        std::fs::create_dir_all(out).map_err(|error| SummaryError::write(out, error))?;
-        std::fs::write(&table, markdown).map_err(|error| SummaryError::write(&table, error))?;
-        write_json(&json, &spread::json(&runs)).map_err(|error| SummaryError::write(&json, error))?;
+        std::fs::create_dir_all(out).map_err(|error| FileError::write(out, error))?;
+        std::fs::write(&table, markdown).map_err(|error| FileError::write(&table, error))?;
+        write_json(&json, &spread::json(&runs)).map_err(|error| FileError::write(&json, error))?;
     }
     Ok(Exit::Good)
 }
@@ -151,10 +151,9 @@ fn name_cause(arguments: &CauseArguments) -> Result<Exit, ReportError> {
 
 fn check(arguments: &CheckArguments) -> Result<Exit, SummaryError> {
     let file = &arguments.file;
-    let text = std::fs::read_to_string(file).map_err(|error| SummaryError::read(file, error))?;
-    let experiment: toml::Table = text.parse().map_err(|error| SummaryError::read(file, error))?;
+    let experiment: toml::Table = read_text(file)?.parse().map_err(|error| FileError::read(file, error))?;
     let passed = experiment.get("passed").map(|passed| passed.as_table().ok_or("[passed] is no table"));
-    let passed = passed.transpose().map_err(|error| SummaryError::read(file, error))?;
+    let passed = passed.transpose().map_err(|error| FileError::read(file, error))?;
     passed.map_or(Ok(()), thresholds::check)?;
     Ok(Exit::Good)
 }

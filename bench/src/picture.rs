@@ -8,6 +8,7 @@ use figures::emergency_stop;
 use figures::record::{Record, largest_step};
 use figures::series::{Series, Span};
 use plotters::style::RGBColor;
+use runlog::run_folder::FileError;
 use std::path::Path;
 
 const METRE_IN_MM: f64 = 1e3;
@@ -22,7 +23,7 @@ const APART_M: f64 = 0.002;
 /// Draws the pictures of a run into `folder`; returns their names.
 ///
 /// # Errors
-/// [`SummaryError::Write`] when a picture cannot be drawn or written.
+/// [`SummaryError::File`] when a picture cannot be drawn or written.
 pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
     let whole = whole(record);
     let mut pictures = vec![("picture.svg", whole.clone())];
@@ -38,8 +39,8 @@ pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, Summary
     }
     for (name, picture) in &pictures {
         let path = folder.join(name);
-        let svg = picture.svg().map_err(|error| SummaryError::write(&path, error))?;
-        std::fs::write(&path, svg).map_err(|error| SummaryError::write(&path, error))?;
+        let svg = picture.svg().map_err(|error| FileError::write(&path, error))?;
+        std::fs::write(&path, svg).map_err(|error| FileError::write(&path, error))?;
     }
     Ok(pictures.into_iter().map(|(name, _)| name).collect())
 }

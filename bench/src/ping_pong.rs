@@ -26,7 +26,7 @@ use protocol::exit::Exit;
 use rally::{Rally, Rhythm};
 use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request, write_hlog};
 use runlog::ping_pong::{PingPongFigures, PingPongFile};
-use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
 use std::io::{self, Write};
 use std::os::fd::{AsFd, OwnedFd};
@@ -47,8 +47,8 @@ pub enum PingPongError {
     Bus(#[from] BusError),
     #[error("no answer {0}; an embedded bus needs a host: 'emulator bus --bus URL'")]
     Silent(String),
-    #[error("cannot write {file}: {reason}")]
-    Write { file: String, reason: String },
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 impl PingPongError {
@@ -57,16 +57,12 @@ impl PingPongError {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::Silent(_) => Exit::BusFailed,
-            Self::System { .. } | Self::Write { .. } => Exit::BadInput,
+            Self::System { .. } | Self::File(_) => Exit::BadInput,
         }
     }
 
     fn system(what: &'static str, reason: impl ToString) -> Self {
         Self::System { what, reason: reason.to_string() }
-    }
-
-    fn write(file: &Path, reason: impl ToString) -> Self {
-        Self::Write { file: file.display().to_string(), reason: reason.to_string() }
     }
 }
 
@@ -99,7 +95,7 @@ pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
             parts.push((&to_arrival, rally.to_arrival_ns.histogram()));
         }
         write_hlog(path, &parts, started.as_secs_f64(), length)
-            .map_err(|error| PingPongError::write(path, error))?;
+            .map_err(|error| FileError::write(path, error))?;
     }
     Ok(if interrupt.came() { Exit::Interrupted } else { Exit::Good })
 }
@@ -236,8 +232,8 @@ fn tell(name: &str, figures: &PingPongFigures) {
 }
 
 /// Adds the figures to a file that other ping-pongs may have begun.
-fn add(path: &Path, name: &str, figures: PingPongFigures) -> Result<(), PingPongError> {
-    let refused = |reason: String| PingPongError::write(path, reason);
+fn add(path: &Path, name: &str, figures: PingPongFigures) -> Result<(), FileError> {
+    let refused = |reason: String| FileError::write(path, reason);
     let mut file: PingPongFile = match std::fs::read_to_string(path) {
         Ok(text) => serde_json::from_str(&text).map_err(|error| refused(format!("not ours: {error}")))?,
         Err(error) if error.kind() == io::ErrorKind::NotFound => PingPongFile::default(),

@@ -21,7 +21,7 @@ use play::{End, Played, heard_of_a_rig, play};
 use protocol::bus::{self, Bus, BusError, StampClock};
 use protocol::exit::Exit;
 use realtime::{Clock, Interrupt, MonotonicClock, Request, write_hlog};
-use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
 use schedule::{LONGEST, Schedule};
 use serde_json::json;
 use std::io::{self, Write};
@@ -65,8 +65,8 @@ pub enum ReplayError {
     NoBus(String),
     #[error("signals cannot be watched: {0}")]
     Signals(io::Error),
-    #[error("cannot write {file}: {reason}")]
-    Write { file: PathBuf, reason: String },
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 impl ReplayError {
@@ -83,7 +83,7 @@ impl ReplayError {
 /// Replays a log, and tells on standard output what was done; in a folder too, if asked.
 ///
 /// # Errors
-/// [`ReplayError`]: nothing was sent, save for [`ReplayError::Write`].
+/// [`ReplayError`]: nothing was sent, save for [`ReplayError::File`].
 pub fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     let log = RecordedLog::read(&arguments.source, arguments.interface.as_deref())?;
     log.tell_cut_line();
@@ -96,7 +96,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
         return Err(ReplayError::Nothing(log.file));
     }
     if let Some(out) = &arguments.out {
-        std::fs::create_dir_all(out).map_err(|error| ReplayError::write(out, error))?;
+        std::fs::create_dir_all(out).map_err(|error| FileError::write(out, error))?;
     }
     let interrupt = Interrupt::watch().map_err(ReplayError::Signals)?;
     let clock: StampClock = Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns));
@@ -188,7 +188,7 @@ fn write(
     schedule: &Schedule,
     played: &Played,
     started: Duration,
-) -> Result<(), ReplayError> {
+) -> Result<(), FileError> {
     let (table, histogram) = (out.join("replay.json"), out.join("replay.hlog"));
     let end = match played.end {
         End::Whole => "whole",
@@ -210,11 +210,11 @@ fn write(
         "frames_disordered": schedule.disordered,
         "timing_error_ns": played.error_ns,
     });
-    write_json(&table, &told).map_err(|error| ReplayError::write(&table, error))?;
+    write_json(&table, &told).map_err(|error| FileError::write(&table, error))?;
     let parts = [("replay-timing-error", played.error_ns.histogram())];
     let length = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(started);
     write_hlog(&histogram, &parts, started.as_secs_f64(), length)
-        .map_err(|error| ReplayError::write(&histogram, error))
+        .map_err(|error| FileError::write(&histogram, error))
 }
 
 fn no_bus(arguments: &ReplayArguments) -> ReplayError {
@@ -228,10 +228,4 @@ fn say(text: &str) {
 
 fn warn(text: &str) {
     let _ = writeln!(io::stderr(), "bench: {text}");
-}
-
-impl ReplayError {
-    fn write(file: &Path, reason: impl ToString) -> Self {
-        Self::Write { file: file.into(), reason: reason.to_string() }
-    }
 }

@@ -1,9 +1,10 @@
 //! Several runs together: their folders read, their experiments held against each other, their figures side by side.
 
 use figures::SummaryError;
-use figures::join::{experiment, read_object};
+use figures::join::experiment;
 use figures::record::{self, Record};
 use figures::{self, position};
+use runlog::run_folder::{FileError, read_json};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +23,8 @@ pub enum RunsError {
     /// A folder cannot be read, or a page not written.
     #[error(transparent)]
     Summary(#[from] SummaryError),
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error(
         "{one} is of '{title_one}' and {other} of '{title_other}', which ask the rig for different things; --anyway lays them side by side all the same"
     )]
@@ -85,8 +88,8 @@ fn read_one(folder: &Path) -> Result<Run, SummaryError> {
     if !summary_path.exists() {
         return Err(SummaryError::NoSummary(folder.into()));
     }
-    let summary = read_object(&summary_path)?;
-    let run = read_object(&folder.join("run.json"))?;
+    let summary = read_json(&summary_path)?;
+    let run = read_json(&folder.join("run.json"))?;
     let record = record::read(folder, experiment(&run)?)?;
     // The figures are computed anew: an older summary may know fewer.
     let computed = figures::of(&record);

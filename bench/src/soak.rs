@@ -43,7 +43,7 @@ use protocol::bus::BusUrl;
 use protocol::exit::Exit;
 use realtime::Interrupt;
 use runlog::conditions::Conditions;
-use runlog::run_folder::{SCHEMA_VERSION, write_json};
+use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
 use segment::{Common, End, Outcome};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -57,8 +57,8 @@ const GIVE_UP_AFTER: usize = 3;
 /// What keeps a soak from going on.
 #[derive(Debug, thiserror::Error)]
 pub enum SoakError {
-    #[error("cannot read {file}: {reason}")]
-    Input { file: PathBuf, reason: String },
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
     Output { file: PathBuf, reason: String },
     #[error("cannot start {program}: {reason}; build it, or say where it is with --bin-dir")]
@@ -120,11 +120,9 @@ pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
 
 /// What all segments have in common, looked at before anything is begun.
 fn common(arguments: &SoakArguments) -> Result<Common, SoakError> {
-    let unreadable =
-        |file: &Path, error: &io::Error| SoakError::Input { file: file.into(), reason: error.to_string() };
     let experiment = |name: &String| arguments.experiment_folder.join(format!("{name}.toml"));
     for file in arguments.experiments.iter().map(experiment).chain([arguments.rig.clone()]) {
-        std::fs::metadata(&file).map_err(|error| unreadable(&file, &error))?;
+        std::fs::metadata(&file).map_err(|error| FileError::read(&file, error))?;
     }
     let beside_us = || std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned()));
     let bin_dir = arguments.bin_dir.clone().or_else(beside_us).unwrap_or_default();

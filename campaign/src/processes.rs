@@ -12,6 +12,7 @@ use crate::shelf::Shelf;
 use axis_control::experiment::Experiment;
 use figures::{SummaryError, join};
 use protocol::exit::Exit;
+use runlog::run_folder::FileError;
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
 use std::fs;
@@ -115,7 +116,7 @@ pub fn run(
 fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, SummaryError> {
     let joined = match join::join(folder) {
         Ok(joined) => joined,
-        Err(error @ SummaryError::Write { .. }) => return Err(error),
+        Err(error @ SummaryError::File(FileError::Write { .. })) => return Err(error),
         Err(error) => return Ok(Outcome::failed(error.to_string())),
     };
     let number = |key: &str| joined.figure(key).as_f64();

@@ -13,7 +13,7 @@ use crate::families::{self, Figures, position};
 use crate::record::{self, Record};
 use crate::reports::{self, Reports};
 use crate::{SummaryError, thresholds};
-use runlog::run_folder::write_json;
+use runlog::run_folder::{FileError, read_json, write_json};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -67,8 +67,8 @@ pub fn join(folder: &Path) -> Result<Joined, SummaryError> {
     if !summary_path.exists() {
         return Err(SummaryError::NoSummary(folder.into()));
     }
-    let mut summary = read_object(&summary_path)?;
-    let mut run = read_object(&folder.join("run.json"))?;
+    let mut summary = read_json(&summary_path)?;
+    let mut run = read_json(&folder.join("run.json"))?;
     add_controllers(&mut summary, &mut run, folder)?;
     let experiment = experiment(&run)?;
     let record = record::read(folder, experiment)?;
@@ -85,7 +85,7 @@ pub fn join(folder: &Path) -> Result<Joined, SummaryError> {
     summary.insert("thresholds".into(), Value::Object(judged));
     for (name, value) in [("summary.json", &summary), ("run.json", &run)] {
         let path = folder.join(name);
-        write_json(&path, value).map_err(|error| SummaryError::write(&path, error))?;
+        write_json(&path, value).map_err(|error| FileError::write(&path, error))?;
     }
     Ok(Joined { summary, run, record })
 }
@@ -204,19 +204,10 @@ fn is_rehearsal(run: &Map<String, Value>) -> bool {
 /// The experiment that the run used; empty without one.
 ///
 /// # Errors
-/// [`SummaryError::Read`] when it is no TOML.
+/// [`FileError::Read`] when it is no TOML.
 pub fn experiment(run: &Map<String, Value>) -> Result<toml::Table, SummaryError> {
     let text = run.get("experiment_toml").and_then(Value::as_str).unwrap_or_default();
-    text.parse().map_err(|error| SummaryError::read(Path::new("run.json: experiment_toml"), error))
-}
-
-/// Reads a file of JSON that holds an object.
-///
-/// # Errors
-/// [`SummaryError::Read`] when it cannot be read, or holds something else.
-pub fn read_object(path: &Path) -> Result<Map<String, Value>, SummaryError> {
-    let text = std::fs::read_to_string(path).map_err(|error| SummaryError::read(path, error))?;
-    serde_json::from_str(&text).map_err(|error| SummaryError::read(path, error))
+    Ok(text.parse().map_err(|error| FileError::read(Path::new("run.json: experiment_toml"), error))?)
 }
 
 #[cfg(test)]

@@ -25,15 +25,14 @@ pub mod thresholds;
 pub use families::{Definition, FAMILIES, Family, Figures, definition, definitions, list, of};
 pub use families::{emergency_stop, position};
 
-use std::path::{Path, PathBuf};
+use runlog::run_folder::FileError;
+use std::path::PathBuf;
 
 /// What keeps a run's folder from being summed up.
 #[derive(Debug, thiserror::Error)]
 pub enum SummaryError {
-    #[error("cannot read {file}: {reason}")]
-    Read { file: PathBuf, reason: String },
-    #[error("cannot write {file}: {reason}")]
-    Write { file: PathBuf, reason: String },
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error(
         "{0} has no summary.json: the emulator was killed or is still running; the rows that it recorded are readable"
     )]
@@ -46,16 +45,4 @@ pub enum SummaryError {
         /// What is wrong, and what would be right.
         problem: String,
     },
-}
-
-impl SummaryError {
-    /// A file that cannot be read.
-    pub fn read(file: &Path, reason: impl ToString) -> Self {
-        Self::Read { file: file.into(), reason: reason.to_string() }
-    }
-
-    /// A file that cannot be written.
-    pub fn write(file: &Path, reason: impl ToString) -> Self {
-        Self::Write { file: file.into(), reason: reason.to_string() }
-    }
 }

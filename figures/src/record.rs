@@ -70,7 +70,7 @@ pub struct Record {
 /// earlier run.
 ///
 /// # Errors
-/// [`SummaryError::Read`]: a table or a report that is there and cannot be read.
+/// [`SummaryError::File`]: a table or a report that is there and cannot be read.
 pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryError> {
     let table = |name: &str, numbers: &[&'static str], states: &[&'static str]| {
         let path = folder.join(name);

@@ -5,7 +5,7 @@
 //! it may be writing. So the reports say which tables are of this run: those of the axes that they name.
 
 use crate::SummaryError;
-use crate::join::read_object;
+use runlog::run_folder::read_json;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -22,11 +22,11 @@ pub enum Reports {
 /// Reads the reports in `folder`.
 ///
 /// # Errors
-/// [`SummaryError::Read`]: a report that is there and cannot be read.
+/// [`SummaryError::File`]: a report that is there and cannot be read.
 pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
     let read = |name: &str| {
         let path = folder.join(name);
-        path.exists().then(|| read_object(&path)).transpose()
+        path.exists().then(|| read_json(&path)).transpose()
     };
     if let Some(both) = read("controller.json")? {
         return Ok(Reports::Both(both));

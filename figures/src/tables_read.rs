@@ -2,6 +2,7 @@
 
 use crate::SummaryError;
 use crate::series::{Series, Span};
+use runlog::run_folder::FileError;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -76,9 +77,9 @@ impl Table {
 /// Comment lines start with `#`.
 ///
 /// # Errors
-/// [`SummaryError::Read`] with file and line: no `time_s`, a number that is none or not finite.
+/// [`SummaryError::File`] with file and line: no `time_s`, a number that is none or not finite.
 pub fn read(path: &Path, numbers: &[&'static str], states: &[&'static str]) -> Result<Table, SummaryError> {
-    let refused = |reason: String| SummaryError::read(path, reason);
+    let refused = |reason: String| SummaryError::from(FileError::read(path, reason));
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .from_path(path)

@@ -3,23 +3,22 @@
 //! It reads the report and nothing else. A machine that stood still, or a cycle that nothing explains, is what machines do
 //! by themselves: alone, they count as nothing that was done to the runs. What was late and not recorded is `unknown`.
 
-use super::ReportError;
 use super::model::{Cause, Finding, Report, SCHEMA, SCHEMA_VERSION};
+use runlog::run_folder::{FileError, read_json};
 use std::path::Path;
 
 /// Reads a report.
 ///
 /// # Errors
-/// [`ReportError::Read`]: no such file, or no report of this version.
-pub fn read(file: &Path) -> Result<Report, ReportError> {
-    let text = std::fs::read_to_string(file).map_err(|error| ReportError::read(file, error))?;
-    let report: Report = serde_json::from_str(&text).map_err(|error| ReportError::read(file, error))?;
+/// [`FileError::Read`]: no such file, or no report of this version.
+pub fn read(file: &Path) -> Result<Report, FileError> {
+    let report: Report = read_json(file)?;
     if (report.schema.as_str(), report.schema_version) != (SCHEMA, SCHEMA_VERSION) {
         let told = format!(
             "{} version {}: this reads {SCHEMA} version {SCHEMA_VERSION}",
             report.schema, report.schema_version
         );
-        return Err(ReportError::read(file, told));
+        return Err(FileError::read(file, told));
     }
     Ok(report)
 }
@@ -82,7 +81,7 @@ mod tests {
         report.schema_version = 99;
         for text in ["{}".to_owned(), serde_json::to_string(&report).unwrap()] {
             std::fs::write(&file, text).unwrap();
-            assert!(matches!(read(&file), Err(ReportError::Read { .. })));
+            assert!(matches!(read(&file), Err(FileError::Read { .. })));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::ReportError;
 use super::files;
+use runlog::run_folder::FileError;
 use std::path::{Path, PathBuf};
 
 /// A run's folder and the group it was put in.
@@ -35,7 +36,7 @@ fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
     if files::is_run(folder) {
         return Ok(vec![folder.to_path_buf()]);
     }
-    let entries = std::fs::read_dir(folder).map_err(|error| ReportError::read(folder, error))?;
+    let entries = std::fs::read_dir(folder).map_err(|error| FileError::read(folder, error))?;
     let mut runs: Vec<_> =
         entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| files::is_run(path)).collect();
     runs.sort();
@@ -88,7 +89,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let told = choose(&[folder.path().into()], &[]).unwrap_err();
         assert!(told.to_string().contains("holds no run"), "{told}");
-        assert!(matches!(choose(&[folder.path().join("none")], &[]), Err(ReportError::Read { .. })));
+        assert!(matches!(
+            choose(&[folder.path().join("none")], &[]),
+            Err(ReportError::File(FileError::Read { .. }))
+        ));
         assert!(matches!(choose(&[], &["new".into()]), Err(ReportError::Group(_))));
     }
 }

@@ -67,6 +67,7 @@ use self::joined::Series;
 use self::model::{Report, SCHEMA, SCHEMA_VERSION};
 use self::resolution::Verdict;
 use self::samples::Samples;
+use runlog::run_folder::{FileError, read_text};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -88,17 +89,13 @@ pub enum ReportError {
     OneRun,
     #[error("--group {0}: write it as NAME=FOLDER")]
     Group(String),
-    #[error("cannot read {file}: {reason}")]
-    Read { file: PathBuf, reason: String },
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
     Write { file: PathBuf, reason: String },
 }
 
 impl ReportError {
-    fn read(file: &Path, reason: impl ToString) -> Self {
-        Self::Read { file: file.into(), reason: reason.to_string() }
-    }
-
     fn write(file: &Path, reason: impl ToString) -> Self {
         Self::Write { file: file.into(), reason: reason.to_string() }
     }
@@ -176,11 +173,11 @@ impl Made {
     /// Holds the bounds of a threshold file against the report.
     ///
     /// # Errors
-    /// [`ReportError::Read`]: a file that cannot be read, or says something that makes no sense.
+    /// [`ReportError::File`]: a file that cannot be read, or says something that makes no sense.
     pub fn judge(&mut self, file: &Path) -> Result<(), ReportError> {
-        let text = std::fs::read_to_string(file).map_err(|error| ReportError::read(file, error))?;
+        let text = read_text(file)?;
         self.report.bounds =
-            bounds::judge(&text, &self.report).map_err(|error| ReportError::read(file, error))?;
+            bounds::judge(&text, &self.report).map_err(|error| FileError::read(file, error))?;
         Ok(())
     }
 

@@ -9,15 +9,15 @@
 //! Medians and intervals are those of [`ratios`], over the pairs; what is claimed stands in `latency/bounds*.toml`, and
 //! [`resolution`] says whether it is kept.
 
-use crate::ReportError;
 use crate::model::{Ratio, Report, RunPart};
 use crate::ratios;
 use crate::resolution::{self, Verdict};
 use clap::Args;
 use figures::median::median;
 use pagekit::grid::Grid;
+use runlog::run_folder::{FileError, read_json};
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// From what, and what for.
 #[derive(Args, Debug)]
@@ -45,20 +45,15 @@ const FACTS: [&str; 6] =
 /// The table in Markdown.
 ///
 /// # Errors
-/// [`ReportError::Read`] when a report cannot be read.
-pub fn table(arguments: &LatencyTableArguments) -> Result<String, ReportError> {
-    let plain = read(&arguments.report)?;
-    let spin = arguments.spin.as_deref().map(read).transpose()?;
+/// [`FileError::Read`] when a report cannot be read.
+pub fn table(arguments: &LatencyTableArguments) -> Result<String, FileError> {
+    let plain: Report = read_json(&arguments.report)?;
+    let spin: Option<Report> = arguments.spin.as_deref().map(read_json).transpose()?;
     let mut rows = plain.ratios.clone();
     rows.extend(spin.and_then(|spin| spinning(&spin.runs)));
     let mut out = head(&plain, arguments.made_by.as_deref());
     let _ = write!(out, "{}", grid(&rows).markdown()); // writing to a string cannot fail
     Ok(out)
-}
-
-fn read(path: &Path) -> Result<Report, ReportError> {
-    let text = std::fs::read_to_string(path).map_err(|error| ReportError::read(path, error))?;
-    serde_json::from_str(&text).map_err(|error| ReportError::read(path, error))
 }
 
 /// The largest value that is claimed of a figure.

@@ -126,6 +126,55 @@ impl LineFile {
     }
 }
 
+/// A file that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It is missing, or is not what it should be.
+    #[error("cannot read {file}: {reason}")]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system or the parser said.
+        reason: String,
+    },
+    /// The system refuses.
+    #[error("cannot write {file}: {reason}")]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl FileError {
+    /// A file that cannot be read.
+    pub fn read(file: &Path, reason: impl ToString) -> Self {
+        Self::Read { file: file.into(), reason: reason.to_string() }
+    }
+
+    /// A file that cannot be written.
+    pub fn write(file: &Path, reason: impl ToString) -> Self {
+        Self::Write { file: file.into(), reason: reason.to_string() }
+    }
+}
+
+/// Reads a text.
+///
+/// # Errors
+/// [`FileError::Read`].
+pub fn read_text(path: &Path) -> Result<String, FileError> {
+    std::fs::read_to_string(path).map_err(|error| FileError::read(path, error))
+}
+
+/// Reads a file of JSON as its type.
+///
+/// # Errors
+/// [`FileError::Read`]: it cannot be read, or is not as the type has it.
+pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, FileError> {
+    serde_json::from_str(&read_text(path)?).map_err(|error| FileError::read(path, error))
+}
+
 /// Writes `value` as pretty JSON by [`write_whole`].
 ///
 /// # Errors

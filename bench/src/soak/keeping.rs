@@ -7,7 +7,7 @@ use super::SoakError;
 use super::merged::Merged;
 use super::model::{SOAK_SCHEMA_VERSION, Segment, Settings, Soak, Totals};
 use super::{junit, procfs, verdict};
-use runlog::run_folder::{write_json, write_whole};
+use runlog::run_folder::{FileError, read_json, write_json, write_whole};
 use rustix::fs::{FlockOperation, flock};
 use std::fs::File;
 use std::io;
@@ -37,14 +37,11 @@ impl Keeping {
         flock(&lock, FlockOperation::NonBlockingLockExclusive).map_err(|_| SoakError::Busy(out.into()))?;
         let path = out.join("soak.json");
         let mut soak = if path.exists() {
-            let unreadable = |reason: String| SoakError::Input { file: path.clone(), reason };
-            let text = std::fs::read(&path).map_err(|error| unreadable(error.to_string()))?;
-            let soak: Soak = serde_json::from_slice(&text).map_err(|error| unreadable(error.to_string()))?;
+            let soak: Soak = read_json(&path)?;
             if soak.schema_version != SOAK_SCHEMA_VERSION {
                 let version = soak.schema_version;
-                return Err(unreadable(format!(
-                    "schema version {version}, {SOAK_SCHEMA_VERSION} is known here"
-                )));
+                let known = format!("schema version {version}, {SOAK_SCHEMA_VERSION} is known here");
+                return Err(FileError::read(&path, known).into());
             }
             soak
         } else {
@@ -60,8 +57,7 @@ impl Keeping {
         if !differences.is_empty() && !anyway {
             return Err(SoakError::OtherSettings { out: out.into(), differences: differences.join("; ") });
         }
-        let merged = Merged::from_kept(&soak.distributions)
-            .map_err(|error| SoakError::Input { file: path, reason: error.to_string() })?;
+        let merged = Merged::from_kept(&soak.distributions).map_err(|error| FileError::read(&path, error))?;
         (soak.settings, soak.planned_s, soak.ended_because) = (settings, planned_s, None);
         let mut keeping = Self { soak, merged, out: out.into(), _lock: lock };
         keeping.find_cut_off()?;
