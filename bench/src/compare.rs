@@ -61,9 +61,6 @@ pub fn pictures(runs: &[Run]) -> Vec<Picture> {
 }
 
 /// The page: heading, runs, table, pictures, all in one file.
-///
-/// # Errors
-/// [`SummaryError::File`] when a picture cannot be drawn.
 pub fn page(runs: &[Run], grid: &Grid, pictures: &[Picture]) -> Result<String, SummaryError> {
     let pictures = pictures.iter().map(|picture| {
         picture.svg().map_err(|error| FileError::write(Path::new("the page's picture"), error))
@@ -90,9 +87,6 @@ fn entry(run: &Run) -> String {
 }
 
 /// Writes the page to `out`, or to `compare.html` in it when that is a folder, with `compare.md` beside it.
-///
-/// # Errors
-/// [`SummaryError::File`]
 pub fn write(runs: &[Run], grid: &Grid, pictures: &[Picture], out: &Path) -> Result<PathBuf, SummaryError> {
     let is_page = out.extension().is_some_and(|extension| extension == "html");
     let page_path = if is_page { out.into() } else { out.join("compare.html") };

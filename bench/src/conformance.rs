@@ -415,7 +415,6 @@ impl Drop for Controller {
     }
 }
 
-/// A folder of the check's own for its bus.
 struct OwnFolder(std::path::PathBuf);
 
 impl OwnFolder {

@@ -41,7 +41,6 @@ const LETTER: f64 = 0.53;
 
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// What the legend says.
     pub name: String,
     pub colour: RGBColor,
     /// Its width in pixels.
@@ -64,7 +63,6 @@ pub struct Panel {
 pub struct Band {
     /// What is written on it.
     pub label: String,
-    /// Where it stands.
     pub span: Span,
     /// Whether it is what the picture is about, and left white.
     pub is_main: bool,
@@ -76,7 +74,6 @@ pub struct Picture {
     pub title: String,
     /// What stands below it, broken into lines.
     pub caption: String,
-    /// What the time axis is called.
     pub time_name: String,
     /// What is shown of it.
     pub range: Span,
@@ -92,9 +89,6 @@ type Failure = Box<dyn std::error::Error>;
 
 impl Picture {
     /// The picture as SVG.
-    ///
-    /// # Errors
-    /// What the drawing library says.
     pub fn svg(&self) -> Result<String, String> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|error| error.to_string())?;
@@ -253,7 +247,6 @@ fn legend_places(panel: &Panel) -> Vec<(i32, i32)> {
     panel.curves.iter().map(place).collect()
 }
 
-/// Height of a panel's title and legend.
 fn head_height(panel: &Panel) -> u32 {
     let rows = legend_places(panel).last().map_or(0, |(_, row)| *row);
     PANEL_HEAD + LINE * rows.unsigned_abs()

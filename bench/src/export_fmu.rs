@@ -34,7 +34,6 @@ pub struct ExportFmuArguments {
 pub enum ExportFmuError {
     #[error(transparent)]
     File(#[from] FileError),
-    /// The rig file is none.
     #[error("{0}")]
     Rig(String),
     #[error(

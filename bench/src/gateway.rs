@@ -49,21 +49,15 @@ const TELL_EVERY: Duration = Duration::from_secs(1);
 /// What keeps a gateway from opening.
 #[derive(Debug, thiserror::Error)]
 pub enum GatewayError {
-    /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
     #[error("cannot listen at {address}: {reason}; choose another with --listen, port 0 for a free one")]
-    Listen {
-        /// Where it was to listen.
-        address: SocketAddr,
-        reason: String,
-    },
+    Listen { address: SocketAddr, reason: String },
     #[error("{0} has no name of 1 to 64 printable characters: give one with --name")]
     Name(String),
     /// The system gave no signal handler, or no poll.
     #[error("{0}")]
     System(io::Error),
-    /// The report cannot be written.
     #[error(transparent)]
     Report(#[from] FileError),
 }
@@ -76,7 +70,6 @@ impl GatewayError {
     }
 }
 
-/// What a gateway counted.
 #[derive(Debug, Serialize)]
 struct Report {
     schema_version: u32,
@@ -98,9 +91,6 @@ struct Report {
 }
 
 /// Opens the door and serves until a signal comes.
-///
-/// # Errors
-/// [`GatewayError`] when bus or address cannot be had, or the report cannot be written.
 pub fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
     let interrupt = Interrupt::watch().map_err(GatewayError::System)?;
     let mut gateway = Gateway::open(arguments)?;

@@ -9,7 +9,6 @@ use std::fmt::Write;
 pub(crate) struct Case {
     pub(crate) class: String,
     pub(crate) name: String,
-    /// How long it took, s.
     pub(crate) time_s: f64,
     pub(crate) result: CheckResult,
     pub(crate) detail: String,

@@ -21,9 +21,6 @@ const AFTER_S: f64 = 0.6;
 const APART_M: f64 = 0.002;
 
 /// Draws the pictures of a run into `folder`; returns their names.
-///
-/// # Errors
-/// [`SummaryError::File`] when a picture cannot be drawn or written.
 pub fn draw(folder: &Path, record: &Record) -> Result<Vec<&'static str>, SummaryError> {
     let whole = whole(record);
     let mut pictures = vec![("picture.svg", whole.clone())];

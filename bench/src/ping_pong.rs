@@ -42,7 +42,6 @@ const SILENCE: Duration = Duration::from_secs(10);
 pub enum PingPongError {
     #[error("{what}: {reason}")]
     System { what: &'static str, reason: String },
-    /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
     #[error("no answer {0}; an embedded bus needs a host: 'emulator bus --bus URL'")]
@@ -67,9 +66,6 @@ impl PingPongError {
 }
 
 /// Plays as asked, prints the figures, and writes them where asked.
-///
-/// # Errors
-/// [`PingPongError`]
 pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
     let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let interrupt = Interrupt::watch().map_err(|error| PingPongError::system("no signal handler", error))?;
@@ -101,9 +97,6 @@ pub fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
 }
 
 /// Answers; the process that [`run`] starts.
-///
-/// # Errors
-/// [`PingPongError`]
 pub fn pong(arguments: &PongArguments) -> Result<Exit, PingPongError> {
     // Whoever asks may be killed; nobody would end this process then.
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))

@@ -42,7 +42,6 @@ use thread_priority::{
     thread_native_id,
 };
 
-/// Head line of the table.
 pub const HEAD: &str = "cpu,from_ns,to_ns,another_ran";
 /// Gaps that wait for the writer: what all CPUs can see in several of its turns.
 const QUEUE: usize = 65_536;
@@ -56,13 +55,8 @@ const MOST_ROWS: u64 = 2_000_000;
 pub enum ProbeError {
     #[error("--cpus {0}: not a list of CPUs such as 0-3,8")]
     Cpus(String),
-    /// A thread does not get its CPU, or no idle priority: its gaps would say nothing.
     #[error("CPU {cpu}: {reason}")]
-    Thread {
-        cpu: usize,
-        /// What was refused, and what to do.
-        reason: String,
-    },
+    Thread { cpu: usize, reason: String },
     #[error("cannot write the gaps: {0}; choose another file with --out")]
     Write(io::Error),
     #[error("cannot watch for signals: {0}")]
@@ -83,9 +77,6 @@ struct Watched {
 }
 
 /// Watches as asked; see the module.
-///
-/// # Errors
-/// [`ProbeError`]
 pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let cpus = cpus(arguments.cpus.as_deref())?;
     let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;

@@ -10,7 +10,6 @@ use std::fs::File;
 use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
-/// A run's log in its folder.
 const LOG_NAME: &str = "bus.log";
 /// A summary whose cycle 0 lies farther from the log's first frame is of another run, s.
 const NEAR_ZERO_S: f64 = 60.0;
@@ -55,9 +54,6 @@ pub struct RecordedLog {
 
 impl RecordedLog {
     /// Reads `path`, a run's folder or a log; with `interface`, what was seen there alone.
-    ///
-    /// # Errors
-    /// [`RecordedLogError`] with file, line and column.
     pub fn read(path: &Path, interface: Option<&str>) -> Result<Self, RecordedLogError> {
         let file = if path.is_dir() { path.join(LOG_NAME) } else { path.to_owned() };
         let opened = File::open(&file).map_err(|error| {

@@ -58,7 +58,6 @@ pub enum ReplayError {
         /// Frames of a rig that would have been sent.
         of_the_rig: u64,
     },
-    /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
     #[error("{0} is not there; an embedded bus needs a host: 'emulator bus --bus URL'")]

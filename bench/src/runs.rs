@@ -28,14 +28,7 @@ pub enum RunsError {
     #[error(
         "{one} is of '{title_one}' and {other} of '{title_other}', which ask the rig for different things; --anyway lays them side by side all the same"
     )]
-    DifferentExperiments {
-        /// The first run.
-        one: PathBuf,
-        title_one: String,
-        /// The run that differs.
-        other: PathBuf,
-        title_other: String,
-    },
+    DifferentExperiments { one: PathBuf, title_one: String, other: PathBuf, title_other: String },
 }
 
 /// A run as it is compared.
@@ -69,9 +62,6 @@ impl Run {
 }
 
 /// Reads the runs in `folders`; names that are equal are made different by their parents.
-///
-/// # Errors
-/// [`SummaryError`]: no summary, files that cannot be read.
 pub fn read(folders: &[PathBuf]) -> Result<Vec<Run>, SummaryError> {
     let mut runs = folders.iter().map(|folder| read_one(folder)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<_> = runs.iter().map(|run| run.name.clone()).collect();
@@ -120,9 +110,6 @@ pub fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// Refuses runs that asked the rig for different things. Programs, their parameters, recording and bounds may differ:
 /// controllers are what is compared.
-///
-/// # Errors
-/// [`RunsError::DifferentExperiments`]
 pub fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
     let Some((first, others)) = runs.split_first() else { return Ok(()) };
     let asked_first = asked(&first.record.experiment);

@@ -34,7 +34,6 @@ impl Spread {
     }
 }
 
-/// The spread of each figure that any run has.
 fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
     let spread = |(name, unit)| {
         let values: Vec<_> = runs.iter().filter_map(|run| run.figure(name)).collect();

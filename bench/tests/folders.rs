@@ -21,7 +21,6 @@ fn bench(arguments: &[&Path]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_bench")).args(arguments).output().unwrap()
 }
 
-/// What it said, and its exit code.
 fn said(output: &Output) -> (String, i32) {
     let text =
         [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat();

@@ -44,7 +44,6 @@ pub struct Places {
 pub enum CampaignError {
     #[error(transparent)]
     File(#[from] FileError),
-    /// A file that it names.
     #[error(transparent)]
     Shelf(#[from] ShelfError),
     #[error("{0}: {1}")]
@@ -61,9 +60,6 @@ pub enum CampaignError {
 
 impl Campaign {
     /// Reads a campaign's file and all that it names, and tries the values at the ends of its lists.
-    ///
-    /// # Errors
-    /// [`CampaignError`] with the file and what is wrong with it.
     pub fn read(path: &Path, places: &Places) -> Result<Self, CampaignError> {
         let mut file = CampaignFile::read(path)?;
         let folder = file.folder()?;
@@ -139,9 +135,6 @@ impl Campaign {
     }
 
     /// The same once more, for somebody to see: an experiment as processes that leave their files in `folder`.
-    ///
-    /// # Errors
-    /// As [`Campaign::run`].
     pub fn repeat(
         &self,
         point: &Point,

@@ -25,7 +25,6 @@ pub enum Cut {
     Stopped,
     #[error("took longer than {0} s, and was ended")]
     TooLong(f64),
-    /// The system says so.
     #[error(transparent)]
     System(#[from] io::Error),
 }
@@ -33,9 +32,6 @@ pub enum Cut {
 impl Own {
     /// Starts it as a group of its own, which a Ctrl-C at the terminal does not reach: what that does to a run is for its owner
     /// to say.
-    ///
-    /// # Errors
-    /// What the system says.
     pub fn start(command: &mut Command) -> io::Result<Self> {
         command.process_group(0).spawn().map(|child| Self { child })
     }

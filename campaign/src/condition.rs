@@ -13,7 +13,6 @@ use plant::effects::sheet;
 use plant::{Axis, RigParameters, Scene};
 use std::fmt::Write as _;
 
-/// What a run is made with.
 #[derive(Debug)]
 pub struct Condition<'s> {
     /// The rig that controllers know.
@@ -46,9 +45,6 @@ pub struct ConditionError {
 }
 
 /// The condition of a run.
-///
-/// # Errors
-/// [`ConditionError`] with what the reader of rig, experiment or setup says.
 pub fn condition<'s>(
     shelf: &'s Shelf,
     points: &Points,

@@ -24,7 +24,6 @@ pub enum EditError {
     #[error("{path}: {part} is {what}")]
     Path {
         path: String,
-        /// The part that leads nowhere.
         part: String,
         /// What stands there instead.
         what: &'static str,
@@ -48,9 +47,6 @@ pub fn with<'a>(text: &str, numbers: impl IntoIterator<Item = (&'a str, f64)>) -
 }
 
 /// The files that are there and that the text at `path` names, as it names them.
-///
-/// # Errors
-/// [`EditError`] for a text that is no TOML.
 pub fn files_beside(text: &str, path: &Path) -> Result<Vec<String>, EditError> {
     let mut found = Found { path, names: Vec::new() };
     found.visit_document_mut(&mut document(text)?);
@@ -58,9 +54,6 @@ pub fn files_beside(text: &str, path: &Path) -> Result<Vec<String>, EditError> {
 }
 
 /// The text at `path` as it may stand elsewhere.
-///
-/// # Errors
-/// [`EditError`] for a text that is no TOML.
 pub fn moved(text: &str, path: &Path) -> Result<String, EditError> {
     let mut document = document(text)?;
     Found { path, names: Vec::new() }.visit_document_mut(&mut document);

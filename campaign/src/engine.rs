@@ -48,11 +48,9 @@ pub enum EngineError {
 /// What a start does.
 pub struct Start<'a> {
     pub campaign: &'a Campaign,
-    /// Where its parts are.
     pub out: &'a Path,
     /// Which of them are this start's.
     pub shard: Shard,
-    /// Runs at once.
     pub jobs: usize,
     /// Set to stop.
     pub stop: &'a AtomicBool,

@@ -62,7 +62,6 @@ pub struct FaultNumber {
     pub to_s: Option<f64>,
 }
 
-/// A file that is chosen as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FileChoice {
     /// What is done.
@@ -86,7 +85,6 @@ pub enum Values {
 /// What a value is drawn from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Smallest and largest.
     pub(crate) ends: [f64; 2],
     /// Evenly in the order of magnitude, not in the value; then both ends are above 0.
     pub log: bool,

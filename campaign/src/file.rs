@@ -38,7 +38,6 @@ pub struct CampaignFile {
     /// What it is about.
     pub title: String,
     pub kind: Kind,
-    /// Programs that a command starts.
     pub programs: Vec<String>,
     /// Runs of each combination of lists.
     pub draws: u64,
@@ -58,7 +57,6 @@ pub struct CampaignFile {
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
-    /// An experiment on the simulated rig.
     Experiment(ExperimentKind),
     /// A program that answers with a line of JSON.
     Command(Vec<String>),
@@ -137,9 +135,6 @@ const MOST_PER_PART: u64 = 100_000;
 
 impl CampaignFile {
     /// Reads a campaign file.
-    ///
-    /// # Errors
-    /// [`FileError`] with the line and what would be right.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = std::fs::read_to_string(path).map_err(|error| FileError {
             file: path.display().to_string(),
@@ -150,9 +145,6 @@ impl CampaignFile {
     }
 
     /// The same of a text; `path` is for messages and as the place that paths are from.
-    ///
-    /// # Errors
-    /// As [`CampaignFile::read`].
     pub fn from_toml(text: &str, path: &Path) -> Result<Self, FileError> {
         let at = At { text, path };
         let form: Form = toml::from_str(text)

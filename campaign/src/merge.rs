@@ -18,15 +18,7 @@ pub enum MergeError {
     #[error(
         "{missing} of {all} parts are missing, the first is part {first} (runs {from} to {to}); the same 'run' does only what is missing"
     )]
-    Missing {
-        missing: u64,
-        all: u64,
-        first: u64,
-        /// Its first run.
-        from: u64,
-        /// Its last run.
-        to: u64,
-    },
+    Missing { missing: u64, all: u64, first: u64, from: u64, to: u64 },
     #[error(
         "part {part} is in {one} and in {other}: one run would count twice; name one folder once, or delete one of them"
     )]
@@ -41,11 +33,7 @@ pub enum MergeError {
     #[error(transparent)]
     Part(#[from] PartError),
     #[error("{path}: {error}")]
-    Write {
-        path: String,
-        /// What the system says.
-        error: io::Error,
-    },
+    Write { path: String, error: io::Error },
 }
 
 /// The table of all runs, column by column, as far as the page needs it.

@@ -3,7 +3,6 @@
 use crate::factor::Value;
 use std::collections::BTreeMap;
 
-/// What a run came to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     pub ended: Ended,
@@ -21,7 +20,6 @@ pub struct Outcome {
 pub enum Ended {
     /// It came to its end.
     Done,
-    /// The longest time was over before.
     TimeOver,
     /// A fault or an abort ended it: a result like any other.
     Stopped,

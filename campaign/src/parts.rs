@@ -30,7 +30,6 @@ pub struct Parts {
     /// Which program: the hash of its executables.
     pub program: String,
     pub columns: Vec<String>,
-    /// How many runs there are.
     pub runs: u64,
     /// How many a part has, but for the last.
     pub runs_per_part: u64,
@@ -77,7 +76,6 @@ pub fn usual_runs_per_part(runs: u64) -> u64 {
 }
 
 impl Parts {
-    /// How many there are.
     #[must_use]
     pub fn count(&self) -> u64 {
         self.runs.div_ceil(self.runs_per_part)
@@ -176,9 +174,6 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// A file that is to get its name when it is whole; whoever may read its folder's other files may read it.
-///
-/// # Errors
-/// What the system says.
 pub fn beside(folder: &Path) -> io::Result<NamedTempFile> {
     let readable = Permissions::from_mode(0o666); // less what the umask takes
     tempfile::Builder::new().prefix(".part-").suffix(".tmp").permissions(readable).tempfile_in(folder)

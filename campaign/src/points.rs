@@ -15,7 +15,6 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use sha2::{Digest, Sha256};
 
-/// All runs of a campaign.
 #[derive(Clone, Debug)]
 pub struct Points {
     factors: Vec<Factor>,
@@ -58,7 +57,6 @@ impl Points {
         Ok(Self { factors: factors.to_vec(), seed, draws, combinations })
     }
 
-    /// How many there are.
     #[must_use]
     pub fn runs(&self) -> u64 {
         self.combinations * self.draws

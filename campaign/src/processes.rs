@@ -36,13 +36,7 @@ pub enum ProcessesError {
     #[error(transparent)]
     Condition(#[from] ConditionError),
     #[error("run {run}: {what}: {error}")]
-    System {
-        run: u64,
-        /// Which file or program.
-        what: String,
-        /// What the system says.
-        error: io::Error,
-    },
+    System { run: u64, what: String, error: io::Error },
 }
 
 /// A run in a folder, of at most `seconds` of the rig's time.

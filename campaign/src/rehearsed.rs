@@ -148,7 +148,6 @@ const CHAINS: [Chain; 4] = [
     ("emergency_stop_chain", |row| row.emergency_stop.name()),
 ];
 
-/// The tables of a run, column by column.
 struct Columns {
     axes: [AxisColumns; 2],
     measured: Vec<Series>,

@@ -27,13 +27,7 @@ pub enum ShardError {
     #[error(
         "{name}={value}: allowed is 0 to {most} with --shard {count}; an array of Slurm begins at 0 with --array=0-{most}"
     )]
-    Index {
-        name: &'static str,
-        value: String,
-        count: u32,
-        /// Largest index.
-        most: u32,
-    },
+    Index { name: &'static str, value: String, count: u32, most: u32 },
 }
 
 /// Where batch systems tell the index: arrays of Slurm, indexed jobs of Kubernetes.

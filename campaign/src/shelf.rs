@@ -86,9 +86,6 @@ pub struct ShelfError {
 
 impl Shelf {
     /// Reads all files; `shipped` is the folder with the shipped `experiments` and `programs`.
-    ///
-    /// # Errors
-    /// [`ShelfError`] with the file and what is wrong with it.
     pub fn read(file: &CampaignFile, kind: &ExperimentKind, shipped: &Path) -> Result<Self, ShelfError> {
         let error = |message: String| ShelfError { campaign: file.path.display().to_string(), message };
         let own = file.path.parent().unwrap_or(Path::new("")).to_owned();

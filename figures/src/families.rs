@@ -48,7 +48,6 @@ pub(crate) enum Worst {
 }
 
 impl Worst {
-    /// The worst of the repetitions' values.
     fn of(self, values: &[Option<f64>]) -> Option<f64> {
         if self == Self::Latest && values.contains(&None) {
             return None;

@@ -39,7 +39,6 @@ pub enum SummaryError {
     NoSummary(PathBuf),
     #[error("[passed] {key} = {value}: {problem}")]
     Threshold {
-        /// Key in the experiment file.
         key: String,
         value: String,
         /// What is wrong, and what would be right.

@@ -12,7 +12,6 @@
 //! # Source
 //! H. A. David, H. N. Nagaraja, Order Statistics, 3rd ed. 2003, section 7.1.
 
-/// Least confidence of an interval.
 const CONFIDENCE: f64 = 0.95;
 /// Fewer values have no interval: 1 − 2 · (1/2)^5 is below [`CONFIDENCE`].
 pub const LEAST_VALUES: u64 = 6;

@@ -9,17 +9,14 @@ const SAME_S: f64 = 1e-7;
 /// Longest gap that does not end a stretch, s: cycles that a late rig skipped are in no table of a controller, and time went on.
 const LONGEST_GAP_S: f64 = 0.1;
 
-/// Samples of one quantity.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     time_s: Vec<f64>,
     values: Vec<f64>,
 }
 
-/// A stretch of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    /// Its first instant.
     pub from_s: f64,
     /// The first instant after it.
     pub to_s: f64,
@@ -58,7 +55,6 @@ impl FromIterator<(f64, f64)> for Series {
 }
 
 impl Series {
-    /// Nothing measured.
     pub const NONE: &'static Self = &Self { time_s: Vec::new(), values: Vec::new() };
 
     /// Adds a sample; `time_s` is later than those before.
@@ -77,7 +73,6 @@ impl Series {
         &self.values
     }
 
-    /// Number of samples.
     #[must_use]
     pub fn len(&self) -> usize {
         self.values.len()
@@ -217,7 +212,6 @@ impl Series {
         self.values.iter().copied().reduce(f64::min)
     }
 
-    /// Largest value.
     #[must_use]
     pub fn most(&self) -> Option<f64> {
         self.values.iter().copied().reduce(f64::max)
@@ -235,7 +229,6 @@ impl Series {
         Some(self.most()? - self.least()?)
     }
 
-    /// Time of the first sample whose value is as wanted.
     #[must_use]
     pub fn first_time(&self, wanted: impl Fn(f64) -> bool) -> Option<f64> {
         self.iter().find(|(_, value)| wanted(*value)).map(|(time, _)| time)

@@ -6,12 +6,10 @@ use runlog::run_folder::FileError;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A state and how long it lasted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateSpan {
     /// The state's name, as `rig.dbc` has it.
     pub state: String,
-    /// From when until when.
     pub span: Span,
 }
 

@@ -147,7 +147,6 @@ pub fn is_kept(entry: &Value) -> bool {
     entry["kept"] == Value::Bool(true)
 }
 
-/// The bounds of a judged entry in words.
 #[must_use]
 pub fn in_words(entry: &Value) -> String {
     match (entry["least"].as_f64(), entry["most"].as_f64()) {

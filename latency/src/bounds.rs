@@ -34,17 +34,10 @@ pub enum BoundsError {
     #[error("[bounds] {figure}: write it as {{ max = 50000 }}, {{ min = 1 }} or with both")]
     Shape { figure: String },
     #[error("[bounds] {figure}: no such figure; there are {known}")]
-    Unknown {
-        /// What the file says.
-        figure: String,
-        known: String,
-    },
+    Unknown { figure: String, known: String },
 }
 
 /// Judges a report by the text of a threshold file.
-///
-/// # Errors
-/// [`BoundsError`] with the figure and what would be right.
 pub fn judge(text: &str, report: &Report) -> Result<Vec<BoundResult>, BoundsError> {
     let file: toml::Table =
         text.parse().map_err(|error: toml::de::Error| BoundsError::Toml(error.to_string()))?;

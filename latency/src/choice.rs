@@ -14,9 +14,6 @@ pub struct Chosen {
 }
 
 /// The runs in `folders`, then those of `groups`, each NAME=FOLDER. A folder that is no run stands for the runs in it, by name.
-///
-/// # Errors
-/// [`ReportError::NoRun`], [`ReportError::Group`].
 pub fn choose(folders: &[PathBuf], groups: &[String]) -> Result<Vec<Chosen>, ReportError> {
     let mut chosen = Vec::new();
     for folder in folders {

@@ -17,7 +17,6 @@ const CHANCE: f64 = 0.05;
 /// Fewest runs in each group that can be told apart at that probability.
 const FEWEST: usize = 4;
 
-/// Percentiles that are compared.
 const FIGURES: [(&str, Pick); 4] = [
     ("p50", |told| told.p50),
     ("p99", |told| told.p99),

@@ -49,7 +49,6 @@ pub struct RunFiles {
     pub told_late_ns: BTreeMap<String, BTreeMap<u64, u64>>,
     /// Gaps that the probe saw; nothing when it did not run.
     pub gaps: Option<Vec<Gap>>,
-    /// The reference beside this run.
     pub reference: Option<Reference>,
     /// Ping-pongs beside this run, by tag.
     pub ping_pongs: BTreeMap<String, Samples>,

@@ -61,7 +61,6 @@ fn worst<'a>(events: impl Iterator<Item = &'a Event>) -> String {
     in_words(events.map(|event| event.late_ns.max(event.slow_ns)).max().unwrap_or_default())
 }
 
-/// Lateness and slowness of all events of a cause, ns.
 fn explained_ns(events: &[Event], cause: Cause) -> u64 {
     of(events, cause).map(|event| event.late_ns.max(event.slow_ns)).sum()
 }

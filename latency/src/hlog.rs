@@ -78,9 +78,6 @@ pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogErro
 }
 
 /// Reads a log of few intervals.
-///
-/// # Errors
-/// As [`each`].
 pub fn read(text: &str) -> Result<Vec<Interval>, LogError> {
     let mut intervals = Vec::new();
     each(text, |Passing { tag, start_s, duration_s, histogram }| {

@@ -43,7 +43,6 @@ const PROCESSES: [(&str, Source, &str); 4] = [
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kind {
     pub tag: String,
-    /// Where it comes from.
     pub source: Source,
     pub about: String,
 }

@@ -105,7 +105,6 @@ impl ReportError {
 #[derive(Debug)]
 pub struct Made {
     pub report: Report,
-    /// The runs as they were read.
     pub runs: Vec<RunFiles>,
     /// The distributions of each run, by tag.
     pub series: Vec<BTreeMap<String, Series>>,

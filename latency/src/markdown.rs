@@ -33,7 +33,6 @@ pub fn summary(report: &Report) -> String {
     out.trim_end().to_owned() + "\n"
 }
 
-/// The short table for a terminal.
 #[must_use]
 pub fn table(report: &Report) -> String {
     let mut out = percentiles(&report.distributions).markdown();

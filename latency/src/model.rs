@@ -20,7 +20,6 @@ pub struct Report {
     pub made_unix_s: f64,
     /// May these figures be quoted as latencies of this machine, and what was left uncontrolled.
     pub claim: Claim,
-    /// Where and how it was measured.
     pub conditions: Conditions,
     /// All runs together: distributions added up, the reference's too.
     pub distributions: Vec<Distribution>,
@@ -48,12 +47,10 @@ pub struct Claim {
     pub not_controlled: Vec<String>,
 }
 
-/// Where and how it was measured.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Conditions {
     /// Facts of machine, kernel, limits and build, in the order in which they are shown.
     pub machine: Vec<Fact>,
-    /// What each program was started with.
     pub command_lines: Vec<Fact>,
     /// What the system granted and refused.
     pub privileges: Vec<Fact>,
@@ -92,7 +89,6 @@ pub enum Source {
 pub struct Distribution {
     /// Tag in the `.hlog`, such as `emulator-wakeup`.
     pub name: String,
-    /// Where it comes from.
     pub source: Source,
     pub about: String,
     pub percentiles_ns: PercentilesNs,
@@ -135,7 +131,6 @@ pub struct Bin {
 pub struct Maximum {
     pub run: usize,
     pub second: u64,
-    /// Largest value, ns.
     pub max_ns: u64,
 }
 
@@ -186,14 +181,11 @@ pub struct Event {
     pub run: usize,
     /// Which process: `emulator`, `controller`, `controller-drive`, `controller-load`.
     pub process: String,
-    /// The rig's cycle that was late.
     pub cycle: u64,
-    /// The rig's time, s.
     pub at_s: f64,
     pub late_ns: u64,
     /// How much later than usual it was done after waking, ns.
     pub slow_ns: u64,
-    /// Cycles missed.
     pub skipped: u64,
     pub cause: Cause,
     pub sentence: String,
@@ -228,7 +220,6 @@ pub struct AroundRow {
     pub due_us: f64,
     /// Wake-up latency, us.
     pub late_us: f64,
-    /// From waking to done, us.
     pub execution_us: f64,
     /// Time that it waited for the CPU, us.
     pub run_delay_us: f64,
@@ -292,7 +283,6 @@ pub struct ArrivalRow {
     /// The frame, such as `DriveSensors`.
     pub frame: String,
     pub period_ms: u64,
-    /// Frames that came.
     pub count: u64,
     /// Intervals longer than one and a half periods.
     pub gaps: u64,
@@ -318,7 +308,6 @@ pub struct ComparisonRow {
     pub cells: Vec<ComparisonCell>,
 }
 
-/// One figure of one group.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ComparisonCell {
     /// Median over the group's runs, ns.
@@ -338,9 +327,7 @@ pub struct BoundResult {
     pub figure: String,
     /// Its value; null when it was not measured, which breaks the bound.
     pub value: Option<f64>,
-    /// Smallest allowed.
     pub min: Option<f64>,
-    /// Largest allowed.
     pub max: Option<f64>,
     /// Whether it was kept; false too when that is not resolved.
     pub kept: bool,

@@ -46,7 +46,6 @@ pub fn watched(gaps: Option<&[Gap]>, cpu: u64, at_ns: u64) -> Watched {
     if gaps.iter().any(|gap| gap.from_ns == gap.to_ns) { Watched::No } else { Watched::NotTold }
 }
 
-/// What a table has wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
 pub struct ProbeError {
@@ -55,9 +54,6 @@ pub struct ProbeError {
 }
 
 /// Reads a table; a last line without its end is left out. Columns may follow that are not known here.
-///
-/// # Errors
-/// [`ProbeError`] with its line.
 pub fn read(text: &str) -> Result<Vec<Gap>, ProbeError> {
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     let mut lines = (1..).zip(whole.lines());

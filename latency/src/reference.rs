@@ -69,7 +69,6 @@ struct Thread {
 /// What keeps a reference from being read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
-    /// No such JSON.
     #[error("{0}")]
     Json(#[from] serde_json::Error),
     #[error("histogram: bin \"{0}\" is no whole number")]
@@ -79,9 +78,6 @@ pub enum ReferenceError {
 }
 
 /// Reads what cyclictest wrote.
-///
-/// # Errors
-/// [`ReferenceError`].
 pub fn read(text: &str) -> Result<Reference, ReferenceError> {
     let file: File = serde_json::from_str(text)?;
     let whole_us = file.resolution_in_ns != 1;

@@ -50,7 +50,6 @@ impl Samples {
         self.histogram.saturating_record_n(ns.min(BOUND_NS), n);
     }
 
-    /// Adds all samples of another.
     pub fn add(&mut self, other: &Self) {
         self.add_histogram(&other.histogram);
     }
@@ -63,7 +62,6 @@ impl Samples {
         }
     }
 
-    /// How many there are.
     #[must_use]
     pub fn count(&self) -> u64 {
         self.histogram.len()
@@ -75,7 +73,6 @@ impl Samples {
         (!self.histogram.is_empty()).then(|| self.histogram.max())
     }
 
-    /// The histogram itself, for logs.
     #[must_use]
     pub fn histogram(&self) -> &Histogram<u64> {
         &self.histogram

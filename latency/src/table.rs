@@ -43,9 +43,6 @@ const FACTS: [&str; 6] =
     ["processor", "kernel", "preemption: model", "hypervisor", "frequency", "clock source"];
 
 /// The table in Markdown.
-///
-/// # Errors
-/// [`FileError::Read`] when a report cannot be read.
 pub fn table(arguments: &LatencyTableArguments) -> Result<String, FileError> {
     let plain: Report = read_json(&arguments.report)?;
     let spin: Option<Report> = arguments.spin.as_deref().map(read_json).transpose()?;
@@ -56,7 +53,6 @@ pub fn table(arguments: &LatencyTableArguments) -> Result<String, FileError> {
     Ok(out)
 }
 
-/// The largest value that is claimed of a figure.
 fn claimed(figure: &str) -> Option<f64> {
     let of = |text: &str| {
         let file: toml::Table = text.parse().ok()?;

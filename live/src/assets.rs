@@ -5,7 +5,6 @@
 
 use pagekit::page;
 
-/// A file of the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Asset {
     /// Its type, as HTTP tells it.
@@ -63,7 +62,6 @@ const ASSETS: &[(&str, Asset)] = &[
     file!("vendor/uplot/uPlot.min.css", STYLE),
 ];
 
-/// The file that is served at a path.
 #[must_use]
 pub fn find(path: &str) -> Option<Asset> {
     ASSETS.iter().find(|(known, _)| *known == path).map(|(_, asset)| *asset)

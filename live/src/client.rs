@@ -24,14 +24,12 @@ const ANSWER_MS: u64 = 5_000;
 /// Bytes taken from a client in one turn.
 const READ_A_TURN: usize = 16 << 10;
 
-/// What a client is here for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     /// It asks.
     Asking,
     /// Its request is being obeyed elsewhere.
     Waiting,
-    /// It gets events.
     Streaming,
     /// It gets its answer, and then its end.
     Ending,
@@ -131,7 +129,6 @@ impl Client {
         }
     }
 
-    /// Makes it a listener to events.
     pub(super) fn stream_events(&mut self, now_ms: u64) {
         self.stage = Stage::Streaming;
         self.queue(http::stream_head().into(), now_ms);

@@ -130,7 +130,6 @@ impl Layout {
         self.measured.map(|place| values.get(place?).copied())
     }
 
-    /// The supply's pressure in a cycle, Pa.
     #[must_use]
     pub fn supply_pa(&self, values: &[f64]) -> Option<f64> {
         values.get(self.supply?).copied()

@@ -59,7 +59,6 @@ pub enum Order {
     /// A stop by the console, repeated on the bus until it is released.
     Stop,
     Release,
-    /// A frame on the bus, once.
     Frame(Frame),
     /// A set-point by hand on the bus, once: one of both, of which the other is not to change.
     SetPoint {
@@ -70,16 +69,12 @@ pub enum Order {
         /// How hard it is to press, N.
         force_n: Option<f64>,
     },
-    /// A line for the emulator's console.
     Line(String),
     /// The last so many seconds, saved.
     Save(f64),
 }
 
 /// Reads what is asked for.
-///
-/// # Errors
-/// What is wrong with it, in words.
 pub fn read(body: &[u8]) -> Result<Order, String> {
     let asked: Asked = serde_json::from_slice(body).map_err(|error| error.to_string())?;
     let run = |command| Order::Frame(Frame::RunControl(RunControl { command, experiment: 0 }));

@@ -39,7 +39,6 @@ pub struct Request {
 /// How far a request has come.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// More is to come.
     Partial,
     /// All of it.
     Whole(Request),
@@ -47,7 +46,6 @@ pub enum Progress {
     Refused(Status),
 }
 
-/// What a request led to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     Good,
@@ -170,7 +168,6 @@ pub fn stream_head() -> Vec<u8> {
     .into_bytes()
 }
 
-/// A Server-Sent Event.
 #[must_use]
 pub fn event(name: &str, data: &Value) -> Vec<u8> {
     // JSON without line breaks, as it is written here, is one line of data.

@@ -54,15 +54,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// What keeps the page from being served.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// The bus cannot be opened.
     #[error(transparent)]
     Bus(#[from] BusError),
     #[error("cannot listen at {address}: {reason}; choose another with --http, port 0 for a free one")]
-    Listen {
-        /// Where it was to listen.
-        address: SocketAddr,
-        reason: String,
-    },
+    Listen { address: SocketAddr, reason: String },
     /// The system gave no signal handler, no poll, or no random numbers.
     #[error("{0}")]
     System(io::Error),
@@ -83,9 +78,6 @@ fn wall_clock_ns(age_ns: u64) -> u64 {
 }
 
 /// Serves the page until a signal comes.
-///
-/// # Errors
-/// [`LiveError`] when bus or address cannot be had.
 pub fn run(arguments: &WatchArguments) -> Result<Exit, LiveError> {
     let interrupt = Interrupt::watch().map_err(LiveError::System)?;
     let mut server = Server::open(arguments)?;

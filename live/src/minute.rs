@@ -45,7 +45,6 @@ pub struct Saved {
 /// How the rig is set up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetUp {
-    /// Whether the rods are linked.
     pub linked: bool,
     /// Weights on the carriage, kg.
     pub added_mass_kg: f64,

@@ -11,7 +11,6 @@ const RECENT_S: usize = 10;
 const SHOWN: [(&str, &[&str]); 2] =
     [("wake_up", &["emulator-wakeup"]), ("round_trip", &["drive-round-trip", "load-round-trip"])];
 
-/// One of those shown.
 #[derive(Debug, Default)]
 struct Distribution {
     whole: Samples,
@@ -27,9 +26,6 @@ pub struct Rhythm {
 
 impl Rhythm {
     /// Takes a line of an interval log.
-    ///
-    /// # Errors
-    /// [`hlog::LogError`] when it is none.
     pub fn take(&mut self, line: &str) -> Result<(), hlog::LogError> {
         hlog::each(&format!("{line}\n"), |passing| {
             let known = SHOWN.iter().position(|(_, tags)| tags.contains(&passing.tag));

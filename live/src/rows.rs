@@ -90,7 +90,6 @@ impl Rows {
         table(self.kept.range(self.kept.len().saturating_sub(rows)..))
     }
 
-    /// The newest row, by column.
     #[must_use]
     pub fn newest(&self) -> Map<String, Value> {
         let Some(row) = self.kept.back() else { return Map::new() };

@@ -26,7 +26,6 @@ const WARNINGS: [&str; 7] =
     ["skipped", "command-stale", "link-refused", "link-given-up", "weights-refused", "malformed", "fault"];
 const ERRORS: [&str; 5] = ["emergency-stop", "two-sources", "second-rig", "not-finite", "bus-lost"];
 
-/// Everything that was heard.
 pub struct View {
     /// The run's folder, if it was named at the command line.
     folder: Option<PathBuf>,
@@ -35,7 +34,6 @@ pub struct View {
     /// Whether cycles come by telemetry, and not by the bus alone.
     pub telemetry: bool,
     cycle: Option<u64>,
-    /// Frames of the bus.
     pub wire: Wire,
     pub rows: Rows,
     pub rhythm: Rhythm,
@@ -58,7 +56,6 @@ pub struct View {
 pub struct Audience {
     /// Listeners to events.
     pub viewers: usize,
-    /// Events that they missed.
     pub missed: u64,
     /// Milliseconds since the start of the program.
     pub now_ms: u64,
@@ -162,7 +159,6 @@ impl View {
         self.rows.add(cycle, &row);
     }
 
-    /// Takes a frame of the bus.
     pub fn frame(&mut self, record: FrameRecord, now_ms: u64) {
         self.minute.frame(record);
         match self.wire.take(&record.frame, now_ms) {

@@ -75,7 +75,6 @@ struct Counts {
 }
 
 impl Wire {
-    /// Takes a frame that came at `now_ms`.
     pub fn take(&mut self, frame: &CanFrame, now_ms: u64) -> Option<News> {
         self.frames.count(frame);
         match Frame::decode(frame) {
@@ -193,12 +192,10 @@ impl Wire {
         Some(HandSetPoint { axis, position_m, force_n })
     }
 
-    /// Notes a stop or its release.
     pub fn note_stop(&mut self, stopper: usize, stop: EmergencyStop, now_ms: u64) {
         self.stops[stopper] = (!stop.release).then_some(now_ms);
     }
 
-    /// The rig's status as it was told last.
     #[must_use]
     pub fn status(&self) -> Option<&RigStatus> {
         self.status.as_ref()

@@ -21,7 +21,6 @@ const USUAL_AGE_CYCLES: u64 = 1;
 /// Quantile of what is judged by most of it.
 const MOST: f64 = 0.99;
 
-/// A phase of a session as it went.
 pub(super) struct Phase<'a> {
     /// Cycles whose sensors were sent, with their stamps; `None` for the time of a cycle that this process disturbed.
     pub(super) cycles: &'a [(u64, Option<u64>)],
@@ -69,7 +68,6 @@ pub(super) fn regular(phase: &Phase<'_>, arguments: &ConformanceArguments) -> Ve
     cases
 }
 
-/// Every cycle is answered, by one command.
 pub(super) fn every_cycle(class: &str, phase: &Phase<'_>, arguments: &ConformanceArguments) -> Case {
     let cycles = phase.cycles.len();
     let mut counts = BTreeMap::new();

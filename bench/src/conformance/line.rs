@@ -31,11 +31,9 @@ const JOIN_PATIENCE: Duration = Duration::from_secs(30);
 pub(super) enum Broken {
     /// Lockstep: somebody did not answer within the barrier's patience.
     TimedOut(String),
-    /// Lockstep: nobody is in the barrier.
     NobodyThere,
 }
 
-/// A cycle as it went.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sent {
     /// When its sensors were handed to the bus, ns.

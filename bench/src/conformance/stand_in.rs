@@ -26,10 +26,8 @@ const STROKE_M: f64 = 0.5;
 /// An identifier that rig.dbc does not know.
 const UNKNOWN_ID: u16 = 0x5A5;
 
-/// What is wrong in a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Disturbance {
-    /// The sensors of the axis are silent.
     pub(super) sensors_lost: bool,
     /// Frames that a controller has to pass over, beside the right ones.
     pub(super) noise: bool,

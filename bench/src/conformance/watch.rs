@@ -38,21 +38,17 @@ pub(super) enum Wrong {
     Checksum,
     /// Bits that no signal covers are not 0.
     Reserved,
-    /// A value beyond its range.
     Range,
 }
 
-/// A frame of the controller.
 #[derive(Clone, Debug)]
 pub(super) struct Heard {
     /// The newest cycle that was sent when it came.
     pub(super) cycle: u64,
-    /// When it came, ns.
     pub(super) stamp_ns: u64,
     pub(super) what: What,
 }
 
-/// Everything that was heard.
 pub(super) struct Watch {
     command: &'static MessageSpec,
     /// Nodes of rig.dbc whose frames it may send.

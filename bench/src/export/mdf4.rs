@@ -12,7 +12,6 @@ use protocol::frames::{SignalKind, SignalSpec};
 /// Where the start time stands in a header block: links of 8 bytes behind 24 bytes of head [ASAM MDF 4.1, HD block].
 const START_TIME_OFFSET: u64 = 72;
 
-/// Writes the file.
 pub(super) fn write(path: &str, signals: &Signals, origin_ns: u64) -> mdf4_rs::Result<()> {
     let mut file = MdfWriter::new(path)?;
     file.init_mdf_file()?;

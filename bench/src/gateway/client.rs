@@ -25,7 +25,6 @@ const KEEP_ALIVE: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(
 /// Bytes taken from a client in one turn, so that one that floods does not keep the others waiting.
 const READ_A_TURN: usize = 4096;
 
-/// Why a connection ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Ended {
@@ -34,14 +33,12 @@ pub(super) enum Ended {
     /// It read nothing for 30 s, or asked without reading the answers.
     ReadsNothing,
     WithGateway,
-    /// The session ended it.
     #[serde(untagged)]
     Parted(Parting),
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct ClientReport {
-    /// Where it came from.
     pub(super) address: SocketAddr,
     /// Frames of the bus that were queued for it.
     pub(super) frames_to_client: u64,

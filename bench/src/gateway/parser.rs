@@ -20,16 +20,13 @@ use protocol::can::{CanFrame, EXTENDED_FLAG};
 /// Longest request in bytes, brackets not counted: twice what the longest one that is allowed needs.
 pub const LONGEST_REQUEST: usize = 128;
 
-/// What a client asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Use the bus of this name.
     Open(String),
     /// Every frame from now on.
     RawMode,
-    /// The same back.
     Echo,
-    /// Put a frame on the bus.
     Send(CanFrame),
 }
 

@@ -31,7 +31,6 @@ pub const MOST_REFUSED: u64 = 100;
 pub enum Action {
     /// Send this text to the client.
     Reply(String),
-    /// Put this frame on the bus.
     Send(CanFrame),
     /// Send what was replied, then end the connection; why.
     Part(Parting),
@@ -42,9 +41,7 @@ pub enum Action {
 #[serde(rename_all = "kebab-case")]
 pub enum Parting {
     NotTheProtocol,
-    /// A bus that is not here.
     UnknownBus,
-    /// Not in raw mode in time.
     NoRawMode,
     /// Nothing but requests that are none.
     TooManyRefused,

@@ -56,7 +56,6 @@ impl Kind {
 }
 
 impl LeftOut {
-    /// Whether it is about the frame.
     #[must_use]
     pub fn names(self, frame: &CanFrame) -> bool {
         match self {

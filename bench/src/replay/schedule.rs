@@ -11,7 +11,6 @@ use std::time::Duration;
 /// Longest log: what is longer has a stamp of another clock in it.
 pub(super) const LONGEST: Duration = Duration::from_secs(7 * 24 * 3600);
 
-/// A frame and when it is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Due {
     /// Since the first frame of the log, ns.
@@ -34,7 +33,6 @@ pub(super) struct Schedule {
     pub(super) of_the_rig: u64,
 }
 
-/// A log that lasts too long.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct TooLong {
     /// Line of the first frame beyond the limit.

@@ -26,7 +26,6 @@ const COUNTER_RANGE: u64 = 16;
 pub struct Counts(BTreeMap<String, u64>);
 
 impl Counts {
-    /// Frames of an identifier.
     #[must_use]
     pub fn of(&self, id: &str) -> u64 {
         self.0.get(id).copied().unwrap_or(0)
@@ -154,7 +153,6 @@ pub struct Row {
     /// Identifier, as candump names it.
     pub id: String,
     pub sender: String,
-    /// Who should have received it.
     pub receiver: String,
     /// Frames sent, by the sender's count.
     pub sent: u64,
@@ -237,7 +235,6 @@ pub fn close(parties: &[Party], wire: Option<&Wire>) -> Account {
     account
 }
 
-/// Sender and frames of each identifier.
 fn senders(parties: &[Party], wire: Option<&Wire>) -> BTreeMap<String, (String, u64)> {
     let mut senders: BTreeMap<String, (String, u64)> = BTreeMap::new();
     let strangers = wire.map_or(&[][..], |wire| &wire.others).iter().map(|seen| ("another", &seen.taken));

@@ -21,9 +21,6 @@ pub struct FrameLog {
 }
 
 /// Reads a log to its last whole line.
-///
-/// # Errors
-/// What the system says.
 pub fn read(path: &Path) -> io::Result<FrameLog> {
     let mut reader = BufReader::with_capacity(1 << 18, File::open(path)?);
     let mut frames: BTreeMap<Vec<u8>, u64> = BTreeMap::new();

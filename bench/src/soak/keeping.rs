@@ -14,10 +14,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// A soak and its folder.
 pub struct Keeping {
     pub soak: Soak,
-    /// Distributions of all segments.
     pub merged: Merged,
     out: PathBuf,
     /// Held as long as we live: one soak in a folder.
@@ -84,7 +82,6 @@ impl Keeping {
         Ok(())
     }
 
-    /// Folder of the soak.
     #[must_use]
     pub fn out(&self) -> &Path {
         &self.out
@@ -96,9 +93,6 @@ impl Keeping {
     }
 
     /// Adds up and writes everything.
-    ///
-    /// # Errors
-    /// [`SoakError::Output`].
     pub fn write(&mut self) -> Result<(), SoakError> {
         let failed = |path: &Path, error: &io::Error| SoakError::output(path, error);
         let soak = &mut self.soak;

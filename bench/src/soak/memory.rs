@@ -32,7 +32,6 @@ const PAIRED_SAMPLES: usize = 600;
 pub struct Sample {
     /// Since the segment's start.
     pub at_s: f64,
-    /// Resident memory.
     pub rss_kib: u64,
     /// The largest it ever was.
     pub peak_rss_kib: u64,

@@ -17,7 +17,6 @@ use std::time::Duration;
 /// Files of a segment that hold distributions.
 const LOGS: &[&str] = &["emulator.hlog", "controller.hlog", "controller-drive.hlog", "controller-load.hlog"];
 
-/// Distributions by tag.
 #[derive(Clone, Default)]
 pub struct Merged(BTreeMap<String, Histogram<u64>>);
 
@@ -93,9 +92,6 @@ impl Merged {
     }
 
     /// Writes all of it as one interval, under a temporary name first.
-    ///
-    /// # Errors
-    /// What the system says.
     pub fn write(&self, path: &Path, started_unix_s: f64, length: Duration) -> io::Result<()> {
         let tagged = self.0.iter().filter(|(tag, _)| !tag.is_empty());
         let parts: Vec<_> = tagged.map(|(tag, histogram)| (tag.as_str(), histogram)).collect();

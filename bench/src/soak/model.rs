@@ -14,7 +14,6 @@ pub const SOAK_SCHEMA_VERSION: u32 = 1;
 /// A soak, over all its starts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Soak {
-    /// See [`SOAK_SCHEMA_VERSION`].
     pub schema_version: u32,
     /// Whether its results may be trusted so far.
     pub trusted: bool,
@@ -42,7 +41,6 @@ pub struct Soak {
     pub folder_bytes: u64,
     /// Resident memory of the soak itself after the last segment.
     pub own_rss_kib: u64,
-    /// The segments in their order.
     pub segments: Vec<Segment>,
 }
 

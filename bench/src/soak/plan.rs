@@ -20,7 +20,6 @@ const WAYS: u32 = 4;
 /// What of a segment is no run of the rig, s: starting, ending, reading what was left.
 const AROUND_S: f64 = 2.5;
 
-/// A segment as it is planned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spec {
     /// Its number, from 1.
@@ -34,7 +33,6 @@ pub struct Spec {
     pub loss: Option<f64>,
 }
 
-/// What segments are made of.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub experiments: Vec<String>,

@@ -24,9 +24,6 @@ pub struct Running {
 
 impl Running {
     /// Starts a program; what it says goes to a file.
-    ///
-    /// # Errors
-    /// What the system says.
     pub fn start(name: &str, program: &Path, arguments: &[OsString], said: &Path) -> io::Result<Self> {
         let file = File::create(said)?;
         // Through this program, which binds itself to us and becomes the other one: the same process.
@@ -44,7 +41,6 @@ impl Running {
         Ok(Self { name: name.into(), child, ended: None })
     }
 
-    /// Its process number.
     #[must_use]
     pub fn pid(&self) -> u32 {
         self.child.id()
@@ -58,7 +54,6 @@ impl Running {
         self.ended.is_none()
     }
 
-    /// Asks it to end.
     pub fn interrupt(&mut self) {
         self.signal(Signal::INT);
     }

@@ -32,7 +32,6 @@ pub struct Common {
     pub bus: BusUrl,
     pub rig: PathBuf,
     pub experiment_folder: PathBuf,
-    /// Folder of the programs.
     pub bin_dir: PathBuf,
     /// Command line of the load generator, its program first; empty for none.
     pub load: Vec<String>,
@@ -42,7 +41,6 @@ pub struct Common {
     pub min_free_bytes: u64,
 }
 
-/// Why a segment ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
     TimeUp,
@@ -68,9 +66,6 @@ pub struct Outcome {
 pub type Tell<'a> = dyn FnMut(f64) + 'a;
 
 /// Runs a segment of `rig_s` in `folder`, which is made.
-///
-/// # Errors
-/// [`SoakError`] when it cannot be begun.
 pub fn run(
     common: &Common,
     spec: &Spec,
@@ -124,7 +119,6 @@ fn interface(bus: &BusUrl) -> Option<&str> {
     }
 }
 
-/// How the programs of a segment are started.
 struct Start<'a> {
     common: &'a Common,
     spec: &'a Spec,

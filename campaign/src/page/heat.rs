@@ -44,7 +44,6 @@ pub(super) fn section(campaign: &Campaign, results: &Results, shown: &[String]) 
 struct Axis {
     name: String,
     classes: Vec<String>,
-    /// The class of each run.
     places: Vec<Option<usize>>,
 }
 

@@ -54,7 +54,6 @@ pub struct Seen {
     pub waited_ns: u64,
     /// Lateness or slowness of all cycles of the event, ns.
     pub together_ns: u64,
-    /// Whether a probe watched this CPU.
     pub probe_watched: Watched,
     /// Longest gap of that probe within the event in which no thread had the CPU, ns.
     pub still_ns: u64,
@@ -68,12 +67,10 @@ pub struct Seen {
     pub ran_elsewhere: bool,
 }
 
-/// A cause with its reasons.
 #[derive(Clone, Debug)]
 pub struct Told {
     pub cause: Cause,
     pub sentence: String,
-    /// What speaks for it, and what against.
     pub evidence: Vec<String>,
 }
 

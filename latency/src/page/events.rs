@@ -172,7 +172,6 @@ fn nearest(rows: &[AroundRow], room: usize) -> &[AroundRow] {
     &rows[start..start + room]
 }
 
-/// What disturbed the runs.
 pub(super) fn findings(findings: &[Finding]) -> String {
     let mut table = Table::new("Findings", ["what", "how often", "in words"]);
     for finding in findings {
@@ -185,7 +184,6 @@ pub(super) fn findings(findings: &[Finding]) -> String {
     table.html_or("None: nothing was found that disturbed the runs.")
 }
 
-/// A cause in a few words.
 fn cause(cause: Cause) -> &'static str {
     match cause {
         Cause::EmulatorStopped => "the rig's process was stopped",

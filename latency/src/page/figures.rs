@@ -14,7 +14,6 @@ pub(super) fn percentiles(of: &PercentilesNs) -> Vec<Cell> {
     lengths.into_iter().chain([number(number::count(of.count))]).collect()
 }
 
-/// The table of all distributions.
 pub(super) fn key_figures(families: &[Family<'_>]) -> String {
     let mut table = Table::new("Key figures in µs", ["all in µs"].into_iter().chain(PERCENTILES));
     for family in families {

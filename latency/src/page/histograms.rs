@@ -124,7 +124,6 @@ fn axes(x: &Scale, y: &Scale, size: &Size) -> String {
     drawn + &upright_label("samples in a bin, logarithmic", (TOP, bottom))
 }
 
-/// The label of a vertical axis.
 fn upright_label(label: &str, across: (f64, f64)) -> String {
     let middle = 0.5 * (across.0 + across.1);
     format!(
@@ -177,7 +176,6 @@ fn marked(distribution: &Distribution) -> Vec<(f64, f64)> {
     lengths.into_iter().map(place).collect()
 }
 
-/// What is to be seen, in words.
 fn description(family: &Family<'_>) -> String {
     let told = family.members.iter().map(|(_, one)| {
         let of = &one.percentiles_ns;

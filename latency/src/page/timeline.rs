@@ -29,7 +29,6 @@ const BEFORE_US: f64 = 3000.0;
 const AFTER_US: f64 = 5000.0;
 /// The rig's cycle, us.
 const PERIOD_US: f64 = 1000.0;
-/// CPUs drawn.
 const MOST_LANES: usize = 8;
 /// Cycles whose markers do not touch each other.
 const MOST_MARKERS: usize = 90;
@@ -99,7 +98,6 @@ fn is_known(row: &AroundRow) -> bool {
     [row.due_us, row.late_us, row.execution_us].iter().all(|value| value.is_finite())
 }
 
-/// The drawing with its legend.
 pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
     let (from_us, to_us) = window(event);
     let x = Scale::linear((from_us * 1e-3, to_us * 1e-3), (LEFT, RIGHT));
