@@ -84,7 +84,7 @@ impl SoakError {
 /// # Errors
 /// [`SoakError`] when it cannot begin or its results cannot be written; how it went is the exit code.
 pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
-    let common = common(arguments)?;
+    let bin_dir = bin_dir(arguments)?;
     let (load, load_missing_because) = load(arguments);
     let planned_s = arguments.planned_s();
     let loss = (arguments.loss_segments == YesNo::Yes && matches!(arguments.bus, BusUrl::Unix { .. }))
@@ -104,9 +104,7 @@ pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     keeping.soak.load_missing_because = load_missing_because;
     let soaking = Soaking {
         plan: Plan { experiments: arguments.experiments.clone(), load: load.is_some(), loss },
-        common: Common { load: load.unwrap_or_default(), ..common },
-        keep: arguments.keep,
-        keep_failed: arguments.keep_failed,
+        common: Common { arguments, bin_dir, load: load.unwrap_or_default() },
         interrupt: Interrupt::watch().map_err(SoakError::Signals)?,
     };
     let (exit, because) = soaking.run(&mut keeping)?;
@@ -118,8 +116,8 @@ pub fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     Ok(exit)
 }
 
-/// What all segments have in common, looked at before anything is begun.
-fn common(arguments: &SoakArguments) -> Result<Common, SoakError> {
+/// Where the programs are; that they and all files are there is looked at before anything is begun.
+fn bin_dir(arguments: &SoakArguments) -> Result<PathBuf, SoakError> {
     let experiment = |name: &String| arguments.experiment_folder.join(format!("{name}.toml"));
     for file in arguments.experiments.iter().map(experiment).chain([arguments.rig.clone()]) {
         std::fs::metadata(&file).map_err(|error| FileError::read(&file, error))?;
@@ -131,17 +129,7 @@ fn common(arguments: &SoakArguments) -> Result<Common, SoakError> {
         std::fs::metadata(&path)
             .map_err(|error| SoakError::Program { program: path.clone(), reason: error.to_string() })?;
     }
-    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect();
-    Ok(Common {
-        bus: arguments.bus.clone(),
-        rig: arguments.rig.clone(),
-        experiment_folder: arguments.experiment_folder.clone(),
-        bin_dir,
-        load: Vec::new(),
-        emulator_options: words(&arguments.emulator_options),
-        controller_options: words(&arguments.controller_options),
-        min_free_bytes: arguments.min_free_mb * 1_000_000,
-    })
+    Ok(bin_dir)
 }
 
 /// The load generator's command line with its program's path, or why there is none although one was asked for.
@@ -164,15 +152,13 @@ fn load(arguments: &SoakArguments) -> (Option<Vec<String>>, Option<String>) {
     }
 }
 
-struct Soaking {
+struct Soaking<'a> {
     plan: Plan,
-    common: Common,
-    keep: u64,
-    keep_failed: u64,
+    common: Common<'a>,
     interrupt: Interrupt,
 }
 
-impl Soaking {
+impl Soaking<'_> {
     /// Runs segments until the time is up, and tells why it ended.
     fn run(&self, keeping: &mut Keeping) -> Result<(Exit, String), SoakError> {
         let mut early_in_a_row = 0;
@@ -261,7 +247,8 @@ impl Soaking {
         }
         keeping.soak.segments.push(segment);
         let out = keeping.out().to_owned();
-        rotate::rotate(&out, &mut keeping.soak.segments, self.keep, self.keep_failed)
+        let SoakArguments { keep, keep_failed, .. } = self.common.arguments;
+        rotate::rotate(&out, &mut keeping.soak.segments, *keep, *keep_failed)
             .map_err(|error| SoakError::output(&out, &error))?;
         keeping.soak.elapsed_s += began.elapsed().as_secs_f64();
         keeping.write()?;
@@ -300,37 +287,13 @@ mod tests {
     use super::memory::Memory;
     use super::merged::Kept;
     use super::model::{Check, CheckResult, Figures, Segment, Soak};
-    use super::plan::Spec;
 
     #[test]
     fn no_key_of_a_soak_is_lost() {
         let mut segment = segment(1, &[("account", CheckResult::Passed)]);
-        segment.account = vec![Row {
-            id: "110".into(),
-            sender: "controller".into(),
-            receiver: "emulator".into(),
-            sent: 1,
-            refused_at_sender: 0,
-            received: 1,
-            lost_on_wire: 0,
-            lost_at_queue: 0,
-            before_it_came: 0,
-            after_it_left: 0,
-            missing_by_gaps: Some(0),
-            pauses: 0,
-        }];
+        segment.account = vec![Row::default()];
         segment.memory = [("emulator".into(), Memory::default())].into();
-        let kept = Kept {
-            p50_ns: 1,
-            p90_ns: 1,
-            p99_ns: 1,
-            p999_ns: 1,
-            p9999_ns: 1,
-            max_ns: 1,
-            count: 1,
-            hdr_v2_base64: String::new(),
-        };
-        let distributions = [("emulator-wakeup".into(), kept)].into();
+        let distributions = [("emulator-wakeup".into(), Kept::default())].into();
         let soak = Soak { distributions, segments: vec![segment], ..Soak::default() };
         let file = serde_json::to_value(soak).unwrap();
         runlog::golden::check("soak.keys", &runlog::golden::keys(&file));
@@ -347,7 +310,7 @@ mod tests {
         segment.finished = true;
         segment.checks = checks.iter().map(check).collect();
         segment.figures = Figures { cycles: Some(1000), ..Figures::default() };
-        assert_eq!(segment.spec, Spec { number, ..segment.spec.clone() });
+        assert_eq!(segment.spec.number, number);
         segment
     }
 }

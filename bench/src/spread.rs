@@ -44,14 +44,14 @@ fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
 
 #[must_use]
 pub fn table(runs: &[Run]) -> Grid {
-    let head = ["figure", "n", "mean", "standard deviation", "least", "most"].map(str::to_owned).to_vec();
+    let head = ["figure", "n", "mean", "standard deviation", "least", "most"];
     let rows = spreads(runs).into_iter().map(|(name, unit, spread)| {
         let told = |value: f64| in_use(value, unit);
         let deviation = spread.standard_deviation.map_or_else(|| "-".to_owned(), told);
         let count = spread.count.to_string();
         vec![without_unit(name), count, told(spread.mean), deviation, told(spread.least), told(spread.most)]
     });
-    Grid { head, rows: rows.collect() }
+    Grid::new(head, rows)
 }
 
 /// The spreads as JSON, SI, by the figures' names.

@@ -89,10 +89,7 @@ fn endings(results: &Results) -> String {
         let kept = passed.iter().filter(|value| **value == 1.0).count();
         rows.push(vec!["kept the experiment's bounds".to_owned(), share(kept)]);
     }
-    format!(
-        "<h2>How the runs ended</h2>\n{}",
-        Grid { head: vec!["runs".into(), "how many".into()], rows }.html()
-    )
+    format!("<h2>How the runs ended</h2>\n{}", Grid::new(["runs", "how many"], rows).html())
 }
 
 fn file_section(campaign: &Campaign) -> String {

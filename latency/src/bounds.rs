@@ -15,11 +15,10 @@
 //! error, which names those that do.
 
 use super::kinds;
-use super::model::{BoundResult, Cause, PercentilesNs, Ratio, Report};
+use super::model::{BoundResult, Cause, Distribution, PercentilesNs, Ratio, Report};
 use super::ratios;
 use super::resolution::{self, Verdict};
 use serde_json::Value;
-use std::collections::BTreeSet;
 
 /// Figures that a message names.
 const NAMED: usize = 12;
@@ -130,16 +129,14 @@ fn of_percentiles(key: &str) -> Option<fn(&PercentilesNs) -> Option<f64>> {
 
 /// Names what there is, what looks most like the figure first.
 fn unknown(figure: &str, report: &Report) -> BoundsError {
-    let mut known: BTreeSet<String> = BTreeSet::new();
-    for distribution in &report.distributions {
-        for key in ["p50_ns", "p99_ns", "p999_ns", "max_ns", "count"] {
-            known.insert(format!("{}.{key}", distribution.name));
-        }
-    }
+    const KEYS: [&str; 5] = ["p50_ns", "p99_ns", "p999_ns", "max_ns", "count"];
+    let of_tag = |told: &Distribution| KEYS.map(|key| format!("{}.{key}", told.name));
+    let mut known: Vec<_> = report.distributions.iter().flat_map(of_tag).collect();
     known.extend(ratios::names().map(|name| format!("ratio.{}", ratios::short_name(&name))));
     known.extend(report.runs.iter().flat_map(|run| run.counts.keys().map(|key| format!("counts.{key}"))));
-    known.insert("findings.frame-loss".into());
-    let mut known: Vec<_> = known.into_iter().collect();
+    known.push("findings.frame-loss".into());
+    known.sort_unstable();
+    known.dedup();
     let alike = |name: &String| name.chars().zip(figure.chars()).take_while(|(a, b)| a == b).count();
     known.sort_by_key(|name| std::cmp::Reverse(alike(name)));
     let more = known.len().saturating_sub(NAMED);
@@ -164,25 +161,18 @@ mod tests {
                     \"counts.skipped\" = { max = 0 }\n\"counts.cycles\" = { min = 2000, max = 2000 }\n\
                     \"ratio.emulator-wakeup.p50\" = { max = 1.1 }\n\"cyclictest.p50_ns\" = { max = 1e9 }\n\
                     \"findings.frame-loss\" = { max = 0 }\n\"emulator-wakeup.p9999_ns\" = { max = 1e9 }";
-        let kept: Vec<_> =
-            judged(text).unwrap().into_iter().map(|bound| (bound.figure, bound.kept)).collect();
-        let broken: Vec<_> =
-            kept.iter().filter(|(_, kept)| !kept).map(|(figure, _)| figure.as_str()).collect();
+        let judged = judged(text).unwrap();
+        assert_eq!(judged.len(), 8);
+        let broken = judged.iter().filter(|bound| !bound.kept).map(|bound| bound.figure.as_str());
+        let mut broken: Vec<_> = broken.collect();
+        broken.sort_unstable();
         let expected = [
             "cyclictest.p50_ns",
             "emulator-wakeup.max_ns",
             "emulator-wakeup.p9999_ns",
             "ratio.emulator-wakeup.p50",
         ];
-        assert_eq!(kept.len(), 8);
-        assert_eq!(
-            {
-                let mut broken = broken;
-                broken.sort_unstable();
-                broken
-            },
-            expected
-        );
+        assert_eq!(broken, expected);
     }
 
     #[test]

@@ -9,7 +9,6 @@ use super::files::RunFiles;
 use super::model::{Claim, Conditions};
 use super::reference;
 use realtime::{Grant, Machine};
-use std::collections::BTreeMap;
 
 /// Cycles for a p99.9 that rests on a hundred samples.
 const CYCLES_FOR_P999: u64 = 100_000;
@@ -140,11 +139,13 @@ fn disturbed(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
     reasons
 }
 
-/// CPU of each process of a run that has one of its own.
-pub(super) fn cpus(run: &RunFiles) -> BTreeMap<&str, u64> {
-    run.granted()
-        .filter_map(|(process, granted)| Some((process, granted.iter().find_map(Grant::cpu)? as u64)))
-        .collect()
+/// CPU of each process of a run that has one of its own, in their order.
+pub(super) fn cpus(run: &RunFiles) -> Vec<(u64, &str)> {
+    let cpu =
+        |(process, granted): (_, Vec<Grant>)| Some((granted.iter().find_map(Grant::cpu)? as u64, process));
+    let mut cpus: Vec<_> = run.granted().filter_map(cpu).collect();
+    cpus.sort_unstable();
+    cpus
 }
 
 /// Where the reference was not measured as the rig runs.
@@ -181,14 +182,13 @@ fn unlike_reference(run: &RunFiles) -> Vec<String> {
 }
 
 fn shared_cpu(run: &RunFiles) -> Vec<String> {
-    let mut of_cpu: BTreeMap<u64, Vec<&str>> = BTreeMap::new();
-    for (process, cpu) in cpus(run) {
-        of_cpu.entry(cpu).or_default().push(process);
-    }
-    let shared = of_cpu.into_iter().filter(|(_, who)| who.len() > 1);
-    shared
-        .map(|(cpu, who)| format!("{} shared CPU {cpu}: they wait for each other.", who.join(" and ")))
-        .collect()
+    let cpus = cpus(run);
+    let shared = cpus.chunk_by(|one, next| one.0 == next.0).filter(|who| who.len() > 1);
+    let told = |of_cpu: &[(u64, &str)]| {
+        let who: Vec<_> = of_cpu.iter().map(|(_, process)| *process).collect();
+        format!("{} shared CPU {}: they wait for each other.", who.join(" and "), of_cpu[0].0)
+    };
+    shared.map(told).collect()
 }
 
 /// What the run itself, its build and its machine forbid.

@@ -36,7 +36,7 @@ pub fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String>
 
 fn of_run(run: &RunFiles) -> Vec<String> {
     let machine = &run.description().machine;
-    let cpus: BTreeSet<u64> = cpus(run).into_values().collect();
+    let cpus: BTreeSet<u64> = cpus(run).into_iter().map(|(cpu, _)| cpu).collect();
     let mut told = governors(machine);
     if ![&machine.preemption.model, &machine.kernel].iter().any(|text| text.contains("PREEMPT_RT")) {
         told.push("The kernel is not PREEMPT_RT: its own work can keep the loops waiting.".into());

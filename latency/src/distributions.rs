@@ -5,7 +5,6 @@ use super::joined::{self, Series};
 use super::model::{Distribution, Maximum, PercentilesNs};
 use super::samples::Samples;
 use super::{kinds, reference};
-use realtime::Percentiles;
 use std::collections::BTreeMap;
 
 /// Share of one-way latencies that may be below zero before the report says so.
@@ -83,17 +82,15 @@ pub fn percentiles_of_run(
 
 /// Percentiles of the summaries; nothing without samples.
 #[must_use]
-pub fn percentiles(told: &Percentiles) -> Option<PercentilesNs> {
+pub fn percentiles(told: &PercentilesNs) -> Option<PercentilesNs> {
     let count = told.count;
     let at = |value: Option<u64>, least: u64| value.filter(|_| count >= least);
     (count > 0).then(|| PercentilesNs {
-        p50: told.p50,
         p90: at(told.p90, 10),
         p99: at(told.p99, 100),
         p999: at(told.p999, 1000),
         p9999: at(told.p9999, 10_000),
-        max: told.max,
-        count,
+        ..*told
     })
 }
 

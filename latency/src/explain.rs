@@ -60,7 +60,7 @@ impl Late {
 /// All events of a run, in the order of its cycles, process by process.
 #[must_use]
 pub fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
-    let late: BTreeMap<&str, Vec<Late>> =
+    let late: Vec<_> =
         run.rows.iter().map(|(process, rows)| (process.as_str(), late_rows(process, rows, run))).collect();
     let mut events = Vec::new();
     for (process, late_rows) in &late {
@@ -166,7 +166,7 @@ fn event(
     process: &str,
     cluster: &[Late],
     run: &RunFiles,
-    all_late: &BTreeMap<&str, Vec<Late>>,
+    all_late: &[(&str, Vec<Late>)],
 ) -> Event {
     let rows = &run.rows[process];
     // A cluster is never empty.
@@ -190,9 +190,7 @@ fn event(
         probe: gaps_around(due_ns, row.done_ns, run.gaps.as_deref().unwrap_or_default()),
         waited_ns: seen.waited_ns,
         machine_ran: seen.machine_ran(),
-        dump: None,
-        frames: BTreeMap::new(),
-        rig_events: Vec::new(),
+        ..Event::default()
     }
 }
 
@@ -202,7 +200,7 @@ fn seen(
     cluster: &[Late],
     worst: &Late,
     run: &RunFiles,
-    all_late: &BTreeMap<&str, Vec<Late>>,
+    all_late: &[(&str, Vec<Late>)],
 ) -> Seen {
     let rows = &run.rows[process];
     let row = rows[worst.place];
@@ -212,7 +210,7 @@ fn seen(
     let after = rows[cluster[0].place..].iter().take_while(|row| row.cycle <= until);
     let same_time =
         |late: &&Late, rows: &[CycleTiming]| late.due_ns < to_ns && rows[late.place].done_ns > from_ns;
-    let others = all_late.iter().filter(|(other, _)| **other != process).filter_map(|(other, late)| {
+    let others = all_late.iter().filter(|(other, _)| *other != process).filter_map(|(other, late)| {
         let rows = run.rows[*other].as_slice();
         let worst = late.iter().filter(|late| same_time(late, rows)).max_by_key(|late| late.severity_ns())?;
         let waited_ns = rows[worst.place].vitals.run_delay_ns;

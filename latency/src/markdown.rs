@@ -68,10 +68,6 @@ fn claim(report: &Report) -> String {
     out
 }
 
-fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
-    words.iter().map(|word| (*word).to_owned()).collect()
-}
-
 fn us(ns: Option<u64>) -> String {
     ns.map_or_else(|| "-".into(), |ns| format!("{:.1}", ns as f64 * 1e-3))
 }
@@ -87,10 +83,8 @@ fn percentiles(distributions: &[Distribution]) -> Grid {
         let name = format!("{}{mark}", distribution.name);
         std::iter::once(name).chain(percentile_cells(&distribution.percentiles_ns)).collect()
     };
-    Grid {
-        head: words(["us", "p50", "p90", "p99", "p99.9", "p99.99", "max", "count"]),
-        rows: distributions.iter().map(row).collect(),
-    }
+    let head = ["us", "p50", "p90", "p99", "p99.9", "p99.99", "max", "count"];
+    Grid::new(head, distributions.iter().map(row))
 }
 
 fn ratios(ratios: &[Ratio]) -> String {
@@ -106,11 +100,8 @@ fn ratios(ratios: &[Ratio]) -> String {
     if ratios.is_empty() {
         return String::new();
     }
-    let grid = Grid {
-        head: words(["ratio", "median", "interval of the median", "pairs"]),
-        rows: ratios.iter().map(row).collect(),
-    };
-    grid.markdown()
+    let head = ["ratio", "median", "interval of the median", "pairs"];
+    Grid::new(head, ratios.iter().map(row)).markdown()
 }
 
 fn bounds(bounds: &[BoundResult]) -> String {
@@ -127,8 +118,7 @@ fn bounds(bounds: &[BoundResult]) -> String {
         };
         vec![bound.figure.clone(), value, number(bound.min), number(bound.max), verdict.into()]
     };
-    let grid =
-        Grid { head: words(["bound", "value", "min", "max", ""]), rows: bounds.iter().map(row).collect() };
+    let grid = Grid::new(["bound", "value", "min", "max", ""], bounds.iter().map(row));
     let open: Vec<_> = bounds.iter().filter_map(not_resolved).collect();
     let gap = if open.is_empty() { "" } else { "\n" };
     format!("{}{gap}{}", grid.markdown(), list(&open))
@@ -148,8 +138,7 @@ fn not_resolved(bound: &BoundResult) -> Option<String> {
 }
 
 fn comparison(comparison: &Comparison) -> String {
-    let mut head = words(["median in us"]);
-    head.extend(comparison.groups.iter().cloned());
+    let head = std::iter::once("median in us").chain(comparison.groups.iter().map(String::as_str));
     let rows = comparison.rows.iter().map(|row| {
         let cells = row.cells.iter().map(|cell| {
             let change = cell.change_percent.map_or_else(String::new, |change| {
@@ -164,7 +153,7 @@ fn comparison(comparison: &Comparison) -> String {
         });
         std::iter::once(row.figure.clone()).chain(cells).collect()
     });
-    Grid { head, rows: rows.collect() }.markdown()
+    Grid::new(head, rows).markdown()
 }
 
 fn findings(report: &Report) -> String {
@@ -199,9 +188,10 @@ fn runs(report: &Report) -> String {
         cells.extend([us(wakeup.p50), us(wakeup.p99), us(wakeup.max)]);
         cells
     };
-    let mut head = words(["run", "group", "s", "cycles", "skipped", "overruns", "lost", "malformed"]);
-    head.extend(words(["wake-up p50", "p99", "max us"]));
-    let mut out = Grid { head, rows: report.runs.iter().enumerate().map(row).collect() }.markdown();
+    let head =
+        ["run", "group", "s", "cycles", "skipped", "overruns", "lost", "malformed", "wake-up p50", "p99"];
+    let head = head.into_iter().chain(["max us"]);
+    let mut out = Grid::new(head, report.runs.iter().enumerate().map(row)).markdown();
     for (place, run) in report.runs.iter().enumerate().filter(|(_, run)| !run.lacks.is_empty()) {
         let _ = write!(out, "\nRun {place} lacks:\n\n{}", list(&run.lacks));
     }
@@ -224,7 +214,7 @@ fn frames(report: &Report) -> String {
         return String::new();
     }
     let head = ["run, frame", "period ms", "came", "gaps", "bursts", "interval p50", "p99", "max"];
-    Grid { head: words(head), rows }.markdown()
+    Grid::new(head, rows).markdown()
 }
 
 fn conditions(report: &Report) -> String {

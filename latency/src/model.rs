@@ -4,6 +4,8 @@
 //! Nothing is NaN: what was not measured is null or missing from its list.
 
 use super::resolution::Verdict;
+/// In ns; null when nothing was measured, or too little for that percentile to differ from the maximum.
+pub use realtime::Percentiles as PercentilesNs;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -11,7 +13,7 @@ pub const SCHEMA: &str = "airbench-latency-report";
 /// Goes up when a key changes its meaning or goes.
 pub const SCHEMA_VERSION: u32 = 1;
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
     pub schema: String,
     pub schema_version: u32,
@@ -37,7 +39,7 @@ pub struct Report {
 }
 
 /// Whether the runs support a latency claim.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Claim {
     /// Whether they do.
     pub supported: bool,
@@ -72,10 +74,11 @@ pub struct Fact {
 }
 
 /// Where a distribution comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
     /// The rig's process.
+    #[default]
     Emulator,
     Controller,
     /// Both, joined on one clock.
@@ -85,7 +88,7 @@ pub enum Source {
 }
 
 /// A distribution of lengths of time.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Distribution {
     /// Tag in the `.hlog`, such as `emulator-wakeup`.
     pub name: String,
@@ -96,24 +99,6 @@ pub struct Distribution {
     pub bins: Vec<Bin>,
     /// The largest value of each second.
     pub maxima: Vec<Maximum>,
-}
-
-/// Percentiles in ns; null when nothing was measured, or too little for that percentile to differ from the maximum.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PercentilesNs {
-    /// Half.
-    pub p50: Option<u64>,
-    /// 90 %.
-    pub p90: Option<u64>,
-    /// 99 %.
-    pub p99: Option<u64>,
-    /// 99.9 %.
-    pub p999: Option<u64>,
-    /// 99.99 %.
-    pub p9999: Option<u64>,
-    pub max: Option<u64>,
-    /// Samples.
-    pub count: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -150,7 +135,7 @@ pub struct Ratio {
 }
 
 /// Why something was late or lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cause {
     /// The rig's process was stopped and continued by a signal.
@@ -170,13 +155,14 @@ pub enum Cause {
     /// The machine stood still: no thread of it ran, the operating system's own interrupts included.
     MachineStoodStill,
     /// Nothing that was recorded explains it.
+    #[default]
     Unexplained,
     /// Something was late or missed and nothing of it was recorded, or nothing tells whether anything was.
     Unknown,
 }
 
 /// One late cycle, or several in a row.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Event {
     pub run: usize,
     /// Which process: `emulator`, `controller`, `controller-drive`, `controller-load`.
@@ -212,7 +198,7 @@ pub struct Event {
 }
 
 /// One cycle near an event, times against the event's due time.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct AroundRow {
     /// The rig's cycle.
     pub cycle: u64,
@@ -255,7 +241,7 @@ pub struct Finding {
     pub sentence: String,
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RunPart {
     pub folder: String,
     /// Group, for comparisons.

@@ -107,7 +107,7 @@ fn grid(rows: &[Ratio]) -> Grid {
         ]
     };
     let head = ["figure", "ours, us", "against, us", "ratio", "interval", "pairs", "at most"];
-    Grid { head: head.map(str::to_owned).into(), rows: rows.iter().map(row).collect() }
+    Grid::new(head, rows.iter().map(row))
 }
 
 /// Whether `name` begins with `start` and a word ends there.

@@ -24,10 +24,8 @@ pub fn command_ages(runs: &[RunPart]) -> Option<Grid> {
     let row = |((_, age), counts): (&(u64, String), &[u64; 2])| {
         std::iter::once(age.clone()).chain(counts.map(|count| count.to_string())).collect()
     };
-    (!ages.is_empty()).then(|| Grid {
-        head: ["age in cycles", "drive commands", "load commands"].map(str::to_owned).into(),
-        rows: ages.iter().map(row).collect(),
-    })
+    let head = ["age in cycles", "drive commands", "load commands"];
+    (!ages.is_empty()).then(|| Grid::new(head, ages.iter().map(row)))
 }
 
 /// Frames of each run that were lost, late, came twice or made no sense, at the rig and at the controllers.
@@ -45,10 +43,8 @@ pub fn frames(runs: &[RunPart]) -> Option<Grid> {
         ];
         rows.push(row(format!("{place} at the controllers"), controllers));
     }
-    (!rows.is_empty()).then(|| Grid {
-        head: ["run, receiver", "lost", "late", "duplicate", "malformed"].map(str::to_owned).into(),
-        rows,
-    })
+    let head = ["run, receiver", "lost", "late", "duplicate", "malformed"];
+    (!rows.is_empty()).then(|| Grid::new(head, rows))
 }
 
 /// The sum of the controllers' counts of these names; nothing when there is none.

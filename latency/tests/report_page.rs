@@ -3,7 +3,7 @@
 //! Each run leaves the page of a made-up report in the target folder's `tmp/report-page.html`, to be looked at.
 
 use crate::sample;
-use latency::model::{Distribution, PercentilesNs, Report, Source};
+use latency::model::{Distribution, PercentilesNs, Report};
 use latency::page::page;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::path::Path;
@@ -197,11 +197,9 @@ fn odd_numbers_break_no_chart() {
     let mut report = sample::rich();
     let odd = |name: &str, bins| Distribution {
         name: name.into(),
-        source: Source::Emulator,
-        about: String::new(),
         percentiles_ns: PercentilesNs { max: Some(u64::MAX), count: u64::MAX, ..PercentilesNs::default() },
         bins,
-        maxima: vec![],
+        ..Distribution::default()
     };
     let bin = |from_ns, to_ns| latency::model::Bin { from_ns, to_ns, count: 1 };
     report.distributions = vec![

@@ -12,6 +12,15 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// A grid of rows that are as long as its head.
+    #[must_use]
+    pub fn new<W: Into<String>>(
+        head: impl IntoIterator<Item = W>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) -> Self {
+        Self { head: head.into_iter().map(Into::into).collect(), rows: rows.into_iter().collect() }
+    }
+
     /// Markdown, padded so that it is readable as it stands: what a terminal gets too.
     #[must_use]
     pub fn markdown(&self) -> String {
@@ -64,8 +73,7 @@ mod tests {
 
     #[test]
     fn a_grid_is_markdown_and_html() {
-        let word = |text: &str| text.to_owned();
-        let grid = Grid { head: vec![word("figure"), word("run")], rows: vec![vec![word("a"), word("<5>")]] };
+        let grid = Grid::new(["figure", "run"], [vec!["a".into(), "<5>".into()]]);
         assert_eq!(grid.markdown(), "| figure | run |\n|--------|----:|\n| a      | <5> |\n");
         assert!(grid.html().contains("<td class=\"n\">&lt;5&gt;</td>"));
     }

@@ -148,7 +148,7 @@ pub struct Wire {
 }
 
 /// One identifier at one receiver.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Row {
     /// Identifier, as candump names it.
     pub id: String,

@@ -195,8 +195,7 @@ mod tests {
     #[test]
     fn a_damaged_report_is_named_and_a_missing_one_is_not_damaged() {
         let folder = tempfile::tempdir().unwrap();
-        let spec =
-            Spec { number: 1, experiment: "soak".into(), two_processes: false, load: false, loss: None };
+        let spec = Spec::default();
         std::fs::write(folder.path().join("controller.json"), "{}").unwrap();
         assert!(Evidence::read(&spec, folder.path()).damaged.is_empty());
 

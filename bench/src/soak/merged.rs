@@ -21,7 +21,7 @@ const LOGS: &[&str] = &["emulator.hlog", "controller.hlog", "controller-drive.hl
 pub struct Merged(BTreeMap<String, Histogram<u64>>);
 
 /// A distribution as `soak.json` keeps it: figures for people, and the histogram to go on with.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Kept {
     /// Half of the samples were at most this, ns.
     pub p50_ns: u64,

@@ -103,7 +103,7 @@ pub struct Totals {
     pub not_there: u64,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     pub spec: Spec,
     /// Its folder below the soak's.
@@ -174,24 +174,11 @@ impl Segment {
     /// One that was running when the soak was killed.
     #[must_use]
     pub fn cut_off(number: u32, experiment: &str, folder: &str) -> Self {
-        let spec =
-            Spec { number, experiment: experiment.into(), two_processes: false, load: false, loss: None };
         Self {
-            spec,
+            spec: Spec { number, experiment: experiment.into(), ..Spec::default() },
             folder: folder.into(),
-            started_unix_s: 0.0,
-            length_s: 0.0,
-            rig_s: 0.0,
-            finished: false,
             ended: "the soak was killed while it ran; its rows stay in its folder".into(),
-            load: None,
-            checks: Vec::new(),
-            figures: Figures::default(),
-            account: Vec::new(),
-            memory: BTreeMap::new(),
-            file_bytes: 0,
-            file_bytes_per_s: 0,
-            rotated: false,
+            ..Self::default()
         }
     }
 

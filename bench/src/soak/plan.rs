@@ -20,7 +20,7 @@ const WAYS: u32 = 4;
 /// What of a segment is no run of the rig, s: starting, ending, reading what was left.
 const AROUND_S: f64 = 2.5;
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spec {
     /// Its number, from 1.
     pub number: u32,

@@ -5,6 +5,7 @@
 //! have recorded stays, and the next segment is another one.
 
 use super::SoakError;
+use super::cli::SoakArguments;
 use super::memory::Sample;
 use super::plan::Spec;
 use super::processes::{Running, end_in_words};
@@ -28,17 +29,11 @@ const LISTEN: Duration = Duration::from_secs(20);
 const SAVE: Duration = Duration::from_secs(20);
 
 /// What all segments of a soak have in common.
-pub struct Common {
-    pub bus: BusUrl,
-    pub rig: PathBuf,
-    pub experiment_folder: PathBuf,
+pub struct Common<'a> {
+    pub arguments: &'a SoakArguments,
     pub bin_dir: PathBuf,
     /// Command line of the load generator, its program first; empty for none.
     pub load: Vec<String>,
-    pub emulator_options: Vec<String>,
-    pub controller_options: Vec<String>,
-    /// Ends the segment while so much of the disk is still free.
-    pub min_free_bytes: u64,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -67,7 +62,7 @@ pub type Tell<'a> = dyn FnMut(f64) + 'a;
 
 /// Runs a segment of `rig_s` in `folder`, which is made.
 pub fn run(
-    common: &Common,
+    common: &Common<'_>,
     spec: &Spec,
     rig_s: f64,
     folder: &Path,
@@ -75,7 +70,7 @@ pub fn run(
     tell: &mut Tell<'_>,
 ) -> Result<Outcome, SoakError> {
     std::fs::create_dir_all(folder).map_err(|error| SoakError::output(folder, &error))?;
-    let interface = interface(&common.bus);
+    let interface = interface(&common.arguments.bus);
     let sent_before = interface.and_then(procfs::sent_by_interface);
     let start = Start { common, spec, folder };
     let mut running = start.controllers()?;
@@ -85,7 +80,7 @@ pub fn run(
     let end = watch.until_the_end(
         &mut running,
         rig_s,
-        |free| free < common.min_free_bytes,
+        |free| free < common.arguments.min_free_mb * 1_000_000,
         interrupt,
         tell,
         folder,
@@ -120,7 +115,7 @@ fn interface(bus: &BusUrl) -> Option<&str> {
 }
 
 struct Start<'a> {
-    common: &'a Common,
+    common: &'a Common<'a>,
     spec: &'a Spec,
     folder: &'a Path,
 }
@@ -128,7 +123,7 @@ struct Start<'a> {
 impl Start<'_> {
     /// The bus of this segment; the seed goes with its number, so that each loses others.
     fn bus(&self) -> BusUrl {
-        let mut bus = self.common.bus.clone();
+        let mut bus = self.common.arguments.bus.clone();
         if let (BusUrl::Unix { wire, .. }, Some(loss)) = (&mut bus, self.spec.loss) {
             (wire.loss, wire.seed) = (loss, u64::from(self.spec.number));
         }
@@ -136,10 +131,10 @@ impl Start<'_> {
     }
 
     fn program(&self, name: &str, program: &str, more: Vec<OsString>) -> Result<Running, SoakError> {
-        let path = self.common.bin_dir.join(program);
-        let experiment = self.common.experiment_folder.join(format!("{}.toml", self.spec.experiment));
+        let (path, asked) = (self.common.bin_dir.join(program), self.common.arguments);
+        let experiment = asked.experiment_folder.join(format!("{}.toml", self.spec.experiment));
         let mut arguments: Vec<OsString> = vec!["run".into(), "--bus".into(), self.bus().to_string().into()];
-        for (option, value) in [("--rig", &self.common.rig), ("--experiment", &experiment)] {
+        for (option, value) in [("--rig", &asked.rig), ("--experiment", &experiment)] {
             arguments.extend([option.into(), value.into()]);
         }
         arguments.extend(["--out".into(), self.folder.into()]);
@@ -155,19 +150,19 @@ impl Start<'_> {
 
     fn emulator(&self, rig_s: f64) -> Result<Running, SoakError> {
         let mut more: Vec<OsString> = vec!["--seconds".into(), rig_s.to_string().into()];
-        more.extend(self.common.emulator_options.iter().map(Into::into));
+        more.extend(self.common.arguments.emulator_options.split_whitespace().map(Into::into));
         self.program("emulator", "emulator", more)
     }
 
     fn controllers(&self) -> Result<Vec<Running>, SoakError> {
         let axes: &[&str] = if self.spec.two_processes { &["drive", "load"] } else { &["both"] };
-        let interface = interface(&self.common.bus);
+        let interface = interface(&self.common.arguments.bus);
         let before = interface.and_then(procfs::listeners);
         let mut controllers = Vec::new();
         for axis in axes {
             let name = if *axis == "both" { "controller".into() } else { format!("controller-{axis}") };
             let mut more: Vec<OsString> = vec!["--axis".into(), axis.into(), "--repeat".into()];
-            more.extend(self.common.controller_options.iter().map(Into::into));
+            more.extend(self.common.arguments.controller_options.split_whitespace().map(Into::into));
             controllers.push(self.program(&name, "controller", more)?);
         }
         if let Some((interface, before)) = interface.zip(before) {

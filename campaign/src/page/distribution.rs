@@ -14,8 +14,7 @@ const HEIGHT: f64 = 120.0;
 
 /// The table of all figures that are shown, and a histogram of each.
 pub(super) fn section(results: &Results, shown: &[String]) -> String {
-    let head =
-        ["figure", "runs", "least", "5 %", "median", "95 %", "99 %", "most"].map(str::to_owned).to_vec();
+    let head = ["figure", "runs", "least", "5 %", "median", "95 %", "99 %", "most"];
     let mut rows = Vec::new();
     let mut pictures = String::new();
     for figure in shown {
@@ -29,7 +28,7 @@ pub(super) fn section(results: &Results, shown: &[String]) -> String {
         rows.push([name(figure), values.len().to_string()].into_iter().chain(quantiles).collect());
         pictures += &histogram(figure, &values);
     }
-    Grid { head, rows }.html() + &pictures
+    Grid::new(head, rows).html() + &pictures
 }
 
 fn histogram(figure: &str, values: &[f64]) -> String {

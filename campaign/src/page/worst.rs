@@ -19,28 +19,24 @@ pub(super) fn section(
 ) -> String {
     let mut text = "<h2>Worst cases</h2>\n".to_owned();
     if !results.unfinished.is_empty() {
-        let head = ["run", "ended", "because", "with", "repeated by"].map(str::to_owned).to_vec();
+        let head = ["run", "ended", "because", "with", "repeated by"];
         let rows = results.unfinished.iter().take(TOLD).map(|Unfinished { run, ended, because }| {
             vec![run.to_string(), ended.clone(), because.clone(), values(campaign, *run), repeat(*run)]
         });
-        let rows = rows.collect();
-        text += &format!(
-            "<h3>Runs that did not come to their end, the first</h3>\n{}",
-            Grid { head, rows }.html()
-        );
+        text += "<h3>Runs that did not come to their end, the first</h3>\n";
+        text += &Grid::new(head, rows).html();
     }
     for figure in shown {
         let Some(column) = results.numbers(figure) else { continue };
         let mut runs: Vec<_> = (0..column.len()).filter(|run| column[*run].is_finite()).collect();
         // Of equals the first.
         runs.sort_by(|one, other| column[*other].total_cmp(&column[*one]));
-        let head = [name(figure), "run".into(), "with".into(), "repeated by".into()].to_vec();
+        let head = [&*name(figure), "run", "with", "repeated by"];
         let rows = runs.iter().take(TOLD).map(|run| {
             let number = *run as u64;
             vec![value(figure, column[*run]), number.to_string(), values(campaign, number), repeat(number)]
         });
-        let rows = rows.collect();
-        text += &format!("<h3>{}</h3>\n{}", escaped(&name(figure)), Grid { head, rows }.html());
+        text += &format!("<h3>{}</h3>\n{}", escaped(&name(figure)), Grid::new(head, rows).html());
     }
     text
 }

@@ -205,15 +205,9 @@ mod tests {
 
     #[test]
     fn the_rows_nearest_to_the_event_are_shown() {
-        let row = |cycle: u64| AroundRow {
-            cycle,
-            due_us: cycle as f64 * 1000.0 - 5000.0,
-            late_us: 1.0,
-            execution_us: 1.0,
-            run_delay_us: 0.0,
-            faults: 0,
-            involuntary_switches: 0,
-            cpu: 0,
+        let row = |cycle: u64| {
+            let due_us = cycle as f64 * 1000.0 - 5000.0;
+            AroundRow { cycle, due_us, ..AroundRow::default() }
         };
         let rows: Vec<_> = (0..20).map(row).collect();
         let cycles = |room| nearest(&rows, room).iter().map(|row| row.cycle).collect::<Vec<_>>();

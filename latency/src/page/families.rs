@@ -113,17 +113,9 @@ fn looks(members: Vec<&Distribution>) -> Vec<(Look, &Distribution)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::PercentilesNs;
 
     fn named(name: &str, source: Source) -> Distribution {
-        Distribution {
-            name: name.into(),
-            source,
-            about: String::new(),
-            percentiles_ns: PercentilesNs::default(),
-            bins: Vec::new(),
-            maxima: Vec::new(),
-        }
+        Distribution { name: name.into(), source, ..Distribution::default() }
     }
 
     #[test]

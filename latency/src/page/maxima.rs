@@ -10,7 +10,6 @@ use crate::model::{Distribution, Maximum, Report};
 use pagekit::markup::none;
 use pagekit::number;
 use pagekit::svg::{Drawing, Look, Place, Scale, line, stroke, text, whole_decades};
-use std::collections::BTreeMap;
 
 /// Height of a strip's heading and of its plot, in pixels.
 const HEADING: f64 = 30.0;
@@ -21,28 +20,24 @@ const LABEL: f64 = 16.0;
 
 /// Where each run begins on the time axis.
 struct Runs {
-    starts_s: BTreeMap<usize, u64>,
+    starts_s: Vec<u64>,
     length_s: u64,
 }
 
 impl Runs {
     fn of(report: &Report) -> Self {
-        let mut lengths_s: BTreeMap<usize, u64> = BTreeMap::new();
-        for (run, part) in report.runs.iter().enumerate() {
-            lengths_s.insert(run, part.duration_s.ceil().max(0.0) as u64);
-        }
+        let mut lengths_s: Vec<_> =
+            report.runs.iter().map(|run| run.duration_s.ceil().max(0.0) as u64).collect();
         for maximum in report.distributions.iter().flat_map(|one| &one.maxima) {
-            let length = lengths_s.entry(maximum.run).or_default();
-            *length = (*length).max(maximum.second.saturating_add(1));
+            if let Some(length) = lengths_s.get_mut(maximum.run) {
+                *length = (*length).max(maximum.second.saturating_add(1));
+            }
         }
         let mut length_s: u64 = 0;
-        let starts_s = lengths_s.into_iter().map(|(run, length)| {
-            let start = length_s;
-            length_s = length_s.saturating_add(length);
-            (run, start)
-        });
-        let starts_s = starts_s.collect();
-        Self { starts_s, length_s }
+        for length in &mut lengths_s {
+            (*length, length_s) = (length_s, length_s.saturating_add(*length));
+        }
+        Self { starts_s: lengths_s, length_s }
     }
 
     fn are_several(&self) -> bool {
@@ -50,7 +45,7 @@ impl Runs {
     }
 
     fn at_s(&self, maximum: &Maximum) -> f64 {
-        self.starts_s.get(&maximum.run).copied().unwrap_or(0) as f64 + maximum.second as f64
+        self.starts_s.get(maximum.run).copied().unwrap_or(0) as f64 + maximum.second as f64
     }
 }
 
@@ -115,7 +110,7 @@ fn time(x: &Scale, size: &Size, runs: &Runs, bottom: f64) -> String {
         drawn += &text("middle", (x.at(value), bottom + 18.0), &number::decimal(value, 0));
     }
     let mut free = f64::NEG_INFINITY;
-    for (run, start) in runs.starts_s.iter().filter(|_| runs.are_several()) {
+    for (run, start) in runs.starts_s.iter().enumerate().filter(|_| runs.are_several()) {
         let at = x.at(*start as f64);
         drawn += &stroke("cut", (at, TOP + 4.0), (at, bottom));
         if at > free {
@@ -145,14 +140,9 @@ fn levels(y: &Scale, across: (f64, f64)) -> String {
 
 /// Steps over the seconds of each run, and a marker on its largest.
 fn trace(look: Look, distribution: &Distribution, x: &Scale, y: &Scale, runs: &Runs) -> String {
-    let mut by_run: BTreeMap<usize, Vec<&Maximum>> = BTreeMap::new();
-    for maximum in &distribution.maxima {
-        by_run.entry(maximum.run).or_default().push(maximum);
-    }
     let base = y.at(0.0);
     let mut drawn = String::new();
-    for maxima in by_run.values_mut() {
-        maxima.sort_unstable_by_key(|maximum| maximum.second);
+    for maxima in distribution.maxima.chunk_by(|one, next| one.run == next.run) {
         let seconds = maxima.iter().map(|maximum| {
             let start_s = runs.at_s(maximum);
             Second { from: x.at(start_s), to: x.at(start_s + 1.0), y: y.at(maximum.max_ns as f64) }

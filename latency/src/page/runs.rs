@@ -1,7 +1,7 @@
 //! The runs one by one: how regularly frames came, what was counted, each run's percentiles.
 
 use super::figures::{PERCENTILES, percentiles};
-use crate::model::{ArrivalRow, PercentilesNs, RunPart};
+use crate::model::{ArrivalRow, RunPart};
 use crate::tallies;
 use pagekit::grid::Grid;
 use pagekit::markup::{Cell, Table, folded, list, number, words as text};
@@ -120,11 +120,11 @@ fn lacking(runs: &[RunPart]) -> String {
 
 /// A row for each count, its sum first. Counts of parts that are 0 throughout are folded away; those of the whole always stand.
 fn counted(runs: &[RunPart]) -> String {
-    let names: BTreeSet<&str> = runs.iter().flat_map(|run| run.counts.keys().map(String::as_str)).collect();
+    let names: BTreeSet<&String> = runs.iter().flat_map(|run| run.counts.keys()).collect();
     let value = |run: &RunPart, name: &str| run.counts.get(name).copied();
-    let is_shown = |name: &&str| !name.contains('.') || runs.iter().any(|run| value(run, name) > Some(0));
+    let is_shown = |name: &&String| !name.contains('.') || runs.iter().any(|run| value(run, name) > Some(0));
     let (shown, zero): (Vec<_>, Vec<_>) = names.into_iter().partition(is_shown);
-    let table = |names: &[&str]| {
+    let table = |names: &[&String]| {
         let sum = (runs.len() > 1).then(|| "all".to_owned());
         let columns = (0..runs.len()).map(|run| format!("run {run}"));
         let mut table = Table::new("Counts", ["count".to_owned()].into_iter().chain(sum).chain(columns));
@@ -145,19 +145,16 @@ fn counted(runs: &[RunPart]) -> String {
 }
 
 fn each_percentiles(runs: &[RunPart]) -> String {
-    let mut by_name: BTreeMap<&str, Vec<(usize, &PercentilesNs)>> = BTreeMap::new();
-    for (run, part) in runs.iter().enumerate() {
-        for (name, of) in &part.percentiles_ns {
-            by_name.entry(name).or_default().push((run, of));
-        }
-    }
-    if by_name.is_empty() {
+    let names: BTreeSet<&String> = runs.iter().flat_map(|run| run.percentiles_ns.keys()).collect();
+    if names.is_empty() {
         return String::new();
     }
     let mut table = Table::new("Percentiles of each run in µs", ["all in µs"].into_iter().chain(PERCENTILES));
-    for (name, of_runs) in by_name {
+    for name in names {
         table.group(name);
-        for (run, of) in of_runs {
+        for (run, of) in
+            runs.iter().enumerate().filter_map(|(run, part)| Some((run, part.percentiles_ns.get(name)?)))
+        {
             table.row([text(format!("run {run}"))].into_iter().chain(percentiles(of)));
         }
     }

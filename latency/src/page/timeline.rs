@@ -153,12 +153,11 @@ pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
     } else {
         String::new()
     };
-    let gaps = event.probe.iter().map(|gap| gap.another_ran).collect();
     let falling = if missed.len() > 1 { none(FALLING) } else { String::new() };
     format!(
         "<figure>\n{}<ul class=\"legend\">\n{}</ul>\n{falling}{watched}</figure>\n",
         scrolling("full", "Cycles around the event", &drawing.with(&drawn)),
-        legend(&processes, &gaps)
+        legend(&processes, &event.probe)
     )
 }
 
@@ -246,7 +245,7 @@ fn waiting_bar((due_us, woke_us): (f64, f64), look: Look, y: f64, x: &Scale) -> 
     bar(&class, (x.at(due_us * 1e-3), y + 8.0), (x.at(woke_us * 1e-3), y + LANE - 8.0))
 }
 
-fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>) -> String {
+fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &[ProbeGap]) -> String {
     let mut entries = String::new();
     for (index, (process, _)) in processes.iter().enumerate() {
         let look = Look::Ours(index);
@@ -261,13 +260,12 @@ fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>) -> Strin
         let sample = bar("bar wait s0", (1.0, 4.5), (24.0, 9.5)) + &bar("bar s0", (24.0, 2.0), (37.0, 12.0));
         entries += &legend_entry(&sample, "lanes: waiting, then running");
     }
-    for another_ran in gaps {
-        let (class, what) = if *another_ran {
-            ("bar ran", "gap: another thread ran")
-        } else {
-            ("bar still", "gap: the CPU stood still")
-        };
-        entries += &legend_entry(&bar(class, (2.0, 2.0), (36.0, 12.0)), what);
+    for (another_ran, class, what) in
+        [(false, "bar still", "gap: the CPU stood still"), (true, "bar ran", "gap: another thread ran")]
+    {
+        if gaps.iter().any(|gap| gap.another_ran == another_ran) {
+            entries += &legend_entry(&bar(class, (2.0, 2.0), (36.0, 12.0)), what);
+        }
     }
     entries
 }
@@ -275,7 +273,6 @@ fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &BTreeSet<bool>) -> Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Cause;
     use std::collections::BTreeMap;
 
     fn event(skipped: u64, cycles: &[u64]) -> Event {
@@ -284,29 +281,15 @@ mod tests {
             due_us: (*cycle as f64 - 100.0) * PERIOD_US,
             late_us: 9.0,
             execution_us: 20.0,
-            run_delay_us: 0.0,
-            faults: 0,
-            involuntary_switches: 0,
-            cpu: 0,
+            ..AroundRow::default()
         };
         Event {
-            run: 0,
             process: "emulator".into(),
             cycle: 100,
-            at_s: 0.1,
             late_ns: skipped * 1_000_000 + 9000,
-            slow_ns: 0,
             skipped,
-            cause: Cause::Unexplained,
-            sentence: String::new(),
-            evidence: Vec::new(),
             around: BTreeMap::from([("emulator".into(), cycles.iter().map(row).collect())]),
-            probe: Vec::new(),
-            waited_ns: 0,
-            machine_ran: false,
-            dump: None,
-            frames: BTreeMap::new(),
-            rig_events: Vec::new(),
+            ..Event::default()
         }
     }
 

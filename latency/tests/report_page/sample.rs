@@ -128,16 +128,7 @@ fn ratio(name: &str, middle: f64, reference_ns: f64) -> Ratio {
 
 fn row(cycle: u64, due_us: f64, late_us: f64, execution_us: f64) -> AroundRow {
     let run_delay_us = if late_us > 100.0 { late_us * 0.02 } else { 0.0 };
-    AroundRow {
-        cycle,
-        due_us,
-        late_us,
-        execution_us,
-        run_delay_us,
-        faults: 0,
-        involuntary_switches: 0,
-        cpu: 1,
-    }
+    AroundRow { cycle, due_us, late_us, execution_us, run_delay_us, cpu: 1, ..AroundRow::default() }
 }
 
 /// Ten cycles before, the late one, those after it.
@@ -474,16 +465,8 @@ pub(crate) fn empty() -> Report {
     Report {
         schema: SCHEMA.into(),
         schema_version: SCHEMA_VERSION,
-        title: String::new(),
         made_unix_s: f64::NAN,
-        claim: Claim { supported: true, sentence: String::new(), reasons: vec![], not_controlled: vec![] },
-        conditions: Conditions::default(),
-        distributions: vec![],
-        ratios: vec![],
-        worst: vec![],
-        findings: vec![],
-        runs: vec![],
-        comparison: None,
-        bounds: vec![],
+        claim: Claim { supported: true, ..Claim::default() },
+        ..Report::default()
     }
 }
