@@ -24,6 +24,7 @@ mod stand_in;
 mod watch;
 
 use crate::junit::{self, Case};
+use crate::say;
 use crate::soak::model::CheckResult;
 use cli::{CheckPace, ConformanceArguments};
 use judge::{Phase, case};
@@ -35,7 +36,7 @@ use realtime::{Interrupt, Request};
 use runlog::run_folder::FileError;
 use rustix::process::{Pid, Signal, kill_process};
 use stand_in::{Disturbance, StandIn};
-use std::io::{self, Write};
+use std::io;
 use std::os::unix::fs::DirBuilderExt;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -125,7 +126,7 @@ pub fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
         let text = junit::text("controller", &cases, began.elapsed().as_secs_f64());
         std::fs::write(file, text).map_err(|error| FileError::write(file, error))?;
     }
-    let failed = cases.iter().any(|case| case.result == CheckResult::Failed);
+    let failed = cases.iter().any(|case| case.check.result == CheckResult::Failed);
     Ok(if failed { Exit::BoundBroken } else { Exit::Good })
 }
 
@@ -147,16 +148,14 @@ fn with_priority(session: Session<'_>, part: Part, tell: bool) -> Result<Vec<Cas
 }
 
 fn tell(cases: &[Case]) {
-    let mut out = io::stdout();
     for case in cases {
-        let result = match case.result {
+        let result = match case.check.result {
             CheckResult::Passed => "passed ",
             CheckResult::Failed => "FAILED ",
             CheckResult::Skipped => "skipped",
         };
-        let name = format!("{} {}", case.class.trim_start_matches("controller."), case.name);
-        // Whoever closed the pipe has read enough.
-        let _ = writeln!(out, "  {result}  {name:<30} {}", case.detail);
+        let name = format!("{} {}", case.class.trim_start_matches("controller."), case.check.name);
+        say(&format!("  {result}  {name:<30} {}", case.check.detail));
     }
 }
 

@@ -16,6 +16,7 @@ mod signals;
 mod table;
 
 use crate::recorded_log::{RecordedLog, RecordedLogError};
+use crate::{say, warn};
 use cli::{ExportArguments, Format};
 use protocol::exit::Exit;
 use runlog::run_folder::FileError;
@@ -152,17 +153,9 @@ fn create(path: &Path) -> io::Result<BufWriter<File>> {
     File::create(path).map(|file| BufWriter::with_capacity(1 << 20, file))
 }
 
-fn part_of(out: &Path) -> PathBuf {
+/// Where a file is until it is whole.
+pub(crate) fn part_of(out: &Path) -> PathBuf {
     let mut name = out.as_os_str().to_owned();
     name.push(".part");
     name.into()
-}
-
-fn say(text: &str) {
-    // A reader that has gone, as `| head` does, has seen enough.
-    let _ = writeln!(io::stdout(), "{text}");
-}
-
-fn warn(text: &str) {
-    let _ = writeln!(io::stderr(), "bench: {text}");
 }

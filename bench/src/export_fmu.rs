@@ -3,6 +3,8 @@
 //! The shared library `libplant_fmu.so` is built with the bench (`cargo build --release -p bench -p plant-fmu`) and looked for
 //! beside it. The same files give the same archive, to the byte.
 
+use crate::export::part_of;
+use crate::say;
 use clap::Args;
 use plant_fmu::{MODEL_IDENTIFIER, RIG_FILE, description};
 use protocol::exit::Exit;
@@ -56,7 +58,7 @@ pub fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
         Some(library) => read(library)?,
         None => read(&beside()?)?,
     };
-    let part = PathBuf::from([out.as_os_str(), ".part".as_ref()].join("".as_ref()));
+    let part = part_of(out);
     let written =
         write(&part, &described.xml, &library, &rig_toml).and_then(|()| std::fs::rename(&part, out));
     written.map_err(|error| {
@@ -64,9 +66,7 @@ pub fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError> {
         let _ = std::fs::remove_file(&part);
         FileError::write(out, error)
     })?;
-    // A reader that has gone has seen enough.
-    let _ =
-        writeln!(io::stdout(), "{}: FMI 2.0 co-simulation, linux64, guid {}", out.display(), described.guid);
+    say(&format!("{}: FMI 2.0 co-simulation, linux64, guid {}", out.display(), described.guid));
     Ok(Exit::Good)
 }
 

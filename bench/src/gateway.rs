@@ -23,20 +23,22 @@ mod client;
 pub mod parser;
 pub mod session;
 
+use crate::say;
 use cli::GatewayArguments;
 use client::{Client, ClientReport, Ended, LONGEST_FRAME};
+use live::client::wait;
+use live::wall_clock_ns;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, Received};
 use protocol::can::CanFrame;
 use protocol::exit::Exit;
 use realtime::Interrupt;
 use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::Serialize;
 use session::write_frame;
 use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// Frames of the bus, and connections, that are taken in one turn.
 const FRAMES_A_TURN: usize = 1024;
@@ -104,16 +106,14 @@ pub fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
         BusUrl::Can { .. } => format!(", {} lost at its own queue", report.bus_counters.dropped_on_receive),
         BusUrl::Unix { .. } => String::new(),
     };
-    // Whoever closed the pipe has read enough.
-    let _ = writeln!(
-        io::stdout(),
+    say(&format!(
         "gateway: {} clients, {} frames to them, {} lost, {} frames from them, {} connections refused{dropped}",
         report.connections,
         report.frames_to_clients,
         report.frames_lost,
         report.frames_from_clients,
         report.connections_refused
-    );
+    ));
     if let Some(file) = &arguments.report {
         write_json(file, &report).map_err(|error| FileError::write(file, error))?;
     }
@@ -208,11 +208,9 @@ impl Gateway {
             self.let_in(now_ms);
         }
         self.carry_from_the_bus(now_ms);
-        for (place, is_readable) in readable.into_iter().enumerate() {
-            if is_readable {
-                self.read(place, now_ms);
-                self.clients[place].tell_arrival();
-            }
+        for place in readable {
+            self.read(place, now_ms);
+            self.clients[place].tell_arrival();
         }
         let now_ms = self.now_ms();
         self.clients.iter_mut().for_each(|client| client.write(now_ms));
@@ -222,7 +220,7 @@ impl Gateway {
     }
 
     /// Which clients have sent something, and whether somebody waits at the door.
-    fn wait(&self) -> io::Result<(Vec<bool>, bool)> {
+    fn wait(&self) -> io::Result<(Vec<usize>, bool)> {
         let now_ms = self.now_ms();
         let pausing = self.clients.iter().any(|client| client.is_pausing(now_ms));
         let milliseconds = match (self.more, self.bus.is_up()) {
@@ -231,24 +229,9 @@ impl Gateway {
             // Tries to come back every 100 ms; a pause has 30 ms.
             _ => 10,
         };
-        let timeout = Timespec { tv_sec: 0, tv_nsec: milliseconds * 1_000_000 };
-        let mut polled = vec![PollFd::new(&self.listener, PollFlags::IN)];
-        for client in &self.clients {
-            let out = if client.has_something_to_write(now_ms) { PollFlags::OUT } else { PollFlags::empty() };
-            polled.push(PollFd::new(client.stream(), PollFlags::IN | out));
-        }
-        if let Some(socket) = self.bus.socket() {
-            polled.push(PollFd::from_borrowed_fd(socket, PollFlags::IN));
-        }
-        match poll(&mut polled, Some(&timeout)) {
-            Ok(_) | Err(rustix::io::Errno::INTR) => {}
-            Err(error) => return Err(error.into()),
-        }
-        let told = |polled: &PollFd<'_>| {
-            polled.revents().intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR)
-        };
-        let readable = polled[1..=self.clients.len()].iter().map(told).collect();
-        Ok((readable, told(&polled[0])))
+        let clients =
+            self.clients.iter().map(|client| (client.stream(), client.has_something_to_write(now_ms)));
+        wait(&self.listener, clients, self.bus.socket(), milliseconds)
     }
 
     fn let_in(&mut self, now_ms: u64) {
@@ -393,10 +376,4 @@ fn tell_loss(client: &Client) {
             report.address, report.frames_lost, report.frames_to_client
         );
     }
-}
-
-/// The time of day `age_ns` ago, ns since the Unix epoch: what clients expect of a time stamp.
-fn wall_clock_ns(age_ns: u64) -> u64 {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    (now.as_nanos() as u64).saturating_sub(age_ns)
 }

@@ -3,20 +3,18 @@
 //! The format is the one that CI systems agree on: `testsuites`, `testsuite`, `testcase` with `failure` or `skipped`. The crates
 //! that write it bring a date library and a UUID generator for forty lines of text.
 
-use crate::soak::model::CheckResult;
+use crate::soak::model::{Check, CheckResult};
 use std::fmt::Write;
 
 pub(crate) struct Case {
     pub(crate) class: String,
-    pub(crate) name: String,
     pub(crate) time_s: f64,
-    pub(crate) result: CheckResult,
-    pub(crate) detail: String,
+    pub(crate) check: Check,
 }
 
 /// The text of a file with one suite; `name` is that of the suite, `time_s` what it took.
 pub(crate) fn text(name: &str, cases: &[Case], time_s: f64) -> String {
-    let count = |result| cases.iter().filter(|case| case.result == result).count();
+    let count = |result| cases.iter().filter(|case| case.check.result == result).count();
     let (tests, failures, skipped) = (cases.len(), count(CheckResult::Failed), count(CheckResult::Skipped));
     let counts = format!(r#"tests="{tests}" failures="{failures}" errors="0""#);
     let time = format!(r#"time="{time_s:.1}""#);
@@ -32,9 +30,10 @@ pub(crate) fn text(name: &str, cases: &[Case], time_s: f64) -> String {
 
 impl Case {
     fn write(&self, text: &mut String) {
-        let [class, name, detail] = [&self.class, &self.name, &self.detail].map(|text| escaped(text));
+        let Check { name, result, detail } = &self.check;
+        let [class, name, detail] = [&self.class, name, detail].map(|text| escaped(text));
         let _ = write!(text, r#"<testcase classname="{class}" name="{name}" time="{:.1}">"#, self.time_s);
-        let _ = match self.result {
+        let _ = match result {
             CheckResult::Passed => write!(text, "<system-out>{detail}</system-out>"),
             CheckResult::Failed => write!(text, r#"<failure message="{detail}">{detail}</failure>"#),
             CheckResult::Skipped => write!(text, r#"<skipped message="{detail}"/>"#),

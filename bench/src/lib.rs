@@ -36,3 +36,15 @@ pub mod replay;
 pub mod runs;
 pub mod soak;
 pub mod spread;
+
+use std::io::Write;
+
+/// A line to standard output. A reader that has gone, as `| head` does, has seen enough.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// A line to standard error, where nobody may be there to read it.
+pub(crate) fn warn(line: &str) {
+    let _ = writeln!(std::io::stderr(), "bench: {line}");
+}

@@ -18,7 +18,6 @@ use live::LiveError;
 use protocol::exit::Exit;
 use runlog::run_folder::{FileError, read_text, write_json};
 use std::fmt::Display;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -72,8 +71,7 @@ fn told<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCod
 }
 
 fn print(text: &str) {
-    // A reader that has gone, as `| head` does, has seen enough.
-    let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
+    bench::say(text.trim_end());
 }
 
 fn sum_up(folder: &Path) -> Result<Exit, SummaryError> {

@@ -18,6 +18,7 @@ pub mod cli;
 mod line;
 mod rally;
 
+use crate::{say, warn};
 use cli::{PingPongArguments, PongArguments};
 use latency::kinds::{PING_PONG, TO_ARRIVAL};
 use line::{Line, OnBus, OnSocket};
@@ -28,7 +29,7 @@ use realtime::{Clock, Grants, Interrupt, MonotonicClock, Percentiles, Request, w
 use runlog::ping_pong::{PingPongFigures, PingPongFile};
 use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
-use std::io::{self, Write};
+use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -167,13 +168,14 @@ fn on_socket(socket: io::Result<OwnedFd>) -> Result<Box<dyn Line>, PingPongError
     Ok(Box::new(OnSocket::new(socket).map_err(|errno| refused(errno.to_string()))?))
 }
 
-fn grants(priority: Option<u8>, cpu: Option<usize>) -> Grants {
+/// What this thread gets of what it asks for; warns of what it does not.
+pub(crate) fn grants(priority: Option<u8>, cpu: Option<usize>) -> Grants {
     let request = match priority {
         Some(priority) => Request::for_a_loop(priority, cpu),
         None => Request { cpu, ..Request::default() },
     };
     let grants = realtime::acquire(&request);
-    grants.refusals().iter().for_each(|refusal| eprintln!("bench: warning: {refusal}"));
+    grants.refusals().iter().for_each(|refusal| warn(&format!("warning: {refusal}")));
     grants
 }
 
@@ -213,14 +215,12 @@ fn tell(name: &str, figures: &PingPongFigures) {
             of.count
         )
     };
-    let mut out = io::stdout();
-    // A reader that has gone has seen enough.
-    let _ = writeln!(out, "{}", line("round trip", &figures.round_trip_ns));
+    say(&line("round trip", &figures.round_trip_ns));
     if let Some(to_arrival_ns) = &figures.to_arrival_ns {
-        let _ = writeln!(out, "{}", line("to arrival", to_arrival_ns));
+        say(&line("to arrival", to_arrival_ns));
     }
     if figures.lost + figures.skipped > 0 {
-        let _ = writeln!(out, "{name}: {} pings lost, {} left out", figures.lost, figures.skipped);
+        say(&format!("{name}: {} pings lost, {} left out", figures.lost, figures.skipped));
     }
 }
 

@@ -25,6 +25,7 @@ mod gaps;
 
 pub use gaps::{Counts, Gap, GapWatch, Total};
 
+use crate::say;
 use cli::ProbeArguments;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use protocol::exit::Exit;
@@ -34,7 +35,7 @@ use realtime::vitals::VitalsReader;
 use realtime::{Clock, Interrupt, MonotonicClock, Request};
 use runlog::run_folder::LineFile;
 use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use thread_priority::{
@@ -243,12 +244,10 @@ fn tell(seen: &BTreeMap<usize, Seen>, length_ns: u64) {
         let share_percent = 100.0 * total.together_ns as f64 / length_ns.max(1) as f64;
         format!("{:>7}  {:>10.1}  {share_percent:>7.3}", total.count, total.longest_ns as f64 / 1e3)
     };
-    // A reader that has gone has seen enough.
-    let mut out = io::stdout();
-    let _ = writeln!(out, "       the CPU stood still             another thread ran");
-    let _ = writeln!(out, "  CPU     gaps  longest us   time %       gaps  longest us   time %");
+    say("       the CPU stood still             another thread ran");
+    say("  CPU     gaps  longest us   time %       gaps  longest us   time %");
     for (cpu, Seen { stood_still, another_ran }) in seen {
-        let _ = writeln!(out, "{cpu:>5}  {}    {}", part(stood_still), part(another_ran));
+        say(&format!("{cpu:>5}  {}    {}", part(stood_still), part(another_ran)));
     }
 }
 

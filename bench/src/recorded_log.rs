@@ -5,9 +5,10 @@
 //!
 //! Frames are kept in memory, 33 bytes each: an hour of a rig with both controllers some 600 MB.
 
+use crate::warn;
 use runlog::candump::{LogError, LogLine, LogReader};
 use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 const LOG_NAME: &str = "bus.log";
@@ -96,11 +97,7 @@ impl RecordedLog {
     pub fn tell_cut_line(&self) {
         if let Some(line) = self.cut_line {
             let file = self.file.display();
-            // Nobody may be there to read it.
-            let _ = writeln!(
-                std::io::stderr(),
-                "bench: {file}:{line}: the last line is cut, and left out: its writer was killed"
-            );
+            warn(&format!("{file}:{line}: the last line is cut, and left out: its writer was killed"));
         }
     }
 }

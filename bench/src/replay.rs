@@ -15,16 +15,18 @@ pub mod kind;
 mod play;
 mod schedule;
 
+use crate::ping_pong::grants;
 use crate::recorded_log::{RecordedLog, RecordedLogError};
+use crate::say;
 use cli::ReplayArguments;
 use play::{End, Played, heard_of_a_rig, play};
 use protocol::bus::{self, Bus, BusError, StampClock};
 use protocol::exit::Exit;
-use realtime::{Clock, Interrupt, MonotonicClock, Request, write_hlog};
+use realtime::{Clock, Interrupt, MonotonicClock, write_hlog};
 use runlog::run_folder::{FileError, SCHEMA_VERSION, write_json};
 use schedule::{LONGEST, Schedule};
 use serde_json::json;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -115,12 +117,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     }
     let length_s = schedule.frames[schedule.frames.len() - 1].after_ns as f64 * 1e-9;
     say(&format!("replaying {} frames over {length_s:.3} s on {}", schedule.frames.len(), arguments.bus));
-    let request = match arguments.priority {
-        Some(priority) => Request::for_a_loop(priority, arguments.cpu),
-        None => Request { cpu: arguments.cpu, ..Request::default() },
-    };
-    let grants = realtime::acquire(&request);
-    grants.refusals().iter().for_each(|refusal| warn(&format!("warning: {refusal}")));
+    let _grants = grants(arguments.priority, arguments.cpu);
     let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let spin = Duration::from_micros(arguments.spin_us);
     let played = play(bus.as_mut(), &MonotonicClock, &schedule, spin, &interrupt);
@@ -218,13 +215,4 @@ fn write(
 
 fn no_bus(arguments: &ReplayArguments) -> ReplayError {
     ReplayError::NoBus(arguments.bus.to_string())
-}
-
-fn say(text: &str) {
-    // A reader that has gone has seen enough.
-    let _ = writeln!(io::stdout(), "{text}");
-}
-
-fn warn(text: &str) {
-    let _ = writeln!(io::stderr(), "bench: {text}");
 }

@@ -301,11 +301,7 @@ mod tests {
 
     /// A finished segment of experiment `e` with these checks.
     pub(super) fn segment(number: u32, checks: &[(&str, CheckResult)]) -> Segment {
-        let check = |(name, result): &(&str, CheckResult)| Check {
-            name: (*name).into(),
-            result: *result,
-            detail: "because".into(),
-        };
+        let check = |(name, result): &(&str, CheckResult)| Check::new(name, *result, "because");
         let mut segment = Segment::cut_off(number, "e", &format!("{number:04}-e"));
         segment.finished = true;
         segment.checks = checks.iter().map(check).collect();

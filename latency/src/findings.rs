@@ -226,12 +226,11 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
     (count > 0).then(|| Finding {
         cause: Cause::SlowListener,
         count,
-        explained_ns: 0,
-        by_itself: false,
         sentence: format!(
             "{count} frames did not fit the full queue of {}, which did not read it in time; other peers had theirs.",
             who.join(", ")
         ),
+        ..Finding::default()
     })
 }
 
@@ -269,11 +268,10 @@ fn frame_loss(runs: &[RunFiles]) -> Option<Finding> {
         Finding {
             cause: Cause::FrameLoss,
             count: unaccounted.max(on_wire),
-            explained_ns: 0,
-            by_itself: false,
             sentence: format!(
                 "{lost} frames never came, by gaps in the counters at rig and controllers; {witness}."
             ),
+            ..Finding::default()
         }
     })
 }
@@ -286,13 +284,12 @@ fn clock_step(runs: &[RunFiles]) -> Option<Finding> {
     Some(Finding {
         cause: Cause::ClockStep,
         count: steps.len() as u64,
-        explained_ns: 0,
-        by_itself: false,
         sentence: format!(
             "The wall clock was stepped, by {largest:+.3} s at most ({} sighting(s)); the cycles run on the monotonic clock and \
              were not touched by it.",
             steps.len()
         ),
+        ..Finding::default()
     })
 }
 

@@ -227,7 +227,7 @@ pub struct ProbeGap {
 }
 
 /// Something that disturbed the runs.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Finding {
     pub cause: Cause,
     /// How often, in events or frames.

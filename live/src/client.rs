@@ -4,9 +4,11 @@
 //! request, is parted with. Neither costs anybody else anything.
 
 use super::http::{self, Progress, Request, Status};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
-use std::net::{Shutdown, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
+use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 
 /// Bytes of events that wait for a client: some ten seconds of them.
@@ -186,7 +188,32 @@ impl Client {
     }
 }
 
-fn is_for_later(error: &io::Error) -> bool {
+/// Waits at the door and for clients, each with whether it has something to write; `other` wakes too. Tells which clients have
+/// sent something, and whether somebody waits at the door.
+pub fn wait<'a>(
+    door: &TcpListener,
+    clients: impl Iterator<Item = (&'a TcpStream, bool)>,
+    other: Option<BorrowedFd<'a>>,
+    milliseconds: i64,
+) -> io::Result<(Vec<usize>, bool)> {
+    let mut polled = vec![PollFd::new(door, PollFlags::IN)];
+    polled.extend(clients.map(|(stream, writes)| {
+        PollFd::new(stream, if writes { PollFlags::IN | PollFlags::OUT } else { PollFlags::IN })
+    }));
+    let count = polled.len();
+    polled.extend(other.map(|socket| PollFd::from_borrowed_fd(socket, PollFlags::IN)));
+    match poll(&mut polled, Some(&Timespec { tv_sec: 0, tv_nsec: milliseconds * 1_000_000 })) {
+        Ok(_) | Err(rustix::io::Errno::INTR) => {}
+        Err(error) => return Err(error.into()),
+    }
+    let told =
+        |polled: &PollFd<'_>| polled.revents().intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR);
+    Ok(((1..count).filter(|place| told(&polled[*place])).map(|place| place - 1).collect(), told(&polled[0])))
+}
+
+/// Whether a socket that does not block has nothing to say yet.
+#[must_use]
+pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }
 
@@ -198,7 +225,6 @@ pub(super) fn refusal() -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::net::TcpListener;
 
     const EVENTS: &str = "GET /api/events HTTP/1.1\r\nHost: localhost:1\r\n\r\n";
 

@@ -28,7 +28,7 @@
 pub mod assets;
 pub mod chains;
 pub mod cli;
-mod client;
+pub mod client;
 pub mod columns;
 pub mod control;
 mod feed;
@@ -72,7 +72,8 @@ impl LiveError {
 }
 
 /// The time of day `age_ns` ago, ns since the Unix epoch, which candump's stamps are.
-fn wall_clock_ns(age_ns: u64) -> u64 {
+#[must_use]
+pub fn wall_clock_ns(age_ns: u64) -> u64 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     (now.as_nanos() as u64).saturating_sub(age_ns)
 }

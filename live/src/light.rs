@@ -8,6 +8,7 @@
 use latency::claim;
 use latency::conditions::conditions;
 use latency::files::RunFiles;
+use runlog::run_folder::read_json;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -30,7 +31,8 @@ impl Light {
     pub fn judge(&mut self, cycles: u64, skipped: u64) -> Value {
         if self.run.run.is_null() {
             // The emulator writes it when it has asked for its privileges, which is after it let viewers in.
-            self.run.run = self.folder.as_deref().and_then(read).unwrap_or_default();
+            let path = self.folder.as_ref().map(|folder| folder.join("run.json"));
+            self.run.run = path.and_then(|path| read_json(&path).ok()).unwrap_or_default();
         }
         if self.run.run.is_null() {
             let reason = "What the emulator was granted is not known: its run.json was not found.";
@@ -47,11 +49,6 @@ impl Light {
         let reasons = [so_far.against, so_far.missing].concat();
         json!({ "supported": supported, "reasons": reasons })
     }
-}
-
-fn read(folder: &Path) -> Option<Value> {
-    let text = std::fs::read_to_string(folder.join("run.json")).ok()?;
-    serde_json::from_str(&text).ok()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::LiveError;
 use super::assets;
 use super::cli::WatchArguments;
-use super::client::{Client, refusal};
+use super::client::{Client, refusal, wait};
 use super::control::{self, Order};
 use super::feed::Feed;
 use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, response, said};
@@ -17,7 +17,6 @@ use protocol::frames::{EmergencyStop, Frame};
 use protocol::periods::EMERGENCY_STOP_CYCLES;
 use runlog::candump::FrameRecord;
 use runlog::telemetry::Packet;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -154,21 +153,8 @@ impl Server {
     /// Which clients have sent something, and whether somebody waits at the door.
     fn wait(&self) -> io::Result<(Vec<usize>, bool)> {
         let left_ms = self.due.turn.saturating_sub(self.now_ms());
-        let timeout = Timespec { tv_sec: 0, tv_nsec: (left_ms * 1_000_000) as i64 };
-        let mut polled = vec![PollFd::new(&self.listener, PollFlags::IN)];
-        for client in &self.clients {
-            let out = if client.has_something_to_write() { PollFlags::OUT } else { PollFlags::empty() };
-            polled.push(PollFd::new(client.stream(), PollFlags::IN | out));
-        }
-        match poll(&mut polled, Some(&timeout)) {
-            Ok(_) | Err(rustix::io::Errno::INTR) => {}
-            Err(error) => return Err(error.into()),
-        }
-        let told = |polled: &PollFd<'_>| {
-            polled.revents().intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR)
-        };
-        let readable = polled[1..].iter().enumerate().filter(|(_, client)| told(client));
-        Ok((readable.map(|(place, _)| place).collect(), told(&polled[0])))
+        let clients = self.clients.iter().map(|client| (client.stream(), client.has_something_to_write()));
+        wait(&self.listener, clients, None, left_ms as i64)
     }
 
     fn let_in(&mut self, now_ms: u64) {

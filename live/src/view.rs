@@ -26,6 +26,7 @@ const WARNINGS: [&str; 7] =
     ["skipped", "command-stale", "link-refused", "link-given-up", "weights-refused", "malformed", "fault"];
 const ERRORS: [&str; 5] = ["emergency-stop", "two-sources", "second-rig", "not-finite", "bus-lost"];
 
+#[derive(Default)]
 pub struct View {
     /// The run's folder, if it was named at the command line.
     folder: Option<PathBuf>,
@@ -65,27 +66,7 @@ impl View {
     /// Nothing heard yet.
     #[must_use]
     pub fn new(folder: Option<&Path>) -> Self {
-        Self {
-            folder: folder.map(Path::to_path_buf),
-            description: Value::Null,
-            layout: Layout::default(),
-            telemetry: false,
-            cycle: None,
-            wire: Wire::default(),
-            rows: Rows::default(),
-            rhythm: Rhythm::default(),
-            minute: Minute::default(),
-            light: Light::new(folder),
-            claim: Value::Null,
-            overruns: 0,
-            recent_overruns: VecDeque::new(),
-            skipped: 0,
-            records_lost: 0,
-            faults: BTreeMap::new(),
-            set_up: SetUp::default(),
-            messages: VecDeque::new(),
-            fresh: Vec::new(),
-        }
+        Self { folder: folder.map(Path::to_path_buf), light: Light::new(folder), ..Self::default() }
     }
 
     /// Takes a packet of the telemetry, save an answer, which is the server's.
@@ -225,11 +206,8 @@ impl View {
         } else {
             "info"
         };
-        let message = json!({ "t_s": cycle as f64 / 1000.0, "level": level, "text": event["text"].as_str().unwrap_or(kind) });
-        if kind != "skipped" || self.overruns <= OVERRUNS_KEPT {
-            self.keep(message.clone());
-        }
-        self.fresh.push(message);
+        let is_kept = kind != "skipped" || self.overruns <= OVERRUNS_KEPT;
+        self.say(cycle, level, event["text"].as_str().unwrap_or(kind), is_kept);
     }
 
     fn change(&mut self, cycle: u64, set_up: SetUp) {
@@ -241,17 +219,18 @@ impl View {
 
     /// A message of the page's own, at the run's newest moment.
     pub fn tell(&mut self, level: &str, text: &str) {
-        let t_s = self.cycle.unwrap_or_default() as f64 / 1000.0;
-        let message = json!({ "t_s": t_s, "level": level, "text": text });
-        self.keep(message.clone());
-        self.fresh.push(message);
+        self.say(self.cycle.unwrap_or_default(), level, text, true);
     }
 
-    fn keep(&mut self, message: Value) {
-        self.messages.push_back(message);
-        if self.messages.len() > MESSAGES_KEPT {
-            self.messages.pop_front();
+    fn say(&mut self, cycle: u64, level: &str, text: &str, is_kept: bool) {
+        let message = json!({ "t_s": cycle as f64 / 1000.0, "level": level, "text": text });
+        if is_kept {
+            self.messages.push_back(message.clone());
+            if self.messages.len() > MESSAGES_KEPT {
+                self.messages.pop_front();
+            }
         }
+        self.fresh.push(message);
     }
 
     /// Messages that are new since this was asked the last time.

@@ -6,7 +6,7 @@
 use super::cli::{CheckPace, ConformanceArguments};
 use super::watch::{Heard, What, Wrong};
 use crate::junit::Case;
-use crate::soak::model::CheckResult;
+use crate::soak::model::{Check, CheckResult};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -42,7 +42,11 @@ impl Phase<'_> {
 }
 
 pub(super) fn case(class: &str, name: &str, result: CheckResult, detail: String) -> Case {
-    Case { class: format!("controller.{class}"), name: name.into(), time_s: 0.0, result, detail }
+    Case {
+        class: format!("controller.{class}"),
+        time_s: 0.0,
+        check: Check { name: name.into(), result, detail },
+    }
 }
 
 fn kept(holds: bool) -> CheckResult {

@@ -4,6 +4,7 @@
 //! counted. A reply that does not fit ends the connection: the client asks and does not read.
 
 use super::session::{Action, GREETING, Parting, Session};
+use live::client::is_for_later;
 use protocol::can::CanFrame;
 use rustix::net::sockopt;
 use serde::Serialize;
@@ -213,8 +214,4 @@ impl Client {
         }
         self.outgoing.extend(text.as_bytes());
     }
-}
-
-fn is_for_later(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }

@@ -40,7 +40,7 @@ pub fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: boo
             loss(spec, &evidence, account),
         ]),
         Err(why) => {
-            checks.extend(["account", "gaps", "loss"].map(|name| check(name, CheckResult::Failed, why)))
+            checks.extend(["account", "gaps", "loss"].map(|name| Check::new(name, CheckResult::Failed, why)))
         }
     }
     checks.extend([
@@ -53,16 +53,12 @@ pub fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: boo
     Judged { checks, figures: evidence.figures(), account, memory, machine }
 }
 
-fn check(name: &str, result: CheckResult, detail: &str) -> Check {
-    Check { name: name.into(), result, detail: detail.into() }
-}
-
 /// Passed when nothing is broken.
 fn result(name: &str, broken: &[String], good: impl Fn() -> String) -> Check {
     if broken.is_empty() {
-        check(name, CheckResult::Passed, &good())
+        Check::new(name, CheckResult::Passed, &good())
     } else {
-        check(name, CheckResult::Failed, &broken.join("; "))
+        Check::new(name, CheckResult::Failed, &broken.join("; "))
     }
 }
 
@@ -104,7 +100,7 @@ fn loss(spec: &Spec, evidence: &Evidence, account: &Account) -> Check {
     let Some(loss) = spec.loss else {
         let detail = format!("no loss asked for, {injected} frames lost on purpose");
         let result = if injected == 0 { CheckResult::Skipped } else { CheckResult::Failed };
-        return check("loss", result, &detail);
+        return Check::new("loss", result, &detail);
     };
     let frames = host.map_or(0, |host| host.on_wire.total()) + injected;
     let expected = loss * frames as f64;
@@ -113,7 +109,7 @@ fn loss(spec: &Spec, evidence: &Evidence, account: &Account) -> Check {
     let detail =
         format!("{injected} of {frames} frames lost on purpose, {expected:.0} ± {allowed:.0} expected");
     let kept = (injected as f64 - expected).abs() <= allowed && found;
-    check("loss", if kept { CheckResult::Passed } else { CheckResult::Failed }, &detail)
+    Check::new("loss", if kept { CheckResult::Passed } else { CheckResult::Failed }, &detail)
 }
 
 fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
@@ -133,7 +129,7 @@ fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
         () if flat.is_empty() || flat.contains(&None) => CheckResult::Skipped,
         () => CheckResult::Passed,
     };
-    check("memory", result, &detail)
+    Check::new("memory", result, &detail)
 }
 
 /// Every record reached the files, and the log holds every frame that the rig counted.
@@ -196,22 +192,26 @@ fn positions(evidence: &Evidence, judge: bool) -> Check {
         experiment.ok().and_then(|table| table.get("passed")?.as_table().cloned()).unwrap_or_default();
     let bounds: toml::Table = passed.into_iter().filter(|(key, _)| measured.contains_key(key)).collect();
     if bounds.is_empty() {
-        return check("positions", CheckResult::Skipped, &format!("no bound to judge: {}", json!(measured)));
+        return Check::new(
+            "positions",
+            CheckResult::Skipped,
+            &format!("no bound to judge: {}", json!(measured)),
+        );
     }
     match thresholds::judge(&bounds, &measured) {
-        Err(error) => check("positions", CheckResult::Failed, &error.to_string()),
+        Err(error) => Check::new("positions", CheckResult::Failed, &error.to_string()),
         Ok(judged) => {
             let words = |key: &String, entry: &Value| {
                 format!("{key} = {}, {}", measured[key], thresholds::in_words(entry))
             };
             let mut told: Vec<_> = judged.iter().map(|(key, entry)| words(key, entry)).collect();
             if judged.values().all(thresholds::is_kept) {
-                return check("positions", CheckResult::Passed, &told.join("; "));
+                return Check::new("positions", CheckResult::Passed, &told.join("; "));
             }
             let excuse = excuse(evidence, judge);
             let result = if excuse.is_some() { CheckResult::Skipped } else { CheckResult::Failed };
             told.extend(excuse);
-            check("positions", result, &told.join("; "))
+            Check::new("positions", result, &told.join("; "))
         }
     }
 }

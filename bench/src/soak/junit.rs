@@ -1,42 +1,30 @@
 //! `soak-junit.xml`: the checks of all segments as test cases, for whatever shows tests.
 
-use super::model::{CheckResult, Segment, Soak};
+use super::model::{Check, CheckResult, Segment, Soak};
 use crate::junit::Case;
 
 #[must_use]
 pub fn text(soak: &Soak) -> String {
     let mut cases: Vec<_> = soak.segments.iter().flat_map(cases).collect();
-    cases.push(Case {
-        class: "soak".into(),
-        name: "verdict".into(),
-        time_s: 0.0,
-        result: if soak.trusted { CheckResult::Passed } else { CheckResult::Failed },
-        detail: soak.verdict.clone(),
-    });
+    let result = if soak.trusted { CheckResult::Passed } else { CheckResult::Failed };
+    let check = Check::new("verdict", result, &soak.verdict);
+    cases.push(Case { class: "soak".into(), time_s: 0.0, check });
     crate::junit::text("soak", &cases, soak.elapsed_s)
 }
 
 fn cases(segment: &Segment) -> Vec<Case> {
     let class = format!("soak.{}", segment.folder);
     if !segment.finished {
-        let detail = segment.ended.clone();
-        return vec![Case {
-            class,
-            name: "finished".into(),
-            time_s: 0.0,
-            result: CheckResult::Skipped,
-            detail,
-        }];
+        let check = Check::new("finished", CheckResult::Skipped, &segment.ended);
+        return vec![Case { class, time_s: 0.0, check }];
     }
     // The segment's time stands at its first check, so that the cases add up to the soak.
     let time_s = |place| if place == 0 { segment.length_s } else { 0.0 };
     let checks = segment.checks.iter().enumerate();
-    let case = |(place, check): (usize, &super::model::Check)| Case {
+    let case = |(place, check): (usize, &Check)| Case {
         class: class.clone(),
-        name: check.name.clone(),
         time_s: time_s(place),
-        result: check.result,
-        detail: check.detail.clone(),
+        check: check.clone(),
     };
     checks.map(case).collect()
 }

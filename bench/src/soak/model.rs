@@ -140,6 +140,12 @@ pub struct Check {
     pub detail: String,
 }
 
+impl Check {
+    pub(crate) fn new(name: &str, result: CheckResult, detail: &str) -> Self {
+        Self { name: name.into(), result, detail: detail.into() }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CheckResult {
