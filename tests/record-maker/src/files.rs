@@ -9,10 +9,13 @@ use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::Path;
 
+/// A column: its name, and its value in a row of an axis.
+type Column = (&'static str, fn(&Row, usize) -> f64);
+
 /// Columns of an axis after its prefix, as in every measurement file.
 const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
 /// Columns of an axis in the truth.
-const TRUE: [(&str, fn(&Row, usize) -> f64); 21] = [
+const TRUE: [Column; 21] = [
     ("extension_m", |row, i| row.axes[i].extension_m),
     ("rod_velocity_m_per_s", |row, i| row.axes[i].rod_velocity_m_per_s),
     ("rod_acceleration_m_per_s2", |row, i| row.axes[i].rod_acceleration_m_per_s2),
