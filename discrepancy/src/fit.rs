@@ -30,27 +30,6 @@ pub(crate) fn loss(squares: &[f64], dof: &[f64]) -> f64 {
     squares.iter().zip(dof).map(|(square, dof)| dof * (square / dof).max(LEAST).ln()).sum()
 }
 
-/// Gauss-Newton: steps from an iterate to one of less loss, until `step` finds none, one lowers the loss by less than `converged`,
-/// or `steps` are done.
-pub(crate) fn descend<P>(
-    start: P,
-    steps: usize,
-    converged: f64,
-    loss: impl Fn(&P) -> f64,
-    mut step: impl FnMut(&P) -> Option<P>,
-) -> P {
-    let mut point = start;
-    for _ in 0..steps {
-        let Some(next) = step(&point) else { break };
-        let fall = loss(&point) - loss(&next);
-        point = next;
-        if fall < converged {
-            break;
-        }
-    }
-    point
-}
-
 /// Products of a residual and some columns, window by window.
 #[derive(Clone, Debug)]
 pub(crate) struct Products {
@@ -222,8 +201,8 @@ impl Products {
         Fit { coefficients, loss, squares, weights }
     }
 
-    /// Cross-validated loss: each fold, a contiguous stretch of windows, is judged with the coefficients of the others; `precisions`
-    /// and `from` as in [`Products::fit_from`]. At a minimum, the difference to [`Products::loss`] is overfitting.
+    /// Cross-validated loss: each fold, a contiguous stretch of windows, is judged with the coefficients of the others. Other
+    /// arguments as in [`Products::fit_from`]. At a minimum, the difference to [`Products::loss`] is overfitting.
     pub(crate) fn cross_validated_loss(
         &self,
         chosen: &[usize],

@@ -32,6 +32,7 @@ pub mod candidates;
 pub mod check;
 pub mod cli;
 pub mod commands;
+pub(crate) mod descent;
 pub mod description_error;
 pub mod engine;
 pub mod extend;

@@ -9,8 +9,9 @@
 //! and slip are useless. Source: discrepancy-notes.md, pipeline 6.
 
 use crate::candidates::Candidate;
+use crate::descent::descend;
 use crate::engine::Engine;
-use crate::fit::{Fit, Products, descend};
+use crate::fit::{Fit, Products};
 use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use plant::RigParameters;

@@ -85,7 +85,7 @@ impl CommandIntake {
         true
     }
 
-    /// Decides whether the command that `take` stored last acts over the cycle that was sent last: a stale or disputed one is withdrawn.
+    /// Decides whether the command that `take` stored acts over the cycle that was sent last: withdraws a stale or disputed one.
     pub fn latch(&mut self, live: &LiveCycles) -> Option<Change> {
         let too_old =
             |command: &ValveCommand| live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES);

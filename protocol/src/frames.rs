@@ -10,7 +10,8 @@
 //! range and unit; only a millionth of a count is forgiven, so that rounding errors at the ends of a range are not.
 //! Bits that no signal covers are reserved: 0 when sent, refused when received.
 //!
-//! `rig.dbc` is the only place where a range, a factor, a bit or an identifier is written. `generator/` makes of it, in `frames/generated.rs`,
+//! `rig.dbc` is the only place where a range, a factor, a bit or an identifier is written. `generator/` makes of it, in
+//! `frames/generated.rs`,
 //!
 //! - a payload struct for each layout, shared by messages that differ by a leading node or axis word,
 //! - [`Frame`], one variant for each identifier, with [`Frame::encode`] and [`Frame::decode`],

@@ -1,5 +1,5 @@
-//! A `rig.dbc` that is broken, or says what the generator does not know, is refused with file and line; `src/frames/generated.rs` is what the
-//! generator makes of the file itself.
+//! A `rig.dbc` that is broken, or says what the generator does not know, is refused with file and line;
+//! `src/frames/generated.rs` is what the generator makes of the file itself.
 
 use crate::emit;
 use crate::model;

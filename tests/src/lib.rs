@@ -22,10 +22,10 @@
 //!   viewers ─ ten of the live page, for scripts/viewers
 //! ```
 //!
-//! Everything here panics where a test would have to fail: a file that is missing or not whole, a program that does not start, answer or
-//! end as it should. Nothing here waits without a limit; what is waited for, and what the programs said, stands in the panic. Programs are
-//! killed with their whole process group when their [`process::Running`] goes. No test asserts on timing: a limit is a
-//! protection against hanging, many times longer than what it limits takes.
+//! Everything here panics where a test would have to fail: a file that is missing or not whole, a program that does not start,
+//! answer or end as it should. Nothing here waits without a limit; what is waited for, and what the programs said, stands in the
+//! panic. Programs are killed with their whole process group when their [`process::Running`] goes. No test asserts on timing: a
+//! limit is a protection against hanging, many times longer than what it limits takes.
 
 pub mod account;
 pub mod axis_table;

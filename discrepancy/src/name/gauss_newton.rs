@@ -9,8 +9,9 @@
 
 use super::NUMBER_COSTS;
 use super::null_distribution::above_far_off;
+use crate::descent::descend;
 use crate::engine::Engine;
-use crate::fit::{Fit, Products, descend, loss};
+use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
     MOST_OFF, Placed, Refit, coordinate_columns, model_penalty, prior_deviations, prior_precisions, rig_of,

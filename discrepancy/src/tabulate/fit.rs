@@ -9,8 +9,9 @@
 //! linearisation.
 
 use super::with_tables;
+use crate::descent::descend;
 use crate::engine::{Engine, FACTOR_CHANGE};
-use crate::fit::{Products, descend, loss};
+use crate::fit::{Products, loss};
 use crate::name::NUMBER_COSTS;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit};

@@ -1,4 +1,5 @@
-//! What the lists in `generated.rs` expand to: an enum for each value table, a struct for each payload, and [`Frame`](super::Frame).
+//! What the lists in `generated.rs` expand to: an enum for each value table, a struct for each payload, and
+//! [`Frame`](super::Frame).
 //!
 //! Each signal knows its place in the message as a constant, so encode and decode are straight lines without a loop.
 
@@ -236,7 +237,7 @@ macro_rules! plain_bytes {
 }
 pub(super) use plain_bytes;
 
-/// `Frame`, `MESSAGES` and their constants, from `identifier Variant(Payload) CONSTANT { rest of its MessageSpec }` for each message.
+/// `Frame`, `MESSAGES` and their constants: `identifier Variant(Payload) CONSTANT { rest of its MessageSpec }` for each message.
 macro_rules! frames {
     (
         $(#[$doc:meta])*

@@ -297,6 +297,7 @@ const DIMENSIONLESS: &[&str] = &[
     "valve",                 // the same, of both axes
     "spool",                 // position of a valve's spool, -1 to 1
     "velocity_feed_forward", // share
+    "prior_std",             // of a factor
     "loss",                  // probability
     "size",                  // of a drawing, in its own units
     "values",                // of parameters, each with its own unit
