@@ -110,7 +110,7 @@ pub fn run(
 fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, SummaryError> {
     let joined = match join::join(folder) {
         Ok(joined) => joined,
-        Err(error @ SummaryError::File(FileError::Write { .. })) => return Err(error),
+        Err(error @ SummaryError::File(FileError::Write(..))) => return Err(error),
         Err(error) => return Ok(Outcome::failed(error.to_string())),
     };
     let number = |key: &str| joined.figure(key).as_f64();

@@ -1,15 +1,21 @@
-//! Rust text for the messages of `rig.dbc`; what it says is explained in `src/frames.rs`, which includes it.
+//! Rust text for the messages of `rig.dbc`; what it says is explained in `src/frames.rs`, whose modules it makes.
 //!
 //! The text is lists: ranges, factors and bits go into the tables, and the macros of `src/frames/layout.rs` make the types.
 
 use crate::model::{Catalogue, Kind, Message, Payload, Signal, Table, camel_case};
 
-/// The whole of `src/frames/generated.rs`.
-pub(crate) fn catalogue(catalogue: &Catalogue) -> String {
-    let mut out = String::from(
-        "// @generated from rig.dbc by the tests of this crate (generator/): cargo test -p protocol generated\n\n",
-    );
+/// The first line of a file, which says what it holds.
+fn head(purpose: &str) -> String {
+    format!(
+        "//! {purpose}\n//!\n//! @generated from rig.dbc by the tests of this crate (generator/): cargo test -p protocol generated\n\n"
+    )
+}
+
+/// The whole of `src/frames/payloads.rs`.
+pub(crate) fn payloads(catalogue: &Catalogue) -> String {
+    let mut out = head("Value tables of `rig.dbc`, and a struct for each payload.");
     let rate = catalogue.bit_rate_per_s;
+    out += "use super::*;\n\n";
     out += &format!("/// Bit rate of the bus, in bit/s.\npub const BIT_RATE_PER_S: u32 = {rate};\n\n");
     for table in &catalogue.tables {
         value_table(&mut out, table);
@@ -17,6 +23,14 @@ pub(crate) fn catalogue(catalogue: &Catalogue) -> String {
     for each in &catalogue.payloads {
         payload(&mut out, each, catalogue);
     }
+    out.truncate(out.trim_end().len());
+    out + "\n"
+}
+
+/// The whole of `src/frames/messages.rs`.
+pub(crate) fn messages(catalogue: &Catalogue) -> String {
+    let mut out = head("The messages of `rig.dbc` with all that it says about them and their signals.");
+    out += "use super::*;\n\n";
     frames(&mut out, catalogue);
     out
 }

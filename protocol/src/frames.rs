@@ -11,7 +11,7 @@
 //! Bits that no signal covers are reserved: 0 when sent, refused when received.
 //!
 //! `rig.dbc` is the only place where a range, a factor, a bit or an identifier is written. `generator/` makes of it, in
-//! `frames/generated.rs`,
+//! `frames/payloads.rs` and `frames/messages.rs`,
 //!
 //! - a payload struct for each layout, shared by messages that differ by a leading node or axis word,
 //! - [`Frame`], one variant for each identifier, with [`Frame::encode`] and [`Frame::decode`],
@@ -27,10 +27,12 @@ use crate::can::{CanFrame, ERROR_FLAG, REMOTE_FLAG};
 use crate::checksum;
 
 mod layout;
+mod messages;
+mod payloads;
 
 use layout::{Field, exact, frames, payload, plain_bytes, put_counts, value_table};
-
-include!("frames/generated.rs");
+pub use messages::*;
+pub use payloads::*;
 
 /// Values of the counter `alive` in commands and sensors: it counts modulo this.
 pub const ALIVE_RANGE: u64 = 16;

@@ -1,5 +1,5 @@
 //! A `rig.dbc` that is broken, or says what the generator does not know, is refused with file and line;
-//! `src/frames/generated.rs` is what the generator makes of the file itself.
+//! `src/frames/payloads.rs` and `messages.rs` are what the generator makes of the file itself.
 
 use crate::emit;
 use crate::model;
@@ -7,9 +7,10 @@ use crate::source;
 
 const RIG: &str = include_str!("../rig.dbc");
 
-fn build(text: &str) -> Result<String, String> {
+/// The two files that the generator makes.
+fn build(text: &str) -> Result<[(&'static str, String); 2], String> {
     let catalogue = model::Catalogue::read(&source::Source::new("rig.dbc", text))?;
-    Ok(emit::catalogue(&catalogue))
+    Ok([("payloads.rs", emit::payloads(&catalogue)), ("messages.rs", emit::messages(&catalogue))])
 }
 
 /// Replaces the first `from` behind `after` in rig.dbc; what the build says, and the line that was changed.
@@ -22,20 +23,28 @@ fn break_it(after: &str, from: &str, to: &str) -> (String, usize) {
 
 #[test]
 fn the_file_itself_builds_the_same_text_twice() {
-    let text = build(RIG).unwrap();
-    assert!(text.contains("pub enum Frame"));
-    assert_eq!(build(RIG).unwrap(), text);
+    let files = build(RIG).unwrap();
+    assert!(files[1].1.contains("pub enum Frame"));
+    assert_eq!(build(RIG).unwrap(), files);
 }
 
-/// The file is written when it is out of date, so that a second run passes with the new frames compiled in.
+/// A file is written when it is out of date, so that a second run passes with the new frames compiled in.
 #[test]
 fn the_committed_frames_are_generated_from_rig_dbc() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/frames/generated.rs");
     let fresh = build(RIG).unwrap_or_else(|problem| panic!("protocol/{problem}"));
-    if std::fs::read_to_string(path).ok().as_deref() != Some(&fresh) {
-        std::fs::write(path, fresh).unwrap();
-        panic!("{path} was out of date: it is written anew, build and test again");
+    let mut written = Vec::new();
+    for (name, text) in fresh {
+        let path = format!("{}/src/frames/{name}", env!("CARGO_MANIFEST_DIR"));
+        if std::fs::read_to_string(&path).ok().as_deref() != Some(&text) {
+            std::fs::write(&path, text).unwrap();
+            written.push(path);
+        }
     }
+    assert!(
+        written.is_empty(),
+        "out of date, and written anew: {}; build and test again",
+        written.join(", ")
+    );
 }
 
 #[test]

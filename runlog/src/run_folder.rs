@@ -126,36 +126,26 @@ impl LineFile {
     }
 }
 
-/// A file that cannot be read or written.
+/// A file that cannot be read or written, with what the system or the parser said.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// It is missing, or is not what it should be.
-    #[error("cannot read {file}: {reason}")]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system or the parser said.
-        reason: String,
-    },
+    #[error("cannot read {}: {reason}", .0.display(), reason = .1)]
+    Read(PathBuf, String),
     /// The system refuses.
-    #[error("cannot write {file}: {reason}")]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        reason: String,
-    },
+    #[error("cannot write {}: {reason}", .0.display(), reason = .1)]
+    Write(PathBuf, String),
 }
 
 impl FileError {
     /// A file that cannot be read.
     pub fn read(file: &Path, reason: impl ToString) -> Self {
-        Self::Read { file: file.into(), reason: reason.to_string() }
+        Self::Read(file.into(), reason.to_string())
     }
 
     /// A file that cannot be written.
     pub fn write(file: &Path, reason: impl ToString) -> Self {
-        Self::Write { file: file.into(), reason: reason.to_string() }
+        Self::Write(file.into(), reason.to_string())
     }
 }
 

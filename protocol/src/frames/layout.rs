@@ -1,5 +1,5 @@
-//! What the lists in `generated.rs` expand to: an enum for each value table, a struct for each payload, and
-//! [`Frame`](super::Frame).
+//! What the generated lists of `payloads.rs` and `messages.rs` expand to: an enum for each value table, a struct for each
+//! payload, and [`Frame`](super::Frame).
 //!
 //! Each signal knows its place in the message as a constant, so encode and decode are straight lines without a loop.
 
@@ -193,21 +193,21 @@ macro_rules! payload {
         }
 
         impl $name {
-            fn pack(&self, message: &'static MessageSpec) -> Result<u64, EncodeError> {
+            pub(super) fn pack(&self, message: &'static MessageSpec) -> Result<u64, EncodeError> {
                 let mut word = 0;
                 $(word |= self.$field.put(message, $index)?;)*
                 Ok(word)
             }
 
-            fn unpack(message: &'static MessageSpec, word: u64) -> Result<Self, DecodeError> {
+            pub(super) fn unpack(message: &'static MessageSpec, word: u64) -> Result<Self, DecodeError> {
                 Ok(Self { $($field: Field::take(message, $index, word)?,)* })
             }
 
-            fn visit(&self, message: &'static MessageSpec, visit: &mut impl FnMut(&'static SignalSpec, f64)) {
+            pub(super) fn visit(&self, message: &'static MessageSpec, visit: &mut impl FnMut(&'static SignalSpec, f64)) {
                 $(visit(&message.signals[$index], self.$field.to_f64());)*
             }
 
-            fn from_values(values: &[f64]) -> Option<Self> {
+            pub(super) fn from_values(values: &[f64]) -> Option<Self> {
                 let &[$($field,)*] = values else { return None };
                 Some(Self { $($field: Field::from_f64($field)?,)* })
             }
@@ -266,7 +266,7 @@ macro_rules! frames {
                 }
             }
 
-            fn pack(&self) -> Result<u64, EncodeError> {
+            pub(super) fn pack(&self) -> Result<u64, EncodeError> {
                 match self {
                     $(Self::$name(payload) => payload.pack($message),)*
                 }
