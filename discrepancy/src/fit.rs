@@ -158,6 +158,24 @@ impl Products {
         (matrix, vector)
     }
 
+    /// The solution of the weighted normal equations; `from` is what earlier steps added to each coefficient. `None` where they
+    /// are singular.
+    fn weighted_solution(
+        &self,
+        chosen: &[usize],
+        weights: &[f64],
+        precisions: &[f64],
+        from: &[f64],
+    ) -> Option<Vec<f64>> {
+        let (matrix, mut vector) = self.normal(chosen, weights, precisions);
+        vector
+            .iter_mut()
+            .zip(precisions)
+            .zip(from)
+            .for_each(|((score, precision), from)| *score -= precision * from);
+        solve(matrix, &vector).map(|solution| solution.iter().copied().collect())
+    }
+
     /// The best coefficients of some columns; `precisions` as in [`Products::normal`].
     pub(crate) fn fit(&self, chosen: &[usize], precisions: &[f64]) -> Fit {
         self.fit_from(chosen, precisions, &vec![0.0; chosen.len()])
@@ -178,14 +196,7 @@ impl Products {
         };
         let mut loss = self.loss(&squares) + prior_loss(&coefficients);
         for _ in 0..PASSES {
-            let (matrix, mut vector) = self.normal(chosen, &weights, precisions);
-            vector
-                .iter_mut()
-                .zip(precisions)
-                .zip(from)
-                .for_each(|((score, precision), from)| *score -= precision * from);
-            let Some(solved) = solve(matrix, &vector) else { break };
-            let tried: Vec<f64> = solved.iter().copied().collect();
+            let Some(tried) = self.weighted_solution(chosen, &weights, precisions, from) else { break };
             let tried_squares = self.squares(chosen, &tried);
             let tried_loss = self.loss(&tried_squares) + prior_loss(&tried);
             if tried_loss > loss - CONVERGED && tried_loss >= loss {
@@ -216,14 +227,8 @@ impl Products {
         let judged = (0..folds).flat_map(|fold| {
             let mut weights = all.clone();
             weights[of(fold)].fill(0.0);
-            let (matrix, mut vector) = self.normal(chosen, &weights, precisions);
-            vector
-                .iter_mut()
-                .zip(precisions)
-                .zip(from)
-                .for_each(|((score, precision), from)| *score -= precision * from);
-            let solution = solve(matrix, &vector)
-                .map_or(vec![0.0; chosen.len()], |solution| solution.iter().copied().collect());
+            let solution = self.weighted_solution(chosen, &weights, precisions, from);
+            let solution = solution.unwrap_or_else(|| vec![0.0; chosen.len()]);
             self.squares(chosen, &solution)[of(fold)].to_vec()
         });
         self.loss(&judged.collect::<Vec<_>>())
@@ -448,6 +453,7 @@ mod tests {
         let held = products.fit(&[0], &[1e6]);
         assert!(held.coefficients[0].abs() < 0.01, "{:?}", held.coefficients);
     }
+
     /// A standard normal number from a generator that is the same each time.
     fn normal(random: &mut Pcg64) -> f64 {
         let share = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
