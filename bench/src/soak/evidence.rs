@@ -11,6 +11,7 @@ use runlog::summary::{ProcessReport, RunDescription, Summary};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// The files of a segment; empty where there is none.
@@ -25,14 +26,18 @@ pub struct Evidence {
     pub reports: BTreeMap<String, ProcessReport>,
     /// `bus.log`, or why it cannot be read.
     pub log: Result<FrameLog, String>,
-    /// Files that are there and not as their types have them, each with the reason: what they would have said is not known.
+    /// Files that are there and cannot be read, or are not as their types have them, each with the reason: what they would have said is not known.
     pub damaged: Vec<String>,
 }
 
 /// A file as its type; the type's default where there is no file, and where it is `damaged`.
 fn read_json<T: DeserializeOwned + Default>(path: &Path, damaged: &mut Vec<String>) -> T {
-    let Ok(bytes) = std::fs::read(path) else { return T::default() };
-    serde_json::from_slice(&bytes).unwrap_or_else(|error| {
+    let read = match std::fs::read(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return T::default(),
+        Err(error) => Err(error.to_string()),
+        Ok(bytes) => serde_json::from_slice(&bytes).map_err(|error| error.to_string()),
+    };
+    read.unwrap_or_else(|error| {
         damaged.push(format!("{}: {error}", path.display()));
         T::default()
     })
@@ -203,5 +208,11 @@ mod tests {
         std::fs::write(folder.path().join("run.json"), r#"{"experiment_toml": 5}"#).unwrap();
         let damaged = Evidence::read(&spec, folder.path()).damaged;
         assert!(!damaged.is_empty() && damaged.iter().all(|why| why.contains("run.json")), "{damaged:?}");
+
+        // There, and no file.
+        std::fs::remove_file(folder.path().join("run.json")).unwrap();
+        std::fs::create_dir(folder.path().join("summary.json")).unwrap();
+        let damaged = Evidence::read(&spec, folder.path()).damaged;
+        assert!(!damaged.is_empty() && damaged.iter().all(|why| why.contains("summary.json")), "{damaged:?}");
     }
 }
