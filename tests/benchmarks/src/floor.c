@@ -1,7 +1,7 @@
 /* The floor: the plant's integration scheme in plain C, one number after the other, for comparison of cost.
  *
  * The same substeps, midpoints, exponentials and corners as plant/src/integrator.rs and its neighbours, without
- * emergency stop, hands and added weights. It is only ever compared with the crate: benches/period.rs checks that both
+ * emergency stop, hands and added weights. It is only ever compared with the crate: ../benches/period.rs checks that both
  * give the same trajectory before it times them.
  */
 #include <math.h>

@@ -1,7 +1,7 @@
 //! Instructions of one period of 1 ms, counted by valgrind: a figure that no other process on the machine moves.
 //!
 //! `cargo install gungraun-runner --version 0.20.0 --root target/tools`, then
-//! `PATH="$PWD/target/tools/bin:$PATH" cargo bench -p system-tests --bench instructions`
+//! `PATH="$PWD/target/tools/bin:$PATH" cargo bench -p benchmarks --bench instructions`
 //!
 //! Both motions start in the middle of the recorded one; a thousand periods are counted together, so one period is the
 //! figure over a thousand. With effects: all of them, every fourth, and a few alone; `plant/docs/effects-cost.md` has each.
@@ -15,7 +15,7 @@ use plant::effects::SHEETS;
 use plant::effects::sheet::Sheet;
 use plant::{Inputs, Plant, RigParameters, Setup};
 
-#[path = "../../plant/tests/scenario/mod.rs"]
+#[path = "../../../plant/tests/scenario/mod.rs"]
 mod scenario;
 
 use scenario::Kind;

@@ -1,6 +1,6 @@
 //! One period of 1 ms of both axes, linked and moving, and the same scheme in plain C as its floor.
 //!
-//! `cargo bench -p system-tests --bench period`
+//! `cargo bench -p benchmarks --bench period`
 //!
 //! The motion is the recorded one of plant's tests of accuracy: set-points under load steps, with rests, sticking and
 //! contact. Before anything is timed, both codes run the whole record and must stay together to 1e-9: only then is it
@@ -12,98 +12,19 @@
 //! the same 6 s as a pass of one plant, corners and all, but no two corners coincide. That each ends where its neighbour began,
 //! to the bit, is checked before anything is timed.
 
-#![allow(unsafe_code, clippy::print_stdout)] // the floor is C, and a benchmark prints
+#![allow(clippy::print_stdout)] // a benchmark prints
 
-use std::ffi::{c_int, c_ulong};
 use std::hint::black_box;
 use std::time::Instant;
 
+use benchmarks::Floor;
 use divan::Bencher;
-use plant::{AxisState, Batch, Inputs, Plant, Registers, RigParameters};
+use plant::{Batch, Inputs, Plant, Registers, RigParameters};
 
-#[path = "../../plant/tests/scenario/mod.rs"]
+#[path = "../../../plant/tests/scenario/mod.rs"]
 mod scenario;
 
 use scenario::{Kind, Scenario};
-
-/// The rig's numbers as `struct rig` of floor.c has them.
-#[repr(C)]
-struct FloorRig {
-    supply: [f64; 4],
-    time_constants: [f64; 2],
-    tables: [[f64; 6]; 3],
-    cylinder: [f64; 4],
-    friction: [f64; 3],
-    masses: [f64; 2],
-    linkage: [f64; 3],
-}
-
-/// `struct axis` of floor.c.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-struct FloorAxis([f64; 7]);
-
-#[link(name = "floor", kind = "static")]
-unsafe extern "C" {
-    fn floor_size() -> c_ulong;
-    fn floor_new(plant: *mut u64, rig: *const FloorRig);
-    fn floor_step(plant: *const u64, axes: *mut FloorAxis, valve: *const f64, linked: c_int);
-}
-
-/// The C plant: constants behind a buffer of its own size, and the state.
-struct Floor {
-    constants: Vec<u64>,
-    axes: [FloorAxis; 2],
-}
-
-impl Floor {
-    fn new(rig: &RigParameters, axes: &[AxisState; 2]) -> Self {
-        let (supply, gas, valve) = (rig.supply(), rig.gas(), rig.valve());
-        let (cylinder, friction, mass, linkage) = (rig.cylinder(), rig.friction(), rig.mass(), rig.linkage());
-        let numbers = FloorRig {
-            supply: [
-                supply.pressure_pa,
-                supply.exhaust_pressure_pa,
-                supply.atmospheric_pressure_pa,
-                gas.normal_pressure_pa,
-            ],
-            time_constants: [valve.spool_time_constant_s, valve.flow_lag_time_constant_s],
-            tables: [valve.opening, valve.kv_supply_m3_per_h, valve.kv_exhaust_m3_per_h],
-            cylinder: [
-                cylinder.stroke_m,
-                cylinder.piston_area_m2,
-                cylinder.annulus_area_m2,
-                cylinder.dead_volume_m3,
-            ],
-            friction: [friction.break_away_force_n, friction.sliding_force_n, friction.viscous_n_s_per_m],
-            masses: [mass.drive_kg, mass.load_kg],
-            linkage: [linkage.gap_m, linkage.stiffness_n_per_m, linkage.damping_n_s_per_m],
-        };
-        // SAFETY: floor_size takes nothing and returns a constant.
-        let bytes = unsafe { floor_size() };
-        let mut constants = vec![0_u64; (bytes as usize).div_ceil(8)];
-        // SAFETY: the buffer has the size that C asked for and is aligned for doubles; FloorRig has the layout of
-        // struct rig, doubles only.
-        unsafe { floor_new(constants.as_mut_ptr(), &numbers) };
-        let axes = axes.map(|axis| {
-            FloorAxis([
-                axis.extension_m,
-                axis.rod_velocity_m_per_s,
-                axis.spool,
-                axis.stored_air_a_j,
-                axis.stored_air_b_j,
-                axis.flow_a_m3_per_s,
-                axis.flow_b_m3_per_s,
-            ])
-        });
-        Floor { constants, axes }
-    }
-
-    fn step(&mut self, inputs: &Inputs) {
-        // SAFETY: the constants were made by floor_new; axes and valve are two of each, as C reads and writes.
-        unsafe { floor_step(self.constants.as_ptr(), self.axes.as_mut_ptr(), inputs.valve.as_ptr(), 1) };
-    }
-}
 
 fn motion() -> (RigParameters, Scenario) {
     let rig = RigParameters::baseline();
