@@ -112,7 +112,6 @@ impl Serialize for Recorder {
 
 /// What a report says of a distribution; in the unit of the samples. Nothing was measured: `None`, in JSON `null`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
-#[serde(default)]
 pub struct Percentiles {
     /// Half of the samples were at most this.
     pub p50: Option<u64>,
@@ -246,6 +245,13 @@ mod tests {
             json,
             r#"{"p50":null,"p90":null,"p99":null,"p999":null,"p9999":null,"max":null,"count":0}"#
         );
+        serde_json::from_str::<Percentiles>(&json).expect("read as it was written");
+    }
+
+    #[test]
+    fn percentiles_without_their_count_are_refused() {
+        let refusal = serde_json::from_str::<Percentiles>(r#"{"p50":1,"max":2}"#).expect_err("no count");
+        assert!(refusal.to_string().contains("missing field `count`"), "{refusal}");
     }
 
     #[test]

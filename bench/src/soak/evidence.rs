@@ -26,7 +26,8 @@ pub struct Evidence {
     pub reports: BTreeMap<String, ProcessReport>,
     /// `bus.log`, or why it cannot be read.
     pub log: Result<FrameLog, String>,
-    /// Files that are there and cannot be read, or are not as their types have them, each with the reason: what they would have said is not known.
+    /// Files that are there and cannot be read, or are not as their types have them, each with the reason: what they would have
+    /// said is not known.
     pub damaged: Vec<String>,
 }
 

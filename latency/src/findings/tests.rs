@@ -96,7 +96,7 @@ fn waiting_of_a_machine_that_nobody_saw_running_is_no_hog() {
 fn lateness_without_rows_is_no_undisturbed_run() {
     let mut run = made_up::run(500);
     made_up::stall(&mut run, "emulator", 100, 5_400_000);
-    run.summary["wakeup_ns"] = json!({ "max": 5_400_000 });
+    run.summary["wakeup_ns"] = json!({ "max": 5_400_000, "count": 500 });
     run.summary["skipped"] = json!(5);
     assert_eq!(found(run.clone()), [Cause::MachineStoodStill], "its rows tell it");
     run.rows.clear();
