@@ -15,7 +15,7 @@ gungraun_version=0.20.0
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_valgrind && install_python && install_dask && install_gungraun && install_browser
+    install_strace && install_valgrind && install_python && install_dask && install_gungraun && install_browser && install_machines
 }
 
 apt_updated=no
@@ -137,6 +137,12 @@ install_dask() { install_requirements dask "$(dirname "${BASH_SOURCE[0]}")/../ca
 
 # MkDocs, which scripts/book builds the book with.
 install_book() { install_requirements book "$(dirname "${BASH_SOURCE[0]}")/../docs/book/requirements.txt"; }
+
+# Kernels and programs of the virtual machines.
+install_machines() {
+    local kernel
+    for kernel in stock rt; do scripts/vcan-vm --fetch --kernel "$kernel" || return 1; done
+}
 
 install_gungraun() {
     [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return

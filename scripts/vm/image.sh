@@ -60,20 +60,19 @@ gather_base() {
     install "$scripts/vm/init" "$tree/init"
 }
 
-# Starts $out/vm/initramfs.cpio with the base.
+# Sets $base_image.
 build_base_image() {
-    local sum image
+    local sum
     staging=$(mktemp -d -p "$cache")
     gather_base "$staging"
     sum=$(cd "$staging" && find . -type f -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -c 1-16)
-    image=$cache/base-$kernel-$sum.cpio
-    if [[ ! -f $image ]]; then
+    base_image=$cache/base-$kernel-$sum.cpio
+    if [[ ! -f $base_image ]]; then
         say "building the initramfs ($(du -sh "$staging" | cut -f 1))"
         rm -f "$cache/base-$kernel-"*.cpio
         pack "$staging" >"$cache/base.new"
-        mv "$cache/base.new" "$image"
+        mv "$cache/base.new" "$base_image"
     fi
-    cp "$image" "$out/vm/initramfs.cpio"
     rm -rf "$staging"
     staging=''
 }
@@ -101,7 +100,7 @@ add_binaries() {
     done
 }
 
-# Adds what belongs to this call to $out/vm/initramfs.cpio.
+# Makes $out/vm/initramfs.cpio of the base and what belongs to this call.
 add_payload() {
     local tree=$out/vm/payload
     mkdir -p "$tree/airbench"
@@ -120,12 +119,9 @@ add_payload() {
         cp "$root"/controller/programs/*.toml "$tree/airbench/programs/"
         add_binaries "$tree"
     fi
-    cp "$scripts"/vm/job-* "$tree/airbench/"
+    cp "$scripts"/vm/job* "$tree/airbench/"
     if [[ -n $payload ]]; then cp -rL "$payload/." "$tree/airbench/"; fi
-    if [[ -n $job_command ]]; then
-        printf '%s\n' "$job_command" >"$tree/job"
-    else
-        cp "$scripts/vm/job" "$tree/job"
-    fi
+    printf '%s\n' "$job_command" >"$tree/job"
+    cp "$base_image" "$out/vm/initramfs.cpio"
     pack "$tree" >>"$out/vm/initramfs.cpio"
 }

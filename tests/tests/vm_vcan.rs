@@ -1,5 +1,5 @@
 //! On real SocketCAN: Debian's kernel in a virtual machine runs emulator and controller on `vcan0`, and can-utils record,
-//! send and disturb.
+//! send and disturb. One machine does all three jobs, one after the other.
 //!
 //! No test here is ever skipped; without network for the first download it fails.
 
@@ -9,16 +9,58 @@ use serde_json::Value;
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::OnceLock;
 use system_tests::firmware;
 use system_tests::foreign_python::python;
 use system_tests::guest::{Guest, compare_candump, data_frames};
 use system_tests::records::{count, json};
 
+/// The machine after its three jobs.
+fn machine() -> &'static Guest {
+    static MACHINE: OnceLock<Guest> = OnceLock::new();
+    MACHINE.get_or_init(|| {
+        python(); // tells at once what is missing
+        let folder = tempfile::tempdir().unwrap();
+        let payload = folder.path().join("payload");
+        fs::create_dir(&payload).unwrap();
+        let built = firmware::build(&folder.path().join("built"), &["STATIC=-static"]);
+        fs::copy(built.join("firmware-socketcan"), payload.join("firmware-socketcan")).unwrap();
+        let line = |n: u16| format!("(1700000000.{:06}) can7 5A5#{n:04X}\n", u32::from(n) * 1000);
+        fs::write(payload.join("replay.log"), (0..REPLAYED).map(line).collect::<String>()).unwrap();
+        // Between two jobs as long as `lines_of_run` wants it.
+        let jobs = ["job", "job-firmware", "job-foreign"].map(|job| format!("sh /airbench/{job}"));
+        let guest =
+            Guest::run(&["--payload", payload.to_str().unwrap(), "--", &jobs.join(" && sleep 1.5 && ")]);
+        assert_eq!(guest.codes().len(), FIRMWARE_CODES.len() + FOREIGN_CODES.len());
+        guest
+    })
+}
+
+/// Exit codes of the programs of `job-firmware`; 0 of the firmware: it still ran.
+const FIRMWARE_CODES: [(&str, i32); 3] = [("canplayer", 0), ("emulator", 0), ("firmware-still-runs", 0)];
+/// Exit codes of the programs of `job-foreign`.
+const FOREIGN_CODES: [(&str, i32); 9] = [
+    ("controller-lockstep", 2), // a barrier is asked for on a bus that has none
+    ("controller-no-interface", 3),
+    ("down-controller", 0),
+    ("down-emulator", 0),
+    ("emulator-interface-down", 3),
+    ("emulator-lockstep", 2),
+    ("emulator-no-interface", 3),
+    ("foreign-controller", 1), // aborted by the emergency stop
+    ("foreign-emulator", 0),
+];
+
+fn ended_with(guest: &Guest, expected: &[(&str, i32)]) {
+    let codes = guest.codes();
+    for (name, code) in expected {
+        assert_eq!(codes.get(*name), Some(code), "{name}");
+    }
+}
+
 #[test]
 fn candump_recorded_what_the_runs_files_say() {
-    python(); // tells at once what is missing
-    let guest = Guest::run(&[]);
-
+    let guest = machine();
     let run = guest.out();
     let summary = json(&run.join("summary.json"));
     assert_eq!(summary["ended_because"], "the controllers are done");
@@ -26,7 +68,9 @@ fn candump_recorded_what_the_runs_files_say() {
     assert_eq!(count(&summary, "/frames_malformed"), 0);
     assert_eq!(json(&run.join("controller.json"))["axes"]["drive"]["chain_state"], "done");
 
-    let log = guest.file("candump.log");
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("candump.log");
+    fs::write(&log, guest.lines_of_run("candump.log", &run)).unwrap();
     let told = compare_candump(&log, &run).unwrap_or_else(|complaint| panic!("{complaint}"));
     eprintln!("compared: {told}");
     let told: Value = serde_json::from_str(&told).unwrap();
@@ -106,28 +150,13 @@ fn comparison_notices_every_alteration(log: &Path, run: &Path) {
     compare_candump(log, run).expect("the files are as they were");
 }
 
-/// The frames of a candump log that `rig.dbc` knows.
-fn known_frames(log: &Path) -> Vec<Frame> {
-    let text = fs::read_to_string(log).unwrap();
-    data_frames(&text).iter().filter_map(|frame| Frame::decode(frame).ok()).collect()
-}
-
 /// Frames that canplayer of can-utils replays.
 const REPLAYED: u16 = 50;
 
 #[test]
 fn the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
-    let folder = tempfile::tempdir().unwrap();
-    let payload = folder.path().join("payload");
-    fs::create_dir(&payload).unwrap();
-    let built = firmware::build(&folder.path().join("built"), &["STATIC=-static"]);
-    fs::copy(built.join("firmware-socketcan"), payload.join("firmware-socketcan")).unwrap();
-    let line = |n: u16| format!("(1700000000.{:06}) can7 5A5#{n:04X}\n", u32::from(n) * 1000);
-    fs::write(payload.join("replay.log"), (0..REPLAYED).map(line).collect::<String>()).unwrap();
-    let guest = Guest::run(&["--payload", payload.to_str().unwrap(), "--", "sh /airbench/job-firmware"]);
-
-    let codes = ["canplayer", "emulator", "firmware-still-runs"].map(|name| (name.to_owned(), 0));
-    assert_eq!(guest.codes(), codes.into());
+    let guest = machine();
+    ended_with(guest, &FIRMWARE_CODES);
     let run = guest.out().join("firmware");
     let summary = json(&run.join("summary.json"));
     assert_eq!(summary["ended_because"], "the controllers are done");
@@ -143,7 +172,7 @@ fn the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
     assert!(done.position_error_dynamic_m < firmware::DYNAMIC_M, "{done:?}");
     assert!(done.position_error_static_m < firmware::STATIC_M, "{done:?}");
 
-    let on_the_bus = data_frames(&fs::read_to_string(guest.file("candump.log")).unwrap());
+    let on_the_bus = data_frames(&guest.lines_of_run("candump.log", &run));
     let replayed: Vec<_> = on_the_bus.iter().filter(|frame| frame.standard_id() == Some(0x5A5)).collect();
     let expected: Vec<_> = (0..REPLAYED).map(|n| CanFrame::new(0x5A5, &n.to_be_bytes())).collect();
     assert!(
@@ -154,23 +183,12 @@ fn the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
 
 #[test]
 fn foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
-    let guest = Guest::run(&["--", "sh /airbench/job-foreign"]);
+    let guest = machine();
+    ended_with(guest, &FOREIGN_CODES);
     let run = guest.out();
-
-    let expected = [
-        ("controller-lockstep", 2), // a barrier is asked for on a bus that has none
-        ("controller-no-interface", 3),
-        ("down-controller", 0),
-        ("down-emulator", 0),
-        ("emulator-interface-down", 3),
-        ("emulator-lockstep", 2),
-        ("emulator-no-interface", 3),
-        ("foreign-controller", 1), // aborted by the emergency stop
-        ("foreign-emulator", 0),
-    ];
-    assert_eq!(guest.codes(), expected.map(|(name, code)| (name.to_owned(), code)).into());
     foreign_frames_are_counted(&run);
-    the_emergency_stop_of_cansend_trips_the_rig(&run, &guest.file("candump.log"));
+    let log = guest.lines_of_run("candump.log", &run.join("foreign"));
+    the_emergency_stop_of_cansend_trips_the_rig(&run, &log);
     the_bus_that_went_down_was_counted(&run);
 }
 
@@ -187,12 +205,12 @@ fn foreign_frames_are_counted(run: &Path) {
     assert_eq!(count(&summary, "/drive_commands/two_sources"), 0, "malformed commands are no second source");
 }
 
-fn the_emergency_stop_of_cansend_trips_the_rig(run: &Path, log: &Path) {
+fn the_emergency_stop_of_cansend_trips_the_rig(run: &Path, log: &str) {
     let summary = json(&run.join("foreign/summary.json"));
     let events = summary["events"].as_array().unwrap();
     assert_eq!(events.iter().filter(|event| event["kind"] == "emergency-stop").count(), 1, "{events:?}");
 
-    let frames = known_frames(log);
+    let frames: Vec<_> = data_frames(log).iter().filter_map(|frame| Frame::decode(frame).ok()).collect();
     let tripped = frames.iter().position(|frame| matches!(frame, Frame::ConsoleEmergencyStop(_))).unwrap();
     let stopped = |frames: &[Frame]| -> Vec<bool> {
         frames
