@@ -18,7 +18,8 @@ struct FloorRig {
     linkage: [f64; 3],
 }
 
-/// `struct axis` of floor.c: extension, m; velocity of the rod, m/s; spool; stored air of both chambers, J; flows into them, m^3/s.
+/// `struct axis` of floor.c: extension, m; velocity of the rod, m/s; spool; stored air of both chambers, J; flows into them,
+/// m^3/s.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct FloorAxis(pub [f64; 7]);
