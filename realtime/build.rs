@@ -1,6 +1,6 @@
 //! Tells the crate what it is built with, so that a run's record can say it: compiler, target, profile.
 //!
-//! Not from which commit: all crates would be built anew after each one. That is told by the program that writes the record.
+//! Not from which commit: all crates would be built anew after each one. That is reported by the program that writes the record.
 
 use std::process::Command;
 

@@ -116,7 +116,7 @@ impl AxisController {
     /// waits for a fresh one.
     pub fn answer(&mut self, cycle: u64, sensors: &Sensors, rig: Option<&RigStatus>) -> Answer {
         self.rig = rig.copied().or(self.rig);
-        // Until the rig has told its supply pressure, the nominal one is the best guess.
+        // Until the rig has reported its supply pressure, the nominal one is the best guess.
         let supply_pa = self.rig.map_or(self.supply_pressure_pa, |rig| rig.supply_pressure_pa);
         self.program.observe(cycle, sensors, supply_pa);
         self.average.take(sensors.position_m);

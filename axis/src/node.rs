@@ -69,7 +69,7 @@ pub struct Change {
 pub struct Outlets {
     /// A row of an axis each recorded cycle.
     pub records: Sender<AxisRecord>,
-    /// What a person is told.
+    /// What a person is shown.
     pub news: Sender<News>,
     /// Parameters changed while running.
     pub changes: Receiver<Change>,

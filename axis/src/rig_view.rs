@@ -147,7 +147,7 @@ impl RigView {
         };
         self.settle_account(tick, cycle);
         if let (None, Some((came, _))) = (self.cycle, &mut self.status) {
-            // It came before anything told the time.
+            // It came before anything reported the time.
             *came = cycle;
         }
         self.cycle = Some(cycle);

@@ -206,9 +206,9 @@ impl Inputs {
         let mut program = self.program(axis, mode.real_time)?;
         self.check_kind(axis, section, &program)?;
         for Setting { name, value, place: at, .. } in self.overrides.iter().filter(|one| one.axis == axis) {
-            let told = |error: String| InputError(format!("{at}{error}"));
-            let place = place(&program, axis, name).map_err(|error| told(error.to_string()))?;
-            program.set(place, *value).map_err(|error| told(format!("{}.{error}", axis.name())))?;
+            let reported = |error: String| InputError(format!("{at}{error}"));
+            let place = place(&program, axis, name).map_err(|error| reported(error.to_string()))?;
+            program.set(place, *value).map_err(|error| reported(format!("{}.{error}", axis.name())))?;
         }
         let changes = section.map_or(Ok(Vec::new()), |section| self.changes(axis, section, &program))?;
         let main = self.main_config(section, &program, mode);

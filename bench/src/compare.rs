@@ -25,10 +25,11 @@ pub fn table(runs: &[Run]) -> Grid {
     }
     let known = rows().filter(|(name, _)| runs.iter().any(|run| run.figure(name).is_some()));
     let rows = known.map(|(name, unit)| {
-        let told = |run: &Run| run.figure(name).map_or_else(|| "-".to_owned(), |value| in_use(value, unit));
-        let mut row = vec![without_unit(name), told(first)];
+        let reported =
+            |run: &Run| run.figure(name).map_or_else(|| "-".to_owned(), |value| in_use(value, unit));
+        let mut row = vec![without_unit(name), reported(first)];
         for run in others {
-            row.extend([told(run), change(first.figure(name), run.figure(name))]);
+            row.extend([reported(run), change(first.figure(name), run.figure(name))]);
         }
         row
     });

@@ -1,6 +1,6 @@
 //! Panels one above the other on one time axis, as SVG: what pictures of runs and comparisons are drawn with.
 //!
-//! Colours are those of Okabe and Ito, told apart by colour-blind people; curves of one panel differ in width too where
+//! Colours are those of Okabe and Ito, distinguished by colour-blind people; curves of one panel differ in width too where
 //! there are few, so that black and white does. Of the samples that fall into one pixel column the smallest and the largest
 //! are drawn: no spike is lost, and a minute is as small as a second. Legends stand above the curves, not on them.
 

@@ -69,13 +69,13 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, ExportError> {
         Format::Csv | Format::Mdf4 => as_signals(&part, &log, *to, *every_ms),
         Format::Asc | Format::Blf => as_frames(&part, &log, *to, arguments.python.as_deref()),
     };
-    let renamed = done.and_then(|told| {
+    let renamed = done.and_then(|reported| {
         std::fs::rename(&part, out).map_err(|error| FileError::write(out, error))?;
-        Ok(told)
+        Ok(reported)
     });
     match renamed {
-        Ok((told, exit)) => {
-            say(&format!("{}: {told}", out.display()));
+        Ok((reported, exit)) => {
+            say(&format!("{}: {reported}", out.display()));
             Ok(exit)
         }
         Err(error) => {
@@ -123,8 +123,8 @@ fn as_signals(
         mdf4::write(path, &signals, origin_ns).map_err(|error| written(&error))?;
         format!(" in {} groups", signals.courses.len())
     };
-    let told = format!("{channels} signals of {frames} frames{rows}; time counts from {origin}");
-    Ok((told, Exit::Good))
+    let reported = format!("{channels} signals of {frames} frames{rows}; time counts from {origin}");
+    Ok((reported, Exit::Good))
 }
 
 fn as_frames(
@@ -137,14 +137,14 @@ fn as_frames(
     create(part).map_err(|error| FileError::write(part, error))?;
     let named = std::env::var_os("AIRBENCH_PYTHON").map(PathBuf::from);
     let python = python.map(Path::to_owned).or(named).unwrap_or_else(|| "python3".into());
-    let told = format!("{} frames", log.frames.len());
+    let reported = format!("{} frames", log.frames.len());
     match foreign::write(part, log, format, &python)? {
-        None => Ok((format!("{told}, read back equal"), Exit::Good)),
+        None => Ok((format!("{reported}, read back equal"), Exit::Good)),
         Some(said) => {
             warn(&format!(
                 "what was written does not read back as it was: {said} (frames, and the first of them)"
             ));
-            Ok((told, Exit::BoundBroken))
+            Ok((reported, Exit::BoundBroken))
         }
     }
 }

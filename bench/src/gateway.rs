@@ -7,7 +7,7 @@
 //! ```
 //!
 //! One thread, one poll over the bus's socket, the listener and all clients. Nobody waits for anybody: a client that does not
-//! read fills its own queue and loses frames, counted and told; one that goes on not reading is parted with. The gateway is
+//! read fills its own queue and loses frames, counted and reported; one that goes on not reading is parted with. The gateway is
 //! one peer of the bus, so it hands what a client sends to the other clients itself: a sender does not hear itself, everyone
 //! else does.
 //!

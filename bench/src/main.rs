@@ -37,18 +37,18 @@ fn main() -> ExitCode {
             .map(|text| print(&text))
             .map(|()| Exit::Good)
             .map_err(Into::into),
-        Command::Replay(arguments) => return told(replay::run(&arguments), ReplayError::exit),
+        Command::Replay(arguments) => return reported(replay::run(&arguments), ReplayError::exit),
         Command::ExportFmu(arguments) => export_fmu::run(&arguments).map_err(Into::into),
         Command::Export(arguments) => export::run(&arguments).map_err(Into::into),
-        Command::Probe(arguments) => return told(probe::run(&arguments), |_| Exit::BadInput),
-        Command::PingPong(arguments) => return told(ping_pong::run(&arguments), PingPongError::exit),
-        Command::Pong(arguments) => return told(ping_pong::pong(&arguments), PingPongError::exit),
+        Command::Probe(arguments) => return reported(probe::run(&arguments), |_| Exit::BadInput),
+        Command::PingPong(arguments) => return reported(ping_pong::run(&arguments), PingPongError::exit),
+        Command::Pong(arguments) => return reported(ping_pong::pong(&arguments), PingPongError::exit),
         Command::CheckController(arguments) => {
-            return told(conformance::run(&arguments), ConformanceError::exit);
+            return reported(conformance::run(&arguments), ConformanceError::exit);
         }
-        Command::Gateway(arguments) => return told(gateway::run(&arguments), GatewayError::exit),
-        Command::Watch(arguments) => return told(live::run(&arguments), LiveError::exit),
-        Command::Soak(arguments) => return told(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
+        Command::Gateway(arguments) => return reported(gateway::run(&arguments), GatewayError::exit),
+        Command::Watch(arguments) => return reported(live::run(&arguments), LiveError::exit),
+        Command::Soak(arguments) => return reported(soak::run(&arguments), |_: &SoakError| Exit::BadInput),
         Command::SoakChild(arguments) => {
             eprintln!("bench: {:?}: {}", arguments.command[0], become_child(&arguments));
             return Exit::BadInput.into();
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
 }
 
 /// How a command of the bench's own measuring ended.
-fn told<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCode {
+fn reported<E: Display>(done: Result<Exit, E>, exit: impl Fn(&E) -> Exit) -> ExitCode {
     done.unwrap_or_else(|error| {
         eprintln!("bench: {error}");
         exit(&error)

@@ -101,7 +101,7 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
             scope.spawn(move || {
                 let begun = begin(cpu);
                 let good = begun.is_ok();
-                // Before it is told: what comes between the telling and a first look would be nobody's gap.
+                // Before it is reported: what comes between the telling and a first look would be nobody's gap.
                 let looking = Looking::begin(gap_ns, continued);
                 // Whoever waits for it takes what comes.
                 let _ = ready.send(begun);
@@ -112,7 +112,7 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
         }
         drop((sender, ready));
         let begun = all_ready.iter().take(cpus.len()).collect::<Result<(), _>>();
-        let told = begun.and_then(|()| {
+        let reported = begun.and_then(|()| {
             table.name_cpus(&cpus, MonotonicClock.now().as_nanos())?;
             eprintln!("bench: probe watches {}, gaps over {} us", named(&cpus), arguments.gap_us);
             let until_ns = arguments.seconds.map(|seconds| began_ns + (seconds * 1e9) as u64);
@@ -124,9 +124,9 @@ pub fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
             Ok(())
         });
         watched.stop.ask();
-        told
+        reported
     })?;
-    // A gap that was going on at the end was told when its thread ran again.
+    // A gap that was going on at the end was reported when its thread ran again.
     table.take(&gaps)?;
     let Table { rows, seen, .. } = table;
     tell(&seen, MonotonicClock.now().as_nanos() - began_ns);
@@ -183,7 +183,7 @@ impl Looking {
     fn go_on(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, watched: &Watched) {
         let mut going_on = true;
         while going_on {
-            // Looked at before the clock, so that a gap that outlasts the run is told too.
+            // Looked at before the clock, so that a gap that outlasts the run is reported too.
             going_on = !watched.stop.came();
             let counts = || {
                 let read = self.vitals.read();

@@ -5,7 +5,7 @@
 //!                                   └─ kind.rs: whose frame is it       └─ refused
 //! ```
 //!
-//! A log holds commands of the past. On a bus with a live rig its valves would follow them, and controllers would be told the
+//! A log holds commands of the past. On a bus with a live rig its valves would follow them, and controllers would be given the
 //! past by a log's sensors: both are refused before the first frame, and end the replay when a rig comes alive later.
 //!
 //! Nothing is sent of a log that is not right to its last line.
@@ -191,7 +191,7 @@ fn write(
         End::Interrupted => "interrupted",
         End::LiveRig => "live-rig",
     };
-    let told = json!({
+    let reported = json!({
         "schema": "airbench-replay",
         "schema_version": SCHEMA_VERSION,
         "log": log.file,
@@ -206,7 +206,7 @@ fn write(
         "frames_disordered": schedule.disordered,
         "timing_error_ns": played.error_ns,
     });
-    write_json(&table, &told).map_err(|error| FileError::write(&table, error))?;
+    write_json(&table, &reported).map_err(|error| FileError::write(&table, error))?;
     let parts = [("replay-timing-error", played.error_ns.histogram())];
     let length = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(started);
     write_hlog(&histogram, &parts, started.as_secs_f64(), length)

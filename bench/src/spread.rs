@@ -46,10 +46,17 @@ fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
 pub fn table(runs: &[Run]) -> Grid {
     let head = ["figure", "n", "mean", "standard deviation", "least", "most"];
     let rows = spreads(runs).into_iter().map(|(name, unit, spread)| {
-        let told = |value: f64| in_use(value, unit);
-        let deviation = spread.standard_deviation.map_or_else(|| "-".to_owned(), told);
+        let reported = |value: f64| in_use(value, unit);
+        let deviation = spread.standard_deviation.map_or_else(|| "-".to_owned(), reported);
         let count = spread.count.to_string();
-        vec![without_unit(name), count, told(spread.mean), deviation, told(spread.least), told(spread.most)]
+        vec![
+            without_unit(name),
+            count,
+            reported(spread.mean),
+            deviation,
+            reported(spread.least),
+            reported(spread.most),
+        ]
     });
     Grid::new(head, rows)
 }
@@ -61,10 +68,10 @@ pub fn json(runs: &[Run]) -> Value {
         .into_iter()
         .map(|(name, _, spread)| {
             let Spread { count, mean, standard_deviation, least, most } = spread;
-            let told = json!({
+            let reported = json!({
                 "n": count, "mean": mean, "standard_deviation": standard_deviation, "least": least, "most": most,
             });
-            (name.to_owned(), told)
+            (name.to_owned(), reported)
         })
         .collect();
     let names: Vec<_> = runs.iter().map(|run| run.name.as_str()).collect();
@@ -98,9 +105,9 @@ mod tests {
         let folders = [("one", 0.002), ("two", 0.004)]
             .map(|(name, error_m)| made::folder(parent.path(), name, "title = \"ramp\"", error_m));
         let runs = runs::read(&folders).unwrap();
-        let told = json(&runs);
-        assert_eq!(told["runs"], json!(["one", "two"]));
-        let figure = &told["figures"]["position_error_dynamic_m"];
+        let reported = json(&runs);
+        assert_eq!(reported["runs"], json!(["one", "two"]));
+        let figure = &reported["figures"]["position_error_dynamic_m"];
         assert!((figure["mean"].as_f64().unwrap() - 0.003).abs() < 1e-12 && figure["n"] == 2);
         let grid = table(&runs);
         let row = grid.rows.iter().find(|row| row[0] == "position error dynamic").unwrap();

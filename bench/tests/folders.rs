@@ -35,8 +35,8 @@ fn run(parent: &Path, name: &str, experiment: &str, time_constant_s: f64) -> Pat
     write("run.json", serde_json::json!({ "pace": "lockstep", "experiment_toml": experiment }).to_string());
     write("summary.json", r#"{ "passed": true, "frames_lost_at_rig": 0, "cycles": 2000 }"#.into());
     for axis in ["drive", "load"] {
-        let told = serde_json::json!({ "ended_well": true, "axes": { axis: { "sensors_lost": 0 } } });
-        write(&format!("controller-{axis}.json"), told.to_string());
+        let reported = serde_json::json!({ "ended_well": true, "axes": { axis: { "sensors_lost": 0 } } });
+        write(&format!("controller-{axis}.json"), reported.to_string());
     }
     let head = "time_s,main_chain,set_position_m,set_force_N,position_m,moving\n";
     let (mut drive, mut load) = (head.to_owned(), head.to_owned());
@@ -101,10 +101,10 @@ fn repetitions_have_a_spread() {
     let (text, code) =
         said(&bench(&[Path::new("spread"), &runs[0], &runs[1], &runs[2], Path::new("--out"), &out]));
     assert!(code == 0 && text.contains("standard deviation"), "{text}");
-    let told: serde_json::Value =
+    let reported: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(out.join("spread.json")).unwrap()).unwrap();
-    assert_eq!(told["figures"]["force_settling_s"]["n"], 3);
-    assert_eq!(told["figures"]["force_settling_s"]["standard_deviation"], 0.0);
+    assert_eq!(reported["figures"]["force_settling_s"]["n"], 3);
+    assert_eq!(reported["figures"]["force_settling_s"]["standard_deviation"], 0.0);
 }
 
 #[test]

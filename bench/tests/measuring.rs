@@ -23,7 +23,7 @@ fn run(line: &str) -> Output {
     bench(line).output().expect("the program starts")
 }
 
-fn told(bytes: &[u8]) -> String {
+fn reported(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
@@ -83,7 +83,7 @@ fn a_stopped_probe_shows_a_gap_that_is_none_of_the_machines() {
     signal(&probe, Signal::TERM);
     let ended = probe.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(130), "interrupted with everything saved");
-    let table = told(&ended.stdout);
+    let table = reported(&ended.stdout);
     assert!(table.contains("stood still") && table.contains("another thread ran"), "{table}");
     let found = covering(&gaps(&folder.path().join("probe.csv")), stopped, until);
     let [[cpu, from_ns, to_ns, another_ran]] = found[..] else { panic!("one gap, not {found:?}") };
@@ -126,7 +126,7 @@ fn a_probe_ends_by_itself_and_one_that_is_killed_leaves_its_table() {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("probe.csv");
     let ended = run(&format!("probe --seconds 0.2 --out {}", table.display()));
-    assert_eq!(ended.status.code(), Some(0), "{}", told(&ended.stderr));
+    assert_eq!(ended.status.code(), Some(0), "{}", reported(&ended.stderr));
     gaps(&table);
 
     let probe = probe(&table, 100);
@@ -159,7 +159,7 @@ fn wrong_command_lines_are_refused_with_what_would_be_right() {
         ("ping-pong --bus vcan0", "can://IFACE"),
     ] {
         let ended = run(line);
-        let said = told(&ended.stderr);
+        let said = reported(&ended.stderr);
         assert_eq!(ended.status.code(), Some(2), "{line}: {said}");
         assert!(said.contains(hint), "{line}: {said}");
     }
@@ -184,23 +184,23 @@ fn a_ping_pong_counts_each_ping_on_both_lines_and_adds_its_figures_to_one_file()
             if ended.status.code() != Some(0) {
                 stop.store(true, Ordering::Relaxed);
             }
-            assert_eq!(ended.status.code(), Some(0), "{}", told(&ended.stderr));
-            assert!(told(&ended.stdout).contains("round trip: p50"), "{}", told(&ended.stdout));
+            assert_eq!(ended.status.code(), Some(0), "{}", reported(&ended.stderr));
+            assert!(reported(&ended.stdout).contains("round trip: p50"), "{}", reported(&ended.stdout));
         }
         stop.store(true, Ordering::Relaxed);
     });
-    let told: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    let reported: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
     for name in ["socketpair", "bus"] {
-        let figures = &told[name];
+        let figures = &reported[name];
         let count = |key: &str| figures[key].as_u64().unwrap();
         assert_eq!(count("sent") + count("skipped"), 200, "{figures}");
         assert_eq!((count("sent"), count("lost")), (count("answered"), 0), "{figures}");
         assert_eq!(count("count"), count("answered"));
         assert!(count("p50") > 0 && count("p50") <= count("max"));
-        assert!(told["commands"][name].as_str().unwrap().contains("ping-pong"));
+        assert!(reported["commands"][name].as_str().unwrap().contains("ping-pong"));
     }
-    assert!(told["socketpair"]["to_arrival_ns"].is_null());
-    let bus = &told["bus"];
+    assert!(reported["socketpair"]["to_arrival_ns"].is_null());
+    let bus = &reported["bus"];
     assert!(bus["to_arrival_ns"]["p50"].as_u64() <= bus["p50"].as_u64(), "{bus}");
     assert!(std::fs::read_to_string(hlog).unwrap().contains("Tag=ping-pong-bus,"));
 }
@@ -209,14 +209,14 @@ fn a_ping_pong_counts_each_ping_on_both_lines_and_adds_its_figures_to_one_file()
 fn a_bus_without_a_host_is_told_with_the_remedy_and_a_strange_file_stays() {
     let folder = tempfile::tempdir().unwrap();
     let ended = run(&format!("ping-pong {SHORT} --bus unix://{}/nobody", folder.path().display()));
-    let said = told(&ended.stderr);
+    let said = reported(&ended.stderr);
     assert_eq!(ended.status.code(), Some(3), "{said}");
     assert!(said.contains("emulator bus") && said.contains("which is down"), "{said}");
 
     let strange = folder.path().join("notes.json");
     std::fs::write(&strange, "precious").unwrap();
     let ended = run(&format!("ping-pong {SHORT} --socketpair --json {}", strange.display()));
-    assert_eq!(ended.status.code(), Some(2), "{}", told(&ended.stderr));
+    assert_eq!(ended.status.code(), Some(2), "{}", reported(&ended.stderr));
     assert_eq!(std::fs::read_to_string(&strange).unwrap(), "precious");
 }
 
@@ -231,7 +231,7 @@ fn an_interrupted_ping_pong_saves_its_figures_and_leaves_nobody_behind() {
     let pong = std::fs::read_to_string(children).unwrap_or_default().trim().to_owned();
     signal(&child, Signal::TERM);
     let ended = child.wait_with_output().unwrap();
-    assert_eq!(ended.status.code(), Some(130), "{}", told(&ended.stderr));
+    assert_eq!(ended.status.code(), Some(130), "{}", reported(&ended.stderr));
     let text = std::fs::read_to_string(&json).unwrap();
     assert!(text.contains("\"socketpair\""), "{text}");
     assert!(pong.is_empty() || !Path::new("/proc").join(&pong).exists(), "process {pong} stayed");

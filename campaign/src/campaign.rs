@@ -109,7 +109,7 @@ impl Campaign {
         CampaignError::Condition(self.file.path.display().to_string(), error)
     }
 
-    /// A run; `None` when it was told to stop.
+    /// A run; `None` when it was asked to stop.
     ///
     /// # Errors
     /// [`CampaignError`] for what is no result: values that go into no file, programs that cannot be started.
@@ -165,7 +165,7 @@ impl Campaign {
         self.run_in(point, folder.path(), limit)
     }
 
-    /// A run of an experiment as processes, which leave their files in `folder`; `None` when it was told to stop.
+    /// A run of an experiment as processes, which leave their files in `folder`; `None` when it was asked to stop.
     fn run_in(
         &self,
         point: &Point,

@@ -46,7 +46,7 @@ pub struct PlanArguments {
     /// The campaign.
     #[command(flatten)]
     pub common: CommonArguments,
-    /// How many runs are told.
+    /// How many runs are reported.
     #[arg(long, default_value_t = 5)]
     pub first: u64,
     /// As JSON, for programs, on standard output.

@@ -1,4 +1,4 @@
-//! A run as a program of somebody else's: it is told the run as a line of JSON, and answers with one.
+//! A run as a program of somebody else's: it is given the run as a line of JSON, and answers with one.
 //!
 //! ```text
 //! stdin    {"run": 17, "draw": 2, "seed": 93, "values": {"hidden": "valve-offset", "noise": 0.5}, "again": false}
@@ -49,7 +49,7 @@ pub enum CommandError {
     NotTried(String),
 }
 
-/// Runs the program; `None` when the campaign was told to stop.
+/// Runs the program; `None` when the campaign was asked to stop.
 ///
 /// # Errors
 /// [`CommandError`] for what is no result.
@@ -99,12 +99,15 @@ pub fn run(
 }
 
 fn question(factors: &[Factor], point: &Point, again: bool) -> Json {
-    let told = |value: &Value| match value {
+    let reported = |value: &Value| match value {
         Value::Number(number) => json!(number),
         Value::Text(text) => json!(text),
     };
-    let values: Map<_, _> =
-        factors.iter().zip(&point.values).map(|(factor, value)| (factor.name.clone(), told(value))).collect();
+    let values: Map<_, _> = factors
+        .iter()
+        .zip(&point.values)
+        .map(|(factor, value)| (factor.name.clone(), reported(value)))
+        .collect();
     json!({ "run": point.run, "draw": point.draw, "seed": point.seed, "values": values, "again": again })
 }
 
@@ -115,7 +118,7 @@ fn answered(answer: &Map<String, Json>) -> Outcome {
         Json::Bool(yes) => Some(Value::Number(f64::from(u8::from(*yes)))),
         Json::Null | Json::Array(_) | Json::Object(_) => None,
     };
-    let figures = answer.iter().filter_map(|(name, told)| Some((name.clone(), value(told)?)));
+    let figures = answer.iter().filter_map(|(name, reported)| Some((name.clone(), value(reported)?)));
     Outcome {
         ended: Ended::Done,
         because: String::new(),
@@ -175,8 +178,8 @@ mod tests {
         let outcome = answer(script, 60.0);
         assert_eq!(outcome.ended, Ended::Done, "{outcome:?}");
         assert_eq!(outcome.figures["n"], Value::Number(2.0));
-        let Value::Text(told) = &outcome.figures["told"] else { panic!("a text") };
-        assert_eq!(told, "{again:false,draw:1,run:3,seed:7,values:{hidden:x}}");
+        let Value::Text(reported) = &outcome.figures["told"] else { panic!("a text") };
+        assert_eq!(reported, "{again:false,draw:1,run:3,seed:7,values:{hidden:x}}");
     }
 
     #[test]
@@ -193,10 +196,10 @@ mod tests {
     #[test]
     fn a_program_that_takes_too_long_is_asked_to_end_with_all_that_it_started() {
         let folder = tempfile::tempdir().unwrap();
-        let told = folder.path().join("told");
-        let script = format!("trap 'echo asked >{}; exit' TERM; sleep 60 & wait", told.display());
+        let reported = folder.path().join("told");
+        let script = format!("trap 'echo asked >{}; exit' TERM; sleep 60 & wait", reported.display());
         assert_eq!(answer(&script, 0.3).ended, Ended::Failed);
-        assert_eq!(std::fs::read_to_string(told).unwrap(), "asked\n");
+        assert_eq!(std::fs::read_to_string(reported).unwrap(), "asked\n");
     }
 
     #[test]

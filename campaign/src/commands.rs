@@ -86,7 +86,7 @@ fn plan(arguments: &PlanArguments) -> Result<Exit, CommandError> {
     let campaign = read(&arguments.common)?;
     let parts = &campaign.parts;
     if arguments.json {
-        let told = json!({
+        let reported = json!({
             "schema_version": SCHEMA_VERSION,
             "title": campaign.file.title,
             "campaign": parts.campaign,
@@ -96,7 +96,7 @@ fn plan(arguments: &PlanArguments) -> Result<Exit, CommandError> {
             "runs_per_part": parts.runs_per_part,
             "columns": parts.columns,
         });
-        return writeln!(io::stdout(), "{told:#}")
+        return writeln!(io::stdout(), "{reported:#}")
             .map(|()| Exit::Good)
             .map_err(|error| CommandError::File("standard output".into(), error));
     }
@@ -112,8 +112,8 @@ fn plan(arguments: &PlanArguments) -> Result<Exit, CommandError> {
     for run in 0..parts.runs.min(arguments.first) {
         let point = campaign.points.point(run);
         let values = campaign.points.factors().iter().zip(&point.values);
-        let told: Vec<_> = values.map(|(factor, value)| format!("{} = {value}", factor.name)).collect();
-        say(&format!("run {run}: draw {}, seed {}; {}", point.draw, point.seed, told.join(", ")));
+        let reported: Vec<_> = values.map(|(factor, value)| format!("{} = {value}", factor.name)).collect();
+        say(&format!("run {run}: draw {}, seed {}; {}", point.draw, point.seed, reported.join(", ")));
     }
     Ok(Exit::Good)
 }
@@ -129,7 +129,7 @@ fn start(arguments: &RunArguments, stop: &AtomicBool) -> Result<Exit, CommandErr
     let jobs = arguments.jobs.map_or_else(cores, |jobs| jobs as usize);
     let start = Start { campaign: &campaign, out: &out, shard, jobs, stop, say: &say };
     let done = start.run()?;
-    say(&told(&done, jobs));
+    say(&reported(&done, jobs));
     if stop.load(Ordering::Relaxed) {
         say(&format!("stopped; {} parts are missing, the same command goes on", done.missing));
         return Ok(Exit::Interrupted);
@@ -141,17 +141,17 @@ fn start(arguments: &RunArguments, stop: &AtomicBool) -> Result<Exit, CommandErr
     Ok(Exit::Good)
 }
 
-fn told(done: &Done, jobs: usize) -> String {
+fn reported(done: &Done, jobs: usize) -> String {
     let Done { runs, simulated_s, wall_s, .. } = *done;
-    let mut told = format!("{runs} runs in {}", in_words(wall_s));
+    let mut reported = format!("{runs} runs in {}", in_words(wall_s));
     if simulated_s > 0.0 && wall_s > 0.0 {
         let rate = simulated_s / wall_s;
-        told += &format!(
+        reported += &format!(
             "; {simulated_s:.0} s of the rig's time, {rate:.0} simulated seconds per second, {:.0} per second and core",
             rate / jobs as f64
         );
     }
-    told
+    reported
 }
 
 /// Merges, and writes the page.

@@ -171,13 +171,13 @@ impl Start<'_> {
     }
 }
 
-/// What is told while it goes on.
+/// What is reported while it goes on.
 struct Progress<'a> {
     todo: u64,
     began: Instant,
     runs: AtomicU64,
     simulated_ms: AtomicU64,
-    told: Mutex<Instant>,
+    reported: Mutex<Instant>,
     say: &'a (dyn Fn(&str) + Sync),
 }
 
@@ -189,7 +189,7 @@ impl<'a> Progress<'a> {
             began,
             runs: AtomicU64::new(0),
             simulated_ms: AtomicU64::new(0),
-            told: Mutex::new(began),
+            reported: Mutex::new(began),
             say,
         }
     }
@@ -197,9 +197,9 @@ impl<'a> Progress<'a> {
     fn ran(&self, simulated_s: f64) {
         self.simulated_ms.fetch_add((simulated_s * 1e3).round() as u64, Ordering::Relaxed);
         let runs = self.runs.fetch_add(1, Ordering::Relaxed) + 1;
-        let mut told = self.told.lock().expect("no holder panics");
-        if runs == 1 || told.elapsed() >= TELL_EACH {
-            *told = Instant::now();
+        let mut reported = self.reported.lock().expect("no holder panics");
+        if runs == 1 || reported.elapsed() >= TELL_EACH {
+            *reported = Instant::now();
             let wall_s = self.began.elapsed().as_secs_f64();
             let left_s = wall_s / runs as f64 * (self.todo - runs) as f64;
             (self.say)(&format!("{runs}/{} runs, {} left", self.todo, in_words(left_s)));
@@ -234,9 +234,9 @@ mod tests {
 
     #[test]
     fn times_are_told_in_the_units_that_people_use() {
-        let told = [0.4, 59.0, 60.0, 3599.0, 3600.0, 90_000.0, 864_000.0].map(in_words);
+        let reported = [0.4, 59.0, 60.0, 3599.0, 3600.0, 90_000.0, 864_000.0].map(in_words);
         assert_eq!(
-            told,
+            reported,
             ["0 s", "59 s", "1 min 00 s", "59 min 59 s", "1 h 00 min", "25 h 00 min", "10.0 days"]
         );
     }

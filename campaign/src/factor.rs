@@ -11,7 +11,7 @@
 //! choose = "hidden"                           one effect, or "none"; its place and numbers are drawn as for sealed rigs
 //! ```
 //!
-//! In a campaign of a program (`command = […]`) a `[[vary]]` has a `name` alone, by which the program is told its value.
+//! In a campaign of a program (`command = […]`) a `[[vary]]` has a `name` alone, by which the program is given its value.
 //!
 //! `list = […]` is gone through, each of its values beside each of every other list; from `range = [least, most]` a value is
 //! drawn for each run, evenly, or evenly in its order of magnitude with `log = true`.
@@ -44,7 +44,7 @@ pub enum Changes {
     File(FileChoice),
     /// The effect that the rig has and the controllers do not know, at a place among these.
     Hidden(Among),
-    /// Nothing here: it is told to the program that is run.
+    /// Nothing here: it is given to the program that is run.
     Told,
 }
 

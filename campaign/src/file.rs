@@ -153,17 +153,18 @@ impl CampaignFile {
         let mut factors: Vec<Factor> = Vec::new();
         for vary in form.vary {
             let span = vary.span();
-            let told = |told: String| at.error(&span, format!("[[vary]]: {told}"));
-            let factor = vary.into_inner().factor().map_err(told)?;
-            check_factor(&factor, &kind, &factors).map_err(told)?;
+            let reported = |reported: String| at.error(&span, format!("[[vary]]: {reported}"));
+            let factor = vary.into_inner().factor().map_err(reported)?;
+            check_factor(&factor, &kind, &factors).map_err(reported)?;
             factors.push(factor);
         }
         let chosen = |factor: &Factor| factor.changes == Changes::File(FileChoice::Experiment);
         if let (Kind::Experiment(ExperimentKind { experiment: None, .. }), false) =
             (&kind, factors.iter().any(chosen))
         {
-            let told = "experiment: name one, or let a [[vary]] choose = \"experiment\", or give a command";
-            return Err(at.error(&(0..0), told.into()));
+            let reported =
+                "experiment: name one, or let a [[vary]] choose = \"experiment\", or give a command";
+            return Err(at.error(&(0..0), reported.into()));
         }
         let programs = form.programs.map(Spanned::into_inner).unwrap_or_default();
         let file = Self {
@@ -204,15 +205,15 @@ impl CampaignFile {
                 || self.factors.iter().any(|factor| factor.name == *name)
                 || (matches!(self.kind, Kind::Experiment(_)) && figures::is_known(name))
         };
-        let told = |name: &String| format!("{name} is neither varied nor collected");
+        let reported = |name: &String| format!("{name} is neither varied nor collected");
         for name in &collect.worst {
             if !own(name.as_ref()) {
-                return Err(at.error(&name.span(), format!("collect.worst: {}", told(name.as_ref()))));
+                return Err(at.error(&name.span(), format!("collect.worst: {}", reported(name.as_ref()))));
             }
         }
         for pair in &collect.confusion {
             if let Some(name) = pair.as_ref().iter().find(|name| !own(name)) {
-                return Err(at.error(&pair.span(), format!("collect.confusion: {}", told(name))));
+                return Err(at.error(&pair.span(), format!("collect.confusion: {}", reported(name))));
             }
         }
         Ok(())
@@ -235,23 +236,23 @@ impl At<'_> {
         if let Some(command) = &form.command {
             let given =
                 [form.experiment.is_some(), form.rig.is_some(), form.seconds.is_some(), form.pace.is_some()];
-            let told = if command.as_ref().is_empty() {
+            let reported = if command.as_ref().is_empty() {
                 "command: needs at least the program"
             } else if given.contains(&true) {
                 "command: experiment, rig, seconds and pace belong to a campaign of experiments"
             } else {
                 return Ok(Kind::Command(command.as_ref().clone()));
             };
-            return Err(self.error(&command.span(), told.into()));
+            return Err(self.error(&command.span(), reported.into()));
         }
         if let Some(programs) = &form.programs {
-            let told = "programs: what a command starts; a campaign of experiments knows its programs";
-            return Err(self.error(&programs.span(), told.into()));
+            let reported = "programs: what a command starts; a campaign of experiments knows its programs";
+            return Err(self.error(&programs.span(), reported.into()));
         }
         if let Some(seconds) = form.seconds.as_ref().filter(|s| !(s.as_ref() > &0.0 && s.as_ref() <= &MOST_S))
         {
-            let told = format!("seconds = {}: allowed is more than 0, to {MOST_S}", seconds.as_ref());
-            return Err(self.error(&seconds.span(), told));
+            let reported = format!("seconds = {}: allowed is more than 0, to {MOST_S}", seconds.as_ref());
+            return Err(self.error(&seconds.span(), reported));
         }
         Ok(Kind::Experiment(ExperimentKind {
             experiment: form.experiment.clone(),
@@ -264,8 +265,8 @@ impl At<'_> {
     fn whole(&self, number: Option<Spanned<u64>>, name: &str, most: u64) -> Result<Option<u64>, FileError> {
         match number {
             Some(number) if !(1..=most).contains(number.as_ref()) => {
-                let told = format!("{name} = {}: allowed is 1 to {most}", number.as_ref());
-                Err(self.error(&number.span(), told))
+                let reported = format!("{name} = {}: allowed is 1 to {most}", number.as_ref());
+                Err(self.error(&number.span(), reported))
             }
             number => Ok(number.map(Spanned::into_inner)),
         }
@@ -281,13 +282,14 @@ impl At<'_> {
         taken.extend(factors.iter().map(|factor| factor.name.as_str()));
         for name in names {
             check_column(name.as_ref(), &taken)
-                .map_err(|told| self.error(&name.span(), format!("collect.figures: {told}")))?;
+                .map_err(|reported| self.error(&name.span(), format!("collect.figures: {reported}")))?;
             taken.push(name.as_ref());
         }
         let experiment = matches!(kind, Kind::Experiment(_));
         if let Some(name) = names.iter().find(|name| experiment && !figures::is_known(name.as_ref())) {
-            let told = format!("collect.figures: no figure {}; `bench figures` lists them", name.as_ref());
-            return Err(self.error(&name.span(), told));
+            let reported =
+                format!("collect.figures: no figure {}; `bench figures` lists them", name.as_ref());
+            return Err(self.error(&name.span(), reported));
         }
         if names.is_empty() && !experiment {
             return Err(self.error(&(0..0), "collect.figures: name the keys of the command's answer".into()));
@@ -305,7 +307,7 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
     {
         return Err(format!("{name} is varied twice; give one of them another name, or leave one out"));
     }
-    check_column(name, RESERVED).map_err(|told| format!("name = {told}"))?;
+    check_column(name, RESERVED).map_err(|reported| format!("name = {reported}"))?;
     if figures::is_known(name) {
         return Err(format!("name = \"{name}\": a figure has this name, choose another"));
     }

@@ -59,7 +59,7 @@ pub struct Unfinished {
     pub because: String,
 }
 
-/// Most runs whose trouble is told one by one.
+/// Most runs whose trouble is reported one by one.
 const MOST_TOLD: usize = 100;
 
 /// A column of words, each kept once.

@@ -143,9 +143,9 @@ impl Parts {
 
     /// Why a part with another head is none of ours.
     fn stranger(&self, text: &str, path: &Path) -> Option<PartError> {
-        let told = text.lines().next()?.strip_prefix("# airbench campaign ")?;
-        let (campaign, told) = told.split_once(", made by ")?;
-        let (program, _) = told.split_once(", part ")?;
+        let reported = text.lines().next()?.strip_prefix("# airbench campaign ")?;
+        let (campaign, reported) = reported.split_once(", made by ")?;
+        let (program, _) = reported.split_once(", part ")?;
         let path = path.display().to_string();
         if campaign != self.campaign {
             Some(PartError::OtherCampaign { path })
@@ -237,8 +237,8 @@ mod tests {
             ("hello\n".to_owned(), "does not begin"),
         ] {
             fs::write(&path, &bad).unwrap();
-            let told = ours.read(out.path(), 0).unwrap_err().to_string();
-            assert!(told.contains(words) && told.contains("delete it"), "{bad}: {told}");
+            let reported = ours.read(out.path(), 0).unwrap_err().to_string();
+            assert!(reported.contains(words) && reported.contains("delete it"), "{bad}: {reported}");
         }
         fs::write(&path, [0xff, 0xfe]).unwrap();
         assert!(ours.read(out.path(), 0).unwrap_err().to_string().contains("cannot be read"));

@@ -125,8 +125,9 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
         (Some(0), Some(3)) => (Ended::TimeOver, words("ended_because")),
         (Some(0 | 1), Some(0 | 1)) => (Ended::Stopped, words("ended_because")),
         (emulator, controller) => {
-            let told = |code: Option<i32>| code.map_or("a signal".to_owned(), |code| format!("code {code}"));
-            let (emulator, controller) = (told(emulator), told(controller));
+            let reported =
+                |code: Option<i32>| code.map_or("a signal".to_owned(), |code| format!("code {code}"));
+            let (emulator, controller) = (reported(emulator), reported(controller));
             (Ended::Failed, format!("the emulator ended with {emulator}, the controller with {controller}"))
         }
     };

@@ -61,9 +61,9 @@ impl Asked {
         if let Some(index) = self.index {
             return Ok(Shard { index, count });
         }
-        let told = INDEX_VARIABLES.into_iter().find_map(|name| Some((name, variable(name)?)));
+        let reported = INDEX_VARIABLES.into_iter().find_map(|name| Some((name, variable(name)?)));
         let (name, value) =
-            told.ok_or_else(|| ShardError::NoIndex { count, names: INDEX_VARIABLES.join(", ") })?;
+            reported.ok_or_else(|| ShardError::NoIndex { count, names: INDEX_VARIABLES.join(", ") })?;
         match value.parse() {
             Ok(index) if index < count => Ok(Shard { index, count }),
             _ => Err(ShardError::Index { name, value, count, most: count - 1 }),
@@ -100,8 +100,9 @@ mod tests {
     use super::*;
 
     fn shard(text: &str, variable: Option<(&str, &str)>) -> Result<Shard, ShardError> {
-        let told = |name: &str| variable.filter(|(own, _)| *own == name).map(|(_, value)| value.to_owned());
-        text.parse::<Asked>()?.shard(told)
+        let reported =
+            |name: &str| variable.filter(|(own, _)| *own == name).map(|(_, value)| value.to_owned());
+        text.parse::<Asked>()?.shard(reported)
     }
 
     #[test]

@@ -92,7 +92,7 @@ impl Shelf {
         let folders = Folders { own, shipped: shipped.to_owned() };
         let read = |path: PathBuf| {
             let text = std::fs::read_to_string(&path)
-                .map_err(|told| error(format!("{}: {told}", path.display())))?;
+                .map_err(|reported| error(format!("{}: {reported}", path.display())))?;
             Ok(Text { path, text })
         };
         let chosen = |choice| names(&file.factors, choice);
@@ -116,12 +116,12 @@ impl Shelf {
                 programs.insert(path, source);
                 Ok(())
             }
-            Err(told) => Err(error(told.to_string())),
+            Err(reported) => Err(error(reported.to_string())),
         };
         let stroke_m = rigs[&usual[1]].nominal.cylinder().stroke_m;
         for Text { path, text } in experiments.values() {
-            let experiment =
-                Experiment::from_toml(text, path, stroke_m).map_err(|told| error(told.to_string()))?;
+            let experiment = Experiment::from_toml(text, path, stroke_m)
+                .map_err(|reported| error(reported.to_string()))?;
             for section in [&experiment.drive, &experiment.load].into_iter().flatten() {
                 add(folders.program(&section.program.written, path))?;
             }
@@ -132,11 +132,11 @@ impl Shelf {
         let mut further = BTreeSet::new();
         let sources = programs.values().map(|source| (&source.path, &source.text));
         for (path, text) in experiments.values().map(|file| (&file.path, &file.text)).chain(sources) {
-            let told = |told: EditError| error(format!("{}: {told}", path.display()));
-            for name in edits::files_beside(text, path).map_err(told)? {
+            let reported = |reported: EditError| error(format!("{}: {reported}", path.display()));
+            for name in edits::files_beside(text, path).map_err(reported)? {
                 let file = beside(path, &name);
-                let bytes =
-                    std::fs::read(&file).map_err(|told| error(format!("{}: {told}", file.display())))?;
+                let bytes = std::fs::read(&file)
+                    .map_err(|reported| error(format!("{}: {reported}", file.display())))?;
                 further.insert((name, hash(&bytes)));
             }
         }
@@ -203,6 +203,6 @@ fn names(factors: &[Factor], choice: FileChoice) -> Vec<String> {
 
 fn rig_file(file: Text) -> Result<RigFile, String> {
     let nominal = RigParameters::from_toml(&file.text, &file.path.display().to_string())
-        .map_err(|told| told.to_string())?;
+        .map_err(|reported| reported.to_string())?;
     Ok(RigFile { file, nominal })
 }

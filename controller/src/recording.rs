@@ -95,7 +95,7 @@ pub(crate) struct Writer {
 
 /// What is left when the queues' senders are gone.
 pub(crate) struct Written {
-    pub(crate) told: Vec<News>,
+    pub(crate) reported: Vec<News>,
     /// Why writing stopped, if it did.
     pub(crate) failure: Option<String>,
     pub(crate) timing: Option<TimingFigures>,
@@ -106,7 +106,7 @@ impl Writer {
     /// which does not return, when an algorithm never does, with everything written.
     pub(crate) fn run(self, failed: impl Fn(), stuck: impl Fn()) -> Written {
         let Self { mut tables, records, news, mut reloader, mut clerk, mut timing } = self;
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
         let mut watch = Stuck::default();
@@ -131,13 +131,13 @@ impl Writer {
                 {
                     timing.fault(cycle);
                 }
-                told.push(item);
+                reported.push(item);
             }
             if let Some(timing) = &mut timing {
                 note(&mut failure, if finished { timing.finish() } else { timing.poll() });
             }
             if watch.look() {
-                // The process ends here; a failure of the last write has nobody left to be told to.
+                // The process ends here; a failure of the last write has nobody left to be reported to.
                 let _ = tables.write_out();
                 let _ = timing.as_mut().map(TimingQueues::finish);
                 stuck();
@@ -152,7 +152,7 @@ impl Writer {
                 failed();
             }
             if finished || failure.is_some() {
-                return Written { told, failure, timing: timing.map(|timing| timing.figures()) };
+                return Written { reported, failure, timing: timing.map(|timing| timing.figures()) };
             }
             std::thread::sleep(POLL_PERIOD);
         }

@@ -43,10 +43,10 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let mut files = PlantTables::create(out, &scene, &rehearsal).map_err(RunError::output)?;
     let mut axes = Tables::create(out, &Axis::ALL).map_err(RunError::output)?;
     let cycles = (arguments.seconds * 1000.0).round() as u64;
-    let (mut told, mut news) = (Vec::new(), Vec::new());
+    let (mut reported, mut news) = (Vec::new(), Vec::new());
     let mut interrupted = false;
     while rehearsal.cycles() < cycles && !rehearsal.ended() && !interrupted {
-        let rehearsed = rehearsal.step(|cycle, outcome| told.push(event(cycle, outcome)));
+        let rehearsed = rehearsal.step(|cycle, outcome| reported.push(event(cycle, outcome)));
         files
             .write(&rehearsed.cycle)
             .and_then(|()| rehearsed.axes.iter().flatten().try_for_each(|record| axes.write(record)))
@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
             "the simulated rig broke in cycle {cycle}: {error}; its file makes it so"
         )));
     }
-    let ended = Ended { rehearsal, interrupted, told, news, took_s: started.elapsed().as_secs_f64() };
+    let ended = Ended { rehearsal, interrupted, reported, news, took_s: started.elapsed().as_secs_f64() };
     save(arguments, &inputs, &scene, &ended)
 }
 
@@ -94,7 +94,7 @@ fn end_when_stuck() {
 struct Ended {
     rehearsal: Rehearsal,
     interrupted: bool,
-    told: Vec<serde_json::Value>,
+    reported: Vec<serde_json::Value>,
     news: Vec<News>,
     took_s: f64,
 }
@@ -190,6 +190,6 @@ fn summary(ended: &Ended, exit: Exit, ended_because: &str) -> serde_json::Value 
         "records_dropped": 0,
         "passed": exit == Exit::Good,
         "ended_because": ended_because,
-        "events": ended.told,
+        "events": ended.reported,
     })
 }

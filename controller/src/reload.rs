@@ -79,24 +79,25 @@ impl ProgramFile {
         if source.text == self.text {
             return Ok(());
         }
-        let told = |problem: String| format!("{}: {problem}", self.path.display());
+        let reported = |problem: String| format!("{}: {problem}", self.path.display());
         // Before a library is loaded that would not be used.
         let makings = source.makings().map_err(|error| error.to_string())?;
         if let Some(problem) = other_making(&self.makings, &makings) {
-            return Err(told(problem));
+            return Err(reported(problem));
         }
         let new = Self::new(&source, self.axis, rig).map_err(|error| error.to_string())?;
         let names = |of: &Self| of.variables.iter().map(|variable| variable.name.clone()).collect::<Vec<_>>();
         if names(&new) != names(self) {
-            return Err(told("another algorithm needs another start".into()));
+            return Err(reported("another algorithm needs another start".into()));
         }
         let differs = |place: &usize| new.values[*place] != self.values[*place];
         let places: Vec<_> = (0..new.values.len()).filter(differs).collect();
         for place in &places {
             let Variable { name, parameter } = &self.variables[*place];
             let task = name.strip_suffix(parameter.name.as_ref()).unwrap_or_default();
-            let _ =
-                parameter.check_change(new.values[*place]).map_err(|error| told(format!("{task}{error}")))?;
+            let _ = parameter
+                .check_change(new.values[*place])
+                .map_err(|error| reported(format!("{task}{error}")))?;
         }
         for place in places {
             let (name, value) = (&self.variables[place].name, new.values[place]);
@@ -115,8 +116,9 @@ fn other_making(old: &Makings, new: &Makings) -> Option<String> {
     let mut keys = new.keys().chain(old.keys());
     let key = keys.find(|key| old.get(*key) != new.get(*key))?;
     let what = if key.ends_with("linearisation") { "linearisation" } else { "algorithm" };
-    let told = |makings: &Makings| makings.get(key).map_or("left out".into(), |text| format!("\"{text}\""));
-    Some(format!("{key} is {} and was {}; another {what} needs another start", told(new), told(old)))
+    let reported =
+        |makings: &Makings| makings.get(key).map_or("left out".into(), |text| format!("\"{text}\""));
+    Some(format!("{key} is {} and was {}; another {what} needs another start", reported(new), reported(old)))
 }
 
 #[cfg(test)]

@@ -337,7 +337,7 @@ fn save(arguments: &RunArguments, inputs: &Inputs, ended: Ended) -> Result<Exit,
         realtime_granted: grants.granted().to_vec(),
         realtime_refused: grants.refusals().iter().map(ToString::to_string).collect(),
         axes,
-        news: written.told,
+        news: written.reported,
     };
     let path = arguments.files.out.join(format!("{}.json", report::name(arguments.axis.list())));
     write_json(&path, &report).map_err(RunError::output)?;

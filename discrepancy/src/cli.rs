@@ -131,7 +131,7 @@ pub struct VerifyArguments {
     pub out: Option<PathBuf>,
 }
 
-/// What is to be told apart.
+/// What is to be distinguished.
 #[derive(Args, Clone, Debug)]
 pub struct NextArguments {
     /// Rig file that the report was made with.

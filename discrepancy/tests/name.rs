@@ -134,7 +134,7 @@ fn a_wrong_mass_is_a_parameter_and_no_effect() {
     assert_eq!(names(&found), Vec::<String>::new());
     let (mass, error) = factors(&found)[0];
     assert!((mass - 1.1).abs() < 4.0 * error + 0.005, "{mass} +- {error}");
-    // What is told is a fit of its own: the mass is as right without the parameters that went back to what the file says.
+    // What is reported is a fit of its own: the mass is as right without the parameters that went back to what the file says.
     let reported = found.reported.factors;
     assert!((reported[0] - 1.1).abs() < 4.0 * error + 0.005, "{reported:?}");
     assert!(reported.iter().filter(|factor| **factor == 1.0).count() >= COUNT / 2, "{reported:?}");

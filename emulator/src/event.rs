@@ -60,7 +60,7 @@ pub enum EventKind {
         /// In +x on the load's eye, N.
         load_eye_n: f64,
     },
-    /// A frame that `rig.dbc` does not allow was ignored; only the first of a kind is told.
+    /// A frame that `rig.dbc` does not allow was ignored; only the first of a kind is reported.
     Malformed {
         /// Its identifier with the kernel's flags.
         raw_id: u32,

@@ -1,4 +1,4 @@
-//! Faults on purpose: what can be broken, when it is, and how it is told.
+//! Faults on purpose: what can be broken, when it is, and how it is reported.
 //!
 //! ```text
 //!   faults.toml ── script.rs ──┐                              ┌─► plant::faults      valve, hose, friction, supply, sensors
@@ -117,10 +117,10 @@ impl Fault {
             None => spec.places.has_usual_place().then_some(0),
         };
         let place = place.ok_or_else(|| {
-            let told = places.iter().take(PLACES_TOLD).cloned().collect::<Vec<_>>().join(", ");
+            let reported = places.iter().take(PLACES_TOLD).cloned().collect::<Vec<_>>().join(", ");
             let more = if places.len() > PLACES_TOLD { ", …: 'emulator faults' has all" } else { "" };
             let at = at.unwrap_or_default().to_owned();
-            FaultError::Place { fault: spec.name, at, allowed: format!("one of {told}{more}") }
+            FaultError::Place { fault: spec.name, at, allowed: format!("one of {reported}{more}") }
         })?;
         if let Some((key, _, value)) =
             numbers.iter().find(|(key, ..)| spec.keys.iter().all(|known| known.name != key))

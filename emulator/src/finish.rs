@@ -1,4 +1,4 @@
-//! The end of a run: `summary.json` written, the run told in a few lines, the exit code chosen.
+//! The end of a run: `summary.json` written, the run reported in a few lines, the exit code chosen.
 
 use crate::cli::RunArguments;
 use crate::event::Event;

@@ -27,7 +27,7 @@ impl HostThread {
         Self { stop, thread }
     }
 
-    /// Stops serving and tells what the host counted; `None` when it failed, which it has told.
+    /// Stops serving and tells what the host counted; `None` when it failed, which it has reported.
     #[must_use]
     pub fn stop(self) -> Option<HostReport> {
         self.stop.store(true, Ordering::Relaxed);

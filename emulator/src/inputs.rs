@@ -1,7 +1,7 @@
 //! What a run reads before it starts: rig, experiment and sealed file, checked, with messages a person can act on.
 //!
 //! Sealed effects go into the plant and nowhere else: everything that describes the run is made of the rig file. What is wrong
-//! in a sealed file is told with line and key, because then no run begins.
+//! in a sealed file is reported with line and key, because then no run begins.
 
 use crate::faults::NEEDS_HOST;
 use crate::faults::overlay::on_wire;

@@ -11,7 +11,7 @@
 //! | [`wire_limits`] | whether the numbers of a rig fit the frames |
 //! | [`recording`] | the queues out of the 1 ms path, the files, and the timing of the rig |
 //! | `finish` | histograms, summary, exit code |
-//! | [`faults`] | what is broken on purpose, when, and how it is told |
+//! | [`faults`] | what is broken on purpose, when, and how it is reported |
 //! | [`console`] | what a person types |
 //! | [`telemetry`] | who looks on |
 //! | [`seal`], [`catalogue`] | drawing effects that nobody knows, listing those that there are |

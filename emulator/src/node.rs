@@ -314,7 +314,7 @@ impl EmulatorNode {
         self.chains_done.iter().flatten().count() > 0 && self.chains_done.iter().flatten().all(|done| *done)
     }
 
-    /// Whether the plant's state is finite; when not, which is told, the run must end with silence on the bus.
+    /// Whether the plant's state is finite; when not, which is reported, the run must end with silence on the bus.
     pub fn is_finite(&mut self, cycle: u64) -> bool {
         let finite = self.node.rig().plant().state().is_finite();
         if !finite {

@@ -42,7 +42,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Interface name in the log of the embedded bus, and of every lockstep run, so that logs can be compared.
 const EMBEDDED_INTERFACE: &str = "bus0";
-/// How often progress is told.
+/// How often progress is reported.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(5);
 
 /// What keeps a run from starting.
@@ -407,11 +407,11 @@ fn describe(
 }
 
 fn tell_progress<T>(rig_loop: &ScopedJoinHandle<'_, T>, shared: &Shared) {
-    let mut told = Instant::now();
+    let mut reported = Instant::now();
     while !rig_loop.is_finished() {
         std::thread::sleep(Duration::from_millis(10));
-        if told.elapsed() >= PROGRESS_PERIOD {
-            told = Instant::now();
+        if reported.elapsed() >= PROGRESS_PERIOD {
+            reported = Instant::now();
             let seconds = shared.cycle.load(Ordering::Relaxed) as f64 / 1000.0;
             let skipped = shared.skipped.load(Ordering::Relaxed);
             let heard = shared.controller_heard.load(Ordering::Relaxed);

@@ -2,7 +2,7 @@
 //!
 //! The file appears at once and for its owner alone, and never in place of another: a sealed rig that runs were made with
 //! cannot be
-//! drawn again by accident. What was drawn is told nowhere else, and neither is the seed, which is as good as the file.
+//! drawn again by accident. What was drawn is reported nowhere else, and neither is the seed, which is as good as the file.
 
 use crate::cli::{SealArguments, SealedAxis};
 use crate::run::RunError;

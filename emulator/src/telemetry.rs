@@ -30,7 +30,7 @@ const MOST_VIEWERS: usize = 8;
 /// The socket and its viewers.
 pub struct Telemetry {
     socket: SocketFile,
-    /// The first packet of each viewer, save what it is told as of its coming.
+    /// The first packet of each viewer, save what it is given at its coming.
     description: Value,
     /// Whether cycles show what only a simulation knows.
     with_truth: bool,
@@ -128,9 +128,9 @@ impl Telemetry {
 }
 
 fn write_event(out: &mut Vec<u8>, event: &Event) {
-    let told = Told { event, text: event.kind.to_string() };
+    let reported = Told { event, text: event.kind.to_string() };
     // A struct of numbers and words has a JSON form.
-    if let Ok(json) = serde_json::to_vec(&told) {
+    if let Ok(json) = serde_json::to_vec(&reported) {
         write_packet(out, Kind::Event, &json);
     }
 }

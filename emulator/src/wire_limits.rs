@@ -1,7 +1,7 @@
 //! Whether the rig of a rig file fits the wire: `rig.dbc` fixes ranges and steps of what crosses it.
 //!
 //! A rig whose sensors differ from the wire's signals would be rounded twice, or make frames that cannot be encoded; both
-//! are told before the run, with the key to change.
+//! are reported before the run, with the key to change.
 
 use plant::RigParameters;
 use protocol::frames::{DRIVE_SENSORS, MessageSpec, RIG_STATUS, SignalSpec};

@@ -97,25 +97,25 @@ fn add_controllers(
     folder: &Path,
 ) -> Result<(), SummaryError> {
     let reports = reports::read(folder)?;
-    let split = |told: &Map<String, Value>| {
+    let split = |reported: &Map<String, Value>| {
         let figures: Map<_, _> =
-            PROCESS_FIGURES.iter().map(|key| ((*key).to_owned(), known(told, key).clone())).collect();
+            PROCESS_FIGURES.iter().map(|key| ((*key).to_owned(), known(reported, key).clone())).collect();
         let apart = |key: &str| key != "axes" && !PROCESS_FIGURES.contains(&key);
-        let used = told.iter().filter(|(key, _)| apart(key));
+        let used = reported.iter().filter(|(key, _)| apart(key));
         let used: Map<_, _> = used.map(|(key, value)| (key.clone(), value.clone())).collect();
         (Value::Object(figures), Value::Object(used))
     };
     match &reports {
         Reports::None => return Ok(()),
-        Reports::Both(told) => {
-            let (figures, used) = split(told);
+        Reports::Both(reported) => {
+            let (figures, used) = split(reported);
             summary.insert("controller".into(), figures);
             run.insert("controller".into(), used);
         }
         Reports::Each(each) => {
             let (mut figures, mut used) = (Map::new(), Map::new());
-            for (axis, told) in each {
-                let own = split(told);
+            for (axis, reported) in each {
+                let own = split(reported);
                 figures.insert((*axis).into(), own.0);
                 used.insert((*axis).into(), own.1);
             }
@@ -146,7 +146,7 @@ fn total(counts: &Value) -> Option<u64> {
 }
 
 fn add_figures(summary: &mut Map<String, Value>, record: &Record, figures: &Figures) {
-    // The drive's controller has told them as it went; one that did not is made up for.
+    // The drive's controller has reported them as it went; one that did not is made up for.
     let made_up = [
         ("position_error_dynamic_m", position::error_dynamic_m as fn(&Record) -> _),
         ("position_error_static_m", position::error_static_m),
@@ -171,13 +171,13 @@ fn against(summary: &Map<String, Value>, judged: &Map<String, Value>, is_rehears
         against.push(format!("the {who} did not end well"));
     }
     // Null: the controller is of an earlier version that does not say, or is not ours.
-    let ended_badly = |who: &str, told: &Value| {
-        let why = told["ended_because"].as_str().map_or_else(String::new, |why| format!(": {why}"));
-        (told["ended_well"] == Value::Bool(false)).then(|| format!("the {who} did not end well{why}"))
+    let ended_badly = |who: &str, reported: &Value| {
+        let why = reported["ended_because"].as_str().map_or_else(String::new, |why| format!(": {why}"));
+        (reported["ended_well"] == Value::Bool(false)).then(|| format!("the {who} did not end well{why}"))
     };
     against.extend(ended_badly("controller", known(summary, "controller")));
-    for (axis, told) in known(summary, "controllers").as_object().into_iter().flatten() {
-        against.extend(ended_badly(&format!("{axis} controller"), told));
+    for (axis, reported) in known(summary, "controllers").as_object().into_iter().flatten() {
+        against.extend(ended_badly(&format!("{axis} controller"), reported));
     }
     let broken = judged.iter().filter(|(_, entry)| !thresholds::is_kept(entry));
     against.extend(broken.map(|(name, _)| format!("bound broken: {name}")));
@@ -233,15 +233,15 @@ mod tests {
 
     /// What a controller for both axes says.
     fn both(changes: &Value) -> Value {
-        let mut told = json!({
+        let mut reported = json!({
             "title": "position-p",
             "ended_well": true,
             "axes": { "drive": { "position_error_dynamic_m": 0.002, "sensors_lost": 1 }, "load": { "sensors_lost": 0 } },
         });
         for (key, value) in changes.as_object().unwrap() {
-            told[key] = value.clone();
+            reported[key] = value.clone();
         }
-        told
+        reported
     }
 
     #[test]
@@ -284,9 +284,9 @@ mod tests {
         let nothing = json!({});
         let good = json!({ "passed": true, "records_dropped": 0, "frames_ignored": { "second_rig": 0 } });
         let rig = |changes: Value| {
-            let mut told = json!({ "passed": true });
-            told.as_object_mut().unwrap().extend(changes.as_object().unwrap().clone());
-            told
+            let mut reported = json!({ "passed": true });
+            reported.as_object_mut().unwrap().extend(changes.as_object().unwrap().clone());
+            reported
         };
         for (summary, controller, against) in [
             (good, nothing.clone(), json!([])),

@@ -7,7 +7,7 @@
 //!   confidence = 1 − 2 · Σ_{i<j} C(n, i) / 2^n          n = 10, j = 2: 1 − 2 · 11/1024 = 97.9 %
 //! ```
 //!
-//! The narrowest interval of at least 95 % is told; five values and fewer have none.
+//! The narrowest interval of at least 95 % is reported; five values and fewer have none.
 //!
 //! # Source
 //! H. A. David, H. N. Nagaraja, Order Statistics, 3rd ed. 2003, section 7.1.
@@ -77,14 +77,14 @@ mod tests {
 
     #[test]
     fn ten_values_give_the_second_and_the_ninth() {
-        let told = median((1..=10).rev().map(f64::from).collect()).unwrap();
-        assert_eq!((told.value, told.interval), (5.5, Some((2.0, 9.0))));
+        let reported = median((1..=10).rev().map(f64::from).collect()).unwrap();
+        assert_eq!((reported.value, reported.interval), (5.5, Some((2.0, 9.0))));
     }
 
     #[test]
     fn a_few_have_a_median_and_no_interval() {
-        let told = median(vec![3.0, 5.0, 4.0]).unwrap();
-        assert_eq!(told, Median { value: 4.0, interval: None, confidence: None });
+        let reported = median(vec![3.0, 5.0, 4.0]).unwrap();
+        assert_eq!(reported, Median { value: 4.0, interval: None, confidence: None });
         assert_eq!(median(vec![]), None);
     }
 }

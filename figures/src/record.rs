@@ -91,7 +91,7 @@ pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryErr
 }
 
 impl Record {
-    /// The table whose main chain is told: the drive's, else the load's.
+    /// The table whose main chain is reported: the drive's, else the load's.
     #[must_use]
     pub fn leader(&self) -> &Table {
         if self.drive.states("main_chain").is_empty() { &self.load } else { &self.drive }

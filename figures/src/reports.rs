@@ -33,7 +33,7 @@ pub fn read(folder: &Path) -> Result<Reports, SummaryError> {
     }
     let mut each = Vec::new();
     for axis in ["drive", "load"] {
-        each.extend(read(&format!("controller-{axis}.json"))?.map(|told| (axis, told)));
+        each.extend(read(&format!("controller-{axis}.json"))?.map(|reported| (axis, reported)));
     }
     Ok(if each.is_empty() { Reports::None } else { Reports::Each(each) })
 }
@@ -42,11 +42,11 @@ impl Reports {
     /// What they say of each axis that they name.
     #[must_use]
     pub fn axes(&self) -> Map<String, Value> {
-        let of = |told: &Map<String, Value>| told.get("axes").and_then(Value::as_object).cloned();
+        let of = |reported: &Map<String, Value>| reported.get("axes").and_then(Value::as_object).cloned();
         match self {
             Self::None => Map::new(),
-            Self::Both(told) => of(told).unwrap_or_default(),
-            Self::Each(each) => each.iter().filter_map(|(_, told)| of(told)).flatten().collect(),
+            Self::Both(reported) => of(reported).unwrap_or_default(),
+            Self::Each(each) => each.iter().filter_map(|(_, reported)| of(reported)).flatten().collect(),
         }
     }
 }

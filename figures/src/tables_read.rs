@@ -155,12 +155,12 @@ mod tests {
         let (_folder, path) =
             table("time_s,s\n0.0,settling\n0.1,settling\n0.2,experiment\n0.3,done\n0.4,done\n");
         let read = read(&path, &[], &["s"]).unwrap();
-        let told: Vec<_> = read
+        let reported: Vec<_> = read
             .states("s")
             .iter()
             .map(|entry| (entry.state.as_str(), entry.span.from_s, entry.span.to_s))
             .collect();
-        assert_eq!(told, [("settling", 0.0, 0.2), ("experiment", 0.2, 0.3), ("done", 0.3, 0.4)]);
+        assert_eq!(reported, [("settling", 0.0, 0.2), ("experiment", 0.2, 0.3), ("done", 0.3, 0.4)]);
         let both = read.in_state("s", &["settling", "experiment"]);
         assert_eq!(both, [Span { from_s: 0.0, to_s: 0.3 }]);
     }

@@ -125,12 +125,12 @@ fn get<V>(
     (references, values, count): (*const c_uint, *mut V, usize),
     work: impl FnOnce(&mut Simulation, &[c_uint], &mut [V]) -> Result<(), Refusal>,
 ) -> Status {
-    on(component, |own| {
+    on(component, |instance| {
         let (references, values) = (slice(references, count), slice_mut(values, count));
         if references.len() != count || values.len() != count {
-            return Ok(null_array(own));
+            return Ok(null_array(instance));
         }
-        work(&mut own.simulation, references, values).map(|()| Status::Ok)
+        work(&mut instance.simulation, references, values).map(|()| Status::Ok)
     })
 }
 
@@ -140,12 +140,12 @@ fn set<V>(
     (references, values, count): (*const c_uint, *const V, usize),
     work: impl FnOnce(&mut Simulation, &[c_uint], &[V]) -> Result<(), Refusal>,
 ) -> Status {
-    on(component, |own| {
+    on(component, |instance| {
         let (references, values) = (slice(references, count), slice(values, count));
         if references.len() != count || values.len() != count {
-            return Ok(null_array(own));
+            return Ok(null_array(instance));
         }
-        work(&mut own.simulation, references, values).map(|()| Status::Ok)
+        work(&mut instance.simulation, references, values).map(|()| Status::Ok)
     })
 }
 
@@ -176,7 +176,7 @@ extern "C" fn fmi2SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> Status {
-    // Warnings and errors are told in any case, and there is nothing below them.
+    // Warnings and errors are reported in any case, and there is nothing below them.
     on(component, |_| Ok(Status::Ok))
 }
 
@@ -272,28 +272,28 @@ extern "C" fn fmi2SetupExperiment(
     _stop_defined: c_int,
     _stop_s: c_double,
 ) -> Status {
-    on(component, |own| own.simulation.set_start(start_s).map(|()| Status::Ok))
+    on(component, |instance| instance.simulation.set_start(start_s).map(|()| Status::Ok))
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2EnterInitializationMode(component: *mut c_void) -> Status {
-    on(component, |own| own.simulation.enter_initialisation().map(|()| Status::Ok))
+    on(component, |instance| instance.simulation.enter_initialisation().map(|()| Status::Ok))
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2ExitInitializationMode(component: *mut c_void) -> Status {
-    on(component, |own| own.simulation.exit_initialisation().map(|()| Status::Ok))
+    on(component, |instance| instance.simulation.exit_initialisation().map(|()| Status::Ok))
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2Terminate(component: *mut c_void) -> Status {
-    on(component, |own| own.simulation.terminate().map(|()| Status::Ok))
+    on(component, |instance| instance.simulation.terminate().map(|()| Status::Ok))
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
-    on(component, |own| {
-        own.simulation.reset()?;
+    on(component, |instance| {
+        instance.simulation.reset()?;
         Ok(Status::Ok)
     })
 }
@@ -305,7 +305,9 @@ extern "C" fn fmi2GetReal(
     count: usize,
     values: *mut c_double,
 ) -> Status {
-    get(component, (references, values, count), |own, references, values| own.reals(references, values))
+    get(component, (references, values, count), |instance, references, values| {
+        instance.reals(references, values)
+    })
 }
 
 #[unsafe(no_mangle)]
@@ -315,7 +317,9 @@ extern "C" fn fmi2GetInteger(
     count: usize,
     values: *mut c_int,
 ) -> Status {
-    get(component, (references, values, count), |own, references, values| own.integers(references, values))
+    get(component, (references, values, count), |instance, references, values| {
+        instance.integers(references, values)
+    })
 }
 
 #[unsafe(no_mangle)]
@@ -325,9 +329,9 @@ extern "C" fn fmi2GetBoolean(
     count: usize,
     values: *mut c_int,
 ) -> Status {
-    get(component, (references, values, count), |own, references, values| {
+    get(component, (references, values, count), |instance, references, values| {
         let mut flags = vec![false; count];
-        own.booleans(references, &mut flags)?;
+        instance.booleans(references, &mut flags)?;
         values.iter_mut().zip(flags).for_each(|(value, flag)| *value = c_int::from(flag));
         Ok(())
     })
@@ -350,7 +354,9 @@ extern "C" fn fmi2SetReal(
     count: usize,
     values: *const c_double,
 ) -> Status {
-    set(component, (references, values, count), |own, references, values| own.set_reals(references, values))
+    set(component, (references, values, count), |instance, references, values| {
+        instance.set_reals(references, values)
+    })
 }
 
 #[unsafe(no_mangle)]
@@ -360,8 +366,8 @@ extern "C" fn fmi2SetInteger(
     count: usize,
     values: *const c_int,
 ) -> Status {
-    set(component, (references, values, count), |own, references, values| {
-        own.set_integers(references, values)
+    set(component, (references, values, count), |instance, references, values| {
+        instance.set_integers(references, values)
     })
 }
 
@@ -372,9 +378,9 @@ extern "C" fn fmi2SetBoolean(
     count: usize,
     values: *const c_int,
 ) -> Status {
-    set(component, (references, values, count), |own, references, values| {
+    set(component, (references, values, count), |instance, references, values| {
         let flags: Vec<_> = values.iter().map(|value| *value != 0).collect();
-        own.set_booleans(references, &flags)
+        instance.set_booleans(references, &flags)
     })
 }
 
@@ -399,10 +405,10 @@ extern "C" fn fmi2DoStep(
     step_s: c_double,
     _no_set_state_prior: c_int,
 ) -> Status {
-    on(component, |own| {
-        let stepped = own.simulation.step(at_s, step_s)?;
+    on(component, |instance| {
+        let stepped = instance.simulation.step(at_s, step_s)?;
         Ok(stepped.warning.map_or(Status::Ok, |warning| {
-            own.teller.tell(Status::Warning, &warning);
+            instance.teller.tell(Status::Warning, &warning);
             Status::Warning
         }))
     })
@@ -410,10 +416,10 @@ extern "C" fn fmi2DoStep(
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2GetFMUstate(component: *mut c_void, state: *mut *mut c_void) -> Status {
-    on(component, |own| {
+    on(component, |instance| {
         // SAFETY: the importer's variable for a state (see the head).
-        let Some(state) = (unsafe { state.as_mut() }) else { return Ok(null_state(own)) };
-        let kept = own.simulation.clone();
+        let Some(state) = (unsafe { state.as_mut() }) else { return Ok(null_state(instance)) };
+        let kept = instance.simulation.clone();
         // SAFETY: null, or a state of this FMU that was not freed.
         match unsafe { state.cast::<Simulation>().as_mut() } {
             Some(before) => *before = kept,
@@ -425,10 +431,12 @@ extern "C" fn fmi2GetFMUstate(component: *mut c_void, state: *mut *mut c_void) -
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2SetFMUstate(component: *mut c_void, state: *mut c_void) -> Status {
-    on(component, |own| {
+    on(component, |instance| {
         // SAFETY: a state of this FMU that was not freed.
-        let Some(kept) = (unsafe { state.cast::<Simulation>().as_ref() }) else { return Ok(null_state(own)) };
-        own.simulation = kept.clone();
+        let Some(kept) = (unsafe { state.cast::<Simulation>().as_ref() }) else {
+            return Ok(null_state(instance));
+        };
+        instance.simulation = kept.clone();
         Ok(Status::Ok)
     })
 }
@@ -447,8 +455,8 @@ extern "C" fn fmi2FreeFMUstate(component: *mut c_void, state: *mut *mut c_void) 
     })
 }
 
-fn null_state(own: &Component) -> Status {
-    own.teller.tell(Status::Error, "a null pointer in place of an FMU state");
+fn null_state(instance: &Component) -> Status {
+    instance.teller.tell(Status::Error, "a null pointer in place of an FMU state");
     Status::Error
 }
 

@@ -55,18 +55,21 @@ fn text(list: &[Variable], guid: &str) -> String {
          <CoSimulation modelIdentifier=\"{MODEL_IDENTIFIER}\" canHandleVariableCommunicationStepSize=\"true\"\n    \
          canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\"/>\n  <UnitDefinitions>\n"
     );
-    let units: BTreeSet<_> = list.iter().map(|own| own.unit).filter(|unit| !unit.is_empty()).collect();
+    let units: BTreeSet<_> =
+        list.iter().map(|instance| instance.unit).filter(|unit| !unit.is_empty()).collect();
     for unit in units {
         let _ = writeln!(out, "    <Unit name=\"{}\"/>", escaped(unit));
     }
     out += "  </UnitDefinitions>\n  <LogCategories>\n    <Category name=\"logStatusWarning\"/>\n    \
             <Category name=\"logStatusError\"/>\n    <Category name=\"logStatusFatal\"/>\n  </LogCategories>\n  \
             <DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"0.001\"/>\n  <ModelVariables>\n";
-    list.iter().enumerate().for_each(|(place, own)| variable(&mut out, place, own));
+    list.iter().enumerate().for_each(|(place, instance)| variable(&mut out, place, instance));
     out += "  </ModelVariables>\n  <ModelStructure>\n";
     for part in ["Outputs", "InitialUnknowns"] {
         let _ = writeln!(out, "    <{part}>");
-        for (place, _) in list.iter().enumerate().filter(|(_, own)| own.causality == Causality::Output) {
+        for (place, _) in
+            list.iter().enumerate().filter(|(_, instance)| instance.causality == Causality::Output)
+        {
             let _ = writeln!(out, "      <Unknown index=\"{}\"/>", place + 1);
         }
         let _ = writeln!(out, "    </{part}>");
@@ -75,21 +78,21 @@ fn text(list: &[Variable], guid: &str) -> String {
     out
 }
 
-fn variable(out: &mut String, place: usize, own: &Variable) {
-    let (causality, variability) = match own.causality {
+fn variable(out: &mut String, place: usize, instance: &Variable) {
+    let (causality, variability) = match instance.causality {
         Causality::Parameter => ("parameter", "fixed"),
-        Causality::Input if own.discrete => ("input", "discrete"),
+        Causality::Input if instance.discrete => ("input", "discrete"),
         Causality::Input => ("input", "continuous"),
-        Causality::Output if own.discrete => ("output", "discrete"),
+        Causality::Output if instance.discrete => ("output", "discrete"),
         Causality::Output => ("output", "continuous"),
     };
-    let (name, about) = (escaped(&own.name), escaped(&own.about));
+    let (name, about) = (escaped(&instance.name), escaped(&instance.about));
     let _ = writeln!(
         out,
         "    <ScalarVariable name=\"{name}\" valueReference=\"{place}\" causality=\"{causality}\" \
          variability=\"{variability}\" description=\"{about}\">"
     );
-    let (kind, start) = match own.kind {
+    let (kind, start) = match instance.kind {
         Kind::Real(start) => ("Real", start.map(|start| start.to_string())),
         Kind::Integer(start) => ("Integer", start.map(|start| start.to_string())),
         Kind::Boolean(start) => ("Boolean", start.map(|start| start.to_string())),
@@ -98,11 +101,11 @@ fn variable(out: &mut String, place: usize, own: &Variable) {
     if let Some(start) = start {
         let _ = write!(out, " start=\"{start}\"");
     }
-    if let Some((least, most)) = own.range {
+    if let Some((least, most)) = instance.range {
         let _ = write!(out, " min=\"{least}\" max=\"{most}\"");
     }
-    if !own.unit.is_empty() {
-        let _ = write!(out, " unit=\"{}\"", escaped(own.unit));
+    if !instance.unit.is_empty() {
+        let _ = write!(out, " unit=\"{}\"", escaped(instance.unit));
     }
     *out += "/>\n    </ScalarVariable>\n";
 }

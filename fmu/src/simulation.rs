@@ -52,8 +52,8 @@ struct Running {
     acting: [f64; 2],
     /// Periods since the start.
     period: u64,
-    /// The linkage was asked for and refused, and that was told.
-    told: bool,
+    /// The linkage was asked for and refused, and that was reported.
+    reported: bool,
 }
 
 /// What an importer may set, save the numbers of the rig.
@@ -203,7 +203,7 @@ impl Simulation {
     pub fn reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Real", |kind| matches!(kind, Kind::Real(_)))?;
-        let outputs = list.iter().any(|own| own.causality == Causality::Output);
+        let outputs = list.iter().any(|instance| instance.causality == Causality::Output);
         if outputs {
             self.ready()?;
         }
@@ -211,10 +211,10 @@ impl Simulation {
         let inputs = inputs(&self.asked, running.map_or([0.0; 2], |running| running.acting));
         let truth = running.filter(|_| outputs).map(|running| running.plant.truth(&inputs).values());
         let terms = running
-            .filter(|_| list.iter().any(|own| matches!(own.role, Role::Term(_))))
+            .filter(|_| list.iter().any(|instance| matches!(instance.role, Role::Term(_))))
             .map(|running| running.plant.terms(&inputs));
-        for (own, value) in list.iter().zip(values) {
-            *value = match own.role {
+        for (instance, value) in list.iter().zip(values) {
+            *value = match instance.role {
                 Role::Valve(axis) => self.asked.valve[axis],
                 Role::Hand(place) => self.asked.hand_n[place],
                 Role::CarriagePosition => self.asked.setup.carriage_position_m,
@@ -239,12 +239,12 @@ impl Simulation {
     pub fn booleans(&mut self, references: &[u32], values: &mut [bool]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
-        if list.iter().any(|own| own.causality == Causality::Output) {
+        if list.iter().any(|instance| instance.causality == Causality::Output) {
             self.ready()?;
         }
         let plant = self.running.as_ref().map(|running| &running.plant);
-        for (own, value) in list.iter().zip(values) {
-            *value = match own.role {
+        for (instance, value) in list.iter().zip(values) {
+            *value = match instance.role {
                 Role::EmergencyStop => self.asked.emergency_stop,
                 Role::Link => self.asked.link,
                 Role::Linked => plant.is_some_and(Plant::linked),
@@ -271,12 +271,12 @@ impl Simulation {
     pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Real", |kind| matches!(kind, Kind::Real(_)))?;
-        for (own, value) in list.iter().zip(values) {
-            self.settable(own)?;
-            in_range(own, *value)?;
+        for (instance, value) in list.iter().zip(values) {
+            self.settable(instance)?;
+            in_range(instance, *value)?;
         }
-        for (own, value) in list.iter().zip(values) {
-            match own.role {
+        for (instance, value) in list.iter().zip(values) {
+            match instance.role {
                 Role::Valve(axis) => self.asked.valve[axis] = *value,
                 Role::Hand(place) => self.asked.hand_n[place] = *value,
                 Role::CarriagePosition => self.asked.setup.carriage_position_m = *value,
@@ -300,9 +300,9 @@ impl Simulation {
     pub fn set_booleans(&mut self, references: &[u32], values: &[bool]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Boolean", |kind| matches!(kind, Kind::Boolean(_)))?;
-        list.iter().try_for_each(|own| self.settable(own))?;
-        for (own, value) in list.iter().zip(values) {
-            match own.role {
+        list.iter().try_for_each(|instance| self.settable(instance))?;
+        for (instance, value) in list.iter().zip(values) {
+            match instance.role {
                 Role::EmergencyStop => self.asked.emergency_stop = *value,
                 _ => self.asked.link = *value,
             }
@@ -318,9 +318,9 @@ impl Simulation {
     pub fn set_integers(&mut self, references: &[u32], values: &[i32]) -> Result<(), Refusal> {
         let variables = Arc::clone(&self.variables);
         let list = find(&variables, references, "Integer", |kind| matches!(kind, Kind::Integer(_)))?;
-        for (own, value) in list.iter().zip(values) {
-            self.settable(own)?;
-            in_range(own, f64::from(*value))?;
+        for (instance, value) in list.iter().zip(values) {
+            self.settable(instance)?;
+            in_range(instance, f64::from(*value))?;
         }
         if let Some(value) = values.last() {
             self.asked.seed = *value;
@@ -333,12 +333,12 @@ impl Simulation {
         if modes.contains(&self.mode) { Ok(()) } else { Err(Refusal::Mode { call, after }) }
     }
 
-    fn settable(&self, own: &Variable) -> Result<(), Refusal> {
+    fn settable(&self, instance: &Variable) -> Result<(), Refusal> {
         let before = matches!(self.mode, Mode::Instantiated | Mode::Initialising);
-        match own.causality {
-            Causality::Output => Err(Refusal::NotSettable(own.name.clone(), "at all: it is an output")),
+        match instance.causality {
+            Causality::Output => Err(Refusal::NotSettable(instance.name.clone(), "at all: it is an output")),
             Causality::Parameter if !before => Err(Refusal::NotSettable(
-                own.name.clone(),
+                instance.name.clone(),
                 "after the initialisation: it is a fixed parameter",
             )),
             _ => Ok(()),
@@ -382,8 +382,8 @@ impl Simulation {
         // The emulator draws once before its first cycle; equal draws give equal noise.
         sensors.sample(&plant, &inputs);
         let readings = sensors.sample(&plant, &inputs);
-        let (acting, period, told) = ([0.0; 2], 0, false);
-        self.running = Some(Box::new(Running { plant, sensors, readings, acting, period, told }));
+        let (acting, period, reported) = ([0.0; 2], 0, false);
+        self.running = Some(Box::new(Running { plant, sensors, readings, acting, period, reported }));
         Ok(())
     }
 }
@@ -397,12 +397,12 @@ impl Running {
             self.plant.release_emergency_stop();
         }
         if !asked.link {
-            self.told = false;
+            self.reported = false;
             self.plant.unlink();
             return None;
         }
         let refused = self.plant.link().err()?;
-        let first = !std::mem::replace(&mut self.told, true);
+        let first = !std::mem::replace(&mut self.reported, true);
         first.then(|| format!("{refused}; the rods stay apart until it does"))
     }
 
@@ -432,19 +432,19 @@ fn find<'v>(
     is: impl Fn(Kind) -> bool,
 ) -> Result<Vec<&'v Variable>, Refusal> {
     let one = |reference: &u32| {
-        let own = variables.get(*reference as usize).filter(|own| is(own.kind));
-        own.ok_or(Refusal::Reference(*reference, kind))
+        let instance = variables.get(*reference as usize).filter(|instance| is(instance.kind));
+        instance.ok_or(Refusal::Reference(*reference, kind))
     };
     references.iter().map(one).collect()
 }
 
-fn in_range(own: &Variable, value: f64) -> Result<(), Refusal> {
-    let (least, most) = own.range.unwrap_or((f64::MIN, f64::MAX));
+fn in_range(instance: &Variable, value: f64) -> Result<(), Refusal> {
+    let (least, most) = instance.range.unwrap_or((f64::MIN, f64::MAX));
     // NaN lies in no range.
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    Err(Refusal::OutOfRange { name: own.name.clone(), value, least, most, unit: own.unit })
+    Err(Refusal::OutOfRange { name: instance.name.clone(), value, least, most, unit: instance.unit })
 }
 
 #[cfg(test)]

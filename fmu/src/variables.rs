@@ -130,7 +130,9 @@ fn inputs() -> Vec<Variable> {
     list.push(variable("emergency_stop", Role::EmergencyStop, Kind::Boolean(Some(false)), stop));
     let link = "Whether the load's eye shall sit in the carriage; at the start it is put there, later it must lie in the gap";
     list.push(variable("link", Role::Link, Kind::Boolean(Some(false)), link));
-    list.into_iter().map(|own| Variable { causality: Causality::Input, discrete: true, ..own }).collect()
+    list.into_iter()
+        .map(|instance| Variable { causality: Causality::Input, discrete: true, ..instance })
+        .collect()
 }
 
 fn setup(rig: &RigParameters) -> Vec<Variable> {
@@ -157,7 +159,7 @@ fn setup(rig: &RigParameters) -> Vec<Variable> {
             ..variable("sensor_seed", Role::Seed, Kind::Integer(Some(1)), seed)
         },
     ];
-    list.map(|own| Variable { causality: Causality::Parameter, ..own }).to_vec()
+    list.map(|instance| Variable { causality: Causality::Parameter, ..instance }).to_vec()
 }
 
 fn numbers(rig: &RigParameters) -> Vec<Variable> {
@@ -165,12 +167,12 @@ fn numbers(rig: &RigParameters) -> Vec<Variable> {
     for (place, key) in KEYS.iter().enumerate() {
         for (index, number) in rig.numbers(&key.path()).iter().enumerate() {
             let name = if key.count == 1 { key.path() } else { format!("{}[{}]", key.path(), index + 1) };
-            let own = variable(name, Role::Rig(place, index), Kind::Real(Some(*number)), key.meaning);
+            let instance = variable(name, Role::Rig(place, index), Kind::Real(Some(*number)), key.meaning);
             list.push(Variable {
                 causality: Causality::Parameter,
                 unit: key.unit.name(),
                 range: Some((key.min, key.max)),
-                ..own
+                ..instance
             });
         }
     }
@@ -208,7 +210,7 @@ fn measured() -> Vec<Variable> {
     }
     let about = "Whether the load's eye sits in the carriage";
     list.push(variable("linked", Role::Linked, Kind::Boolean(None), about));
-    list.into_iter().map(|own| Variable { discrete: true, ..own }).collect()
+    list.into_iter().map(|instance| Variable { discrete: true, ..instance }).collect()
 }
 
 /// Endings of names and the units that they say; longer ones first.
@@ -246,25 +248,25 @@ mod tests {
             .with_effect("piston-leakage", "load", &[("leakage_nl_per_min", 5.0)])
             .unwrap();
         let list = of(&rig).unwrap();
-        let names: BTreeSet<_> = list.iter().map(|own| own.name.as_str()).collect();
+        let names: BTreeSet<_> = list.iter().map(|instance| instance.name.as_str()).collect();
         assert_eq!(names.len(), list.len());
         assert!(Truth::COLUMNS.iter().all(|column| names.contains(column)));
         let numbers: usize = KEYS.iter().map(|key| key.count).sum();
-        assert_eq!(list.iter().filter(|own| matches!(own.role, Role::Rig(..))).count(), numbers);
-        assert!(list.iter().any(|own| matches!(own.role, Role::Term(_))), "the leakage has terms");
+        assert_eq!(list.iter().filter(|instance| matches!(instance.role, Role::Rig(..))).count(), numbers);
+        assert!(list.iter().any(|instance| matches!(instance.role, Role::Term(_))), "the leakage has terms");
     }
 
     #[test]
     fn starts_lie_in_their_ranges_and_outputs_have_none() {
-        for own in of(&RigParameters::baseline()).unwrap() {
-            let start = match own.kind {
+        for instance in of(&RigParameters::baseline()).unwrap() {
+            let start = match instance.kind {
                 Kind::Real(start) => start,
                 Kind::Integer(start) => start.map(f64::from),
                 Kind::Boolean(start) => start.map(|flag| f64::from(u8::from(flag))),
             };
-            assert_eq!(start.is_none(), own.causality == Causality::Output, "{}", own.name);
-            if let (Some(start), Some((least, most))) = (start, own.range) {
-                assert!((least..=most).contains(&start), "{}", own.name);
+            assert_eq!(start.is_none(), instance.causality == Causality::Output, "{}", instance.name);
+            if let (Some(start), Some((least, most))) = (start, instance.range) {
+                assert!((least..=most).contains(&start), "{}", instance.name);
             }
         }
     }

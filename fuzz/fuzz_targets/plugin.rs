@@ -20,7 +20,7 @@ fuzz_target!(|bytes: &[u8]| {
     let library = OPENED.get_or_init(|| unsafe { Library::new(LIBRARY) }.expect("build.rs has made it"));
     // SAFETY: it has this type there.
     let set = unsafe { library.get::<Set>(b"fuzz_set\0") }.expect("it has it");
-    // SAFETY: it reads as many bytes as it is told.
+    // SAFETY: it reads as many bytes as it is given.
     unsafe { set(bytes.as_ptr(), bytes.len()) };
     match plugin::probe(Path::new(LIBRARY)) {
         Ok(description) => {

@@ -1,4 +1,4 @@
-//! Records of the discrepancy workflow: a measurement.csv, a log, or a foreign CSV with its mapping, told apart by the first
+//! Records of the discrepancy workflow: a measurement.csv, a log, or a foreign CSV with its mapping, distinguished by the first
 //! byte.
 //!
 //! `m` a measurement, `l` a log, `f` a mapping, a line `---`, and its CSV.
@@ -15,22 +15,22 @@ fuzz_target!(|bytes: &[u8]| {
         b'm' => {
             for unknown in [Unknown::Ignored, Unknown::Refused] {
                 let options = ReadOptions { unknown, ..ReadOptions::default() };
-                told(records::read(&written("measurement.csv", rest), &options));
+                reported(records::read(&written("measurement.csv", rest), &options));
             }
         }
-        b'l' => told(records::read(&written("bus.log", rest), &ReadOptions::default())),
+        b'l' => reported(records::read(&written("bus.log", rest), &ReadOptions::default())),
         b'f' => {
             let text = String::from_utf8_lossy(rest);
             let (mapping, table) = text.split_once("\n---\n").unwrap_or((&text, ""));
             if let Ok(mapping) = Mapping::from_toml(mapping, Path::new("mapping.toml")) {
-                told(records::read_mapped(&written("foreign.csv", table.as_bytes()), &mapping));
+                reported(records::read_mapped(&written("foreign.csv", table.as_bytes()), &mapping));
             }
         }
         _ => {}
     }
 });
 
-fn told(read: Result<records::Record, records::ReadError>) {
+fn reported(read: Result<records::Record, records::ReadError>) {
     match read {
         Ok(record) => {
             for channel in record.channels() {

@@ -109,20 +109,20 @@ fn value(figure: &str, report: &Report) -> Option<Option<f64>> {
     }
     let (tag, key) = figure.rsplit_once('.')?;
     let of = of_percentiles(key)?;
-    let told = report.distributions.iter().find(|distribution| distribution.name == tag);
+    let reported = report.distributions.iter().find(|distribution| distribution.name == tag);
     let known = || kinds::place(tag) != usize::MAX;
-    told.map(|told| of(&told.percentiles_ns)).or_else(|| known().then_some(None))
+    reported.map(|reported| of(&reported.percentiles_ns)).or_else(|| known().then_some(None))
 }
 
 fn of_percentiles(key: &str) -> Option<fn(&PercentilesNs) -> Option<f64>> {
     Some(match key {
-        "p50_ns" => |told| told.p50.map(|ns| ns as f64),
-        "p90_ns" => |told| told.p90.map(|ns| ns as f64),
-        "p99_ns" => |told| told.p99.map(|ns| ns as f64),
-        "p999_ns" => |told| told.p999.map(|ns| ns as f64),
-        "p9999_ns" => |told| told.p9999.map(|ns| ns as f64),
-        "max_ns" => |told| told.max.map(|ns| ns as f64),
-        "count" => |told| Some(told.count as f64),
+        "p50_ns" => |reported| reported.p50.map(|ns| ns as f64),
+        "p90_ns" => |reported| reported.p90.map(|ns| ns as f64),
+        "p99_ns" => |reported| reported.p99.map(|ns| ns as f64),
+        "p999_ns" => |reported| reported.p999.map(|ns| ns as f64),
+        "p9999_ns" => |reported| reported.p9999.map(|ns| ns as f64),
+        "max_ns" => |reported| reported.max.map(|ns| ns as f64),
+        "count" => |reported| Some(reported.count as f64),
         _ => return None,
     })
 }
@@ -130,7 +130,7 @@ fn of_percentiles(key: &str) -> Option<fn(&PercentilesNs) -> Option<f64>> {
 /// Names what there is, what looks most like the figure first.
 fn unknown(figure: &str, report: &Report) -> BoundsError {
     const KEYS: [&str; 5] = ["p50_ns", "p99_ns", "p999_ns", "max_ns", "count"];
-    let of_tag = |told: &Distribution| KEYS.map(|key| format!("{}.{key}", told.name));
+    let of_tag = |reported: &Distribution| KEYS.map(|key| format!("{}.{key}", reported.name));
     let mut known: Vec<_> = report.distributions.iter().flat_map(of_tag).collect();
     known.extend(ratios::names().map(|name| format!("ratio.{}", ratios::short_name(&name))));
     known.extend(report.runs.iter().flat_map(|run| run.counts.keys().map(|key| format!("counts.{key}"))));
@@ -192,8 +192,9 @@ mod tests {
         assert_eq!(judged([99; 10]).verdict(), Verdict::Kept);
         assert_eq!(judged([124; 10]).verdict(), Verdict::Broken);
         let text = serde_json::to_string(&bound).unwrap();
-        let told = "\"kept\":false,\"interval\":[0.27,4.95],\"resolved\":false,\"pairs_to_resolve\":11111";
-        assert!(text.contains(told), "{text}");
+        let reported =
+            "\"kept\":false,\"interval\":[0.27,4.95],\"resolved\":false,\"pairs_to_resolve\":11111";
+        assert!(text.contains(reported), "{text}");
         // A report of before says nothing of it.
         let before = "{\"figure\":\"a\",\"value\":null,\"min\":null,\"max\":1,\"kept\":false}";
         let before: BoundResult = serde_json::from_str(before).unwrap();

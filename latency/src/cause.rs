@@ -14,11 +14,11 @@ use std::path::Path;
 pub fn read(file: &Path) -> Result<Report, FileError> {
     let report: Report = read_json(file)?;
     if (report.schema.as_str(), report.schema_version) != (SCHEMA, SCHEMA_VERSION) {
-        let told = format!(
+        let reported = format!(
             "{} version {}: this reads {SCHEMA} version {SCHEMA_VERSION}",
             report.schema, report.schema_version
         );
-        return Err(FileError::read(file, told));
+        return Err(FileError::read(file, reported));
     }
     Ok(report)
 }

@@ -40,7 +40,7 @@ fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
     if runs.is_empty() { Err(ReportError::NoRun(folder.into())) } else { Ok(runs) }
 }
 
-/// Where a report goes that was told no folder: into its run's, or for several into `report` in the folder that holds them all.
+/// Where a report goes that was given no folder: into its run's, or for several into `report` in the folder that holds them all.
 #[must_use]
 pub fn default_out(chosen: &[Chosen]) -> PathBuf {
     let [first, others @ ..] = chosen else { return PathBuf::from("report") };
@@ -73,8 +73,8 @@ mod tests {
         ["a/2", "a/1", "b/1"].iter().for_each(|name| run(&at(name)));
         std::fs::create_dir_all(at("a/report")).unwrap();
         let chosen = choose(&[at("a")], &[format!("new={}", at("b/1").display())]).unwrap();
-        let told: Vec<_> = chosen.iter().map(|one| (one.folder.clone(), one.group.as_deref())).collect();
-        assert_eq!(told, [(at("a/1"), None), (at("a/2"), None), (at("b/1"), Some("new"))]);
+        let reported: Vec<_> = chosen.iter().map(|one| (one.folder.clone(), one.group.as_deref())).collect();
+        assert_eq!(reported, [(at("a/1"), None), (at("a/2"), None), (at("b/1"), Some("new"))]);
         let whole = |path: PathBuf| path.canonicalize().unwrap();
         assert_eq!(default_out(&chosen), whole(folder.path().into()).join("report"));
         assert_eq!(default_out(&chosen[..2]), whole(at("a")).join("report"));
@@ -84,8 +84,8 @@ mod tests {
     #[test]
     fn what_holds_no_run_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let told = choose(&[folder.path().into()], &[]).unwrap_err();
-        assert!(told.to_string().contains("holds no run"), "{told}");
+        let reported = choose(&[folder.path().into()], &[]).unwrap_err();
+        assert!(reported.to_string().contains("holds no run"), "{reported}");
         assert!(matches!(
             choose(&[folder.path().join("none")], &[]),
             Err(ReportError::File(FileError::Read { .. }))

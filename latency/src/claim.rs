@@ -1,7 +1,7 @@
 //! Whether runs support a latency claim: what must be so is so, and what was not controlled is said.
 //!
 //! *Reasons* are what a claim cannot do without: real-time priority, locked memory, CPUs of their own, a reference measured in
-//! turns with the runs, enough cycles for the percentiles that are told, no probe that burns the CPUs, no record lost. *Not
+//! turns with the runs, enough cycles for the percentiles that are reported, no probe that burns the CPUs, no record lost. *Not
 //! controlled* is what another machine or another hour may do differently, and what a reader must know to judge.
 
 use super::controlled::not_controlled;
@@ -81,7 +81,7 @@ fn not_granted(runs: &[RunFiles]) -> Vec<String> {
     reasons
 }
 
-/// What is not told, or too little.
+/// What is not reported, or too little.
 fn missing(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
     let mut reasons = Vec::new();
     let unknown = runs.iter().filter(|run| run.run.is_null() || run.controllers.is_empty()).count();
@@ -150,11 +150,11 @@ pub(super) fn cpus(run: &RunFiles) -> Vec<(u64, &str)> {
 
 /// Where the reference was not measured as the rig runs.
 fn unlike_reference(run: &RunFiles) -> Vec<String> {
-    let Some(told) = &run.reference else { return Vec::new() };
+    let Some(reported) = &run.reference else { return Vec::new() };
     let mut unlike = Vec::new();
     let rig = run.granted().next().filter(|(process, _)| *process == "emulator");
     let granted = rig.map(|(_, granted)| granted).unwrap_or_default();
-    let line = &told.command_line;
+    let line = &reported.command_line;
     let mut compare = |what: &str, theirs: Option<&str>, ours: Option<String>| {
         // What the rig lacks is a reason of its own.
         if let Some(ours) = ours.filter(|ours| theirs != Some(ours.as_str())) {
@@ -172,7 +172,7 @@ fn unlike_reference(run: &RunFiles) -> Vec<String> {
     compare("CPU", reference::option(line, 'a', "affinity"), cpu.map(|cpu| cpu.to_string()));
     let interval = reference::option(line, 'i', "interval").unwrap_or(INTERVAL_US);
     compare("an interval in us of", Some(interval), Some(INTERVAL_US.to_owned()));
-    let length_s = told.samples.count() as f64 * interval.parse::<f64>().unwrap_or_default() * 1e-6;
+    let length_s = reported.samples.count() as f64 * interval.parse::<f64>().unwrap_or_default() * 1e-6;
     let share = length_s / run.duration_s();
     if !SAME_LENGTH.contains(&share) {
         let ours_s = run.duration_s();
@@ -184,11 +184,11 @@ fn unlike_reference(run: &RunFiles) -> Vec<String> {
 fn shared_cpu(run: &RunFiles) -> Vec<String> {
     let cpus = cpus(run);
     let shared = cpus.chunk_by(|one, next| one.0 == next.0).filter(|who| who.len() > 1);
-    let told = |of_cpu: &[(u64, &str)]| {
+    let reported = |of_cpu: &[(u64, &str)]| {
         let who: Vec<_> = of_cpu.iter().map(|(_, process)| *process).collect();
         format!("{} shared CPU {}: they wait for each other.", who.join(" and "), of_cpu[0].0)
     };
-    shared.map(told).collect()
+    shared.map(reported).collect()
 }
 
 /// What the run itself, its build and its machine forbid.
@@ -256,9 +256,9 @@ mod tests {
 
     #[test]
     fn runs_with_everything_support_a_claim() {
-        let told = judged(&good());
-        assert!(told.supported, "{:?}", told.reasons);
-        assert_eq!(told.not_controlled, [""; 0]);
+        let reported = judged(&good());
+        assert!(reported.supported, "{:?}", reported.reasons);
+        assert_eq!(reported.not_controlled, [""; 0]);
     }
 
     #[test]
@@ -298,9 +298,9 @@ mod tests {
         for (words, spoil) in cases {
             let mut runs = good();
             spoil(&mut runs[1]);
-            let told = judged(&runs);
-            assert!(!told.supported && told.reasons.len() == 1, "{words}: {:?}", told.reasons);
-            assert!(told.reasons[0].contains(words), "{:?}", told.reasons);
+            let reported = judged(&runs);
+            assert!(!reported.supported && reported.reasons.len() == 1, "{words}: {:?}", reported.reasons);
+            assert!(reported.reasons[0].contains(words), "{:?}", reported.reasons);
         }
     }
 
@@ -311,8 +311,8 @@ mod tests {
             run.run["machine"] = json!({ "kernel": "PREEMPT_DYNAMIC", "hypervisor": "KVM" });
             run.conditions.get_or_insert_default().load_generator = None;
         }
-        let told = judged(&runs);
-        assert!(told.supported && told.sentence.contains("virtual machine (KVM)"), "{told:?}");
-        assert!(told.not_controlled.len() >= 5, "{:?}", told.not_controlled);
+        let reported = judged(&runs);
+        assert!(reported.supported && reported.sentence.contains("virtual machine (KVM)"), "{reported:?}");
+        assert!(reported.not_controlled.len() >= 5, "{:?}", reported.not_controlled);
     }
 }

@@ -14,14 +14,14 @@ use std::collections::BTreeSet;
 
 /// Probability below which a difference is taken as none of chance.
 const CHANCE: f64 = 0.05;
-/// Fewest runs in each group that can be told apart at that probability.
+/// Fewest runs in each group that can be distinguished at that probability.
 const FEWEST: usize = 4;
 
 const FIGURES: [(&str, Pick); 4] = [
-    ("p50", |told| told.p50),
-    ("p99", |told| told.p99),
-    ("p99.9", |told| told.p999),
-    ("max", |told| told.max),
+    ("p50", |reported| reported.p50),
+    ("p99", |reported| reported.p99),
+    ("p99.9", |reported| reported.p999),
+    ("max", |reported| reported.max),
 ];
 
 /// Compares the groups of the runs in the order in which they first appear; runs of one group, or of none, stand each for
@@ -134,8 +134,12 @@ mod tests {
     use std::collections::BTreeMap;
 
     fn run(group: &str, p50: u64) -> RunPart {
-        let told = PercentilesNs { p50: Some(p50), max: Some(9), count: 10, ..PercentilesNs::default() };
-        parts::part(&made_up::run(10), Some(group), BTreeMap::from([("emulator-wakeup".to_owned(), told)]))
+        let reported = PercentilesNs { p50: Some(p50), max: Some(9), count: 10, ..PercentilesNs::default() };
+        parts::part(
+            &made_up::run(10),
+            Some(group),
+            BTreeMap::from([("emulator-wakeup".to_owned(), reported)]),
+        )
     }
 
     fn runs(before: &[u64], after: &[u64]) -> Vec<RunPart> {
@@ -156,14 +160,14 @@ mod tests {
 
     #[test]
     fn a_change_is_told_against_the_first_group_with_whether_it_is_noise() {
-        let told = compare(&runs(&[100, 102, 98, 101], &[150, 149, 152, 151])).unwrap();
-        assert_eq!(told.groups, ["before", "after"]);
-        let row = &told.rows[0];
+        let reported = compare(&runs(&[100, 102, 98, 101], &[150, 149, 152, 151])).unwrap();
+        assert_eq!(reported.groups, ["before", "after"]);
+        let row = &reported.rows[0];
         assert_eq!((row.figure.as_str(), row.cells[0].change_percent), ("emulator-wakeup p50", None));
         assert_eq!((row.cells[1].median_ns, row.cells[1].range_ns), (150, (149, 152)));
         assert!((row.cells[1].change_percent.unwrap() - 50.0).abs() < 1.0);
         assert_eq!(row.cells[1].beyond_noise, Some(true));
-        assert_eq!(told.rows[1].cells[1].beyond_noise, Some(false), "the maxima are equal");
+        assert_eq!(reported.rows[1].cells[1].beyond_noise, Some(false), "the maxima are equal");
     }
 
     #[test]

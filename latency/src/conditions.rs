@@ -14,22 +14,23 @@ pub fn conditions(runs: &[RunFiles]) -> Conditions {
         runs.iter().filter_map(|run| run.conditions.as_ref()).find_map(of)
     };
     let reference = runs.iter().find_map(|run| run.reference.as_ref());
-    let told_command = reference.map(|told| told.command_line.clone()).filter(|line| !line.is_empty());
+    let told_command =
+        reference.map(|reported| reported.command_line.clone()).filter(|line| !line.is_empty());
     let with_resolution = |line: String| match reference {
-        Some(told) if told.whole_us => format!("{line} (whole us, the fraction left out)"),
+        Some(reported) if reported.whole_us => format!("{line} (whole us, the fraction left out)"),
         _ => line,
     };
     Conditions {
         machine: machine(runs),
         command_lines: command_lines(runs),
         privileges: privileges(runs),
-        load_generator: one_of(|told| told.load_generator.clone()),
+        load_generator: one_of(|reported| reported.load_generator.clone()),
         reference: reference
-            .and(told_command.or_else(|| one_of(|told| told.reference_command.clone())))
+            .and(told_command.or_else(|| one_of(|reported| reported.reference_command.clone())))
             .map(with_resolution),
         reference_missing_because: reference.is_none().then(|| {
             let untold = "no run has a cyclictest.json; scripts/latency makes one beside each run";
-            one_of(|told| told.reference_missing_because.clone()).unwrap_or_else(|| untold.into())
+            one_of(|reported| reported.reference_missing_because.clone()).unwrap_or_else(|| untold.into())
         }),
         probe: runs.iter().any(|run| run.gaps.is_some() || run.circumstances().probe),
     }
@@ -51,8 +52,8 @@ impl Facts {
         }
     }
 
-    fn told(self) -> Vec<Fact> {
-        let told = |(name, mut values): (String, Vec<String>)| {
+    fn reported(self) -> Vec<Fact> {
+        let reported = |(name, mut values): (String, Vec<String>)| {
             let more = values.len().saturating_sub(VALUES_SHOWN);
             values.truncate(VALUES_SHOWN);
             if more > 0 {
@@ -60,7 +61,7 @@ impl Facts {
             }
             Fact { name, value: values.join("; ") }
         };
-        self.0.into_iter().map(told).collect()
+        self.0.into_iter().map(reported).collect()
     }
 }
 
@@ -77,11 +78,13 @@ fn machine(runs: &[RunFiles]) -> Vec<Fact> {
                 facts.add(&key.replace('_', " "), &text(&run.run[key]));
             }
         }
-        for (process, told) in run.controller_reports().filter(|(_, told)| !told.version.is_empty()) {
-            facts.add(&format!("{process} version"), &told.version);
+        for (process, reported) in
+            run.controller_reports().filter(|(_, reported)| !reported.version.is_empty())
+        {
+            facts.add(&format!("{process} version"), &reported.version);
         }
     }
-    facts.told()
+    facts.reported()
 }
 
 fn flatten(facts: &mut Facts, name: &str, value: &Value) {
@@ -112,7 +115,7 @@ fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
     for run in runs {
         let emulator = run.description().emulator_command_line.join(" ");
         let controllers =
-            run.controller_reports().map(|(process, told)| (process, told.command_line.join(" ")));
+            run.controller_reports().map(|(process, reported)| (process, reported.command_line.join(" ")));
         let lines = std::iter::once(("emulator", emulator)).chain(controllers);
         lines.filter(|(_, line)| !line.is_empty()).for_each(|(process, line)| facts.add(process, &line));
         if let Some(command) = run.circumstances().command {
@@ -122,7 +125,7 @@ fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
             facts.add(&format!("ping-pong {name}"), command);
         }
     }
-    facts.told()
+    facts.reported()
 }
 
 fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
@@ -132,8 +135,9 @@ fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
         let emulator = run.description();
         let emulator = ("emulator", [lines(emulator.realtime_granted), emulator.realtime_refused]);
         let controllers = run.controller_reports();
-        let controllers = controllers
-            .map(|(process, told)| (process, [lines(told.realtime_granted), told.realtime_refused]));
+        let controllers = controllers.map(|(process, reported)| {
+            (process, [lines(reported.realtime_granted), reported.realtime_refused])
+        });
         for (process, lists) in std::iter::once(emulator).chain(controllers) {
             for (list, word) in lists.iter().zip(["granted", "refused"]).filter(|(list, _)| !list.is_empty())
             {
@@ -141,7 +145,7 @@ fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
             }
         }
     }
-    facts.told()
+    facts.reported()
 }
 
 #[cfg(test)]
@@ -151,13 +155,14 @@ mod tests {
 
     #[test]
     fn machine_facts_are_flattened_and_told_once() {
-        let told = conditions(&[made_up::run(10), made_up::run(10)]);
-        let value =
-            |name: &str| told.machine.iter().find(|fact| fact.name == name).map(|fact| fact.value.as_str());
+        let reported = conditions(&[made_up::run(10), made_up::run(10)]);
+        let value = |name: &str| {
+            reported.machine.iter().find(|fact| fact.name == name).map(|fact| fact.value.as_str())
+        };
         assert_eq!(value("preemption: model"), Some("PREEMPT_RT"));
         assert_eq!(value("processors"), Some("2"));
-        assert_eq!(told.command_lines[0].value, "emulator run");
-        assert!(told.privileges.iter().any(|fact| fact.name == "controller, granted"));
+        assert_eq!(reported.command_lines[0].value, "emulator run");
+        assert!(reported.privileges.iter().any(|fact| fact.name == "controller, granted"));
         let mut run = made_up::run(10);
         let told_of = run.conditions.as_mut().unwrap();
         told_of.command = Some("scripts/latency --pairs 2".into());
@@ -165,15 +170,15 @@ mod tests {
         let with = conditions(&[run]);
         assert!(with.command_lines.iter().any(|fact| fact.value == "scripts/latency --pairs 2"));
         assert!(with.machine.iter().any(|fact| fact.name == "uncommitted files" && fact.value == "3"));
-        assert!(told.reference.is_none() && told.reference_missing_because.is_some());
+        assert!(reported.reference.is_none() && reported.reference_missing_because.is_some());
     }
 
     #[test]
     fn facts_that_differ_are_all_told() {
         let mut other = made_up::run(10);
         other.run["machine"]["kernel"] = "another".into();
-        let told = conditions(&[made_up::run(10), other]);
-        let kernel = told.machine.iter().find(|fact| fact.name == "kernel").unwrap();
+        let reported = conditions(&[made_up::run(10), other]);
+        let kernel = reported.machine.iter().find(|fact| fact.name == "kernel").unwrap();
         assert!(kernel.value.ends_with("; another"), "{kernel:?}");
     }
 
@@ -182,7 +187,7 @@ mod tests {
         let mut run = made_up::run(10);
         made_up::reference(&mut run, [13_000].into_iter().collect());
         run.reference.as_mut().unwrap().whole_us = true;
-        let told = conditions(&[run]).reference.unwrap();
-        assert!(told.starts_with("cyclictest -p 80") && told.contains("whole us"), "{told}");
+        let reported = conditions(&[run]).reference.unwrap();
+        assert!(reported.starts_with("cyclictest -p 80") && reported.contains("whole us"), "{reported}");
     }
 }

@@ -11,48 +11,48 @@ use std::collections::BTreeSet;
 /// The sentences of all runs, each once.
 #[must_use]
 pub fn not_controlled(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     if let Some(host) = virtual_machine(conditions) {
-        told.push(format!(
+        reported.push(format!(
             "The machine is a virtual one ({host}): its host may stop it at any time, unseen from inside."
         ));
     }
     for run in runs {
         for sentence in of_run(run) {
-            if !told.contains(&sentence) {
-                told.push(sentence);
+            if !reported.contains(&sentence) {
+                reported.push(sentence);
             }
         }
     }
     if conditions.load_generator.is_none() {
-        told.push("What else ran on the machine was not told.".into());
+        reported.push("What else ran on the machine was not told.".into());
     }
     let unknown = runs.iter().filter(|run| run.conditions.is_none()).count();
     if unknown > 0 && runs.len() > unknown {
-        told.push(format!("{unknown} run(s) have no conditions.json."));
+        reported.push(format!("{unknown} run(s) have no conditions.json."));
     }
-    told
+    reported
 }
 
 fn of_run(run: &RunFiles) -> Vec<String> {
     let machine = &run.description().machine;
     let cpus: BTreeSet<u64> = cpus(run).into_iter().map(|(cpu, _)| cpu).collect();
-    let mut told = governors(machine);
+    let mut reported = governors(machine);
     if ![&machine.preemption.model, &machine.kernel].iter().any(|text| text.contains("PREEMPT_RT")) {
-        told.push("The kernel is not PREEMPT_RT: its own work can keep the loops waiting.".into());
+        reported.push("The kernel is not PREEMPT_RT: its own work can keep the loops waiting.".into());
     }
-    told.extend(isolation(machine, &cpus));
-    told.extend(cpus.iter().filter_map(|cpu| interrupts(machine, *cpu)));
-    told.extend(siblings(machine, &cpus));
+    reported.extend(isolation(machine, &cpus));
+    reported.extend(cpus.iter().filter_map(|cpu| interrupts(machine, *cpu)));
+    reported.extend(siblings(machine, &cpus));
     let about = &machine.rt_throttling.about;
     if about.starts_with("on") {
-        told.push(format!("RT throttling is {about}: a loop that needs more is stopped for the rest."));
+        reported.push(format!("RT throttling is {about}: a loop that needs more is stopped for the rest."));
     }
     let held = |granted: &[Grant]| granted.contains(&Grant::DmaLatency);
     let refused: Vec<_> =
         run.granted().filter(|(_, granted)| !held(granted)).map(|(process, _)| process).collect();
     if !refused.is_empty() {
-        told.push(format!(
+        reported.push(format!(
             "{} did not hold /dev/cpu_dma_latency: CPUs may sleep deeply{}, and wake up late.",
             refused.join(" and "),
             idle_states(machine)
@@ -60,15 +60,15 @@ fn of_run(run: &RunFiles) -> Vec<String> {
     }
     match machine.clock_source.as_str() {
         "tsc" => {}
-        "" => told.push("The clock source is not known.".into()),
-        source => told.push(format!(
+        "" => reported.push("The clock source is not known.".into()),
+        source => reported.push(format!(
             "The clock source is {source}, not tsc: reading it takes longer, and its steps are its own."
         )),
     }
     if let Some(kib) = machine.memory.swap_used_kib.filter(|kib| *kib > 0) {
-        told.push(format!("{kib} KiB of swap were in use: other programs waited for their pages."));
+        reported.push(format!("{kib} KiB of swap were in use: other programs waited for their pages."));
     }
-    told
+    reported
 }
 
 /// Each policy that is not `performance`: one among others that are must not pass.
@@ -188,8 +188,8 @@ mod tests {
         for (key, value, words) in cases {
             let mut run = made_up::run(10);
             run.run["machine"][key] = value;
-            let told = of_run(&run);
-            assert!(told.len() == 1 && told[0].contains(words), "{words}: {told:?}");
+            let reported = of_run(&run);
+            assert!(reported.len() == 1 && reported[0].contains(words), "{words}: {reported:?}");
         }
     }
 
@@ -198,8 +198,8 @@ mod tests {
         let mut run = made_up::run(10);
         run.run["realtime_granted"].as_array_mut().unwrap().remove(0);
         run.run["machine"]["idle_states"] = json!(["C6: 133 us to leave"]);
-        let told = of_run(&run);
-        assert!(told.len() == 1 && told[0].starts_with("emulator did not hold"), "{told:?}");
-        assert!(told[0].contains("(C6: 133 us to leave)"), "{told:?}");
+        let reported = of_run(&run);
+        assert!(reported.len() == 1 && reported[0].starts_with("emulator did not hold"), "{reported:?}");
+        assert!(reported[0].contains("(C6: 133 us to leave)"), "{reported:?}");
     }
 }

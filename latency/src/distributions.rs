@@ -53,7 +53,7 @@ pub fn percentiles_of_run(
     run: &RunFiles,
     series: &BTreeMap<String, Series>,
 ) -> BTreeMap<String, PercentilesNs> {
-    let mut told: BTreeMap<_, _> =
+    let mut reported: BTreeMap<_, _> =
         series.iter().map(|(tag, series)| (tag.clone(), series.samples.percentiles_ns())).collect();
     for (process, report) in run.process_reports() {
         let stages = &report.timing.stages;
@@ -64,7 +64,7 @@ pub fn percentiles_of_run(
             ("drive-round-trip".to_owned(), &report.round_trip_ns),
         ] {
             if let Some(percentiles) = percentiles(figures) {
-                told.entry(tag).or_insert(percentiles);
+                reported.entry(tag).or_insert(percentiles);
             }
         }
     }
@@ -73,24 +73,24 @@ pub fn percentiles_of_run(
         let to_arrival = figures.to_arrival_ns.as_ref().map(|figures| (kinds::TO_ARRIVAL, figures));
         for (end, figures) in std::iter::once(("", &figures.round_trip_ns)).chain(to_arrival) {
             if let Some(percentiles) = percentiles(figures) {
-                told.entry(format!("{}{name}{end}", kinds::PING_PONG)).or_insert(percentiles);
+                reported.entry(format!("{}{name}{end}", kinds::PING_PONG)).or_insert(percentiles);
             }
         }
     }
-    told
+    reported
 }
 
 /// Percentiles of the summaries; nothing without samples.
 #[must_use]
-pub fn percentiles(told: &PercentilesNs) -> Option<PercentilesNs> {
-    let count = told.count;
+pub fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
+    let count = reported.count;
     let at = |value: Option<u64>, least: u64| value.filter(|_| count >= least);
     (count > 0).then(|| PercentilesNs {
-        p90: at(told.p90, 10),
-        p99: at(told.p99, 100),
-        p999: at(told.p999, 1000),
-        p9999: at(told.p9999, 10_000),
-        ..*told
+        p90: at(reported.p90, 10),
+        p99: at(reported.p99, 100),
+        p999: at(reported.p999, 1000),
+        p9999: at(reported.p9999, 10_000),
+        ..*reported
     })
 }
 
@@ -168,7 +168,7 @@ mod tests {
         run.rows.clear();
         let series = of_run(&mut run);
         assert!(series.is_empty());
-        let told = percentiles_of_run(&run, &series)["emulator-wakeup"];
-        assert_eq!((told.p50, told.p999, told.p9999, told.count), (Some(3), None, None, 500));
+        let reported = percentiles_of_run(&run, &series)["emulator-wakeup"];
+        assert_eq!((reported.p50, reported.p999, reported.p9999, reported.count), (Some(3), None, None, 500));
     }
 }

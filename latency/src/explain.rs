@@ -129,7 +129,7 @@ fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<Late> {
 fn missed_by_controller(place: usize, process: &str, run: &RunFiles, lost: u64) -> (u64, u64) {
     let rows = &run.rows[process];
     let row = &rows[place];
-    let told_ns = run.told_late_ns.get(process).and_then(|told| told.get(&row.cycle));
+    let told_ns = run.told_late_ns.get(process).and_then(|reported| reported.get(&row.cycle));
     let own_ns = row.woke_ns.saturating_sub(row.due_ns);
     let came_ns = told_ns.map(|late_ns| row.woke_ns.saturating_sub((*late_ns).max(own_ns)));
     // Between dumps of the flight recorder lie cycles that nobody missed.
@@ -173,7 +173,7 @@ fn event(
     let worst = cluster.iter().max_by_key(|late| late.severity_ns()).copied().unwrap_or(cluster[0]);
     let row = rows[worst.place];
     let seen = seen(process, cluster, &worst, run, all_late);
-    let told = rules::cause(&seen);
+    let reported = rules::cause(&seen);
     let due_ns = worst.due_ns;
     Event {
         run: place_of_run,
@@ -183,9 +183,9 @@ fn event(
         late_ns: worst.late_ns,
         slow_ns: worst.slow_ns,
         skipped: cluster.iter().map(|late| late.missed).sum(),
-        cause: told.cause,
-        sentence: told.sentence,
-        evidence: told.evidence,
+        cause: reported.cause,
+        sentence: reported.sentence,
+        evidence: reported.evidence,
         around: around(row.cycle, worst.missed, due_ns, run),
         probe: gaps_around(due_ns, row.done_ns, run.gaps.as_deref().unwrap_or_default()),
         waited_ns: seen.waited_ns,

@@ -1,4 +1,4 @@
-//! What a run left in its folder, read as far as it is there: what is missing or damaged is told, and the rest is used.
+//! What a run left in its folder, read as far as it is there: what is missing or damaged is reported, and the rest is used.
 
 use super::hlog::{self, Passing};
 use super::joined::Series;
@@ -75,9 +75,9 @@ impl RunFiles {
         run.judge_types();
         for process in PROCESSES {
             if process != "emulator" {
-                let told: Value = run.json(&format!("{process}.json"));
-                if !told.is_null() {
-                    run.controllers.insert(process.into(), told);
+                let reported: Value = run.json(&format!("{process}.json"));
+                if !reported.is_null() {
+                    run.controllers.insert(process.into(), reported);
                 }
             }
             run.take_log(&format!("{process}.hlog"));
@@ -224,7 +224,7 @@ impl RunFiles {
         }
     }
 
-    /// When the run began, s since 1970; nothing when it is not told.
+    /// When the run began, s since 1970; nothing when it is not reported.
     #[must_use]
     pub fn started_unix_s(&self) -> Option<f64> {
         self.description().started_unix_s
@@ -257,18 +257,18 @@ impl RunFiles {
 
     /// Each `controller*.json` by process.
     pub fn controller_reports(&self) -> impl Iterator<Item = (&str, ControllerReport)> {
-        self.controllers.iter().map(|(process, told)| (process.as_str(), typed(told)))
+        self.controllers.iter().map(|(process, reported)| (process.as_str(), typed(reported)))
     }
 
     /// What `summary.json` and each `controller*.json` have in common, by process.
     pub fn process_reports(&self) -> impl Iterator<Item = (&str, ProcessReport)> {
-        self.reports().map(|(process, told)| (process, typed(told)))
+        self.reports().map(|(process, reported)| (process, typed(reported)))
     }
 
     /// `summary.json` and each `controller*.json` as they stand, by process.
     pub fn reports(&self) -> impl Iterator<Item = (&str, &Value)> {
         let emulator = std::iter::once(("emulator", &self.summary));
-        emulator.chain(self.controllers.iter().map(|(process, told)| (process.as_str(), told)))
+        emulator.chain(self.controllers.iter().map(|(process, reported)| (process.as_str(), reported)))
     }
 
     /// What each process was granted for real time.
@@ -276,7 +276,7 @@ impl RunFiles {
         let emulator = (!self.run.is_null()).then(|| ("emulator", grants_of(&self.run)));
         emulator
             .into_iter()
-            .chain(self.controllers.iter().map(|(process, told)| (process.as_str(), grants_of(told))))
+            .chain(self.controllers.iter().map(|(process, reported)| (process.as_str(), grants_of(reported))))
     }
 }
 

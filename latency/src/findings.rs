@@ -139,25 +139,25 @@ fn unrecorded(runs: &[RunFiles]) -> Option<Finding> {
         }
         untold += u64::from(rows.is_empty() && (counted.is_none() || longest_ns.is_none()));
     }
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     if skipped > 0 || worst_ns > EVENT_OVER_NS {
         let worst = if worst_ns > 0 { in_words(worst_ns) } else { "not told".into() };
-        told.push(format!(
+        reported.push(format!(
             "{skipped} cycles skipped, worst wake-up {worst}; no rows recorded, the cause cannot be told (run with \
              --full-timing)."
         ));
     }
     if untold > 0 {
-        told.push(format!(
+        reported.push(format!(
             "{untold} run(s) hold neither rows nor both counts and wake-ups of the rig: whether a cycle was late is not known."
         ));
     }
-    (!told.is_empty()).then(|| Finding {
+    (!reported.is_empty()).then(|| Finding {
         cause: Cause::Unknown,
         count: skipped.max(1),
         explained_ns: 0,
         by_itself: true,
-        sentence: told.join(" "),
+        sentence: reported.join(" "),
     })
 }
 

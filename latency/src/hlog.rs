@@ -60,12 +60,12 @@ pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogErro
         let failed = |reason: String| LogError { line: place + 1, reason };
         for entry in IntervalLogIterator::new(line.as_bytes()) {
             match entry {
-                Ok(LogEntry::Interval(told)) => {
-                    let histogram = decode(&told, &mut deserializer).map_err(failed)?;
+                Ok(LogEntry::Interval(reported)) => {
+                    let histogram = decode(&reported, &mut deserializer).map_err(failed)?;
                     take(Passing {
-                        tag: told.tag().map_or("", |tag| tag.as_str()),
-                        start_s: told.start_timestamp().as_secs_f64(),
-                        duration_s: told.duration().as_secs_f64(),
+                        tag: reported.tag().map_or("", |tag| tag.as_str()),
+                        start_s: reported.start_timestamp().as_secs_f64(),
+                        duration_s: reported.duration().as_secs_f64(),
                         histogram: &histogram,
                     });
                 }
@@ -88,10 +88,10 @@ pub fn read(text: &str) -> Result<Vec<Interval>, LogError> {
 }
 
 fn decode(
-    told: &IntervalLogHistogram<'_>,
+    reported: &IntervalLogHistogram<'_>,
     deserializer: &mut Deserializer,
 ) -> Result<Histogram<u64>, String> {
-    let bytes = STANDARD.decode(told.encoded_histogram()).map_err(|error| error.to_string())?;
+    let bytes = STANDARD.decode(reported.encoded_histogram()).map_err(|error| error.to_string())?;
     deserializer.deserialize(&mut bytes.as_slice()).map_err(|error| error.to_string())
 }
 

@@ -79,15 +79,15 @@ mod tests {
             ("emulator-wakeup".to_owned(), samples(&[13_999, 13_000, 2_000_500])),
             ("emulator-send".to_owned(), samples(&[1])),
         ]);
-        let told = value(&sums, &[made_up::run(10)]);
-        assert_eq!(told["version"], 2);
-        assert_eq!(told["sysinfo"]["release"], "6.1.0-rt");
-        assert_eq!(told["sysinfo"]["version"], "#1 SMP PREEMPT_RT");
-        let rig = &told["cpu"]["0"];
-        assert_eq!(rig["histogram"]["13"], 2, "{told:#}");
+        let reported = value(&sums, &[made_up::run(10)]);
+        assert_eq!(reported["version"], 2);
+        assert_eq!(reported["sysinfo"]["release"], "6.1.0-rt");
+        assert_eq!(reported["sysinfo"]["version"], "#1 SMP PREEMPT_RT");
+        let rig = &reported["cpu"]["0"];
+        assert_eq!(rig["histogram"]["13"], 2, "{reported:#}");
         assert_eq!([&rig["count"], &rig["min"]], [3, 13]);
         assert!(rig["max"].as_u64().unwrap().abs_diff(2000) <= 2);
-        assert_eq!(told["cpu"]["1"]["histogram"]["0"], 1);
-        assert!(told["cpu"]["2"].is_null());
+        assert_eq!(reported["cpu"]["1"]["histogram"]["0"], 1);
+        assert!(reported["cpu"]["2"].is_null());
     }
 }

@@ -54,26 +54,29 @@ pub fn one_way(run: &RunFiles) -> OneWay {
         let controllers = PROCESSES.iter().filter(|process| **process != "emulator");
         let rows = controllers.filter_map(|process| run.rows.get(*process)).flatten();
         // Whoever drives this axis has stamps of it.
-        let answered: HashMap<u64, Exchange> =
-            rows.map(|row| (row.cycle, exchange(row))).filter(|(_, told)| told.sensors_ns > 0).collect();
+        let answered: HashMap<u64, Exchange> = rows
+            .map(|row| (row.cycle, exchange(row)))
+            .filter(|(_, reported)| reported.sensors_ns > 0)
+            .collect();
         for row in rig {
-            let told = exchange(row);
-            if let Some(other) = answered.get(&row.cycle).filter(|_| told.sensors_ns > 0) {
+            let reported = exchange(row);
+            if let Some(other) = answered.get(&row.cycle).filter(|_| reported.sensors_ns > 0) {
                 found.record(
                     &format!("{axis}-rig-to-controller"),
                     row.cycle,
-                    told.sensors_ns,
+                    reported.sensors_ns,
                     other.sensors_ns,
                 );
             }
-            let answer =
-                answered.get(&told.answers).filter(|other| told.command_ns > 0 && other.command_ns > 0);
+            let answer = answered
+                .get(&reported.answers)
+                .filter(|other| reported.command_ns > 0 && other.command_ns > 0);
             if let Some(other) = answer {
                 found.record(
                     &format!("{axis}-controller-to-rig"),
                     row.cycle,
                     other.command_ns,
-                    told.command_ns,
+                    reported.command_ns,
                 );
             }
         }
@@ -129,8 +132,8 @@ mod tests {
     #[test]
     fn latencies_are_told_each_way_and_for_each_axis() {
         let run = made_up::run(1000);
-        let told = one_way(&run);
-        let tags: Vec<_> = told.series.keys().map(String::as_str).collect();
+        let reported = one_way(&run);
+        let tags: Vec<_> = reported.series.keys().map(String::as_str).collect();
         let ways = [
             "drive-controller-to-rig",
             "drive-rig-to-controller",
@@ -142,24 +145,24 @@ mod tests {
             ("drive-rig-to-controller", made_up::TO_CONTROLLER_NS),
             ("load-controller-to-rig", made_up::TO_RIG_NS),
         ] {
-            let told = told.series[tag].samples.percentiles_ns();
-            let p50 = told.p50.unwrap();
+            let reported = reported.series[tag].samples.percentiles_ns();
+            let p50 = reported.p50.unwrap();
             assert!((ns..=ns + ns / 500).contains(&p50), "{tag}: {p50}");
-            assert!(told.count > 990, "{tag}: {}", told.count);
+            assert!(reported.count > 990, "{tag}: {}", reported.count);
         }
-        assert_eq!(told.below_zero, 0);
+        assert_eq!(reported.below_zero, 0);
     }
 
     #[test]
     fn a_cycle_that_the_rig_missed_is_late_against_its_own_time() {
         let mut run = made_up::run(100);
         made_up::stall(&mut run, "emulator", 50, 5_300_000);
-        let told = of_rows("emulator", &run.rows["emulator"]);
-        let wakeup = &told["emulator-wakeup"].samples;
+        let reported = of_rows("emulator", &run.rows["emulator"]);
+        let wakeup = &reported["emulator-wakeup"].samples;
         assert_eq!(wakeup.count(), 100);
         let late = wakeup.histogram().count_between(1_000_000, 10_000_000);
         assert_eq!(late, 5, "5.3, 4.3, 3.3, 2.3 and 1.3 ms late");
-        let completion = &told["emulator-completion"].samples;
+        let completion = &reported["emulator-completion"].samples;
         assert_eq!(completion.count(), 100);
         assert!(completion.histogram().max() >= wakeup.histogram().max());
     }

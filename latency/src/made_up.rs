@@ -97,13 +97,13 @@ fn both(cycle: u64) -> (CycleTiming, CycleTiming) {
 }
 
 /// The spread of wake-ups makes the answer of the cycle before arrive a little earlier or later.
-fn shifted(told: Exchange, cycle: u64) -> Exchange {
+fn shifted(reported: Exchange, cycle: u64) -> Exchange {
     if cycle == 0 {
-        return told;
+        return reported;
     }
     let spread = |cycle: u64| cycle * 37 % 5_000;
-    let command_ns = told.command_ns + spread(cycle - 1) - spread(cycle);
-    Exchange { command_ns, ..told }
+    let command_ns = reported.command_ns + spread(cycle - 1) - spread(cycle);
+    Exchange { command_ns, ..reported }
 }
 
 /// Makes a process wake this late in a cycle, missing those in between, and gives the row of its first cycle after.
@@ -159,7 +159,7 @@ pub(crate) fn write(run: &RunFiles, folder: &Path) {
     json("summary.json", &run.summary);
     json("run.json", &run.run);
     json("conditions.json", &serde_json::json!(run.conditions));
-    run.controllers.iter().for_each(|(process, told)| json(&format!("{process}.json"), told));
+    run.controllers.iter().for_each(|(process, reported)| json(&format!("{process}.json"), reported));
     for (process, rows) in &run.rows {
         let mut table = Vec::new();
         runlog::timing::write_head(&mut table).unwrap();

@@ -72,8 +72,8 @@ fn us(ns: Option<u64>) -> String {
     ns.map_or_else(|| "-".into(), |ns| format!("{:.1}", ns as f64 * 1e-3))
 }
 
-fn percentile_cells(told: &PercentilesNs) -> Vec<String> {
-    let PercentilesNs { p50, p90, p99, p999, p9999, max, count } = told;
+fn percentile_cells(reported: &PercentilesNs) -> Vec<String> {
+    let PercentilesNs { p50, p90, p99, p999, p9999, max, count } = reported;
     [p50, p90, p99, p999, p9999, max].into_iter().map(|ns| us(*ns)).chain([count.to_string()]).collect()
 }
 
@@ -202,11 +202,12 @@ fn frames(report: &Report) -> String {
     let mut rows = Vec::new();
     for (place, run) in report.runs.iter().enumerate() {
         for row in &run.arrivals {
-            let told = &row.interval_ns;
+            let reported = &row.interval_ns;
             let name = format!("{place} {} at {}", row.frame, row.receiver);
             let counts = [row.period_ms, row.count, row.gaps].map(|count| count.to_string());
             let bursts = row.bursts.map_or_else(|| "sent on change too".into(), |count| count.to_string());
-            let ends = [told.p50, told.p99, told.max].map(|ns| ns.map_or_else(|| "-".into(), in_words));
+            let ends =
+                [reported.p50, reported.p99, reported.max].map(|ns| ns.map_or_else(|| "-".into(), in_words));
             rows.push(std::iter::once(name).chain(counts).chain([bursts]).chain(ends).collect());
         }
     }
@@ -218,17 +219,17 @@ fn frames(report: &Report) -> String {
 }
 
 fn conditions(report: &Report) -> String {
-    let told = &report.conditions;
+    let reported = &report.conditions;
     let mut lines: Vec<String> = Vec::new();
     // A list, because command lines would make a table of any width.
     let mut line = |name: &str, value: &str| lines.push(format!("{name}: {value}"));
-    line("load generator", told.load_generator.as_deref().unwrap_or("not told"));
-    line("reference", told.reference.as_deref().unwrap_or("none"));
-    if let Some(why) = &told.reference_missing_because {
+    line("load generator", reported.load_generator.as_deref().unwrap_or("not told"));
+    line("reference", reported.reference.as_deref().unwrap_or("none"));
+    if let Some(why) = &reported.reference_missing_because {
         line("no reference because", why);
     }
-    line("spin-gap probe", if told.probe { "on" } else { "off" });
-    for fact in told.command_lines.iter().chain(&told.privileges).chain(&told.machine) {
+    line("spin-gap probe", if reported.probe { "on" } else { "off" });
+    for fact in reported.command_lines.iter().chain(&reported.privileges).chain(&reported.machine) {
         line(&fact.name, &fact.value);
     }
     list(&lines)

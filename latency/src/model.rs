@@ -56,7 +56,7 @@ pub struct Conditions {
     pub command_lines: Vec<Fact>,
     /// What the system granted and refused.
     pub privileges: Vec<Fact>,
-    /// The load generator with its settings; null when none was told of.
+    /// The load generator with its settings; null when none was reported.
     pub load_generator: Option<String>,
     /// The reference with its command line; null without one.
     pub reference: Option<String>,

@@ -14,7 +14,7 @@ const NO_GROUP: &str = "all";
 
 #[must_use]
 pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String, PercentilesNs>) -> RunPart {
-    let told_group = run.conditions.as_ref().and_then(|told| told.group.as_deref());
+    let told_group = run.conditions.as_ref().and_then(|reported| reported.group.as_deref());
     RunPart {
         folder: run.folder.display().to_string(),
         group: group.or(told_group).unwrap_or(NO_GROUP).to_owned(),
@@ -32,9 +32,9 @@ pub fn part(run: &RunFiles, group: Option<&str>, percentiles_ns: BTreeMap<String
 fn counts(run: &RunFiles) -> BTreeMap<String, u64> {
     const NO_COUNTS: [&str; 3] = ["schema_version", "thresholds", "figures"];
     let mut counts = BTreeMap::new();
-    for (process, told) in run.reports() {
+    for (process, reported) in run.reports() {
         let prefix = if process == "emulator" { String::new() } else { format!("{process}.") };
-        for (key, value) in told.as_object().into_iter().flatten() {
+        for (key, value) in reported.as_object().into_iter().flatten() {
             // Percentiles are no counts, and what joining copied from the controllers' own files stands there.
             let copied =
                 process == "emulator" && ["axes", "controller", "controllers"].contains(&key.as_str());
@@ -64,14 +64,14 @@ fn add(counts: &mut BTreeMap<String, u64>, name: &str, value: &Value) {
 
 fn arrivals(run: &RunFiles) -> Vec<ArrivalRow> {
     let of_process = |(receiver, report): (&str, ProcessReport)| {
-        let row = |told: ArrivalFigures| ArrivalRow {
+        let row = |reported: ArrivalFigures| ArrivalRow {
             receiver: receiver.to_owned(),
-            frame: told.frame.into_owned(),
-            period_ms: told.period_ms,
-            count: told.count,
-            gaps: told.gaps,
-            bursts: told.bursts,
-            interval_ns: percentiles(&told.interval_ns).unwrap_or_default(),
+            frame: reported.frame.into_owned(),
+            period_ms: reported.period_ms,
+            count: reported.count,
+            gaps: reported.gaps,
+            bursts: reported.bursts,
+            interval_ns: percentiles(&reported.interval_ns).unwrap_or_default(),
         };
         report.timing.arrivals.into_iter().map(row).collect::<Vec<_>>()
     };
@@ -89,13 +89,13 @@ mod tests {
         let mut run = made_up::run(50);
         run.summary["wakeup_ns"] = json!({ "p50": 3, "count": 50 });
         run.summary["vitals"] = json!({ "minor_faults": 4, "run_delay_ns": 5 });
-        let told = part(&run, None, BTreeMap::new());
-        assert_eq!(told.counts["cycles"], 50);
-        assert_eq!(told.counts["vitals.minor_faults"], 4);
-        assert_eq!(told.counts["controller.axes.drive.sensors_lost"], 0);
-        assert_eq!(told.counts["vitals.run_delay_ns"], 5);
-        assert!(!told.counts.keys().any(|key| key.contains("wakeup_ns")));
-        assert_eq!((told.group.as_str(), told.passed), ("a", true));
+        let reported = part(&run, None, BTreeMap::new());
+        assert_eq!(reported.counts["cycles"], 50);
+        assert_eq!(reported.counts["vitals.minor_faults"], 4);
+        assert_eq!(reported.counts["controller.axes.drive.sensors_lost"], 0);
+        assert_eq!(reported.counts["vitals.run_delay_ns"], 5);
+        assert!(!reported.counts.keys().any(|key| key.contains("wakeup_ns")));
+        assert_eq!((reported.group.as_str(), reported.passed), ("a", true));
         assert_eq!(part(&run, Some("b"), BTreeMap::new()).group, "b");
     }
 
@@ -109,11 +109,11 @@ mod tests {
         run.summary["arrivals"] = row("DriveValveCommand");
         run.summary["arrivals"][0]["bursts"] = json!(null);
         run.controllers.get_mut("controller").unwrap()["arrivals"] = row("DriveSensors");
-        let told = arrivals(&run);
+        let reported = arrivals(&run);
         let names: Vec<_> =
-            told.iter().map(|row| (row.receiver.as_str(), row.frame.as_str(), row.gaps)).collect();
+            reported.iter().map(|row| (row.receiver.as_str(), row.frame.as_str(), row.gaps)).collect();
         assert_eq!(names, [("emulator", "DriveValveCommand", 2), ("controller", "DriveSensors", 2)]);
-        assert_eq!(told[0].interval_ns.p50, Some(1_000_000));
-        assert_eq!((told[0].bursts, told[1].bursts), (None, Some(1)));
+        assert_eq!(reported[0].interval_ns.p50, Some(1_000_000));
+        assert_eq!((reported[0].bursts, reported[1].bursts), (None, Some(1)));
     }
 }

@@ -1,7 +1,7 @@
 //! Ours against the reference, pair by pair: the median ratio with an interval that needs no distribution.
 //!
 //! A pair is a run with the reference measured right beside it, so that what the machine did in those minutes is in both. What is
-//! told of the ratios is their [`median`].
+//! reported of the ratios is their [`median`].
 
 use super::model::{Ratio, RunPart};
 use super::reference;
@@ -10,13 +10,13 @@ use figures::median::{Median, median};
 
 /// What is set against what: our distribution, percentile, the reference's distribution.
 const COMPARED: [(&str, &str, Pick, &str); 6] = [
-    ("emulator-wakeup", "p50", |told| told.p50, reference::TAG),
-    ("emulator-wakeup", "p99", |told| told.p99, reference::TAG),
-    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-bus"),
+    ("emulator-wakeup", "p50", |reported| reported.p50, reference::TAG),
+    ("emulator-wakeup", "p99", |reported| reported.p99, reference::TAG),
+    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-bus"),
     // Like for like: both end when the answer has arrived.
-    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-bus-to-arrival"),
-    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-embedded"),
-    ("drive-round-trip", "p50", |told| told.p50, "ping-pong-socketpair"),
+    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-bus-to-arrival"),
+    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-embedded"),
+    ("drive-round-trip", "p50", |reported| reported.p50, "ping-pong-socketpair"),
 ];
 
 /// Names of all ratios that there can be.
@@ -66,10 +66,10 @@ mod tests {
     #[test]
     fn ten_pairs_give_the_second_and_the_ninth() {
         let pairs = (1..=10).rev().map(|n| (n * 100, 1000)).collect();
-        let told = ratio("a p50 / b p50".into(), pairs).unwrap();
-        assert!((told.median - 0.55).abs() < 1e-12);
-        assert_eq!(told.interval, Some((0.2, 0.9)));
-        assert!((told.confidence.unwrap() - 0.978_515_625).abs() < 1e-12);
+        let reported = ratio("a p50 / b p50".into(), pairs).unwrap();
+        assert!((reported.median - 0.55).abs() < 1e-12);
+        assert_eq!(reported.interval, Some((0.2, 0.9)));
+        assert!((reported.confidence.unwrap() - 0.978_515_625).abs() < 1e-12);
         assert_eq!(short_name("a p50 / cyclictest p50"), "a.p50");
         assert_eq!(short_name("a p50 / ping-pong-bus p50"), "a.p50/ping-pong-bus");
     }
@@ -77,19 +77,20 @@ mod tests {
     #[test]
     fn round_trips_are_held_against_the_ping_pongs_of_their_own_run() {
         let run = |ours: Option<u64>, bus: Option<u64>| {
-            let told = |p50: Option<u64>| PercentilesNs { p50, count: 1, ..PercentilesNs::default() };
+            let reported = |p50: Option<u64>| PercentilesNs { p50, count: 1, ..PercentilesNs::default() };
             let of = [
                 ("drive-round-trip", ours),
                 ("ping-pong-bus", bus),
                 ("ping-pong-bus-to-arrival", bus.map(|ns| ns - 10)),
             ];
-            let of = of.map(|(tag, p50)| (tag.to_owned(), told(p50)));
+            let of = of.map(|(tag, p50)| (tag.to_owned(), reported(p50)));
             parts::part(&made_up::run(10), None, of.into())
         };
-        let told = ratios(&[run(Some(60), Some(40)), run(Some(90), Some(30)), run(Some(70), None)]);
-        let told: Vec<_> = told.iter().map(|ratio| (ratio.name.as_str(), ratio.pairs_ns.clone())).collect();
+        let reported = ratios(&[run(Some(60), Some(40)), run(Some(90), Some(30)), run(Some(70), None)]);
+        let reported: Vec<_> =
+            reported.iter().map(|ratio| (ratio.name.as_str(), ratio.pairs_ns.clone())).collect();
         assert_eq!(
-            told,
+            reported,
             [
                 ("drive-round-trip p50 / ping-pong-bus p50", vec![(60, 40), (90, 30)]),
                 ("drive-round-trip p50 / ping-pong-bus-to-arrival p50", vec![(60, 30), (90, 20)]),
@@ -99,8 +100,8 @@ mod tests {
 
     #[test]
     fn few_pairs_have_a_median_and_no_interval() {
-        let told = ratio("x".into(), vec![(3, 2), (5, 2), (4, 2)]).unwrap();
-        assert_eq!((told.median, told.interval, told.confidence), (2.0, None, None));
+        let reported = ratio("x".into(), vec![(3, 2), (5, 2), (4, 2)]).unwrap();
+        assert_eq!((reported.median, reported.interval, reported.confidence), (2.0, None, None));
         assert!(ratio("x".into(), vec![]).is_none());
     }
 }

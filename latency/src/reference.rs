@@ -118,11 +118,11 @@ mod tests {
     fn both_resolutions_are_ns_here() {
         let thread =
             r#"{"histogram": {"12": 3, "13": 222}, "cycles": 226, "min": 12, "max": 7939, "avg": 13.1}"#;
-        let told = read(&text(0, thread)).unwrap();
-        assert!(told.whole_us);
-        assert_eq!((told.samples.count(), told.beyond_histogram), (226, 1));
-        assert_eq!(told.samples.percentiles_ns().p50.unwrap() / 1000, 13);
-        assert!(told.samples.max_ns().unwrap() >= 7_939_000);
+        let reported = read(&text(0, thread)).unwrap();
+        assert!(reported.whole_us);
+        assert_eq!((reported.samples.count(), reported.beyond_histogram), (226, 1));
+        assert_eq!(reported.samples.percentiles_ns().p50.unwrap() / 1000, 13);
+        assert!(reported.samples.max_ns().unwrap() >= 7_939_000);
         let fine = read(&text(1, &thread.replace("7939", "13"))).unwrap();
         assert!(!fine.whole_us);
         assert_eq!(fine.samples.percentiles_ns().p50, Some(13));
@@ -138,8 +138,8 @@ mod tests {
 
     #[test]
     fn a_reference_without_histogram_says_what_to_do() {
-        let told = read(&text(0, r#"{"cycles": 5, "min": 1, "max": 2, "avg": 1.0}"#)).unwrap_err();
-        assert!(told.to_string().contains("-h"), "{told}");
+        let reported = read(&text(0, r#"{"cycles": 5, "min": 1, "max": 2, "avg": 1.0}"#)).unwrap_err();
+        assert!(reported.to_string().contains("-h"), "{reported}");
         assert!(read("{").unwrap_err().to_string().contains("line 1"));
     }
 }

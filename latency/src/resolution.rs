@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn numbers_of_pairs_are_told_with_two_digits() {
-        let told = [7, 40, 335, 11_111, 99_999].map(two_digits);
-        assert_eq!(told, [7, 40, 340, 12_000, 100_000]);
+        let reported = [7, 40, 335, 11_111, 99_999].map(two_digits);
+        assert_eq!(reported, [7, 40, 340, 12_000, 100_000]);
     }
 }

@@ -156,8 +156,8 @@ mod tests {
 
     #[test]
     fn a_percentile_that_too_few_samples_cannot_tell_is_null() {
-        let told = (0..999).collect::<Samples>().percentiles_ns();
-        assert!(told.p99.is_some() && told.p999.is_none() && told.p9999.is_none());
+        let reported = (0..999).collect::<Samples>().percentiles_ns();
+        assert!(reported.p99.is_some() && reported.p999.is_none() && reported.p9999.is_none());
         assert_eq!(Samples::default().percentiles_ns(), PercentilesNs::default());
     }
 }

@@ -27,7 +27,7 @@ pub struct LatencyTableArguments {
     /// report.json of the runs that wake early and spin.
     #[arg(long, value_name = "FILE")]
     pub spin: Option<PathBuf>,
-    /// The command that measured, to be told above the table.
+    /// The command that measured, to be reported above the table.
     #[arg(long)]
     pub made_by: Option<String>,
 }
@@ -38,7 +38,7 @@ const CLAIMS: [&str; 2] = [include_str!("../bounds.toml"), include_str!("../boun
 /// The figure of the runs that spin that is claimed, and the name of its row.
 const SPIN_CLAIM: &str = "emulator-wakeup.p99_ns";
 const SPIN_ROW: &str = "emulator-wakeup p99, spinning / claimed";
-/// Facts of the machine that are told above the table, by the beginning of their names.
+/// Facts of the machine that are reported above the table, by the beginning of their names.
 const FACTS: [&str; 6] =
     ["processor", "kernel", "preemption: model", "hypervisor", "frequency", "clock source"];
 
@@ -117,7 +117,7 @@ fn starts(name: &str, start: &str) -> bool {
 
 fn head(report: &Report, made_by: Option<&str>) -> String {
     let mut out = String::new();
-    let told = |name: &&str| {
+    let reported = |name: &&str| {
         let is =
             |fact: &str| fact == *name || starts(&fact.replace(['_', ':'], " "), &name.replace(':', " "));
         let fact = report.conditions.machine.iter().find(|fact| is(&fact.name))?;
@@ -127,7 +127,7 @@ fn head(report: &Report, made_by: Option<&str>) -> String {
     if let Some(command) = made_by {
         let _ = writeln!(out, "`{command}`, {} runs of {length_s:.0} s together.\n", report.runs.len());
     }
-    for fact in FACTS.iter().filter_map(told) {
+    for fact in FACTS.iter().filter_map(reported) {
         let _ = writeln!(out, "- {fact}");
     }
     let load = report.conditions.load_generator.as_deref().unwrap_or("not told");
@@ -174,9 +174,9 @@ mod tests {
         let names: Vec<_> =
             ratios::names().map(|name| format!("ratio.{}", ratios::short_name(&name))).collect();
         let plain: toml::Table = CLAIMS[0].parse().unwrap();
-        let told: Vec<_> = plain["bounds"].as_table().unwrap().keys().collect();
-        assert_eq!(told.len(), 3);
-        assert!(told.iter().all(|figure| names.contains(figure)), "{told:?}");
+        let reported: Vec<_> = plain["bounds"].as_table().unwrap().keys().collect();
+        assert_eq!(reported.len(), 3);
+        assert!(reported.iter().all(|figure| names.contains(figure)), "{reported:?}");
         assert_eq!(claimed(SPIN_CLAIM), Some(1000.0));
     }
 }

@@ -54,8 +54,8 @@ fn sum(run: &RunPart, is_wanted: impl Fn(&str) -> bool) -> Option<u64> {
 }
 
 fn row(name: String, counts: [Option<u64>; 4]) -> Vec<String> {
-    let told = counts.map(|count| count.map_or_else(|| "-".to_owned(), |count| count.to_string()));
-    std::iter::once(name).chain(told).collect()
+    let reported = counts.map(|count| count.map_or_else(|| "-".to_owned(), |count| count.to_string()));
+    std::iter::once(name).chain(reported).collect()
 }
 
 #[cfg(test)]
@@ -73,10 +73,10 @@ mod tests {
         let controller = run.controllers.get_mut("controller").unwrap();
         controller["axes"]["load"]["sensors_lost"] = json!(4);
         controller["frames_duplicate"] = json!(6);
-        let told = [parts::part(&run, None, BTreeMap::new()), parts::part(&run, None, BTreeMap::new())];
-        let ages = command_ages(&told).unwrap();
+        let reported = [parts::part(&run, None, BTreeMap::new()), parts::part(&run, None, BTreeMap::new())];
+        let ages = command_ages(&reported).unwrap();
         assert_eq!(ages.rows, [["1", "14", "22"], ["2", "6", "0"], ["10", "2", "0"]]);
-        let frames = frames(&told).unwrap();
+        let frames = frames(&reported).unwrap();
         assert_eq!(frames.rows[0], ["0 at the rig", "0", "5", "-", "-"]);
         assert_eq!(frames.rows[3], ["1 at the controllers", "4", "-", "6", "-"]);
         assert!(command_ages(&[]).is_none());

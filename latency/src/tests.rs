@@ -88,9 +88,9 @@ fn ping_pongs_beside_a_run_are_references_with_ratios() {
     hlog::write(&mut log, 1e9, &parts).unwrap();
     std::fs::write(folder.path().join("ping-pong-bus.hlog"), log).unwrap();
     // An older measurement left the figures alone.
-    let told =
+    let reported =
         serde_json::json!({ "socketpair": { "p50": 8_000, "count": 100 }, "commands": { "bus": "bench x" } });
-    std::fs::write(folder.path().join("ping-pong.json"), told.to_string()).unwrap();
+    std::fs::write(folder.path().join("ping-pong.json"), reported.to_string()).unwrap();
     let report = made_in(folder.path()).report;
     let bus = report.distributions.iter().find(|one| one.name == "ping-pong-bus").unwrap();
     assert_eq!((bus.source, bus.percentiles_ns.count), (Source::Reference, 100));

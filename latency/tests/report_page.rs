@@ -71,9 +71,9 @@ fn check(html: &str) {
         links.into_iter().flatten().flat_map(str::split_whitespace).collect::<Vec<_>>()
     });
     links.for_each(|link| assert!(identifiers.binary_search(&link).is_ok(), "{link} leads nowhere"));
-    let told = text(document.root_element());
-    assert!(!told.contains("NaN") && !told.contains("@import"));
-    assert_eq!(told.matches("url(").count(), told.matches("url(#").count());
+    let reported = text(document.root_element());
+    assert!(!reported.contains("NaN") && !reported.contains("@import"));
+    assert_eq!(reported.matches("url(").count(), reported.matches("url(#").count());
 }
 
 #[test]
@@ -136,8 +136,8 @@ fn every_drawing_has_its_text() {
     let mut number = 0;
     for drawing in drawings {
         for part in ["title", "desc"] {
-            let told = drawing.children().find(|node| node.has_tag_name(part)).map(text);
-            assert!(told.is_some_and(|told| !told.trim().is_empty()), "a drawing without {part}");
+            let reported = drawing.children().find(|node| node.has_tag_name(part)).map(text);
+            assert!(reported.is_some_and(|reported| !reported.trim().is_empty()), "a drawing without {part}");
         }
         number += 1;
     }

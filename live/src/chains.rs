@@ -2,7 +2,7 @@
 //!
 //! The edges are those of the drawings at the heads of `axis/src/chains/*.rs`; a test holds every name against `rig.dbc`.
 //! What may happen in any state (a fault, an emergency stop, another phase of the main chain) is drawn from the state in which
-//! it is told of most, where the drawing says "any": a page cannot show arrows from everywhere.
+//! it is reported at most places, where the drawing says "any": a page cannot show arrows from everywhere.
 
 use protocol::frames::{ChainStatus, DRIVE_CHAIN_STATUS, Frame};
 use serde_json::{Map, Value, json};
@@ -129,10 +129,10 @@ mod tests {
     fn active_states_are_told_by_name() {
         let frame = Frame::from_values(DRIVE_CHAIN_STATUS.id, &[5.0, 2.0, 3.0, 0.0, 1.0, 9.0, 0.0]);
         let Some(Frame::DriveChainStatus(status)) = frame else { panic!("{frame:?}") };
-        let told = active(status);
-        assert_eq!(told["main"], "experiment");
-        assert_eq!(told["force"], "standstill");
-        assert_eq!(told["matching"], "matched");
-        assert_eq!(told["emergency_stop"], "ready");
+        let reported = active(status);
+        assert_eq!(reported["main"], "experiment");
+        assert_eq!(reported["force"], "standstill");
+        assert_eq!(reported["matching"], "matched");
+        assert_eq!(reported["emergency_stop"], "ready");
     }
 }

@@ -206,9 +206,12 @@ pub fn wait<'a>(
         Ok(_) | Err(rustix::io::Errno::INTR) => {}
         Err(error) => return Err(error.into()),
     }
-    let told =
+    let reported =
         |polled: &PollFd<'_>| polled.revents().intersects(PollFlags::IN | PollFlags::HUP | PollFlags::ERR);
-    Ok(((1..count).filter(|place| told(&polled[*place])).map(|place| place - 1).collect(), told(&polled[0])))
+    Ok((
+        (1..count).filter(|place| reported(&polled[*place])).map(|place| place - 1).collect(),
+        reported(&polled[0]),
+    ))
 }
 
 /// Whether a socket that does not block has nothing to say yet.

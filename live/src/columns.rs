@@ -61,7 +61,7 @@ pub static COLUMNS: LazyLock<Vec<Column>> = LazyLock::new(|| {
 });
 
 fn of_axis(axis: usize) -> Vec<Column> {
-    // The load's rod goes out in -x: what is told along its own extension is turned round.
+    // The load's rod goes out in -x: what is reported along its own extension is turned round.
     let along_x = [1.0, -1.0][axis];
     let measured = |name: &str| {
         let place = MEASURED.iter().position(|known| *known == name);

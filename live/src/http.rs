@@ -107,7 +107,7 @@ pub fn parse(bytes: &[u8]) -> Progress {
         } else if is("x-airbench-token") {
             once(&mut request.token)
         } else if is("content-length") {
-            value.trim().parse().map(|told: usize| length = told).is_ok()
+            value.trim().parse().map(|reported: usize| length = reported).is_ok()
         } else {
             // Nobody who asks for so little needs to send in pieces.
             !is("transfer-encoding")
@@ -128,13 +128,13 @@ pub fn parse(bytes: &[u8]) -> Progress {
 /// digits. A name of somebody's own that leads here (DNS rebinding) would make a foreign page's requests look like ours.
 #[must_use]
 pub fn is_ours(host: &str, port: u16) -> bool {
-    let (name, told) = match host.rsplit_once(':') {
-        Some((name, told)) if !told.ends_with(']') => (name, told),
+    let (name, reported) = match host.rsplit_once(':') {
+        Some((name, reported)) if !reported.ends_with(']') => (name, reported),
         // Browsers leave out the port that http has by itself.
         _ => (host, "80"),
     };
     let bare = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
-    told.parse() == Ok(port) && (name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok())
+    reported.parse() == Ok(port) && (name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok())
 }
 
 #[must_use]

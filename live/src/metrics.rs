@@ -66,8 +66,10 @@ pub fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
     }
     for (name, samples) in view.rhythm.samples() {
         head(&mut text, format!("{name}_seconds"), "summary", "Latency since this program looks on.");
-        let told = samples.percentiles_ns();
-        for (quantile, ns) in [(0.5, told.p50), (0.9, told.p90), (0.99, told.p99), (0.999, told.p999)] {
+        let reported = samples.percentiles_ns();
+        for (quantile, ns) in
+            [(0.5, reported.p50), (0.9, reported.p90), (0.99, reported.p99), (0.999, reported.p999)]
+        {
             // One that there are too few samples for has no line, as it is null in the state.
             if let Some(ns) = ns {
                 let seconds = ns as f64 * 1e-9;

@@ -53,8 +53,8 @@ pub struct SetUp {
 impl Minute {
     /// Takes a cycle whose measured values are all there.
     pub fn cycle(&mut self, cycle: u64, values: [Option<f64>; MEASURED_COUNT]) {
-        let told: Vec<f64> = values.into_iter().flatten().collect();
-        if let Ok(values) = told.try_into() {
+        let reported: Vec<f64> = values.into_iter().flatten().collect();
+        if let Ok(values) = reported.try_into() {
             self.cycles.push_back(Measured { cycle, values });
             if self.cycles.len() > CYCLES_KEPT {
                 self.cycles.pop_front();
@@ -111,7 +111,7 @@ impl Saved {
         if self.frames.is_empty() && self.cycles.is_empty() {
             return Err(io::Error::other("nothing was heard yet, or not since linkage or weights changed"));
         }
-        let told = format!("saved in {}{}", self.folder.display(), self.cut);
+        let reported = format!("saved in {}{}", self.folder.display(), self.cut);
         std::fs::create_dir_all(&self.folder)?;
         let mut log = LineFile::create(&self.folder.join("bus.log"))?;
         for record in &self.frames {
@@ -121,7 +121,7 @@ impl Saved {
         log.write_out()?;
         if self.cycles.is_empty() {
             // Only telemetry tells which valve opening acted in which cycle.
-            return Ok(told);
+            return Ok(reported);
         }
         let mut table = LineFile::create(&self.folder.join("measurement.csv"))?;
         write!(table.lines(), "# linked={} added_mass_kg={}\ntime_s", self.linked, self.added_mass_kg)?;
@@ -136,7 +136,7 @@ impl Saved {
             table.write_when_full()?;
         }
         table.write_out()?;
-        Ok(told)
+        Ok(reported)
     }
 }
 
@@ -161,12 +161,12 @@ mod tests {
         minute
     }
 
-    /// Saves so many seconds: what is told after the folder, and the lines of `measurement.csv` and `bus.log`.
+    /// Saves so many seconds: what is reported after the folder, and the lines of `measurement.csv` and `bus.log`.
     fn saved(minute: &Minute, seconds: f64) -> (String, Vec<String>, usize) {
         let folder = tempfile::tempdir().unwrap();
-        let told = minute.last(seconds, folder.path(), "bus0", SET_UP).write().unwrap();
-        let told = told.strip_prefix("saved in ").unwrap();
-        let (path, rest) = told.split_once(' ').unwrap_or((told, ""));
+        let reported = minute.last(seconds, folder.path(), "bus0", SET_UP).write().unwrap();
+        let reported = reported.strip_prefix("saved in ").unwrap();
+        let (path, rest) = reported.split_once(' ').unwrap_or((reported, ""));
         let table = std::fs::read_to_string(Path::new(path).join("measurement.csv")).unwrap();
         let log = std::fs::read_to_string(Path::new(path).join("bus.log")).unwrap();
         (rest.to_owned(), table.lines().map(str::to_owned).collect(), log.lines().count())

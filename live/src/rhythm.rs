@@ -49,18 +49,18 @@ impl Rhythm {
     #[must_use]
     pub fn percentiles(&self) -> Value {
         let us = |ns: Option<u64>| ns.map(|ns| ns as f64 / 1e3);
-        let told = |distribution: &Distribution| {
-            let told = distribution.whole.percentiles_ns();
+        let reported = |distribution: &Distribution| {
+            let reported = distribution.whole.percentiles_ns();
             json!({
-                "p50": us(told.p50),
-                "p90": us(told.p90),
-                "p99": us(told.p99),
-                "p999": us(told.p999),
-                "max": us(told.max),
-                "count": told.count,
+                "p50": us(reported.p50),
+                "p90": us(reported.p90),
+                "p99": us(reported.p99),
+                "p999": us(reported.p999),
+                "max": us(reported.max),
+                "count": reported.count,
             })
         };
-        self.each(told)
+        self.each(reported)
     }
 
     /// Bins on a logarithmic axis: upper end in us, and samples.
@@ -82,8 +82,9 @@ impl Rhythm {
     }
 
     fn each(&self, tell: impl Fn(&Distribution) -> Value) -> Value {
-        let told = SHOWN.iter().zip(&self.distributions);
-        told.map(|((name, _), distribution)| ((*name).to_owned(), tell(distribution)))
+        let reported = SHOWN.iter().zip(&self.distributions);
+        reported
+            .map(|((name, _), distribution)| ((*name).to_owned(), tell(distribution)))
             .collect::<serde_json::Map<_, _>>()
             .into()
     }
@@ -110,13 +111,13 @@ mod tests {
                 rhythm.take(&line).unwrap();
             }
         }
-        let told = rhythm.histograms();
+        let reported = rhythm.histograms();
         let count = |which: &str| -> u64 {
-            let bins = told["wake_up"][which].as_array().unwrap();
+            let bins = reported["wake_up"][which].as_array().unwrap();
             bins.iter().map(|bin| bin[1].as_u64().unwrap()).sum()
         };
         assert_eq!((count("whole"), count("last_10_s")), (1500, 1000));
-        assert_eq!(told["wake_up"]["last_10_s"].as_array().unwrap().len(), 1, "all of one length");
+        assert_eq!(reported["wake_up"]["last_10_s"].as_array().unwrap().len(), 1, "all of one length");
         assert_eq!(rhythm.percentiles()["wake_up"]["count"], 1500);
         assert_eq!(rhythm.percentiles()["round_trip"]["p50"], Value::Null);
     }

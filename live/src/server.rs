@@ -200,7 +200,7 @@ impl Server {
                 self.answer(number, said(Status::Busy, "the emulator is gone"), now_ms);
             }
         }
-        // Connected is told with the description, not before it: who hears of it asks for that at once.
+        // Connected is reported with the description, not before it: who hears of it asks for that at once.
         if described || had_telemetry && gone {
             self.tell_status(now_ms);
         }
@@ -210,12 +210,12 @@ impl Server {
     fn hand_on(&mut self, text: &str, now_ms: u64) {
         let Some(number) = self.asked.pop_front() else { return };
         let answer: Value = serde_json::from_str(text).unwrap_or_default();
-        let told = match (answer["ok"] == true, answer["text"].as_str().unwrap_or_default()) {
+        let reported = match (answer["ok"] == true, answer["text"].as_str().unwrap_or_default()) {
             (true, "") => said(Status::Good, "the emulator obeys"),
             (true, text) => said(Status::Good, text),
             (false, text) => said(Status::BadRequest, text),
         };
-        self.answer(number, told, now_ms);
+        self.answer(number, reported, now_ms);
     }
 
     fn answer(&mut self, number: u64, response: Vec<u8>, now_ms: u64) {
@@ -248,11 +248,11 @@ impl Server {
         }
         if let Ok((number, saved)) = self.saved.1.try_recv() {
             self.saving = false;
-            let told = match saved {
-                Ok(told) => said(Status::Good, &told),
+            let reported = match saved {
+                Ok(reported) => said(Status::Good, &reported),
                 Err(error) => said(Status::BadRequest, &error.to_string()),
             };
-            self.answer(number, told, now_ms);
+            self.answer(number, reported, now_ms);
         }
     }
 

@@ -191,8 +191,8 @@ impl View {
             "fault" => {
                 let number = of["number"].as_u64().unwrap_or_default();
                 if of["what"] == "begins" {
-                    let told = json!({ "name": of["fault"], "place": of["at"], "values": of["numbers"], "cause": of["cause"] });
-                    self.faults.insert(number, told);
+                    let fault = json!({ "name": of["fault"], "place": of["at"], "values": of["numbers"], "cause": of["cause"] });
+                    self.faults.insert(number, fault);
                 } else {
                     self.faults.remove(&number);
                 }
@@ -263,7 +263,7 @@ impl View {
         let now = second(self.cycle.unwrap_or_default());
         let mut counts = vec![0; OVERRUN_SECONDS];
         for cycle in &self.recent_overruns {
-            // One that is told ahead of its cycle is of the second that goes on.
+            // One that is reported ahead of its cycle is of the second that goes on.
             let ago = now.saturating_sub(second(*cycle)) as usize;
             if let Some(count) = counts.iter_mut().rev().nth(ago) {
                 *count += 1;
@@ -342,7 +342,7 @@ impl View {
 /// The table of faults in the words of the page.
 fn faults(listed: &Value) -> Value {
     let number = |key: &Value| {
-        let mut told = Map::new();
+        let mut reported = Map::new();
         for (name, of) in [
             ("name", "key"),
             ("unit", "unit"),
@@ -352,9 +352,9 @@ fn faults(listed: &Value) -> Value {
             ("whole", "whole"),
             ("about", "meaning"),
         ] {
-            told.insert(name.into(), key[of].clone());
+            reported.insert(name.into(), key[of].clone());
         }
-        told
+        reported
     };
     let fault = |fault: &Value| {
         let numbers = fault["keys"].as_array().into_iter().flatten().map(number);

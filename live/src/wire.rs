@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 /// Who stopped or failed to is known by a frame every 100 ms; one that is silent for so long holds nothing any more.
 const STOP_HOLDS_MS: u64 = 500;
-/// A controller's chains are told every 10 ms; after so long they are none.
+/// A controller's chains are reported every 10 ms; after so long they are none.
 const STATUS_HOLDS_MS: u64 = 1000;
 /// Values of the tick's count of skipped cycles.
 const SKIPPED_RANGE: u64 = 1 << 16;
@@ -25,7 +25,7 @@ pub const CONSOLE: usize = 0;
 /// What a frame tells the rest of the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum News {
-    /// The rig is at this cycle, and started anew if it is told so.
+    /// The rig is at this cycle, and started anew if that is reported.
     Cycle(u64, bool),
     /// The controller of an axis says what it does, in its answer to the sensors of this cycle.
     Said(usize, u64, ChainValues),
@@ -34,14 +34,14 @@ pub enum News {
 /// Frames of the bus, taken in.
 #[derive(Debug, Default)]
 pub struct Wire {
-    /// The newest that is known of, once a tick has told one.
+    /// The newest that is known of, once a tick has reported one.
     cycle: Option<u64>,
     /// Low bits of the cycle that each controller answered last, as its command to the valve tells.
     echo: [Option<u16>; 2],
     said: [Option<ChainValues>; 2],
     /// Sensors of each axis, since the first tick.
     sensors: [Came; 2],
-    /// Cycles that the rig skipped since then, and what its own count was when it told it last.
+    /// Cycles that the rig skipped since then, and what its own count was when it reported it last.
     skipped: u64,
     skipped_told: Option<u16>,
     status: Option<RigStatus>,
@@ -150,22 +150,22 @@ impl Wire {
     }
 
     fn tick(&mut self, tick: &Tick) -> Option<News> {
-        let told = u64::from(tick.cycle);
-        let anew = self.cycle.is_some_and(|cycle| told + ALIVE_RANGE < cycle);
+        let reported = u64::from(tick.cycle);
+        let anew = self.cycle.is_some_and(|cycle| reported + ALIVE_RANGE < cycle);
         if anew {
             self.begin_anew();
         }
         let before = self.skipped_told.replace(tick.skipped).unwrap_or(tick.skipped);
         self.skipped += (SKIPPED_RANGE + u64::from(tick.skipped) - u64::from(before)) % SKIPPED_RANGE;
         match self.cycle {
-            None => self.sensors = [Came::since(told); 2],
+            None => self.sensors = [Came::since(reported); 2],
             // A tick after a miss comes ahead of the sensors of its cycle, but of no earlier ones.
-            Some(_) => self.sensors.iter_mut().for_each(|came| came.look_for(told.saturating_sub(1))),
+            Some(_) => self.sensors.iter_mut().for_each(|came| came.look_for(reported.saturating_sub(1))),
         }
-        self.cycle = self.cycle.max(Some(told));
+        self.cycle = self.cycle.max(Some(reported));
         let lost = self.sensors.iter().map(|came| came.missing.saturating_sub(self.skipped)).sum();
         self.lost = self.lost.max(lost);
-        Some(News::Cycle(told, anew))
+        Some(News::Cycle(reported, anew))
     }
 
     /// Another run: of the one before nothing but the counts of frames holds.
@@ -175,7 +175,7 @@ impl Wire {
     }
 
     /// A set-point by hand. The frame has room for a position and a force, and the axis follows the one that it controls: what
-    /// was not given is what its controller told last, and leads nowhere. `None` as long as no controller of it was heard.
+    /// was not given is what its controller reported last, and leads nowhere. `None` as long as no controller of it was heard.
     #[must_use]
     pub fn hand_set_point(
         &self,
@@ -241,7 +241,7 @@ impl Wire {
     pub fn load(&self) -> Value {
         let counts = &self.frames;
         let seconds = counts.last_ms as f64 / 1000.0;
-        let told = |(place, count): (usize, &u64)| {
+        let reported = |(place, count): (usize, &u64)| {
             (*count > 0)
                 .then(|| (name(place).to_owned(), json!((*count as f64 / seconds * 10.0).round() / 10.0)))
         };
@@ -250,7 +250,7 @@ impl Wire {
         let load_percent = (seconds > 0.0).then(|| 100.0 * bits as f64 / seconds / f64::from(BIT_RATE_PER_S));
         json!({
             "load_percent": load_percent,
-            "frames_per_s": counts.last.iter().enumerate().filter_map(told).collect::<Map<_, _>>(),
+            "frames_per_s": counts.last.iter().enumerate().filter_map(reported).collect::<Map<_, _>>(),
             "lost": self.lost,
             "malformed": self.malformed,
         })
@@ -451,8 +451,11 @@ mod tests {
         assert_eq!(wire.take(&said, 0), None, "nobody knows of which cycle");
         let command = ValveCommand { opening: 0.0, enable: true, alive: 1, echo: 154 };
         wire.take(&Frame::DriveValveCommand(command).encode().unwrap(), 0);
-        let told = wire.take(&said, 0);
-        assert!(matches!(told, Some(News::Said(0, 154, _))), "the newest sensors are of 157: {told:?}");
+        let reported = wire.take(&said, 0);
+        assert!(
+            matches!(reported, Some(News::Said(0, 154, _))),
+            "the newest sensors are of 157: {reported:?}"
+        );
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! Numbers, lengths of time and dates as a person reads them. What is no number is a dash, never NaN.
 
+use humantime::format_rfc3339_seconds;
+use std::time::{Duration, UNIX_EPOCH};
+
 /// What stands where nothing was measured.
 pub const NOTHING: &str = "–";
 /// Narrow space between thousands, where no line may break.
@@ -130,24 +133,8 @@ pub fn instant(unix_s: f64) -> String {
     if !(0.0..253_402_300_800.0).contains(&unix_s) {
         return "at an unknown time".into();
     }
-    let seconds = unix_s as u64;
-    let (year, month, day) = civil_from_days(seconds / 86_400);
-    let (hour, minute, second) = (seconds / 3600 % 24, seconds / 60 % 60, seconds % 60);
-    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02} UTC")
-}
-
-/// The Gregorian date of a day since 1970-01-01: years are taken to begin in March, so that the leap day ends them.
-fn civil_from_days(days: u64) -> (u64, u64, u64) {
-    // Days from 0000-03-01 to 1970-01-01, and of 400, 100, 4 years.
-    let day = days + 719_468;
-    let (era, day_of_era) = (day / 146_097, day % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    // 153 days are five months from March on.
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day_of_month = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
-    (400 * era + year_of_era + u64::from(month <= 2), month, day_of_month)
+    let stamp = format_rfc3339_seconds(UNIX_EPOCH + Duration::from_secs(unix_s as u64)).to_string();
+    stamp.replace('T', " ").replace('Z', " UTC")
 }
 
 /// A word of a count: one event, two events.
@@ -180,8 +167,8 @@ mod tests {
             (in_us(52), in_us(13_149), maybe_us(None)),
             ("0.05".into(), "13.1".into(), NOTHING.into())
         );
-        let told = [7, 13_149, 3_500_000, 2_000_000_000].map(length);
-        assert_eq!(told, ["7 ns", "13.1 µs", "3.50 ms", "2.00 s"]);
+        let reported = [7, 13_149, 3_500_000, 2_000_000_000].map(length);
+        assert_eq!(reported, ["7 ns", "13.1 µs", "3.50 ms", "2.00 s"]);
         assert_eq!([1e2, 1e4, 1e7, 1e10].map(tick_ns), ["100 ns", "10 µs", "10 ms", "10 s"]);
     }
 

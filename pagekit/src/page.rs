@@ -2,8 +2,8 @@
 //!
 //! A page is one file without any resource from elsewhere, so that it opens offline and in ten years. It is written as HTML
 //! that an XML parser reads too, which lets tests hold it to being well-formed. Colours are variables of [`STYLE`], after Okabe
-//! and Ito (darker where white paper needs it), for light, dark and print; a line is told from its neighbour by its dashes and
-//! its markers too, a verdict by its word: nothing hangs on colour alone.
+//! and Ito (darker where white paper needs it), for light, dark and print; a line is distinguished from its neighbour by its
+//! dashes and its markers too, a verdict by its word: nothing hangs on colour alone.
 
 /// The stylesheet of every page.
 pub const STYLE: &str = include_str!("page.css");

@@ -1,7 +1,7 @@
 //! Axes, lines and markers as inline SVG, in the colours of the stylesheet.
 //!
-//! Lines are told apart by colour, dashes (both in the stylesheet, by class) and the shape of their markers; the reference is a
-//! grey area. Drawings have a title and a description for who does not see them.
+//! Lines are distinguished by colour, dashes (both in the stylesheet, by class) and the shape of their markers; the reference is
+//! a grey area. Drawings have a title and a description for who does not see them.
 
 use crate::number;
 use crate::page::escaped;

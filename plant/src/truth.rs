@@ -132,19 +132,19 @@ impl Truth {
         let forces = Forces::at(integrator, effects, &lanes, hand_forces(inputs), state.linked);
 
         let axis = |i: usize| {
-            let (own, axis) = (&state.axes[i], &forces.axes[i]);
+            let (axis_state, axis) = (&state.axes[i], &forces.axes[i]);
             let rest_m = [0.0, integrator.motion.stroke_m()][i];
             AxisTruth {
-                position_m: rest_m + [1.0, -1.0][i] * own.extension_m,
-                rod_velocity_m_per_s: own.rod_velocity_m_per_s,
+                position_m: rest_m + [1.0, -1.0][i] * axis_state.extension_m,
+                rod_velocity_m_per_s: axis_state.rod_velocity_m_per_s,
                 rod_acceleration_m_per_s2: axis.sum() / integrator.motion.mass_kg(i),
-                spool: own.spool,
+                spool: axis_state.spool,
                 pressure_a_pa: air.pressure[0].to_array()[i],
                 pressure_b_pa: air.pressure[1].to_array()[i],
-                stored_air_a_j: own.stored_air_a_j,
-                stored_air_b_j: own.stored_air_b_j,
-                flow_a_m3_per_s: own.flow_a_m3_per_s,
-                flow_b_m3_per_s: own.flow_b_m3_per_s,
+                stored_air_a_j: axis_state.stored_air_a_j,
+                stored_air_b_j: axis_state.stored_air_b_j,
+                flow_a_m3_per_s: axis_state.flow_a_m3_per_s,
+                flow_b_m3_per_s: axis_state.flow_b_m3_per_s,
                 edge_flow_a_m3_per_s: edge_flow[0].to_array()[i],
                 edge_flow_b_m3_per_s: edge_flow[1].to_array()[i],
                 pneumatic_force_n: axis.pneumatic_n,
@@ -308,16 +308,16 @@ impl Forces {
 
     /// Force on a piston without any friction, N.
     pub(crate) fn unresisted_n(&self, axis: usize) -> f64 {
-        let own = &self.axes[axis];
-        own.pneumatic_n + own.hand_n + own.contact_n + own.effect_n
+        let axis_forces = &self.axes[axis];
+        axis_forces.pneumatic_n + axis_forces.hand_n + axis_forces.contact_n + axis_forces.effect_n
     }
 
     /// What the force sensor of an axis would show, N: what pushes its rod back in; behind the drive's there is the carriage
     /// to be moved, too.
     pub(crate) fn sensor_n(&self, integrator: &Integrator, axis: usize) -> f64 {
-        let own = &self.axes[axis];
-        let acceleration = own.sum() / integrator.motion.mass_kg(axis);
-        integrator.motion.behind_sensor_kg(axis) * acceleration - self.contact_n - own.hand_n
+        let axis_forces = &self.axes[axis];
+        let acceleration = axis_forces.sum() / integrator.motion.mass_kg(axis);
+        integrator.motion.behind_sensor_kg(axis) * acceleration - self.contact_n - axis_forces.hand_n
     }
 }
 

@@ -211,9 +211,9 @@ mod tests {
         for chamber_bar in [1.5, 4.0, 6.5] {
             let filled = paper_flow(supply_kv, supply_bar, chamber_bar) / 3600.0;
             let emptied = paper_flow(exhaust_kv, chamber_bar, exhaust_bar) / 3600.0;
-            let told = [opening, -opening].map(|own| valve.flow_m3_per_s(own, chamber_bar * 1e5));
-            assert!((told[0] - filled).abs() <= 1e-9 * filled, "{told:?}, {filled}");
-            assert!((told[1] + emptied).abs() <= 1e-9 * emptied, "{told:?}, {emptied}");
+            let reported = [opening, -opening].map(|own| valve.flow_m3_per_s(own, chamber_bar * 1e5));
+            assert!((reported[0] - filled).abs() <= 1e-9 * filled, "{reported:?}, {filled}");
+            assert!((reported[1] + emptied).abs() <= 1e-9 * emptied, "{reported:?}, {emptied}");
         }
     }
 

@@ -141,13 +141,13 @@ fn people_allocate_nothing_in_a_cycle() {
     let mut plant = Plant::new(&rig, &scene.setup()).expect("good");
     let mut people = People::new(&scene);
     let counted = ALLOCATIONS.with(Cell::get);
-    let mut told = 0;
+    let mut reported = 0;
     for cycle in 0..2000 {
         let mut inputs = Inputs::default();
-        people.begin_cycle(cycle, &mut plant, |_| told += 1).put_into(&mut inputs);
-        told += usize::from(people.rig_call(cycle).is_some());
+        people.begin_cycle(cycle, &mut plant, |_| reported += 1).put_into(&mut inputs);
+        reported += usize::from(people.rig_call(cycle).is_some());
         plant.step(&inputs);
     }
     assert_eq!(ALLOCATIONS.with(Cell::get), counted);
-    assert!(told > 5, "{told} things happened");
+    assert!(reported > 5, "{reported} things happened");
 }

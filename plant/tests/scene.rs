@@ -15,7 +15,7 @@ fn refused(text: &str) -> SceneError {
 struct Played {
     /// Plant at the start of each cycle, with the scripted forces over it.
     course: Vec<(State, HandForces)>,
-    told: Vec<(u64, Outcome)>,
+    reported: Vec<(u64, Outcome)>,
     plant: Plant,
 }
 
@@ -23,15 +23,15 @@ struct Played {
 fn play(scene: &Scene, cycles: u64, valve: impl Fn(u64) -> [f64; 2]) -> Played {
     let mut plant = Plant::new(&RigParameters::baseline(), &scene.setup()).expect("a checked setup");
     let mut people = People::new(scene);
-    let (mut course, mut told) = (Vec::new(), Vec::new());
+    let (mut course, mut reported) = (Vec::new(), Vec::new());
     for cycle in 0..cycles {
-        let forces = people.begin_cycle(cycle, &mut plant, |outcome| told.push((cycle, outcome)));
+        let forces = people.begin_cycle(cycle, &mut plant, |outcome| reported.push((cycle, outcome)));
         course.push((*plant.state(), forces));
         let mut inputs = Inputs { valve: valve(cycle), ..Inputs::default() };
         forces.put_into(&mut inputs);
         plant.step(&inputs);
     }
-    Played { course, told, plant }
+    Played { course, reported, plant }
 }
 
 fn shut(_: u64) -> [f64; 2] {
@@ -47,13 +47,15 @@ fn an_event_at_a_position_waits_for_the_carriage_from_its_time_on() {
     let text = "[rig]\ncarriage_position_m = 0.1\n[[rig.event]]\nat_s = 0.05\nat_position_m = 0.2\ndo = \"emergency-stop\"\n\
                 [[rig.event]]\nat_s = 0.1\ndo = \"weights\"\nadded_mass_kg = 5\n";
     let played = play(&scene(text), 1000, |_| [1.0, 0.0]);
-    let Some((cycle, Outcome::Stopped)) = played.told.last().copied() else { panic!("{:?}", played.told) };
-    assert_eq!(played.told[0], (100, Outcome::Weights { added_mass_kg: 5.0 }), "nothing waits for it");
+    let Some((cycle, Outcome::Stopped)) = played.reported.last().copied() else {
+        panic!("{:?}", played.reported)
+    };
+    assert_eq!(played.reported[0], (100, Outcome::Weights { added_mass_kg: 5.0 }), "nothing waits for it");
     let place_m = |cycle: u64| played.course[cycle as usize].0.axes[0].extension_m;
     assert!(place_m(cycle - 1) < 0.2 && place_m(cycle) >= 0.2, "{cycle}");
     // Beyond the place already: it is passed on the way back, and here there is none.
     let late = text.replace("0.05", "0.5");
-    assert_eq!(play(&scene(&late), 1000, |_| [1.0, 0.0]).told.len(), 1);
+    assert_eq!(play(&scene(&late), 1000, |_| [1.0, 0.0]).reported.len(), 1);
 }
 
 // The file.
@@ -236,7 +238,7 @@ fn events_act_in_their_cycle_in_the_order_of_their_times() {
         (200, Outcome::Linked),
         (300, Outcome::Released),
     ];
-    assert_eq!(played.told, expected);
+    assert_eq!(played.reported, expected);
     let stopped = |ms: usize| played.course[ms].0.emergency_stop;
     assert_eq!([99, 100, 299, 300].map(stopped), [false, true, true, false]);
 }
@@ -252,7 +254,7 @@ fn passing(until_s: f64) -> Played {
 #[test]
 fn a_link_is_tried_until_the_eye_passes_the_gap() {
     let played = passing(3.9);
-    let [(cycle, Outcome::Linked)] = played.told[..] else { panic!("{:?}", played.told) };
+    let [(cycle, Outcome::Linked)] = played.reported[..] else { panic!("{:?}", played.reported) };
     let (state, _) = &played.course[cycle as usize];
     let distance_m = eye_m(state) - state.axes[0].extension_m;
     assert!(cycle > 300 && distance_m.abs() <= 1e-4, "linked in cycle {cycle} at {distance_m} m");
@@ -262,10 +264,10 @@ fn a_link_is_tried_until_the_eye_passes_the_gap() {
 #[test]
 fn a_link_that_never_succeeded_is_told_once_when_its_time_is_up() {
     let played = passing(0.25);
-    assert_eq!(played.told, [(250, Outcome::LinkGivenUp)]);
+    assert_eq!(played.reported, [(250, Outcome::LinkGivenUp)]);
     assert!(!played.plant.linked());
     let once = scene("[[rig.event]]\nat_s = 0.2\ndo = \"link\"\n");
-    assert_eq!(play(&once, 300, shut).told, [(200, Outcome::LinkRefused)]);
+    assert_eq!(play(&once, 300, shut).reported, [(200, Outcome::LinkRefused)]);
 }
 
 #[test]
@@ -273,7 +275,7 @@ fn parting_the_rods_ends_the_tries_at_linking_them() {
     let text =
         "[[rig.event]]\nat_s = 0.1\ndo = \"link\"\nuntil_s = 1\n[[rig.event]]\nat_s = 0.2\ndo = \"unlink\"\n";
     let expected = [(200, Outcome::LinkGivenUp), (200, Outcome::Unlinked)];
-    assert_eq!(play(&scene(text), 1500, shut).told, expected);
+    assert_eq!(play(&scene(text), 1500, shut).reported, expected);
 }
 
 /// Valve of a load that yields to whoever pushes it: some 1.5 mm/s for each newton, over the valve's dead band of 3 %.
@@ -290,15 +292,15 @@ fn the_linkage_is_made_and_broken_by_hand_when_the_load_yields() {
     let rig = RigParameters::baseline();
     let mut plant = Plant::new(&rig, &scene.setup()).expect("a checked setup");
     let mut people = People::new(&scene);
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for cycle in 0..5500 {
-        let forces = people.begin_cycle(cycle, &mut plant, |outcome| told.push((cycle, outcome)));
+        let forces = people.begin_cycle(cycle, &mut plant, |outcome| reported.push((cycle, outcome)));
         let mut inputs = Inputs::default();
         forces.put_into(&mut inputs);
         inputs.valve[1] = plant::quantise_valve(yielding(plant.truth(&inputs).axes[1].sensor_force_n));
         plant.step(&inputs);
     }
-    let [(linked, Outcome::Linked), (5000, Outcome::Unlinked)] = told[..] else { panic!("{told:?}") };
+    let [(linked, Outcome::Linked), (5000, Outcome::Unlinked)] = reported[..] else { panic!("{reported:?}") };
     assert!((1000..4000).contains(&linked), "cycle {linked}");
 }
 
@@ -313,6 +315,6 @@ fn a_scene_played_twice_is_equal_to_the_bit() {
     );
     let valve = |cycle: u64| [0.0, if cycle > 2000 { 0.2 } else { 0.0 }];
     let [one, other] = [(); 2].map(|()| play(&scene(&text), 4000, valve));
-    assert_eq!(one.told, other.told);
+    assert_eq!(one.reported, other.reported);
     assert_eq!(one.course, other.course);
 }

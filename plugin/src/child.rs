@@ -152,9 +152,9 @@ fn wait(child: &mut Child, limit: Duration) -> io::Result<Option<ExitStatus>> {
 fn judge(trier: &Trier, status: Option<ExitStatus>, text: &str) -> Result<(), Wrong> {
     let (mut stage, mut verdict, mut last) = (None, None, "");
     for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
-        match line.strip_prefix(MARK).map(|told| told.split_once(' ').unwrap_or((told, ""))) {
+        match line.strip_prefix(MARK).map(|reported| reported.split_once(' ').unwrap_or((reported, ""))) {
             Some(("at", place)) => stage = Some(place.to_owned()),
-            Some(told) => verdict = Some(told),
+            Some(reported) => verdict = Some(reported),
             None => last = line,
         }
     }
@@ -163,7 +163,7 @@ fn judge(trier: &Trier, status: Option<ExitStatus>, text: &str) -> Result<(), Wr
     match (status, verdict) {
         (None, _) => Err(Wrong::Hung { limit: trier.limit, during }),
         (Some(status), _) if status.signal().is_some() => Err(Wrong::Crashed { status, during }),
-        // It told no stage: another program, or an older one.
+        // It reported no stage: another program, or an older one.
         _ if stage.is_none() => Err(Wrong::ForeignTrier(trier.program.clone())),
         (Some(status), Some(("good", _))) if status.success() => Ok(()),
         (Some(_), Some(("refused", why))) => Err(Wrong::Told(why.to_owned())),

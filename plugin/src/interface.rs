@@ -114,8 +114,8 @@ mod tests {
     macro_rules! layout {
         ($rust:ident, $c:literal: $($field:ident)*) => {{
             let fields = [$((stringify!($field), offset_of!($rust, $field))),*];
-            let told = [("size", size_of::<$rust>())].into_iter().chain(fields);
-            let lines: String = told.map(|(name, bytes)| format!("{} {name} {bytes}\n", $c)).collect();
+            let reported = [("size", size_of::<$rust>())].into_iter().chain(fields);
+            let lines: String = reported.map(|(name, bytes)| format!("{} {name} {bytes}\n", $c)).collect();
             let mut program = format!("printf(\"{} size %zu\\n\", sizeof(struct {}));\n", $c, $c);
             for (name, _) in fields {
                 program += &format!("printf(\"{} {name} %zu\\n\", offsetof(struct {}, {name}));\n", $c, $c);

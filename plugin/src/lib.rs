@@ -96,12 +96,12 @@ pub fn load_tried_by(trier: &Trier, path: &Path, rig: &RigParameters) -> Result<
 
 /// What the library of `path` offers, after a trial in a child process.
 pub fn describe(trier: &Trier, path: &Path) -> Result<Description, PluginError> {
-    let told = || {
+    let reported = || {
         let file = absolute(path)?;
         trier.try_out(&file)?;
         Ok(foreign::open(&file, &mut |_| ())?.description)
     };
-    told().map_err(|wrong| PluginError { library: path.to_owned(), wrong })
+    reported().map_err(|wrong| PluginError { library: path.to_owned(), wrong })
 }
 
 /// The trial itself, in this process: opens, asks and runs the library with the shipped rig's numbers, every parameter

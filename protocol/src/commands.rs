@@ -29,7 +29,7 @@ pub struct CommandCounters {
     pub breaks: u64,
     /// Accepted commands that came a cycle or more later than the cycle after the one that they answer.
     pub late: u64,
-    /// Commands equal to the one before, counter and all; accepted all the same, and told apart by the watch for two senders.
+    /// Commands equal to the one before, counter and all; accepted all the same, and distinguished by the watch for two senders.
     pub duplicate: u64,
     /// Times that the fault `two-sources` was latched.
     pub two_sources: u64,
@@ -156,7 +156,7 @@ impl CommandIntake {
 mod tests {
     use super::*;
 
-    /// An intake and its cycles, with a sender that answers each cycle unless told not to.
+    /// An intake and its cycles, with a sender that answers each cycle unless asked not to.
     #[derive(Default)]
     struct Bench {
         intake: CommandIntake,

@@ -54,7 +54,7 @@ impl SourceWatch {
     pub fn note(&mut self, alive: u8, cycle: u64, answered: u64) -> Step {
         let step = match &self.last {
             None => Step::Continues { lost: 0 },
-            // After a silence the command was stale, which is told; what comes now may be a restart, so that its
+            // After a silence the command was stale, which is reported; what comes now may be a restart, so that its
             // counter says nothing about loss.
             Some(seen) if cycle - seen.cycle > SILENCE_CYCLES => Step::Continues { lost: 0 },
             Some(seen) => {

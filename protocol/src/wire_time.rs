@@ -6,16 +6,16 @@
 //!                                                   └─────────────────────────────────┘ again
 //! ```
 //!
-//! The model has no clock, no thread and no socket: it is told when frames enter and how far time has come, and answers with what
-//! happened by then, in ns of whatever clock the caller uses. The host of the embedded bus drives it in real time and in lockstep
-//! (`bus/timed.rs`); tests drive it alone.
+//! The model has no clock, no thread and no socket: it is given when frames enter and how far time has come, and answers with
+//! what happened by then, in ns of whatever clock the caller uses. The host of the embedded bus drives it in real time and in
+//! lockstep (`bus/timed.rs`); tests drive it alone.
 //!
 //! `bits` counts a frame's bits, `node` holds error counters and bus-off, `model` puts frames in order and in time, `report`
 //! is what it counted. What the analysis says beforehand is [`crate::response_time`].
 //!
 //! Modelled: bits with real stuffing, arbitration by identifier, queues, errors and their cost, error counters, error-passive and
 //! bus-off nodes with their recovery. Not modelled: propagation delay and clock tolerance, missing acknowledgement (a node
-//! alone on the bus is heard by nobody and told nothing), overload frames, two nodes that send one identifier at once (the
+//! alone on the bus is heard by nobody and informed of nothing), overload frames, two nodes that send one identifier at once (the
 //! one that was queued first goes first), and controllers that hold fewer mailboxes than frames.
 //!
 //! Source: ISO 11898-1; Davis, Burns, Bril, Lukkien, "Controller Area Network (CAN) schedulability analysis: Refuted,

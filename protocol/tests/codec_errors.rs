@@ -31,8 +31,8 @@ fn each_physical_signal_refuses_what_is_out_of_range_or_not_finite() {
                     EncodeError::NotFinite { message, signal: named, .. } if not_finite => {
                         assert_eq!((message.name, named.name), (spec.name, signal.name));
                     }
-                    EncodeError::OutOfRange { message, signal: named, value: told } if !not_finite => {
-                        assert_eq!((message.name, named.name, told), (spec.name, signal.name, value));
+                    EncodeError::OutOfRange { message, signal: named, value: reported } if !not_finite => {
+                        assert_eq!((message.name, named.name, reported), (spec.name, signal.name, value));
                     }
                     other => panic!("{}.{} = {value}: {other}", spec.name, signal.name),
                 }

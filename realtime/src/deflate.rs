@@ -45,7 +45,7 @@ impl DeflateSerializer {
         };
         let mut largest = Recorder::new();
         largest.record(BOUND_NS);
-        // Into the sink goes everything; a histogram that cannot be encoded is told when it is one of the run.
+        // Into the sink goes everything; a histogram that cannot be encoded is reported when it is one of the run.
         let _ = serializer.serialize(largest.histogram(), &mut io::sink());
         serializer
     }

@@ -170,7 +170,7 @@ impl IntervalLog {
         let written = self.file.write_all(&self.lines).map_err(|error| named(&self.path, &error));
         match written {
             Ok(()) => self.length += self.lines.len() as u64,
-            // A full disk takes a part: it goes again. If it cannot, the error that led here is told in any case.
+            // A full disk takes a part: it goes again. If it cannot, the error that led here is reported in any case.
             Err(_) => drop(self.file.set_len(self.length)),
         }
         self.lines.clear();

@@ -175,7 +175,7 @@ pub struct LoopStatistics {
     pub late_completions: u64,
     /// Wake-up latency of each cycle, missed ones too, against its own scheduled time, in ns.
     pub wakeup_ns: Recorder,
-    /// Execution time of each cycle whose end of work was told, in ns.
+    /// Execution time of each cycle whose end of work was reported, in ns.
     pub execution_ns: Recorder,
     /// Period error of each cycle handed out but the first, in ns.
     pub period_error_ns: Recorder,
@@ -251,7 +251,7 @@ impl<C: Clock> PeriodicLoop<C> {
         Ok(cycle)
     }
 
-    /// Records the execution time of the cycle since its wake-up, and tells when that was. Without a cycle, or told twice, it
+    /// Records the execution time of the cycle since its wake-up, and tells when that was. Without a cycle, or reported twice, it
     /// does nothing.
     pub fn end_of_work(&mut self) -> Option<Instant> {
         let cycle = self.working.take()?;

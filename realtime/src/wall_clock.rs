@@ -92,8 +92,8 @@ mod tests {
         let mut watch = WallClockWatch { began: Instant::from_nanos(0), offset_ns: 1_000_000_000 };
         let at = |ms: u64| Instant::from_nanos(ms * 1_000_000);
         assert_eq!(watch.judge(at(4), 1_000_002_000), None);
-        let told = watch.judge(at(2000), 4_600_002_000);
-        assert_eq!(told, Some(WallClockStep { at_s: 2.0, step_s: 3.6 }));
+        let reported = watch.judge(at(2000), 4_600_002_000);
+        assert_eq!(reported, Some(WallClockStep { at_s: 2.0, step_s: 3.6 }));
         assert_eq!(watch.judge(at(2004), 4_600_004_000), None);
         let back = watch.judge(at(2008), 1_000_004_000);
         assert_eq!(back.map(|step| step.step_s), Some(-3.6));

@@ -1,7 +1,7 @@
 //! Logs as `candump -L` writes them: a line, written and read, and a [`LogReader`] over a whole one.
 //!
 //! `(SSSSSSSSSS.UUUUUU) IFACE ID#HEX`, six decimals, upper case, no comments: python-can, cantools and SavvyCAN read it. Readers
-//! take anything: what is no line is told with its column, and a [`LogReader`] adds the line.
+//! take anything: what is no line is reported with its column, and a [`LogReader`] adds the line.
 
 mod reader;
 

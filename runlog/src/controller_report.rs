@@ -58,7 +58,7 @@ pub struct ControllerReport<N = Value, X = Value> {
     pub realtime_refused: Vec<String>,
     /// Each axis of the process.
     pub axes: BTreeMap<String, AxisReport<X>>,
-    /// What a person was told.
+    /// What a person was shown.
     pub news: Vec<N>,
 }
 

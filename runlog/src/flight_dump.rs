@@ -175,8 +175,8 @@ mod tests {
         };
         assert_eq!(timing::read(&read("timing.csv")).unwrap(), rows);
         assert_eq!(read("bus.log"), "(1700000001.234567) vcan0 120#AB0001\n");
-        let told: serde_json::Value = serde_json::from_str(&read("event.json")).unwrap();
-        assert_eq!((&told["trigger"], &told["cycle"]), (&"late".into(), &42.into()));
+        let reported: serde_json::Value = serde_json::from_str(&read("event.json")).unwrap();
+        assert_eq!((&reported["trigger"], &reported["cycle"]), (&"late".into(), &42.into()));
     }
 
     #[test]

@@ -121,7 +121,7 @@ impl LineFile {
         let taken = self.file.stream_position().map_or(0, |end| end.saturating_sub(self.length)) as usize;
         let taken = &self.buffer[..taken.min(self.buffer.len())];
         self.length += taken.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end as u64 + 1);
-        // A file that cannot be cut keeps its half line; the error that led here is told in any case.
+        // A file that cannot be cut keeps its half line; the error that led here is reported in any case.
         let _ = self.file.set_len(self.length);
     }
 }
@@ -192,7 +192,7 @@ pub fn write_whole(path: &Path, text: &str) -> io::Result<()> {
         .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
         .and_then(|()| std::fs::rename(&temporary, path));
     written.inspect_err(|_| {
-        // Half a file is no use; that it cannot be taken away changes nothing of what is told.
+        // Half a file is no use; that it cannot be taken away changes nothing of what is reported.
         let _ = std::fs::remove_file(&temporary);
     })
 }

@@ -14,7 +14,7 @@
 //! | 4 loss | u64 LE: records that this viewer's buffer had no room for, in all |
 //! | 5 answer | JSON, one for each line asked, in their order: `ok`, and `text` for a person |
 //!
-//! The stream is lossy: a viewer that reads too slowly misses whole records, never parts of one, and is told how many before the
+//! The stream is lossy: a viewer that reads too slowly misses whole records, never parts of one, and is given how many before the
 //! next that it gets. Events that came before a viewer did follow the description, so that it knows what is broken and loaded:
 //! the first thousand of each kind, and of late wake-ups the description counts the others.
 //! Nothing that a viewer does or leaves undone reaches the run, save commands of a run with `--console`.

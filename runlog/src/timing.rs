@@ -244,10 +244,10 @@ mod tests {
     fn what_is_wrong_is_told_with_its_place() {
         assert!(matches!(read("a,b\n"), Err(TableError::Head(_))));
         let head = COLUMNS.join(",");
-        let told = read(&format!("{head}\n1,2\n")).unwrap_err().to_string();
-        assert!(told.starts_with("line 2: 2 values"), "{told}");
+        let reported = read(&format!("{head}\n1,2\n")).unwrap_err().to_string();
+        assert!(reported.starts_with("line 2: 2 values"), "{reported}");
         let values = ["1"; COLUMNS.len()].join(",").replacen("1,", "x,", 1);
-        let told = read(&format!("{head}\n{values}\n")).unwrap_err().to_string();
-        assert!(told.starts_with("line 2, cycle: "), "{told}");
+        let reported = read(&format!("{head}\n{values}\n")).unwrap_err().to_string();
+        assert!(reported.starts_with("line 2, cycle: "), "{reported}");
     }
 }

@@ -1,4 +1,4 @@
-//! A table of a TOML file, read key by key: what is wrong is told with file, line, key, value and what is allowed.
+//! A table of a TOML file, read key by key: what is wrong is reported with file, line, key, value and what is allowed.
 //!
 //! Every number is checked against a [`Parameter`]. A key that nobody asked for is refused by [`Section::finish`], which names
 //! those that were asked for.
@@ -95,13 +95,13 @@ impl<'a> Section<'a> {
         let Some(value) = self.value(&parameter.name) else { return Ok(None) };
         match number(value.get_ref()) {
             Some(number) => {
-                parameter.check(number).map(Some).map_err(|error| self.told(value, &error.to_string()))
+                parameter.check(number).map(Some).map_err(|error| self.reported(value, &error.to_string()))
             }
             None => {
                 let Parameter { name, unit, least, most, .. } = parameter;
                 let written = self.source.written(value);
                 let allowed = format!("allowed is a number, {least} to {most} {unit}");
-                Err(self.told(value, &format!("{name} = {written}; {}", allowed.trim_end())))
+                Err(self.reported(value, &format!("{name} = {written}; {}", allowed.trim_end())))
             }
         }
     }
@@ -147,7 +147,7 @@ impl<'a> Section<'a> {
             Some(text) => Ok(Some(Text { text: text.into(), line: self.source.line(value.span().start) })),
             None => {
                 let written = self.source.written(value);
-                Err(self.told(value, &format!("{key} = {written}; allowed is a text in quotes")))
+                Err(self.reported(value, &format!("{key} = {written}; allowed is a text in quotes")))
             }
         }
     }
@@ -179,7 +179,7 @@ impl<'a> Section<'a> {
         let texts = list.and_then(|list| list.iter().map(|item| item.get_ref().as_str()).collect());
         let Some(texts): Option<Vec<&str>> = texts else {
             let written = self.source.written(value);
-            return Err(self.told(value, &format!("{key} = {written}; allowed is a list of texts")));
+            return Err(self.reported(value, &format!("{key} = {written}; allowed is a list of texts")));
         };
         texts.into_iter().map(|text| self.chosen(key, text, choices)).collect()
     }
@@ -208,7 +208,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let Some(list) = value.get_ref().as_array() else {
             return Err(
-                self.told(value, &format!("{key} must be a list of tables: [[{}]]", self.path_of(key)))
+                self.reported(value, &format!("{key} must be a list of tables: [[{}]]", self.path_of(key)))
             );
         };
         let path = |place: usize| format!("{}[{place}]", self.path_of(key));
@@ -259,7 +259,7 @@ impl<'a> Section<'a> {
     #[must_use]
     pub fn wrong_at(&self, key: &str, said: &str) -> SettingsError {
         match self.table.iter().find(|(name, _)| name.get_ref() == key) {
-            Some((_, value)) => self.told(value, said),
+            Some((_, value)) => self.reported(value, said),
             None => self.wrong(said),
         }
     }
@@ -270,7 +270,7 @@ impl<'a> Section<'a> {
         self.wrong(&format!("{said}; the keys here are {}", keys.join(", ")))
     }
 
-    fn told(&self, value: &Spanned<DeValue<'_>>, said: &str) -> SettingsError {
+    fn reported(&self, value: &Spanned<DeValue<'_>>, said: &str) -> SettingsError {
         let line = self.source.line(value.span().start);
         SettingsError(format!("{}:{line}: {}", self.source.file.display(), self.path_of(said)))
     }

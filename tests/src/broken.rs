@@ -1,5 +1,5 @@
 //! Runs in lockstep with a script of faults, and everything that they leave: the rig with one member that opens the valves as it
-//! is told and writes down what it hears.
+//! is given and writes down what it hears.
 
 use crate::launch::Pace;
 use crate::records::{Table, bus_log, json};
@@ -144,11 +144,11 @@ impl Left {
                 (cycle, mark["number"].as_u64().unwrap_or(0) as u16, text("what"), text("fault"), text("at"))
             })
             .collect();
-        let told: Vec<_> = rows
+        let reported: Vec<_> = rows
             .iter()
             .map(|row| (row.cycle, row.number, row.what.clone(), row.fault.clone(), row.at.clone()))
             .collect();
-        assert_eq!(events, told, "summary.json and faults.csv");
+        assert_eq!(events, reported, "summary.json and faults.csv");
         let frames: Vec<_> = self
             .log
             .iter()

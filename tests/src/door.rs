@@ -1,4 +1,4 @@
-//! The gateway as a process, and a client of the socketcand protocol that does exactly what it is told.
+//! The gateway as a process, and a client of the socketcand protocol that does exactly what it is asked.
 
 use crate::binaries::Program;
 use crate::process::{PATIENCE, Running, wait_until};
@@ -59,7 +59,7 @@ impl Door {
     }
 }
 
-/// A client that does what it is told.
+/// A client that does what it is asked.
 pub struct DoorClient {
     pub stream: TcpStream,
     text: String,

@@ -1,4 +1,4 @@
-//! What the emulator told of a run, read from `summary.json`, and what the valve did meanwhile.
+//! What the emulator reported of a run, read from `summary.json`, and what the valve did meanwhile.
 
 use crate::records::{Table, count};
 use serde_json::Value;
@@ -34,7 +34,7 @@ fn read(event: &Value) -> Event {
     }
 }
 
-/// How often an event was told.
+/// How often an event was reported.
 pub fn times(events: &[Event], kind: &str) -> usize {
     events.iter().filter(|event| event.kind == kind).count()
 }

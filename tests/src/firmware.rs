@@ -51,9 +51,9 @@ pub struct Positioned {
     pub position_error_dynamic_m: f64,
     /// Largest of the mean differences over the last 0.2 s of each rest, m.
     pub position_error_static_m: f64,
-    /// Largest difference of the set-points that it told from those that are computed here, m.
+    /// Largest difference between the set-points that it reported and those that are computed here, m.
     pub set_point_error_m: f64,
-    /// Set-points that it told during the experiment.
+    /// Set-points that it reported during the experiment.
     pub set_points: usize,
     /// Cycles of the experiment whose sensors crossed the bus, and that are in the errors.
     pub cycles: usize,
@@ -61,7 +61,7 @@ pub struct Positioned {
     pub left_out: usize,
 }
 
-/// Reads off the frames of a run how it positioned. What a machine that stood still did to the loop is left out, and told.
+/// Reads off the frames of a run how it positioned. What a machine that stood still did to the loop is left out, and reported.
 pub fn positioned(frames: &[CanFrame]) -> Positioned {
     let mut counted = Counted::default();
     frames.iter().filter_map(|frame| Frame::decode(frame).ok()).for_each(|frame| counted.take(&frame));
@@ -136,14 +136,14 @@ impl Counted {
                 self.answered = answered;
                 std::mem::take(&mut self.waiting).iter().for_each(|frame| self.take_told(frame));
             }
-            told if self.lockstep => self.take_told(told),
-            told => self.waiting.push(*told),
+            reported if self.lockstep => self.take_told(reported),
+            reported => self.waiting.push(*reported),
         }
     }
 
-    /// What it told of the cycle that it answers.
-    fn take_told(&mut self, told: &Frame) {
-        match told {
+    /// What it reported of the cycle that it answers.
+    fn take_told(&mut self, reported: &Frame) {
+        match reported {
             Frame::DriveChainStatus(status) if status.main_chain == MainChainState::Experiment => {
                 self.began.get_or_insert(self.answered);
             }

@@ -151,7 +151,7 @@ pub struct InterfaceCounters {
     pub received: u64,
     /// Frames, and error frames, that the kernel dropped before the sockets since the interface went down.
     pub dropped: u64,
-    /// Times the card told that its receive FIFO had run over, each for one frame or more.
+    /// Times the card reported that its receive FIFO had run over, each for one frame or more.
     pub overruns: u64,
 }
 
@@ -188,7 +188,7 @@ pub fn compare_candump(log: &Path, run: &Path) -> Result<String, String> {
     let mut command = Command::new(python());
     command.args(["-W", "error"]).arg(script).arg(workspace().join("protocol/rig.dbc")).arg(log).arg(run);
     let output = command.output().expect("Python starts");
-    let [told, complaint] =
+    let [reported, complaint] =
         [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-    if output.status.success() { Ok(told) } else { Err(complaint) }
+    if output.status.success() { Ok(reported) } else { Err(complaint) }
 }

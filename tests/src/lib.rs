@@ -10,7 +10,7 @@
 //!   xcp ───── a client of the controllers' XCP, packet by packet, and the foreign one in Python
 //!   foreign_python  scripts with the packages that the product is held against
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
-//!   door ──── the gateway, and a client that does what it is told
+//!   door ──── the gateway, and a client that does what it is asked
 //!   onlooker  a viewer of the telemetry, and the live page as programs see it
 //!   discrepancy  the workflow as a program
 //!   hidden ── effects: each, drawn, all at the ends of their ranges

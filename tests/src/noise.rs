@@ -54,7 +54,7 @@ pub struct Sent {
     pub duration_s: f64,
 }
 
-/// A node that babbles until it is told to end.
+/// A node that babbles until it is asked to end.
 pub struct Noise {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<Sent>,
@@ -188,7 +188,7 @@ pub fn run(seconds: u32, per_second: u32, seed: u64) -> Outcome {
 
 fn outcome(scene: &Scene, sent: Sent) -> Outcome {
     let summary = records::json(&scene.path("emulator/summary.json"));
-    let told = records::json(&scene.path("controller/controller.json"));
+    let reported = records::json(&scene.path("controller/controller.json"));
     let of = |pointer: &str| count(&summary, pointer);
     let mut obeyed = Obeyed::default();
     AXES.iter().for_each(|axis| obeyed.add(scene, axis));
@@ -199,7 +199,7 @@ fn outcome(scene: &Scene, sent: Sent) -> Outcome {
         wakeup_p99_ns: of("/wakeup_ns/p99"),
         round_trip_p99_ns: of("/round_trip_ns/p99"),
         commands_lost: of("/frames_lost_at_rig"),
-        sensors_lost: count(&told, "/axes/drive/sensors_lost"),
+        sensors_lost: count(&reported, "/axes/drive/sensors_lost"),
         malformed: of("/frames_ignored/malformed"),
         unknown: of("/frames_ignored/unknown"),
         stale: of("/stale_commands"),
@@ -221,8 +221,9 @@ impl Obeyed {
     /// Adds those of an axis. The load's controller holds its valve shut throughout, so whatever acts there is wrong.
     fn add(&mut self, scene: &Scene, axis: &str) {
         let acted = Table::read(&scene.path("emulator/measurement.csv")).column(&format!("{axis}_valve"));
-        let told = AxisTable::read(&scene.path(&format!("controller/controller-{axis}.csv")));
-        let (cycles, openings, enabled) = (told.cycles(), told.numbers("opening"), told.numbers("enabled"));
+        let reported = AxisTable::read(&scene.path(&format!("controller/controller-{axis}.csv")));
+        let (cycles, openings, enabled) =
+            (reported.cycles(), reported.numbers("opening"), reported.numbers("enabled"));
         let mut answered = 0;
         for (cycle, acted) in acted.into_iter().enumerate() {
             answered += cycles[answered..].iter().take_while(|answers| **answers < cycle).count();

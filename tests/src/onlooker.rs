@@ -16,10 +16,10 @@ pub struct Viewer {
     decoder: Decoder,
 }
 
-/// A cycle as a viewer was told it: its number, and a value for each column.
+/// A cycle as a viewer was given it: its number, and a value for each column.
 pub type ToldCycle = (u64, Vec<f64>);
 
-/// Everything that a viewer was told.
+/// Everything that a viewer was sent.
 #[derive(Debug, Default)]
 pub struct Told {
     pub description: Value,
@@ -75,19 +75,19 @@ impl Viewer {
 
     /// Everything until the run ends.
     pub fn to_the_end(mut self) -> Told {
-        let mut told = Told::default();
+        let mut reported = Told::default();
         let json = |text: &str| serde_json::from_str(text).expect("JSON");
         while let Some(packet) = self.packet() {
             match packet {
-                Packet::Description(text) => told.description = json(&text),
-                Packet::Cycle(cycle, values) => told.cycles.push((cycle, values)),
-                Packet::Event(text) => told.events.push(json(&text)),
-                Packet::Histogram(line) => told.histograms.push(line),
-                Packet::Loss(lost) => told.lost = lost,
+                Packet::Description(text) => reported.description = json(&text),
+                Packet::Cycle(cycle, values) => reported.cycles.push((cycle, values)),
+                Packet::Event(text) => reported.events.push(json(&text)),
+                Packet::Histogram(line) => reported.histograms.push(line),
+                Packet::Loss(lost) => reported.lost = lost,
                 Packet::Answer(text) => panic!("nobody asked for {text}"),
             }
         }
-        told
+        reported
     }
 }
 

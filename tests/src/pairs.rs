@@ -7,7 +7,7 @@ use std::time::Instant;
 /// A figure of a run: its name, and how it is read.
 pub type Figure<T> = (&'static str, fn(&T) -> f64);
 
-/// Runs so many pairs, without and with; `run` is told which, and the pair's number from 1. `tell` says something of each pair.
+/// Runs so many pairs, without and with; `run` is given which, and the pair's number from 1. `tell` says something of each pair.
 pub fn in_turns<T>(
     pairs: u32,
     mut run: impl FnMut(bool, u32) -> T,

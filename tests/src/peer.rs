@@ -99,7 +99,7 @@ impl Peer {
         }
     }
 
-    /// Takes part in the lockstep barrier until the host goes: `act` is told the cycle and its frames, and sends through the
+    /// Takes part in the lockstep barrier until the host goes: `act` is given the cycle and its frames, and sends through the
     /// peer what it likes before the member is done.
     pub fn take_part(&self, name: &str, mut act: impl FnMut(&Self, u32, &[CanFrame])) {
         self.send(&Control::named(Kind::Join(Role::Member), 0, name).to_bytes());

@@ -164,9 +164,12 @@ fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() 
         rows.iter().position(|row| row.skipped >= 25).expect("a row that skips the cycles of the stop");
     // A cycle that was stopped in its midst tells it in its own row, before the one that skips; a handler that runs on another
     // thread, in a later one.
-    let told: Vec<_> = (0..rows.len()).filter(|row| rows[*row].vitals.continued > 0).collect();
-    assert!(matches!(told[..], [row] if row + 1 >= stopped), "told in {told:?}, stopped at {stopped}");
-    assert_eq!(rows[told[0]].vitals.continued, 1, "{:?}", rows[told[0]]);
+    let reported: Vec<_> = (0..rows.len()).filter(|row| rows[*row].vitals.continued > 0).collect();
+    assert!(
+        matches!(reported[..], [row] if row + 1 >= stopped),
+        "told in {reported:?}, stopped at {stopped}"
+    );
+    assert_eq!(rows[reported[0]].vitals.continued, 1, "{:?}", rows[reported[0]]);
     let report = json(&scene.path("controller/controller.json"));
     assert_eq!(count(&report, "/vitals/continued"), 1);
     let max_ns = count(&report, "/wakeup_ns/max");

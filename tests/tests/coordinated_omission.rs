@@ -69,9 +69,11 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     assert_eq!(table.len() as u64 + skipped, cycles, "rows and skipped cycles");
     // A busy machine may stall the rig for longer at another time; this stall ends with the continuation, whose handler may run
     // on another thread, a moment later.
-    let told = table.iter().find(|row| row.vitals.continued > 0).expect("no row tells of the continuation");
-    let before =
-        table.iter().filter(|row| (told.cycle.saturating_sub(1000)..=told.cycle).contains(&row.cycle));
+    let reported =
+        table.iter().find(|row| row.vitals.continued > 0).expect("no row tells of the continuation");
+    let before = table
+        .iter()
+        .filter(|row| (reported.cycle.saturating_sub(1000)..=reported.cycle).contains(&row.cycle));
     let stall = before.max_by_key(|row| row.skipped).expect("a row");
     // The system may take its time to go on, but not less than was slept.
     assert!(stall.skipped >= 49, "{stall:?}");
@@ -110,7 +112,7 @@ fn a_stall_of_fifty_milliseconds_leaves_all_its_late_cycles_and_a_dump_that_show
     assert_eq!((&event["trigger"], &event["process"]), (&"overrun".into(), &"emulator".into()));
     assert_eq!((count(&event, "/cycle"), count(&event, "/late_ns")), (stall.cycle, late_ns));
     let around = rows(&dump.join("timing.csv"));
-    assert!(around.iter().any(|row| row.vitals.continued > 0), "{told:?} is not in the dump");
+    assert!(around.iter().any(|row| row.vitals.continued > 0), "{reported:?} is not in the dump");
     assert!(count(&summary, "/vitals/continued") > 0);
     assert!(around.len() > 1000, "a second before, and something after: {} rows", around.len());
     assert!(bus_log(&dump.join("bus.log")).len() > 4000, "four frames in a cycle at least");

@@ -1,6 +1,6 @@
 //! `discrepancy` as a program: a hidden effect is named from a blind record, the same bytes come out whatever the threads and
 //! whether or not a held-out record is given, each step runs alone, bad records are survived or refused, and what cannot be
-//! read is told with file, line and what is allowed.
+//! read is reported with file, line and what is allowed.
 //!
 //! The record is the record maker's, whose integrator and laws are not the plant's.
 
@@ -125,9 +125,9 @@ fn a_hidden_effect_is_named_in_the_same_bytes_whatever_the_threads_and_the_held_
     assert_eq!(report["named"][0]["where"]["axis"], "drive");
     assert!(one.stdout.contains(EFFECT), "{}", one.stdout);
     assert!(one.stderr.contains(" s: "), "no progress: {}", one.stderr);
-    let told = &report["named"][0]["parameters"][0];
-    let (value, error) = (told["value"].as_f64().unwrap(), told["standard_error"].as_f64().unwrap());
-    assert!((value - FORCE_N).abs() < (4.0 * error).max(0.1 * FORCE_N), "{told}");
+    let reported = &report["named"][0]["parameters"][0];
+    let (value, error) = (reported["value"].as_f64().unwrap(), reported["standard_error"].as_f64().unwrap());
+    assert!((value - FORCE_N).abs() < (4.0 * error).max(0.1 * FORCE_N), "{reported}");
 
     // `name` is a close without a held-out record.
     on("name", &own.train, &out("name"), &["--threads", "2"]).expect_code(GOOD);
@@ -217,13 +217,13 @@ fn the_steps_before_a_report_run_alone() {
     assert_eq!(json(&folder.path().join("checks.json"))[0]["usable"], true);
 
     let calibrate = on("calibrate", train, folder.path(), &[]).expect_code(GOOD);
-    // What is missing here is no number of the file: points of a table that it hides are said not to be told.
-    for told in [
+    // What is missing here is no number of the file: points of a table that it hides are said not to be reported.
+    for reported in [
         "parameter:mass = ",
         "cylinder.dead_volume_cm3 = ",
         "valve.kv_supply_m3_per_h[3]: not determined by these records",
     ] {
-        assert!(calibrate.stdout.contains(told), "{}", calibrate.stdout);
+        assert!(calibrate.stdout.contains(reported), "{}", calibrate.stdout);
     }
     let parameters = json(&folder.path().join("parameters.json"));
     let mass = &parameters[0];
@@ -268,7 +268,7 @@ fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
     });
     assert!(saturated, "{}", check.stdout);
 
-    // A held-out record that cannot be used takes nothing away from what was found, and is told.
+    // A held-out record that cannot be used takes nothing away from what was found, and is reported.
     let swapped = folder.path().join("swapped");
     fs::create_dir(&swapped).expect("a folder");
     let swapped = spoilt(&swapped, |_, cells| Some(swap_pressures(cells)));
@@ -291,7 +291,7 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
         ("swapped-pressures", "pressures a and b are swapped", swap_pressures),
         ("force-sign", "drive_force_N", |cells| turn_force(&cells)),
     ];
-    for (kind, told, change) in cases {
+    for (kind, reported, change) in cases {
         let folder = tempfile::tempdir().expect("a folder");
         let record = spoilt(folder.path(), |_, cells| Some(change(cells)));
         let ended = on("close", &record, folder.path(), &[]).expect_code(BAD_INPUT);
@@ -302,12 +302,12 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
         let own = findings.iter().find(|own| own["kind"] == kind).unwrap_or_else(|| panic!("{findings:#?}"));
         assert_eq!(own["fatal"], true);
         let line = own["line"].as_u64().unwrap_or_else(|| panic!("no line in {own}"));
-        ended.expect_printed(&[told, &format!("{}:{line}: ", record.display())]);
+        ended.expect_printed(&[reported, &format!("{}:{line}: ", record.display())]);
         assert!(folder.path().join("report.html").exists());
         assert!(!folder.path().join("rig.toml").exists(), "a model out of a record that cannot be used");
         // The steps alone refuse it too, with the same words.
         let ended = on("calibrate", &record, folder.path(), &[]).expect_code(BAD_INPUT);
-        assert!(ended.stderr.contains(told), "{}", ended.stderr);
+        assert!(ended.stderr.contains(reported), "{}", ended.stderr);
     }
 }
 
@@ -338,7 +338,7 @@ fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves
     for name in ["report.json", "rig.toml", "next-chirps.toml", "notes.txt"] {
         fs::write(out.join(name), "{}").expect("a folder that can be written");
     }
-    // Without a column that the simulation needs: told as any other defect, with a report.
+    // Without a column that the simulation needs: reported as any other defect, with a report.
     let record = folder.path().join("narrow.csv");
     let text = fs::read_to_string(&records().train).expect("the record");
     fs::write(&record, text.replace("drive_pressure_b_Pa", "drive_presure_b_Pa")).expect("room");

@@ -1,5 +1,5 @@
-//! Steps of `discrepancy` alone: records that do not go together are refused by all of them, and what cannot be told apart gets
-//! an experiment.
+//! Steps of `discrepancy` alone: records that do not go together are refused by all of them, and what cannot be distinguished
+//! gets an experiment.
 
 use plant::{Axis, RigParameters};
 use record_maker::{Recipe, simulate, write};
@@ -34,7 +34,7 @@ fn steps_alone_refuse_records_that_do_not_go_together() {
         let mixed = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", other];
         let _ = discrepancy(&mixed).expect_code(BAD_INPUT).expect_said(&["load", "the same axes"]);
     }
-    // Of the held-out record nothing is told where it shows another axis.
+    // Of the held-out record nothing is reported where it shows another axis.
     let out = folder.path().join("closed");
     let test = [
         &"close" as &dyn AsRef<OsStr>,
@@ -66,8 +66,8 @@ fn next_writes_an_experiment_that_tells_apart_what_a_report_could_not() {
     let other = effect("valve-dead-zone", "dead_zone_percent", 0.4, "");
     let named = effect("command-dead-time", "delay_ms", 0.6, &other);
     let inputs = r#"{ "rig": "rig.toml", "train": ["a.csv"], "axes": ["drive"], "searched_share": 1.0 }"#;
-    let told = format!(r#"{{ "inputs": {inputs}, "named": [{named}], "parameters": [] }}"#);
-    fs::write(&report, told).expect("a report");
+    let reported = format!(r#"{{ "inputs": {inputs}, "named": [{named}], "parameters": [] }}"#);
+    fs::write(&report, reported).expect("a report");
     let next =
         discrepancy(&[&"next", &"--rig", &rig(), &"--report", &report, &"--out", &out]).expect_code(GOOD);
     let parts = ["command-dead-time drive and valve-dead-zone drive", "is expected to separate them"];

@@ -1,7 +1,7 @@
 //! Emergency stop at full speed and the way back: the air stays in the chambers, the carriage stands, and it begins anew
 //! where it is.
 //!
-//! Times and ways are the rig's; they are told, and held against what `bench summary` makes of the same files.
+//! Times and ways are the rig's; they are reported, and held against what `bench summary` makes of the same files.
 
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand};
 use rustix::process::Signal;

@@ -77,18 +77,18 @@ fn point_to_point_keeps_its_bounds_in_every_repetition_and_with_weights() {
         let _ =
             scene.rehearsal().experiment(&experiment).out(&out).with(&options).start().wait().expect_code(0);
         let summary = Program::Bench.start(&[&"summary", &out]).wait().expect_code(0);
-        let told = json(&out.join("summary.json"));
+        let reported = json(&out.join("summary.json"));
         assert!(
-            told["position_error_dynamic_m"].as_f64().is_some_and(|error_m| error_m <= 0.004),
-            "{told:#}"
+            reported["position_error_dynamic_m"].as_f64().is_some_and(|error_m| error_m <= 0.004),
+            "{reported:#}"
         );
         assert!(
-            told["position_error_static_m"].as_f64().is_some_and(|error_m| error_m <= 0.0004),
-            "{told:#}"
+            reported["position_error_static_m"].as_f64().is_some_and(|error_m| error_m <= 0.0004),
+            "{reported:#}"
         );
         assert!(summary.stdout.contains("repetitions"), "{}", summary.stdout);
         // The paper's two maxima: always once the chambers are as moves leave them.
-        let maxima = &told["figures_by_repetition"]["position_error_maxima"];
+        let maxima = &reported["figures_by_repetition"]["position_error_maxima"];
         let later = maxima.as_array().and_then(|maxima| maxima.get(1..)).expect("four repetitions");
         assert_eq!(later, [2.0, 2.0, 2.0], "{weights}: {maxima}");
     }

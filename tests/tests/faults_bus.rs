@@ -45,8 +45,8 @@ fn a_second_controller_shuts_the_valve_until_one_of_them_is_silent() {
     for axis in ["drive", "load"] {
         assert!(count(&summary, &format!("/{axis}_commands/two_sources")) >= 1, "{axis}");
     }
-    let told = events::all(&summary);
-    for span in events::spans(&told, "two-sources", "one-source", measurement.len()) {
+    let reported = events::all(&summary);
+    for span in events::spans(&reported, "two-sources", "one-source", measurement.len()) {
         assert!(span.len() >= 20, "cleared after 20 silent cycles, not before: {span:?}");
     }
 }
@@ -62,8 +62,8 @@ fn controllers_that_know_of_each_other_take_a_second_one_for_a_fault_and_stop() 
     let _ = first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
     let _ = second.wait().expect_code(1);
     let _ = emulator.interrupt();
-    let told = events::all(&json(&scene.path("emulator/summary.json")));
-    assert!(events::times(&told, "emergency-stop") >= 1, "{told:?}");
+    let reported = events::all(&json(&scene.path("emulator/summary.json")));
+    assert!(events::times(&reported, "emergency-stop") >= 1, "{reported:?}");
     let valve = Table::read(&scene.path("emulator/measurement.csv")).column("drive_valve");
     assert!(valve[valve.len() - 1000..].iter().all(|opening| *opening == 0.0), "the valve stays shut");
 }
@@ -200,8 +200,8 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
     for counted in [&summary, &report] {
         assert_eq!((count(counted, "/bus/disconnects"), count(counted, "/bus/reconnects")), (1, 1));
     }
-    let told = events::all(&summary);
-    assert_eq!((events::times(&told, "bus-lost"), events::times(&told, "bus-back")), (1, 1));
+    let reported = events::all(&summary);
+    assert_eq!((events::times(&reported, "bus-lost"), events::times(&reported, "bus-back")), (1, 1));
 }
 
 #[test]

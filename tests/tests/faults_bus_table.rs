@@ -108,8 +108,8 @@ fn commands_that_are_delayed_beyond_their_age_shut_the_valve() {
     assert!(valve[BEGINS - 1] > 0.29 && valve[BEGINS + 25..ENDS].iter().all(|opening| *opening == 0.0));
     assert!(left.measurement.column("load_valve")[BEGINS..ENDS].iter().all(|opening| *opening > 0.19));
     assert!(count(&left.summary, "/drive_commands/refused_stale") > 50);
-    let told = events::all(&left.summary);
-    assert_eq!(events::times(&told, "command-stale"), 1, "{told:?}");
+    let reported = events::all(&left.summary);
+    assert_eq!(events::times(&reported, "command-stale"), 1, "{reported:?}");
 }
 
 #[test]

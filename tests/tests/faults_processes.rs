@@ -143,10 +143,10 @@ fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost
     for axis in ["drive", "load"] {
         assert_eq!(count(&report, &format!("/axes/{axis}/sensors_lost")), 0, "{axis}: skipped is not lost");
     }
-    let told: u64 = events::all(&summary)
+    let reported: u64 = events::all(&summary)
         .iter()
         .filter(|event| event.kind == "skipped")
         .map(|event| count(&event.of, "/cycles"))
         .sum();
-    assert_eq!(told, skipped, "every skipped cycle was told");
+    assert_eq!(reported, skipped, "every skipped cycle was told");
 }

@@ -226,16 +226,19 @@ fn sensors_are_noisy_spiky_and_coarse() {
     );
 }
 
-/// The drive's valve is told 0.5, and -0.4 in answer to cycle 249: from cycle 250 on.
-fn told(cycle: u32) -> Option<[f64; 2]> {
+/// The drive's valve is reported 0.5, and -0.4 in answer to cycle 249: from cycle 250 on.
+fn reported(cycle: u32) -> Option<[f64; 2]> {
     Some([if cycle < 249 { 0.5 } else { -0.4 }, 0.0])
 }
 
 fn with_valve(name: &str, numbers: &str) -> Left {
-    let left = Plan { faults: &fault(name, "drive", numbers), act: told, ..Plan::default() }.run();
+    let left = Plan { faults: &fault(name, "drive", numbers), act: reported, ..Plan::default() }.run();
     left.expect_marks_in_every_log();
-    let told = left.measurement.column("drive_valve");
-    assert!(told[100] > 0.49 && told[249] > 0.49 && told[250] < -0.39, "the record shows what was commanded");
+    let reported = left.measurement.column("drive_valve");
+    assert!(
+        reported[100] > 0.49 && reported[249] > 0.49 && reported[250] < -0.39,
+        "the record shows what was commanded"
+    );
     left
 }
 
@@ -246,7 +249,7 @@ fn a_stuck_valve_holds_its_spool_and_the_flow() {
     assert!(spool[BEGINS..=ENDS].iter().all(|s| s.to_bits() == spool[BEGINS].to_bits()), "it moves");
     let flow = left.truth.column("drive_edge_flow_a_m3_per_s");
     assert!(flow[251..ENDS].iter().all(|flow| *flow > 1e-4), "supplied against the command of -0.4");
-    // Ten time constants of 1.6 ms after its end the spool is where it is told to be, and the chamber exhausts.
+    // Ten time constants of 1.6 ms after its end the spool is where it is asked to be, and the chamber exhausts.
     assert!((spool[ENDS + 20] + 0.4).abs() < 1e-3 && flow[ENDS + 20] < -1e-4);
 }
 

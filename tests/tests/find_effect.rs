@@ -87,14 +87,14 @@ fn what_was_named_is_held_against_the_seal() {
         (nothing, 1, "named: nothing (nothing-missing)"),
     ];
     let short = ["--experiment", "point-to-point", "--held-out", "point-to-point"];
-    for (place, (report, code, told)) in cases.iter().enumerate() {
+    for (place, (report, code, reported)) in cases.iter().enumerate() {
         let (out, program) = (folder.path().join(place.to_string()), stand_in(folder.path(), report));
         let out = out.to_str().expect("a path in ASCII");
         let options =
             ["--lockstep", "--seed", SEED, "--expect-right", "--discrepancy", &program, "--out", out];
         let ended = find_effect(&[&options[..], &short].concat()).expect_code(*code);
         let hidden = format!("hidden: {HIDDEN} (leakage_nl_per_min 5.89");
-        ended.expect_printed(&[*told, &hidden]);
+        ended.expect_printed(&[*reported, &hidden]);
         if *code == 0 {
             assert!(ended.stdout.contains("(leakage_nl_per_min 5.912 +- 0.051 Nl/min)"), "{}", ended.stdout);
         }
@@ -110,8 +110,8 @@ fn a_sealed_effect_is_found_over_the_bus_added_and_the_gap_shrinks() {
     let out = folder.path().join("found");
     let out = out.to_str().expect("a path in ASCII");
     let ended = find_effect(&["--lockstep", "--seed", SEED, "--expect-right", "--out", out]).expect_code(0);
-    let told = format!("named: {HIDDEN}");
-    assert!(ended.stdout.contains(&told), "'{told}' is missing in: {}{}", ended.stdout, ended.stderr);
+    let reported = format!("named: {HIDDEN}");
+    assert!(ended.stdout.contains(&reported), "'{reported}' is missing in: {}{}", ended.stdout, ended.stderr);
     assert!(ended.stdout.contains(" repeated |"), "the rig itself is no column of: {}", ended.stdout);
     let folder = Path::new(out).join("seed-9");
     // What names the hidden terms of the rig measured once more lies where only the last step looks.

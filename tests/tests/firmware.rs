@@ -86,11 +86,11 @@ fn the_emergency_stop_shuts_its_valve_and_it_stays_shut() {
         let after = command(cycle);
         assert!(!after.enable && after.opening == 0.0, "cycle {cycle}: {after:?}");
     }
-    let told = logged.iter().rev().find_map(|logged| match logged.frame {
+    let reported = logged.iter().rev().find_map(|logged| match logged.frame {
         Frame::DriveChainStatus(status) => Some(status.main_chain),
         _ => None,
     });
-    assert_eq!(told, Some(MainChainState::Aborted));
+    assert_eq!(reported, Some(MainChainState::Aborted));
 }
 
 #[test]

@@ -29,8 +29,8 @@ fn exported(scene: &Scene, rig: &Path) -> PathBuf {
 fn simulate(scene: &Scene, fmu: &Path, inputs: &str, starts: &[&str]) -> (Table, String) {
     let (table, out) = (scene.write("inputs.csv", inputs), scene.path("outputs.csv"));
     let paths = [fmu, &table, &out].map(|path| path.to_str().expect("UTF-8"));
-    let told = run_script("simulate_fmu.py", &[&paths[..], starts].concat());
-    (Table::read(&out), told)
+    let reported = run_script("simulate_fmu.py", &[&paths[..], starts].concat());
+    (Table::read(&out), reported)
 }
 
 #[track_caller]
@@ -53,8 +53,8 @@ fn the_fmu_under_the_commands_of_a_rehearsal_gives_its_measurement_and_its_truth
         inputs += &format!("{},{},{}\n", cycle as f64 * 1e-3, valves[0][cycle + 1], valves[1][cycle + 1]);
     }
     let fmu = exported(&scene, &scene.path("rig.toml"));
-    let (outputs, told) = simulate(&scene, &fmu, &inputs, &[]);
-    assert_eq!(told.trim(), "");
+    let (outputs, reported) = simulate(&scene, &fmu, &inputs, &[]);
+    assert_eq!(reported.trim(), "");
     assert_eq!(outputs.len(), measured.len());
     let seen = ["position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
     for axis in ["drive", "load"] {
@@ -103,8 +103,8 @@ fn the_fmu_of_a_rig_with_effects_gives_what_the_plant_gives() {
     }
     let fmu = exported(&scene, &rig_file);
     let starts = ["carriage_position_m=0.2", "added_mass_kg=2.5", "supply.pressure_bar=6.0"];
-    let (outputs, told) = simulate(&scene, &fmu, &inputs, &starts);
-    assert_eq!(told.trim(), "");
+    let (outputs, reported) = simulate(&scene, &fmu, &inputs, &starts);
+    assert_eq!(reported.trim(), "");
     assert_eq!(outputs.len(), CYCLES + 1);
 
     let names = [plant::Truth::COLUMNS.map(str::to_owned).to_vec(), plant.term_names()].concat();
@@ -139,19 +139,19 @@ fn the_fmu_of_a_rig_with_effects_gives_what_the_plant_gives() {
 fn states_and_resets_repeat_to_the_bit_and_refusals_reach_the_importers_log() {
     let scene = Scene::new(SHORT);
     let fmu = exported(&scene, &scene.path("rig.toml"));
-    let told: Value = serde_json::from_str(&run_script("fmu_by_hand.py", &[&fmu])).expect("JSON");
-    assert_eq!(told["first"], told["anew"], "after a reset");
-    assert_eq!(told["on"], told["again"], "from a state that was kept");
-    assert_eq!(told["on"], told["after"], "refusals change nothing");
-    assert_ne!(told["first"], told["on"]);
+    let reported: Value = serde_json::from_str(&run_script("fmu_by_hand.py", &[&fmu])).expect("JSON");
+    assert_eq!(reported["first"], reported["anew"], "after a reset");
+    assert_eq!(reported["on"], reported["again"], "from a state that was kept");
+    assert_eq!(reported["on"], reported["after"], "refusals change nothing");
+    assert_ne!(reported["first"], reported["on"]);
     for (what, words) in [
         ("half_step", "whole milliseconds"),
         ("beyond", "drive_valve = 1.5: allowed are -1 to 1"),
         ("fixed", "cannot be set after the initialisation"),
         ("other_guid", "put together from two builds"),
     ] {
-        assert!(!told[what]["error"].is_null(), "{what} was taken");
-        let said = told[what]["told"].to_string();
+        assert!(!reported[what]["error"].is_null(), "{what} was taken");
+        let said = reported[what]["told"].to_string();
         assert!(said.contains(words), "{what}: {said}");
     }
 }

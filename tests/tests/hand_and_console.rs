@@ -46,7 +46,7 @@ fn rig_calls(log: &Path) -> Vec<(usize, bool)> {
     calls
 }
 
-fn told(scene: &Scene) -> Vec<Event> {
+fn reported(scene: &Scene) -> Vec<Event> {
     all(&json(&scene.path("emulator/summary.json")))
 }
 
@@ -63,7 +63,7 @@ fn a_scripted_stop_is_called_out_every_100_ms_and_empties_the_supply() {
     lockstep(&scene, 1800, |_| None);
     let stops = [400, 500, 600, 700, 800, 900].map(|cycle| (cycle, false));
     assert_eq!(rig_calls(&scene.path("emulator/bus.log")), [&stops[..], &[(950, true)]].concat());
-    let events = told(&scene);
+    let events = reported(&scene);
     assert_eq!(cycles_of(&events, "emergency-stop"), [400]);
     assert_eq!(cycles_of(&events, "emergency-stop-released"), [950]);
     let supply = Table::read(&scene.path("emulator/truth.csv")).column("supply_pressure_Pa");
@@ -121,7 +121,7 @@ fn the_rig_releases_its_own_stop_alone() {
         1299 => stop(true),
         _ => None,
     });
-    let events = told(&scene);
+    let events = reported(&scene);
     assert_eq!(cycles_of(&events, "emergency-stop"), [400], "held by one or the other all the time");
     assert_eq!(cycles_of(&events, "emergency-stop-still-held"), [950]);
     assert_eq!(cycles_of(&events, "emergency-stop-released"), [1300]);
@@ -149,7 +149,7 @@ fn a_run_with_people_in_it_is_the_same_to_the_byte() {
         let path = |scene: &Scene| scene.path("emulator").join(file);
         assert!(one.same(&path(&one), &path(&other)), "{file} differs");
     }
-    let events = told(&one);
+    let events = reported(&one);
     assert_eq!(cycles_of(&events, "link-given-up"), [1200]);
     assert_eq!(times(&events, "weights"), 1);
 }
@@ -228,7 +228,7 @@ fn what_is_typed_is_done_told_and_recorded() {
     emulator.type_line("quit");
     let heard = peer.frames_to_the_end();
     let _ = emulator.wait().expect_code(0).expect_said(&["ended at the console"]);
-    let events = told(&scene);
+    let events = reported(&scene);
     for kind in ["emergency-stop", "emergency-stop-released", "link-refused", "unlinked", "weights"] {
         assert_eq!(times(&events, kind), 1, "{kind}: {events:?}");
     }
@@ -292,5 +292,5 @@ fn without_the_option_nothing_is_read_from_standard_input() {
     wait_until("the run goes on", || scene.path("emulator/run.json").exists());
     let ended = emulator.wait().expect_code(0);
     assert!(!ended.stderr.contains("console"), "{}", ended.stderr);
-    assert_eq!(times(&told(&scene), "emergency-stop"), 0);
+    assert_eq!(times(&reported(&scene), "emergency-stop"), 0);
 }

@@ -63,22 +63,22 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     {
         assert!(Path::new(out).join(file).exists(), "{file}");
     }
-    let told = json(&run.join("conditions.json"));
+    let reported = json(&run.join("conditions.json"));
     assert_eq!(
-        (told["group"].as_str(), told["load_generator"].as_str()),
+        (reported["group"].as_str(), reported["load_generator"].as_str()),
         (Some("plain"), Some("sleep 1000"))
     );
-    assert_eq!((told["pair"].as_u64(), told["probe"].as_bool()), (Some(1), Some(false)));
-    // Where the package cannot be had, that is told instead.
+    assert_eq!((reported["pair"].as_u64(), reported["probe"].as_bool()), (Some(1), Some(false)));
+    // Where the package cannot be had, that is reported instead.
     if run.join("cyclictest.json").exists() {
         assert!(
-            told["reference_command"]
+            reported["reference_command"]
                 .as_str()
                 .is_some_and(|command| command.starts_with("cyclictest -m -p 80"))
         );
         assert!(ended.stdout.contains("emulator-wakeup p99 / cyclictest p99"), "{}", ended.stdout);
     } else {
-        let why = told["reference_missing_because"].as_str().expect("a reason");
+        let why = reported["reference_missing_because"].as_str().expect("a reason");
         skip::tell("a_pair_leaves_runs_references_reports_and_the_table: cyclictest", why);
     }
     // A second measurement into the same folder would mix the two.

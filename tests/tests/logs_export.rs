@@ -67,8 +67,8 @@ const CARRIED: [(&str, &str); 8] = [
 fn a_csv_holds_the_signals_of_the_measurement_at_its_times() {
     let folder = run_folder();
     let out = folder.join("every.csv");
-    let told = export(&folder, "csv", &out, &["--every-ms", "1"]).expect_code(0);
-    assert!(told.stdout.contains("time counts from cycle 0"), "{}", told.stdout);
+    let reported = export(&folder, "csv", &out, &["--every-ms", "1"]).expect_code(0);
+    assert!(reported.stdout.contains("time counts from cycle 0"), "{}", reported.stdout);
     let (exported, measured) = (columns(&out), Table::read(&folder.join("measurement.csv")));
     let times: Vec<f64> = exported["time_s"].iter().flatten().copied().collect();
     let first = times.iter().position(|time_s| *time_s == 0.0).expect("a row for cycle 0");
@@ -177,8 +177,8 @@ fn python_can_reads_asc_and_blf_equal_to_the_log() {
         let expected = frames(&fs::read_to_string(&log).expect("the log"));
         for format in ["asc", "blf"] {
             let out = scene.path(&format!("log.{format}"));
-            let told = export(&log, format, &out, &[]).expect_code(0).stdout;
-            assert!(told.contains(&format!("{} frames, read back equal", expected.len())), "{told}");
+            let reported = export(&log, format, &out, &[]).expect_code(0).stdout;
+            assert!(reported.contains(&format!("{} frames, read back equal", expected.len())), "{reported}");
             let read = run_script("read_frames.py", &[&out]);
             let read: Vec<_> = read.lines().map(str::to_owned).collect();
             assert!(

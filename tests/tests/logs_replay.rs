@@ -68,8 +68,8 @@ fn every_frame_of_a_run_is_on_the_bus_again_in_its_order() {
     let expected = frames_of(&fs::read_to_string(&short).expect("it was written"));
     let came = heard(&peer, expected.len());
     assert!(came == expected, "first difference: {:?}", came.iter().zip(&expected).position(|(a, b)| a != b));
-    let told = replayed.wait().expect_code(0).stdout;
-    assert!(told.contains("timing error: p50"), "{told}");
+    let reported = replayed.wait().expect_code(0).stdout;
+    assert!(reported.contains("timing error: p50"), "{reported}");
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!(report["ended"], "whole");
     for pointer in ["/frames_sent", "/frames_in_log", "/timing_error_ns/count"] {

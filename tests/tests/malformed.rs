@@ -111,7 +111,7 @@ fn one_good_command_from_elsewhere_does_change_the_run() {
     }
 }
 
-/// A well-formed frame that only a rig sends is not malformed; it is told by its own name.
+/// A well-formed frame that only a rig sends is not malformed; it is reported by its own name.
 #[test]
 fn a_tick_from_elsewhere_is_counted_as_a_second_rig() {
     let scene = run(Some(&mut |peer, cycle| {

@@ -33,8 +33,8 @@ fn read_by_python(log: &Path) -> Value {
 fn others_read_what_a_report_writes() {
     let scene = Scene::new(SHORT);
     let out = run(&scene);
-    let told = report(&out, &[]).expect_code(0).stdout;
-    assert!(told.contains("emulator-wakeup"), "{told}");
+    let reported = report(&out, &[]).expect_code(0).stdout;
+    assert!(reported.contains("emulator-wakeup"), "{reported}");
 
     let report_json = json(&out.join("report.json"));
     assert_eq!(report_json["schema"], "airbench-latency-report");

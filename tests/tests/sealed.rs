@@ -148,10 +148,12 @@ fn first_line(path: &Path) -> String {
 #[test]
 fn the_search_finds_what_is_planted() {
     let words = words();
-    for told in ["piston-leakage", "piston_leakage", "PistonLeakage", "leakage_nl_per_min"] {
-        let outputs =
-            BTreeMap::from([("flight/emulator-7-late/event.json".to_owned(), format!("{{\"{told}\": 1}}"))]);
-        assert_eq!(census(&outputs, &words).get(&format!("{told} in flight")), Some(&1), "{told}");
+    for reported in ["piston-leakage", "piston_leakage", "PistonLeakage", "leakage_nl_per_min"] {
+        let outputs = BTreeMap::from([(
+            "flight/emulator-7-late/event.json".to_owned(),
+            format!("{{\"{reported}\": 1}}"),
+        )]);
+        assert_eq!(census(&outputs, &words).get(&format!("{reported} in flight")), Some(&1), "{reported}");
     }
     let effects = drawn(1, 1);
     let digits = telling_numbers(&effects);
@@ -170,8 +172,8 @@ fn twenty_sealed_runs_tell_what_is_sealed_in_truth_csv_alone() {
         let outputs = outputs(&sealed);
         assert_eq!(census(&outputs, &words), open_census, "{what}");
         for number in telling_numbers(&effects) {
-            let told = outputs.iter().find(|(_, text)| text.contains(&number));
-            assert!(told.is_none(), "{number} stands in {:?}, {what}", told.map(|(name, _)| name));
+            let reported = outputs.iter().find(|(_, text)| text.contains(&number));
+            assert!(reported.is_none(), "{number} stands in {:?}, {what}", reported.map(|(name, _)| name));
         }
         assert_eq!(rig_frames(&sealed), rig_frames(&open), "{what}");
         assert_eq!(kinds_of_frames(&sealed), kinds_of_frames(&open), "{what}");

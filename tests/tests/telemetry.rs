@@ -1,4 +1,4 @@
-//! The telemetry: what viewers are told is what stands in the run's files, and nothing that they do reaches the run.
+//! The telemetry: what viewers are reported is what stands in the run's files, and nothing that they do reaches the run.
 
 use runlog::telemetry::Packet;
 use serde_json::{Value, json as value};
@@ -18,11 +18,11 @@ fn viewer(scene: &Scene) -> Viewer {
     Viewer::connect(&scene.path("telemetry"))
 }
 
-/// Holds what a viewer was told against the tables, cell by cell and to the bit.
-fn expect_rows_of_the_files(scene: &Scene, told: &Told) {
+/// Holds what a viewer was reported against the tables, cell by cell and to the bit.
+fn expect_rows_of_the_files(scene: &Scene, reported: &Told) {
     let tables =
         ["measurement", "truth"].map(|name| Table::read(&scene.path(&format!("emulator/{name}.csv"))));
-    let columns: Vec<Vec<f64>> = told.description["columns"]
+    let columns: Vec<Vec<f64>> = reported.description["columns"]
         .as_array()
         .expect("columns")
         .iter()
@@ -31,7 +31,7 @@ fn expect_rows_of_the_files(scene: &Scene, told: &Told) {
             table.column(column["name"].as_str().expect("a name"))
         })
         .collect();
-    for (cycle, values) in &told.cycles {
+    for (cycle, values) in &reported.cycles {
         assert_eq!(values.len(), columns.len(), "cycle {cycle}");
         for (place, (value, column)) in values.iter().zip(&columns).enumerate() {
             let written = column[*cycle as usize];
@@ -55,29 +55,32 @@ fn a_viewer_is_told_what_the_files_hold() {
     let controller = scene.controller(Pace::Real).with("--repeat").start();
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait().expect_code(0);
-    let told = reading.join().expect("the viewer does not panic");
+    let reported = reading.join().expect("the viewer does not panic");
 
-    assert_eq!(told.description["experiment"], value!({ "name": "experiment", "title": "restless" }));
-    assert_eq!((&told.description["seed"], &told.description["console"]), (&value!(7), &value!(false)));
-    assert_eq!(told.description["rig"]["stroke_m"], 0.5);
-    assert!(told.description["faults"].as_array().is_some_and(|faults| faults.len() > 10));
+    assert_eq!(reported.description["experiment"], value!({ "name": "experiment", "title": "restless" }));
+    assert_eq!(
+        (&reported.description["seed"], &reported.description["console"]),
+        (&value!(7), &value!(false))
+    );
+    assert_eq!(reported.description["rig"]["stroke_m"], 0.5);
+    assert!(reported.description["faults"].as_array().is_some_and(|faults| faults.len() > 10));
     let out = scene.path("emulator");
-    assert_eq!(told.description["out"], out.to_str().expect("a plain path"));
-    expect_rows_of_the_files(&scene, &told);
-    assert!(told.cycles.len() > 3000, "{} cycles", told.cycles.len());
-    assert_eq!(told.lost, 0);
-    let consecutive = told.cycles.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
+    assert_eq!(reported.description["out"], out.to_str().expect("a plain path"));
+    expect_rows_of_the_files(&scene, &reported);
+    assert!(reported.cycles.len() > 3000, "{} cycles", reported.cycles.len());
+    assert_eq!(reported.lost, 0);
+    let consecutive = reported.cycles.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
     assert!(consecutive, "cycles are told in order and without a hole");
 
     let summary = json(&out.join("summary.json"));
     let without_text =
-        told.events.iter().map(|event| value!({ "cycle": event["cycle"], "kind": event["kind"] }));
+        reported.events.iter().map(|event| value!({ "cycle": event["cycle"], "kind": event["kind"] }));
     let events = summary["events"].as_array().expect("events");
     // Those of the last milliseconds may still be on their way when the emulator ends.
-    assert!(events.starts_with(&without_text.collect::<Vec<_>>()), "{:?}\n{events:?}", told.events);
+    assert!(events.starts_with(&without_text.collect::<Vec<_>>()), "{:?}\n{events:?}", reported.events);
     let log = std::fs::read_to_string(out.join("emulator.hlog")).expect("a log");
-    assert!(told.histograms.len() > 10, "{} histograms", told.histograms.len());
-    for line in &told.histograms {
+    assert!(reported.histograms.len() > 10, "{} histograms", reported.histograms.len());
+    for line in &reported.histograms {
         assert!(log.lines().any(|written| written == line), "{line}");
     }
 }
@@ -92,19 +95,19 @@ fn lockstep_leaves_the_same_bytes_whoever_looks_on() {
         // One that reads, and one that stands still.
         let viewers = telemetry.then(|| (viewer(&scene), viewer(&scene)));
         let controller = scene.controller(Pace::Lockstep).start();
-        let told = viewers.map(|(reads, still)| (reads.to_the_end(), still));
+        let reported = viewers.map(|(reads, still)| (reads.to_the_end(), still));
         let _ = emulator.wait().expect_code(0);
         let _ = controller.wait().expect_code(0);
-        (scene, told.map(|(told, _)| told))
+        (scene, reported.map(|(reported, _)| reported))
     };
     let (alone, watched) = (run(false), run(true));
     for file in ["measurement.csv", "truth.csv", "bus.log"] {
         let path = |scene: &Scene| scene.path("emulator").join(file);
         assert!(alone.0.same(&path(&alone.0), &path(&watched.0)), "{file}");
     }
-    let told = watched.1.expect("a viewer");
-    expect_rows_of_the_files(&watched.0, &told);
-    assert!(told.histograms.is_empty(), "simulated time is never late");
+    let reported = watched.1.expect("a viewer");
+    expect_rows_of_the_files(&watched.0, &reported);
+    assert!(reported.histograms.is_empty(), "simulated time is never late");
 }
 
 #[test]
@@ -119,7 +122,7 @@ fn a_viewer_that_stands_still_or_dies_costs_the_run_nothing() {
     drop(dies);
     // More cycles than the buffer and the socket of a viewer hold.
     scene.wait_for_rows("emulator", 13_000);
-    // It wakes up: what did not fit is lost by whole records, and told.
+    // It wakes up: what did not fit is lost by whole records, and reported.
     let (mut cycles, mut lost) = (Vec::new(), None);
     while lost.is_none() {
         match still.packet() {
@@ -165,7 +168,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
         "{refused}"
     );
     let is_weights = |event: &Value| event["kind"]["weights"]["added_mass_kg"] == 3.0;
-    // Who comes later is told of it too.
+    // Who comes later is informed of it too.
     let mut later = viewer(&scene);
     let heard = std::iter::from_fn(|| later.packet()).find_map(|packet| match packet {
         Packet::Event(text) => serde_json::from_str::<Value>(&text).ok().filter(is_weights),
@@ -184,13 +187,16 @@ fn a_sealed_run_tells_viewers_nothing_that_only_a_simulation_knows() {
     let sealed = scene.write("sealed.toml", "[effects.piston-leakage.drive]\nleakage_nl_per_min = 4.0\n");
     let options = format!("--seconds 1 --sealed {}", sealed.display());
     let emulator = with_telemetry(&scene, Pace::Real).with(&options).start();
-    let told = viewer(&scene).to_the_end();
+    let reported = viewer(&scene).to_the_end();
     let _ = emulator.wait().expect_code(0);
-    let columns = told.description["columns"].as_array().expect("columns");
+    let columns = reported.description["columns"].as_array().expect("columns");
     assert_eq!(columns.len(), 10);
     assert!(columns.iter().all(|column| column["table"] == "measurement"));
-    assert!(!told.description.to_string().contains("leakage_nl_per_min\":4"), "no word of what is sealed");
-    expect_rows_of_the_files(&scene, &told);
+    assert!(
+        !reported.description.to_string().contains("leakage_nl_per_min\":4"),
+        "no word of what is sealed"
+    );
+    expect_rows_of_the_files(&scene, &reported);
 }
 
 #[test]

@@ -116,9 +116,9 @@ fn the_system_granted_real_time(run: &Path) {
 fn candump_agrees(guest: &Guest, run: &Path) {
     let log = tempfile::NamedTempFile::new().unwrap();
     fs::write(log.path(), guest.lines_of_run("candump.log", run)).unwrap();
-    let told =
+    let reported =
         compare_candump(log.path(), run).unwrap_or_else(|complaint| panic!("{}: {complaint}", run.display()));
-    eprintln!("{}: {told}", run.display());
+    eprintln!("{}: {reported}", run.display());
 }
 
 /// Both programs' files of a run on the cards, what the interfaces counted, and what candump saw on `can1`.
@@ -288,15 +288,15 @@ fn both_interfaces_went_down_and_came_back(run: &Path) {
     let lost = expected(0, "bus-lost".into());
     let back = expected(lost, "bus-back".into());
     for axis in ["drive", "load"] {
-        let told = |what: &str, from: u64| expected(from, serde_json::json!({ what: axis }));
+        let reported = |what: &str, from: u64| expected(from, serde_json::json!({ what: axis }));
         // With the queue full the command may have grown stale before the bus went.
         let shut = cycle_of(lost, serde_json::json!({ "command-stale": axis }))
             .filter(|cycle| *cycle < back)
             .unwrap_or(lost);
-        let again = told("command-fresh", back);
+        let again = reported("command-fresh", back);
         // can1, under the controller: the rig still has its bus, but no commands.
-        let shut_again = told("command-stale", again);
-        let fresh_again = told("command-fresh", shut_again);
+        let shut_again = reported("command-stale", again);
+        let fresh_again = reported("command-fresh", shut_again);
         let valve = measurement.column(&format!("{axis}_valve"));
         for rows in [shut..again, shut_again..fresh_again] {
             let open = rows.clone().find(|row| valve[*row as usize] != 0.0);
@@ -318,7 +318,7 @@ fn both_interfaces_went_down_and_came_back(run: &Path) {
     }
 }
 
-/// How often each kind was told, for who has to find out why one was not.
+/// How often each kind was reported, for who has to find out why one was not.
 fn kinds_of_events(summary: &Value) -> String {
     let mut kinds = BTreeMap::<String, usize>::new();
     for event in summary["events"].as_array().unwrap() {

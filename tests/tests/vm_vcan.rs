@@ -71,18 +71,18 @@ fn candump_recorded_what_the_runs_files_say() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("candump.log");
     fs::write(&log, guest.lines_of_run("candump.log", &run)).unwrap();
-    let told = compare_candump(&log, &run).unwrap_or_else(|complaint| panic!("{complaint}"));
-    eprintln!("compared: {told}");
-    let told: Value = serde_json::from_str(&told).unwrap();
-    assert!(count(&told, "/frames") > 5000 && count(&told, "/sensor_frames") > 2000, "{told:#}");
-    assert_eq!(count(&told, "/sensor_values"), 4 * count(&told, "/sensor_frames"));
-    assert_eq!(count(&told, "/valve_values"), 2 * count(&summary, "/cycles"));
+    let reported = compare_candump(&log, &run).unwrap_or_else(|complaint| panic!("{complaint}"));
+    eprintln!("compared: {reported}");
+    let reported: Value = serde_json::from_str(&reported).unwrap();
+    assert!(count(&reported, "/frames") > 5000 && count(&reported, "/sensor_frames") > 2000, "{reported:#}");
+    assert_eq!(count(&reported, "/sensor_values"), 4 * count(&reported, "/sensor_frames"));
+    assert_eq!(count(&reported, "/valve_values"), 2 * count(&summary, "/cycles"));
     assert!(
-        count(&told, "/valve_values_not_zero") > 1000,
+        count(&reported, "/valve_values_not_zero") > 1000,
         "the valve hardly moved: its column shows nothing"
     );
-    assert_eq!(count(&told, "/skipped_cycles"), count(&summary, "/skipped"));
-    assert_eq!(told["last_main_chain"], "done");
+    assert_eq!(count(&reported, "/skipped_cycles"), count(&summary, "/skipped"));
+    assert_eq!(reported["last_main_chain"], "done");
 
     comparison_notices_every_alteration(&log, &run);
 }

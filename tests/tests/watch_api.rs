@@ -84,7 +84,7 @@ fn a_run_is_told_by_description_state_history_events_and_metrics() {
     let names: Vec<_> =
         description["columns"].as_array().expect("columns").iter().map(|c| c["name"].as_str()).collect();
     assert!(names.iter().flatten().all(|name| rows["columns"][name].is_array()), "{names:?}");
-    let histograms = events.wait_for("histograms", |told| told["wake_up"]["whole"][0].is_array());
+    let histograms = events.wait_for("histograms", |reported| reported["wake_up"]["whole"][0].is_array());
     assert!(histograms["round_trip"]["last_10_s"][0][1].as_u64() > Some(0), "{histograms}");
 
     wait_until("a second of history", || {
@@ -285,7 +285,7 @@ fn viewers_that_hang_or_talk_nonsense_cost_nobody_anything() {
     // It misses events, counted, once the socket and its queue are full; the other gets all of them.
     let state = events.wait_for("state", |state| state["dropped"].as_u64() > Some(3));
     assert_eq!(state["viewers"], 2);
-    // There is room for twenty; the rest is told so.
+    // There is room for twenty; the rest is reported so.
     let crowd: Vec<_> = (0..20).map(|_| watched.page.connect()).collect();
     let mut refused = String::new();
     let mut last = crowd.last().expect("a crowd");

@@ -39,7 +39,7 @@ pub struct Description {
     pub texts: Texts,
 }
 
-/// A file that our own tables do not make: a bug, told with what the library said.
+/// A file that our own tables do not make: a bug, reported with what the library said.
 #[derive(Debug, thiserror::Error)]
 #[error("the A2L file of the {axis} axis cannot be made: {reason}")]
 pub struct A2lError {
@@ -299,11 +299,11 @@ impl Maker<'_> {
     }
 
     fn trace(&mut self) {
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         for ((name, meaning), at) in TOLD.iter().zip(0_u32..) {
             let conversion = if at == 0 { self.names("trace", trace::STATES) } else { self.unit("") };
             let place = Place { address: TRACE_TOLD + at * NARROW, format: Format::Long, conversion };
-            told.push(self.measurement(name, meaning, [0.0, f64::from(u32::MAX)], place));
+            reported.push(self.measurement(name, meaning, [0.0, f64::from(u32::MAX)], place));
         }
         let cycles = Parameter::new(
             ("trace.cycles", "cycles"),
@@ -320,7 +320,7 @@ impl Maker<'_> {
             };
             blocks.push(self.block(&about, TRACE_CHANNELS + at * CHANNEL_STEP, Format::Double));
         }
-        self.parts.push(("trace".into(), blocks, told));
+        self.parts.push(("trace".into(), blocks, reported));
     }
 
     /// Samples as a block of memory, which is only read.

@@ -134,17 +134,17 @@ impl Clerk {
         let settings = parameter_set::read(&self.path(axis)).map_err(|error| error.to_string())?;
         let mut changes = Vec::new();
         for setting in settings {
-            let told = |problem: String| format!("{}{}.{problem}", setting.place, axis.name());
+            let reported = |problem: String| format!("{}{}.{problem}", setting.place, axis.name());
             let place = book
                 .variables
                 .iter()
                 .position(|variable| setting.axis == axis && variable.name == setting.name)
-                .ok_or_else(|| told(format!("{}: no such variable here", setting.name)))?;
+                .ok_or_else(|| reported(format!("{}: no such variable here", setting.name)))?;
             let parameter = &book.variables[place].parameter;
             if parameter.at_start_only && setting.value == book.values[place] {
                 continue;
             }
-            let value = parameter.check_change(setting.value).map_err(|error| told(error.to_string()))?;
+            let value = parameter.check_change(setting.value).map_err(|error| reported(error.to_string()))?;
             changes.push(Change { axis, place, value });
         }
         let count = changes.len();

@@ -174,13 +174,13 @@ impl Image {
             Region::Controls if place == ARM => long(u32::from(self.trace.runs())),
             Region::Controls => trace::control_format(place).encode(self.controls[place]),
             Region::Signals => SIGNALS[place].format.encode(self.signals[place]),
-            Region::TraceTold => long(self.trace.told()[place]),
+            Region::TraceTold => long(self.trace.reported()[place]),
             Region::TraceCycles => long(self.trace.cycle(place)),
             Region::TraceChannel(channel) => Format::Double.encode(self.trace.value(channel, place)),
         }
     }
 
-    /// Writes the bytes from `address` on; `desk` is told of every value that became another's.
+    /// Writes the bytes from `address` on; `desk` is informed of every value that became another's.
     ///
     /// # Errors
     /// [`Refusal::AccessDenied`] where nothing is; [`Refusal::WriteProtected`] for what is only read, or read at the start only;
@@ -267,7 +267,7 @@ impl Image {
     ) -> Result<(), Refusal> {
         if region == Region::Parameters {
             let value = Format::Double.decode(bytes);
-            // What is the same already is no change, and nobody is told of it.
+            // What is the same already is no change, and nobody is informed of it.
             if value.to_bits() != self.parameters[place].to_bits() {
                 self.parameters[place] = value;
                 desk.set(place, value);
@@ -308,7 +308,7 @@ pub(super) mod tests {
     use super::*;
     use settings::parameters::{Parameter, declare};
 
-    /// Whoever is told, and remembers.
+    /// Whoever is reported, and remembers.
     #[derive(Default)]
     pub(crate) struct Notes {
         pub(crate) set: Vec<(usize, f64)>,

@@ -243,7 +243,7 @@ impl Trace {
     }
 
     /// What it tells of itself, in the order of [`TOLD`].
-    pub fn told(&self) -> [u32; TOLD.len()] {
+    pub fn reported(&self) -> [u32; TOLD.len()] {
         [self.state as u32, self.samples() as u32, self.trigger_cycle, self.triggers]
     }
 
@@ -310,7 +310,7 @@ mod tests {
             let mut trace = armed(&[]);
             run(&mut trace, 0..start + 100, |cycle| cycle as f64 - start as f64);
             let trigger = (start + 50) as u32;
-            assert_eq!((trace.state, trace.told()[2]), (State::Ready, trigger));
+            assert_eq!((trace.state, trace.reported()[2]), (State::Ready, trigger));
             assert_eq!(cycles(&trace), (trigger - 3..trigger + 5).collect::<Vec<_>>());
             assert_eq!(trace.value(0, 3), 50.0);
         }
@@ -330,7 +330,7 @@ mod tests {
         for (slope, trigger) in [(0.0, 10), (1.0, 20), (2.0, 10), (3.0, 3)] {
             let mut trace = armed(&[(SLOPE, slope)]);
             run(&mut trace, 0..40, pulse);
-            assert_eq!(trace.told()[2], trigger, "slope {slope}");
+            assert_eq!(trace.reported()[2], trigger, "slope {slope}");
         }
     }
 

@@ -18,7 +18,7 @@ const MOST_N: f64 = DRIVE_CHAIN_VALUES.signals[2].max;
 /// What was sent last.
 pub(super) struct Slow {
     phases: [u64; 2],
-    told: ChainStatus,
+    reported: ChainStatus,
     /// Periods of status and values in which they were sent last.
     periods: [u64; 2],
 }
@@ -27,23 +27,23 @@ pub(super) struct Slow {
 pub(super) struct Due {
     pub(super) status: bool,
     pub(super) values: bool,
-    /// The main chain is in another state than was told last.
+    /// The main chain is in another state than was reported last.
     pub(super) other_state: bool,
 }
 
 impl Slow {
     pub(super) fn new(axis: Axis) -> Self {
-        Self { phases: PHASES[axis.index()], told: ChainStatus::default(), periods: [0; 2] }
+        Self { phases: PHASES[axis.index()], reported: ChainStatus::default(), periods: [0; 2] }
     }
 
     /// What is due in `cycle`, and counts as sent.
     pub(super) fn due(&mut self, cycle: u64, status: &ChainStatus) -> Due {
-        let changed = *status != self.told;
-        let other_state = status.main_chain != self.told.main_chain;
+        let changed = *status != self.reported;
+        let other_state = status.main_chain != self.reported.main_chain;
         // Counted, so that a cycle that was skipped puts off what was due in it and does not drop it.
         let periods = self.phases.map(|phase| (cycle + PERIOD - phase) / PERIOD);
         let [status_due, values] = [0, 1].map(|which| changed || periods[which] != self.periods[which]);
-        (self.periods, self.told) = (periods, *status);
+        (self.periods, self.reported) = (periods, *status);
         Due { status: status_due, values, other_state }
     }
 }

@@ -37,7 +37,7 @@ use protocol::frames::{EmergencyStop, EmergencyStopChainState, EmergencyStopReas
 
 /// Cycles between two frames of a stop that is held.
 const REPEAT_CYCLES: u64 = protocol::periods::EMERGENCY_STOP_CYCLES;
-/// Shortest stay in tripped: the rig has told ten times by then whether it is tripped.
+/// Shortest stay in tripped: the rig has reported ten times by then whether it is tripped.
 const TRIPPED_SHORTEST_S: f64 = 0.1;
 /// Longest stay in tripped, whatever the axis still does.
 const TRIPPED_LONGEST_S: f64 = 1.0;
@@ -46,7 +46,7 @@ const RECOVERED_SHARE: f64 = 0.9;
 /// How long the rig must have been recovered.
 const RECOVERED_S: f64 = 0.2;
 
-/// What the chain is told once.
+/// What the chain is given once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopConfig {
     pub after_emergency_stop: AfterStop,
@@ -54,7 +54,7 @@ pub struct StopConfig {
     pub supply_pressure_pa: f64,
 }
 
-/// What the chain is told each cycle.
+/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StopInputs {
     pub cycle: u64,
@@ -239,8 +239,8 @@ impl EmergencyStopChain {
                 }
             }
             State::WaitingForRelease { .. } => {
-                let told = inputs.rig.is_some() && !rig_tripped && inputs.frame.is_none();
-                (told && self.holds().is_none()).then_some((S::Recovering, StopCause::Released))
+                let reported = inputs.rig.is_some() && !rig_tripped && inputs.frame.is_none();
+                (reported && self.holds().is_none()).then_some((S::Recovering, StopCause::Released))
             }
             State::Recovering { up_since } => tripped().or_else(|| {
                 let up_s = elapsed_s(up_since?, inputs.cycle);

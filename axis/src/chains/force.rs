@@ -73,7 +73,7 @@ pub enum ForceAsked {
     Done,
 }
 
-/// What the chain is told each cycle.
+/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ForceInputs {
     pub cycle: u64,

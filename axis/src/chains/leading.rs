@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   rig status, frames ──► emergency stop ──► main ──► what is asked
-//!                                 ▲             │ enters fault, or a fault is told while it is in fault
+//!                                 ▲             │ enters fault, or a fault is reported while it is in fault
 //!                                 └─── trip ────┘
 //! ```
 //!
@@ -13,7 +13,7 @@ use super::main::{MainChain, MainConfig, MainInputs, MainOutput, OwnAxis};
 use super::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopReason, RigStatus};
 
-/// What both are told each cycle.
+/// What both are given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LeadingInputs {
     pub cycle: u64,

@@ -37,12 +37,12 @@
 
 mod config;
 mod decide;
+mod interface;
 #[cfg(test)]
 mod tests;
-mod told;
 
 pub use config::{Lengths, MainConfig, Start, approach_s};
-pub use told::{MainCause, MainInputs, MainOutput, OwnAxis, Phase};
+pub use interface::{MainCause, MainInputs, MainOutput, OwnAxis, Phase};
 
 use super::settled::Settled;
 use super::sync::repetitions_ahead;

@@ -38,7 +38,7 @@ settings::parameters! {
 /// The partner's averaged position is taken each so many cycles, its period.
 const SAMPLE_CYCLES: u64 = 10;
 
-/// What the chain is told each cycle.
+/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MatchingInputs {
     pub cycle: u64,

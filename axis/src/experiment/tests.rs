@@ -1,4 +1,4 @@
-//! What a file may say and what it is told when it may not.
+//! What a file may say, and the message when it says something else.
 
 use super::*;
 use algorithms::algorithm::Quantity;

@@ -34,22 +34,22 @@ fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
     let file = given.section.needed_text("file", "the CSV file, relative to the experiment's folder")?;
     let path = given.section.beside(&file.text);
     let smooth = given.section.choice("interpolation", &[("linear", false), ("smooth", true)])?;
-    let told = |said: String| given.section.wrong_at("file", &format!("file: {said}"));
-    let (quantity, points) = points_of(&path).map_err(told)?;
+    let reported = |said: String| given.section.wrong_at("file", &format!("file: {said}"));
+    let (quantity, points) = points_of(&path).map_err(reported)?;
     let (unit, most) = (given.scale.unit(), given.scale.most());
     if quantity != given.scale.quantity {
         let column = COLUMNS.iter().find(|(_, of)| *of == given.scale.quantity).map_or("", |(name, _)| name);
-        return Err(told(format!("{}:1: column {column} is missing", path.display())));
+        return Err(reported(format!("{}:1: column {column} is missing", path.display())));
     }
     let outside = points.iter().find(|point| !(0.0..=most).contains(&point.value));
     if let Some(Point { line, value, .. }) = outside {
         let said = format!("{}:{line}: {value} {unit}; allowed is 0 to {most} {unit}", path.display());
-        return Err(told(said));
+        return Err(reported(said));
     }
     let Point { line, value, .. } = points[0];
     if quantity == Quantity::Position && (value - given.from).abs() > START_TOLERANCE_M {
         let (path, from) = (path.display(), given.from);
-        return Err(told(format!("{path}:{line}: begins at {value} m, where the axis is at {from} m")));
+        return Err(reported(format!("{path}:{line}: begins at {value} m, where the axis is at {from} m")));
     }
     Ok(Arc::new(Table::new(&points, smooth)))
 }

@@ -122,12 +122,12 @@ fn command_age(phase: &Phase<'_>) -> Case {
     let holds = never_sent == 0
         && most.is_some_and(|age| age <= USUAL_AGE_CYCLES)
         && oldest.is_some_and(|age| age <= STALE_AFTER_CYCLES);
-    let told = |age: Option<u64>| age.map_or("none".into(), |age| age.to_string());
+    let reported = |age: Option<u64>| age.map_or("none".into(), |age| age.to_string());
     let detail = format!(
         "age in cycles: 99 % at most {}, oldest {} ({USUAL_AGE_CYCLES} and {STALE_AFTER_CYCLES} are allowed); {never_sent} \
          echoed a cycle that was never sent",
-        told(most),
-        told(oldest)
+        reported(most),
+        reported(oldest)
     );
     case("regular", "command-age", kept(holds), detail)
 }
@@ -230,15 +230,16 @@ pub(super) fn emergency_stop(heard: &[Heard], window: Range<u64>) -> Vec<Case> {
     vec![valve_shut("emergency-stop", heard, window, STOP_WITHIN_CYCLES)]
 }
 
-/// Without sensors the valve is shut and the others are told; nothing is answered that was not asked, not either once the
+/// Without sensors the valve is shut and the others are reported; nothing is answered that was not asked, not either once the
 /// sensors are `back`.
 pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
     let class = "sensor-loss";
     let [without, again] = [&window, &back].map(|window| {
         during(heard, window).filter(|heard| matches!(heard.what, What::Command { age: None, .. })).count()
     });
-    let told = during(heard, &window).find(|heard| matches!(&heard.what, What::Stop(stop) if !stop.release));
-    let told = match told {
+    let reported =
+        during(heard, &window).find(|heard| matches!(&heard.what, What::Stop(stop) if !stop.release));
+    let reported = match reported {
         Some(heard) => (
             CheckResult::Passed,
             format!(
@@ -262,7 +263,7 @@ pub(super) fn sensor_loss(heard: &[Heard], window: Range<u64>, back: Range<u64>)
                 back.end - back.start
             ),
         ),
-        case(class, "told", told.0, told.1),
+        case(class, "told", reported.0, reported.1),
     ]
 }
 

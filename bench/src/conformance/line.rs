@@ -5,8 +5,8 @@
 //!   lockstep  Go(k): frames out, done(k) ── members post ── Go(k+1): what came belongs to cycle k
 //! ```
 //!
-//! Deadlines are absolute. When this process itself is late by a cycle or more, time goes on from there, and the cycle is told as
-//! disturbed: it says nothing of the controller.
+//! Deadlines are absolute. When this process itself is late by a cycle or more, time goes on from there, and the cycle is
+//! reported as disturbed: it says nothing of the controller.
 
 use super::cli::{CheckPace, ConformanceArguments};
 use protocol::bus::control::{Kind, Role};

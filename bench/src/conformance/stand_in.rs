@@ -1,4 +1,4 @@
-//! A rig for the check: says on the bus what the rig says, obeys valves, and can be told to fall silent or to stop.
+//! A rig for the check: says on the bus what the rig says, obeys valves, and can be asked to fall silent or to stop.
 //!
 //! It is no plant and stands for none: a carriage follows its valve with a lag, so that a controller has something to move and
 //! its set-points come true. Pressures and forces stand still. A controller is judged by what it sends, never by where the

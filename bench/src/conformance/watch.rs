@@ -152,7 +152,7 @@ mod tests {
         Frame::DriveValveCommand(command).encode().unwrap()
     }
 
-    /// What a controller is told to have sent, after cycles up to 4999 of which 4990 was skipped.
+    /// What a controller is asked to have sent, after cycles up to 4999 of which 4990 was skipped.
     fn judged(frames: &[CanFrame]) -> Vec<What> {
         let mut watch = Watch::new(CheckedAxis::Drive, false);
         (0..5000).filter(|cycle| *cycle != 4990).for_each(|cycle| watch.note_sent(cycle, cycle != 4995));

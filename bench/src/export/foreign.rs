@@ -56,6 +56,6 @@ pub(super) fn write(
         let said = String::from_utf8_lossy(&done.stderr);
         return Err(failed(said.lines().last().unwrap_or("it failed").to_owned()));
     }
-    let told = String::from_utf8_lossy(&done.stdout).trim().to_owned();
-    Ok((told != format!("equal {}", log.frames.len())).then_some(told))
+    let reported = String::from_utf8_lossy(&done.stdout).trim().to_owned();
+    Ok((reported != format!("equal {}", log.frames.len())).then_some(reported))
 }

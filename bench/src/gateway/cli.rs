@@ -18,7 +18,7 @@ pub struct GatewayArguments {
     /// Name by which clients open the bus [default: the interface, or the file name of the embedded bus].
     #[arg(long, value_parser = bus_name)]
     pub name: Option<String>,
-    /// Clients at a time; who comes beside them is told so and parted with.
+    /// Clients at a time; who comes beside them is informed and parted with.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub clients: u16,
     /// Frames that wait for a client that reads slowly; what does not fit is lost to it, and counted.

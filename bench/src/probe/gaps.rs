@@ -137,11 +137,11 @@ mod tests {
         let mut pending = counts(0, 1, 60_000);
         let mut asked = 0;
         for now_ns in (50_000..=1_000_000).step_by(50_000) {
-            let told = watch.look(now_ns, || {
+            let reported = watch.look(now_ns, || {
                 asked += 1;
                 std::mem::take(&mut pending)
             });
-            assert_eq!(told, None);
+            assert_eq!(reported, None);
         }
         assert_eq!(asked, 1, "read once a millisecond");
         let gap = watch.look(1_200_000, || pending).expect("200 us are a gap");

@@ -3,10 +3,10 @@
 //! | kind | frames | beside a live rig |
 //! |---|---|---|
 //! | command | of controllers, console and bench in `rig.dbc` | stale: valves would follow the past |
-//! | rig | of the rig in `rig.dbc` | a second rig: controllers would be told the past |
+//! | rig | of the rig in `rig.dbc` | a second rig: controllers would be given the past |
 //! | other | identifiers that `rig.dbc` does not know | nobody of ours acts on them |
 //!
-//! An error frame is what an interface told its own host; nobody can send it.
+//! An error frame is what an interface reports to its own host; nobody can send it.
 
 use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG};
 use protocol::frames::MessageSpec;

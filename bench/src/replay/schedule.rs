@@ -22,7 +22,7 @@ pub(super) struct Due {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Schedule {
     pub(super) frames: Vec<Due>,
-    /// Left out because told so.
+    /// Left out because the file says so.
     pub(super) left_out: u64,
     pub(super) error_frames: u64,
     /// Stamps before an earlier line's.

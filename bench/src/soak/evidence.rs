@@ -89,7 +89,7 @@ impl Evidence {
             return Err(format!("no account: {name} left no report"));
         }
         let mut parties = vec![self.rig()];
-        parties.extend(self.controllers.iter().map(|(name, told)| self.controller(name, told)));
+        parties.extend(self.controllers.iter().map(|(name, reported)| self.controller(name, reported)));
         let Some(host) = &self.summary.bus_host else {
             let mut account = account::close(&parties, None);
             let sent: u64 = parties.iter().map(|party| party.sent.total()).sum();
@@ -151,7 +151,7 @@ impl Evidence {
 
     #[must_use]
     pub fn figures(&self) -> Figures {
-        let axes = self.controllers.values().flat_map(|told| told.axes.values());
+        let axes = self.controllers.values().flat_map(|reported| reported.axes.values());
         let drive = self.drive();
         let summary = &self.summary;
         let is_told = self.reports.get("emulator").is_some_and(|report| report.bus.is_some());
@@ -169,7 +169,7 @@ impl Evidence {
 
     #[must_use]
     pub fn drive(&self) -> Option<&AxisReport> {
-        self.controllers.values().find_map(|told| told.axes.get("drive"))
+        self.controllers.values().find_map(|reported| reported.axes.get("drive"))
     }
 
     fn party(&self, name: &str) -> Party {
@@ -184,9 +184,9 @@ impl Evidence {
         }
     }
 
-    fn controller(&self, name: &str, told: &ControllerReport) -> Party {
+    fn controller(&self, name: &str, reported: &ControllerReport) -> Party {
         let gaps = [("drive", "120"), ("load", "121")].iter().filter_map(|(axis, id)| {
-            let axis = told.axes.get(*axis)?;
+            let axis = reported.axes.get(*axis)?;
             let (lost, before) = (axis.sensors_lost?, axis.sensors_missed_before_first_tick?);
             Some(((*id).to_owned(), Gaps::Sensors { lost, before }))
         });

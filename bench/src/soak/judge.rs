@@ -113,12 +113,12 @@ fn loss(spec: &Spec, evidence: &Evidence, account: &Account) -> Check {
 }
 
 fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
-    let told = |name: &String, memory: &Memory| {
+    let reported = |name: &String, memory: &Memory| {
         let slope = memory.slope_kib_per_h.map_or(String::new(), |slope| format!(", {slope:+.0} KiB/h"));
         let growth = memory.growth_percent.map_or(String::new(), |growth| format!(", {growth:+.2} %"));
         format!("{name} {} KiB{slope}{growth}", memory.rss_last_kib)
     };
-    let all: Vec<_> = memory.iter().map(|(name, memory)| told(name, memory)).collect();
+    let all: Vec<_> = memory.iter().map(|(name, memory)| reported(name, memory)).collect();
     let bounds = format!(
         "(bounds: {SLOPE_LIMIT_KIB_PER_H:.0} KiB/h, {GROWTH_LIMIT_PERCENT} % from the second quarter to the last)"
     );
@@ -204,14 +204,14 @@ fn positions(evidence: &Evidence, judge: bool) -> Check {
             let words = |key: &String, entry: &Value| {
                 format!("{key} = {}, {}", measured[key], thresholds::in_words(entry))
             };
-            let mut told: Vec<_> = judged.iter().map(|(key, entry)| words(key, entry)).collect();
+            let mut reported: Vec<_> = judged.iter().map(|(key, entry)| words(key, entry)).collect();
             if judged.values().all(thresholds::is_kept) {
-                return Check::new("positions", CheckResult::Passed, &told.join("; "));
+                return Check::new("positions", CheckResult::Passed, &reported.join("; "));
             }
             let excuse = excuse(evidence, judge);
             let result = if excuse.is_some() { CheckResult::Skipped } else { CheckResult::Failed };
-            told.extend(excuse);
-            Check::new("positions", result, &told.join("; "))
+            reported.extend(excuse);
+            Check::new("positions", result, &reported.join("; "))
         }
     }
 }

@@ -155,7 +155,7 @@ pub enum CheckResult {
     Skipped,
 }
 
-/// Figures of a segment's run; what nobody told is null.
+/// Figures of a segment's run; what nobody reported is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// Cycles of the rig.

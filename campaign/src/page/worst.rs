@@ -7,7 +7,7 @@ use crate::merge::{Results, Unfinished};
 use pagekit::grid::Grid;
 use pagekit::page::escaped;
 
-/// Runs that are told of each figure.
+/// Runs that are informed of each figure.
 const TOLD: usize = 8;
 
 /// The worst of each figure that is shown.
@@ -44,11 +44,12 @@ pub(super) fn section(
 /// What the run was made with.
 fn values(campaign: &Campaign, run: u64) -> String {
     let point = campaign.points.point(run);
-    let told = campaign.file.factors.iter().zip(&point.values).map(|(factor, value)| match &factor.values {
-        Values::Range(_) => {
-            format!("{} {}", factor.name, value.number().map_or_else(String::new, pagekit::number::short))
-        }
-        Values::List(_) => format!("{} {value}", factor.name),
-    });
-    told.collect::<Vec<_>>().join(", ")
+    let reported =
+        campaign.file.factors.iter().zip(&point.values).map(|(factor, value)| match &factor.values {
+            Values::Range(_) => {
+                format!("{} {}", factor.name, value.number().map_or_else(String::new, pagekit::number::short))
+            }
+            Values::List(_) => format!("{} {value}", factor.name),
+        });
+    reported.collect::<Vec<_>>().join(", ")
 }

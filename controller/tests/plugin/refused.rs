@@ -94,10 +94,10 @@ fn what_is_no_library_and_what_is_not_there_is_told_so() {
     let libraries = Libraries::new();
     let text = libraries.place("text.so");
     std::fs::write(&text, "not a library").unwrap();
-    let told = refusal(&text);
-    assert!(told.contains("does not load it") && told.contains("text.so"), "{told}");
-    let told = refusal(&libraries.place("missing.so"));
-    assert!(told.contains("missing.so") && told.contains("No such file"), "{told}");
+    let reported = refusal(&text);
+    assert!(reported.contains("does not load it") && reported.contains("text.so"), "{reported}");
+    let reported = refusal(&libraries.place("missing.so"));
+    assert!(reported.contains("missing.so") && reported.contains("No such file"), "{reported}");
 }
 
 #[test]
@@ -105,8 +105,8 @@ fn a_trier_that_knows_nothing_of_libraries_refuses_all() {
     let libraries = Libraries::new();
     let library = libraries.hostile(&[]);
     let other = plugin::Trier { program: "/bin/true".into(), ..trier() };
-    let told = load_tried_by(&other, &library, &RigParameters::baseline()).err().unwrap().to_string();
-    assert!(told.contains("'/bin/true' cannot try libraries"), "{told}");
+    let reported = load_tried_by(&other, &library, &RigParameters::baseline()).err().unwrap().to_string();
+    assert!(reported.contains("'/bin/true' cannot try libraries"), "{reported}");
 }
 
 #[test]

@@ -54,7 +54,7 @@ pub(super) struct Cuts {
 pub(super) struct Judged {
     pub(super) place: usize,
     pub(super) variant: usize,
-    /// Of the variant, the first where it has two; its spread when the columns cannot be told apart is not here.
+    /// Of the variant, the first where it has two; its spread when the columns cannot be distinguished is not here.
     pub(super) number: f64,
     /// Share of the power left out in time that it takes.
     pub(super) share: f64,
@@ -143,7 +143,7 @@ impl Excess {
         Excess(all.into_iter().flatten().filter_map(rss).collect())
     }
 
-    /// A power as a share of it; of `left` where the baseline's own columns cannot be told on this cut.
+    /// A power as a share of it; of `left` where the baseline's own columns cannot be distinguished on this cut.
     fn share(&self, cut: &Cut, rss: f64, left: f64) -> f64 {
         let reference =
             self.0.iter().find(|(name, _)| *name == cut.name).map_or(left, |(_, reference)| *reference);

@@ -8,7 +8,7 @@ pub(crate) fn crate_folder() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The folder of the records; without it the test is told as skipped, here and in the list of `scripts/test`.
+/// The folder of the records; without it the test is reported as skipped, here and in the list of `scripts/test`.
 pub(crate) fn data(test: &str) -> Option<PathBuf> {
     let folder = crate_folder().parent()?.join("../shared/data");
     if folder.is_dir() {

@@ -1,4 +1,4 @@
-//! The table is whole: every row can be read, put in and told, and names agree with what the wire counts.
+//! The table is whole: every row can be read, put in and reported, and names agree with what the wire counts.
 
 use super::mark::{Cause, Mark, What};
 use super::overlay::{Overlay, on_wire};

@@ -98,7 +98,7 @@ fn a_writer_that_does_not_write_is_waited_for_once_in_a_stall_and_one_that_is_go
     assert!(began.elapsed().as_secs_f64() < 1.0);
 }
 
-/// A rig that stood still while its interface went down and came back never saw it down, and told nobody.
+/// A rig that stood still while its interface went down and came back never saw it down, and reported nothing.
 #[test]
 fn a_bus_that_went_and_came_back_between_two_looks_is_told_of() {
     let (mut node, records) = node("");
@@ -107,6 +107,6 @@ fn a_bus_that_went_and_came_back_between_two_looks_is_told_of() {
     (bus.0.disconnects, bus.0.reconnects) = (1, 1);
     node.publish(1, false, &mut bus);
     node.publish(2, false, &mut bus);
-    let told: Vec<_> = records.events.try_iter().map(|event| (event.cycle, event.kind)).collect();
-    assert_eq!(told, [(1, EventKind::BusLost), (1, EventKind::BusBack)]);
+    let reported: Vec<_> = records.events.try_iter().map(|event| (event.cycle, event.kind)).collect();
+    assert_eq!(reported, [(1, EventKind::BusLost), (1, EventKind::BusBack)]);
 }

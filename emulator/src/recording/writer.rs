@@ -26,10 +26,10 @@ use std::time::{Duration, Instant};
 const POLL_PERIOD: Duration = Duration::from_millis(4);
 /// Longest time that a recorded line stays in memory.
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
-/// Events of a kind that are told on the terminal, and kept for the summary.
+/// Events of a kind that are reported on the terminal, and kept for the summary.
 const EVENTS_TOLD: usize = 100;
 const EVENTS_KEPT: usize = 1000;
-/// Late wake-ups that are told, of which a bad machine makes thousands.
+/// Late wake-ups that are reported, of which a bad machine makes thousands.
 const SKIPS_TOLD: usize = 10;
 /// How long a frame waits for those that were read later but arrived earlier: longer than any stall of note.
 const FRAME_DELAY_NS: u64 = 250_000_000;
@@ -82,7 +82,7 @@ pub struct Writer {
     faults: Option<LineFile>,
     timing: Option<RigTiming>,
     pending: Vec<FrameRecord>,
-    told: HashMap<Discriminant<EventKind>, usize>,
+    reported: HashMap<Discriminant<EventKind>, usize>,
     untold: Untold,
     report: WriterReport,
 }
@@ -115,7 +115,7 @@ impl Writer {
             faults,
             timing,
             pending,
-            told: HashMap::new(),
+            reported: HashMap::new(),
             untold: Untold::default(),
             report,
         })
@@ -242,17 +242,17 @@ impl Writer {
         }
         let late = matches!(event.kind, EventKind::Skipped { .. });
         let most_told = if late { SKIPS_TOLD } else { EVENTS_TOLD };
-        let told = self.told.entry(discriminant(&event.kind)).or_default();
-        *told += 1;
-        if *told <= EVENTS_KEPT {
+        let reported = self.reported.entry(discriminant(&event.kind)).or_default();
+        *reported += 1;
+        if *reported <= EVENTS_KEPT {
             self.report.events.push(event);
         } else if let EventKind::Skipped { cycles } = event.kind {
             self.untold.overruns += 1;
             self.untold.skipped += cycles;
         }
-        if *told < most_told {
+        if *reported < most_told {
             eprintln!("emulator: {event}");
-        } else if *told == most_told {
+        } else if *reported == most_told {
             eprintln!("emulator: {event}; further ones of this kind stand in summary.json only");
         }
         Ok(())

@@ -49,7 +49,7 @@ impl Viewer {
             return;
         }
         if self.lost > self.lost_told {
-            // What was lost is told ahead of what comes after it.
+            // What was lost is reported ahead of what comes after it.
             let mut loss = Vec::new();
             write_loss(&mut loss, self.lost);
             self.outgoing.extend(loss);

@@ -98,7 +98,7 @@ fn maxima(error: &Series) -> Option<f64> {
     Some(f64::from(count))
 }
 
-/// Dynamic error, m: what a controller that kept no account of it would have told.
+/// Dynamic error, m: what a controller that kept no account of it would have reported.
 #[must_use]
 pub fn error_dynamic_m(record: &Record) -> Option<f64> {
     record.position_error().within_all(&record.moves()).largest()

@@ -35,8 +35,9 @@ not_offered! {
 }
 
 fn unsupported(component: *mut c_void, attribute: &str) -> Status {
-    on(component, |own| {
-        own.teller
+    on(component, |instance| {
+        instance
+            .teller
             .tell(Status::Error, &format!("not supported: modelDescription.xml does not set {attribute}"));
         Ok(Status::Error)
     })
@@ -49,10 +50,10 @@ extern "C" fn fmi2GetStatus(component: *mut c_void, _kind: c_int, _value: *mut S
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, value: *mut c_double) -> Status {
-    on(component, |own| {
+    on(component, |instance| {
         // SAFETY: the importer's variable.
         match (kind, unsafe { value.as_mut() }) {
-            (LAST_SUCCESSFUL_TIME, Some(value)) => *value = own.simulation.time_s(),
+            (LAST_SUCCESSFUL_TIME, Some(value)) => *value = instance.simulation.time_s(),
             _ => return Ok(Status::Discard),
         }
         Ok(Status::Ok)

@@ -43,12 +43,12 @@ fn component() -> *mut c_void {
 fn null_is_an_error_and_no_crash() {
     assert_eq!(fmi2DoStep(null_mut(), 0.0, 1e-3, 1), Status::Error);
     fmi2FreeInstance(null_mut());
-    let own = component();
-    assert_eq!(fmi2GetReal(own, std::ptr::null(), 1, null_mut()), Status::Error);
-    assert_eq!(fmi2GetReal(own, std::ptr::null(), 0, null_mut()), Status::Ok);
-    assert_eq!(fmi2SetFMUstate(own, null_mut()), Status::Error);
-    assert_eq!(fmi2GetString(own, [0].as_ptr(), 1, null_mut()), Status::Error);
-    fmi2FreeInstance(own);
+    let instance = component();
+    assert_eq!(fmi2GetReal(instance, std::ptr::null(), 1, null_mut()), Status::Error);
+    assert_eq!(fmi2GetReal(instance, std::ptr::null(), 0, null_mut()), Status::Ok);
+    assert_eq!(fmi2SetFMUstate(instance, null_mut()), Status::Error);
+    assert_eq!(fmi2GetString(instance, [0].as_ptr(), 1, null_mut()), Status::Error);
+    fmi2FreeInstance(instance);
     let nothing = std::ptr::null();
     assert!(fmi2Instantiate(nothing, CO_SIMULATION, nothing, nothing, std::ptr::null(), 0, 0).is_null());
     let callbacks = callbacks();
@@ -58,33 +58,37 @@ fn null_is_an_error_and_no_crash() {
 
 #[test]
 fn a_panic_kills_the_instance_and_nothing_else() {
-    let own = component();
-    assert_eq!(on(own, |_| panic!("a bug")), Status::Fatal);
-    assert_eq!(fmi2EnterInitializationMode(own), Status::Fatal);
-    fmi2FreeInstance(own);
+    let instance = component();
+    assert_eq!(on(instance, |_| panic!("a bug")), Status::Fatal);
+    assert_eq!(fmi2EnterInitializationMode(instance), Status::Fatal);
+    fmi2FreeInstance(instance);
 }
 
 #[test]
 fn refusals_reach_the_logger_and_percent_signs_are_no_formats() {
-    let own = component();
-    assert_eq!(on(own, |_| Err(Refusal::Time("100 % of it".into()))), Status::Error);
+    let instance = component();
+    assert_eq!(on(instance, |_| Err(Refusal::Time("100 % of it".into()))), Status::Error);
     let expected = (Status::Error, "100 %% of it".to_owned());
     assert!(SAID.lock().unwrap().contains(&expected));
-    fmi2FreeInstance(own);
+    fmi2FreeInstance(instance);
 }
 
 #[test]
 fn a_state_is_made_overwritten_and_freed_once() {
-    let own = component();
+    let instance = component();
     let mut state = null_mut();
-    assert_eq!(fmi2GetFMUstate(own, &mut state), Status::Ok);
+    assert_eq!(fmi2GetFMUstate(instance, &mut state), Status::Ok);
     let place = state;
-    assert_eq!((fmi2GetFMUstate(own, &mut state), state), (Status::Ok, place), "overwritten, not leaked");
-    assert_eq!(fmi2SetFMUstate(own, state), Status::Ok);
+    assert_eq!(
+        (fmi2GetFMUstate(instance, &mut state), state),
+        (Status::Ok, place),
+        "overwritten, not leaked"
+    );
+    assert_eq!(fmi2SetFMUstate(instance, state), Status::Ok);
     for _ in 0..2 {
-        assert_eq!((fmi2FreeFMUstate(own, &mut state), state), (Status::Ok, null_mut()));
+        assert_eq!((fmi2FreeFMUstate(instance, &mut state), state), (Status::Ok, null_mut()));
     }
-    fmi2FreeInstance(own);
+    fmi2FreeInstance(instance);
 }
 
 #[test]

@@ -7,7 +7,7 @@ fn baseline() -> Simulation {
 }
 
 fn reference(simulation: &Simulation, name: &str) -> u32 {
-    let place = simulation.variables.iter().position(|own| own.name == name);
+    let place = simulation.variables.iter().position(|instance| instance.name == name);
     place.unwrap_or_else(|| panic!("no variable {name}")) as u32
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// Cycles on each side of an event in which a dump of it may have its own cycle: neighbours are one event.
 const DUMP_WITHIN_CYCLES: u64 = 5;
-/// Cycles, of 1 ms, on each side of an event from which the rig's own events are told.
+/// Cycles, of 1 ms, on each side of an event from which the rig's own events are reported.
 const RIG_WITHIN_CYCLES: u64 = 10;
 
 /// Adds to an event of this run what lies beside it in the run's folder and summary.
@@ -52,11 +52,11 @@ fn frames(log: &Path) -> BTreeMap<String, u64> {
 /// What the rig noted near these cycles, but for the missed cycles themselves.
 fn rig_events(summary: &Summary, first: u64, last: u64) -> Vec<String> {
     let near = first.saturating_sub(RIG_WITHIN_CYCLES)..=last + RIG_WITHIN_CYCLES;
-    let mut told: Vec<_> = summary.events.iter().filter_map(|noted| in_words(noted, &near)).collect();
+    let mut reported: Vec<_> = summary.events.iter().filter_map(|noted| in_words(noted, &near)).collect();
     if summary.event_count.is_some_and(|count| count > summary.events.len() as u64) {
-        told.push("Of what came often the rig noted the first only.".to_owned());
+        reported.push("Of what came often the rig noted the first only.".to_owned());
     }
-    told
+    reported
 }
 
 fn in_words(noted: &NotedEvent, near: &std::ops::RangeInclusive<u64>) -> Option<String> {

@@ -224,39 +224,40 @@ fn sentence(cause: Cause, seen: &Seen) -> String {
 
 fn evidence(seen: &Seen) -> Vec<String> {
     let Seen { vitals, .. } = seen;
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     if seen.continued > 0 {
-        told.push(format!("SIGCONT was counted {} time(s) in these cycles.", seen.continued));
+        reported.push(format!("SIGCONT was counted {} time(s) in these cycles.", seen.continued));
     }
-    told.push(match seen.run_delay {
+    reported.push(match seen.run_delay {
         Known::Yes => format!("It was ready and waited for the CPU for {}.", in_words(seen.waited_ns)),
         Known::No => "The kernel does not tell how long threads wait for a CPU.".to_owned(),
     });
-    told.push(format!(
+    reported.push(format!(
         "Page faults in the cycle: {} minor, {} major.",
         vitals.minor_faults, vitals.major_faults
     ));
     if vitals.involuntary_switches > 0 {
-        told.push(format!("Another thread took the CPU from it {} time(s).", vitals.involuntary_switches));
+        reported
+            .push(format!("Another thread took the CPU from it {} time(s).", vitals.involuntary_switches));
     }
     if vitals.voluntary_switches > 1 {
         let switches = vitals.voluntary_switches;
-        told.push(format!(
+        reported.push(format!(
             "It gave the CPU away {switches} times; once a cycle is usual, so its own work blocked."
         ));
     }
     if seen.slow_ns > seen.late_ns {
         let [receive, step, send] = seen.stages_ns.map(in_words);
-        told.push(format!("Stages of that cycle: receive {receive}, step {step}, send {send}."));
+        reported.push(format!("Stages of that cycle: receive {receive}, step {step}, send {send}."));
     }
     for (other, bad_ns, waited_ns) in &seen.others {
         let (bad, waited) = (in_words(*bad_ns), in_words(*waited_ns));
-        told.push(format!(
+        reported.push(format!(
             "In the same moment {other} was late or slow by {bad}, of which it waited {waited} for a CPU."
         ));
     }
-    told.push(probe_evidence(seen));
-    told
+    reported.push(probe_evidence(seen));
+    reported
 }
 
 fn probe_evidence(seen: &Seen) -> String {

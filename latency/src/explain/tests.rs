@@ -161,8 +161,8 @@ fn late_cycles_in_a_row_are_one_event_and_the_worst_events_come_first() {
     }
     let mut events = events(0, &run);
     sort_by_severity(&mut events);
-    let told: Vec<_> = events.iter().map(|event| (event.cycle, event.late_ns)).collect();
-    assert_eq!(told, [(300, 900_000), (102, 700_000)]);
+    let reported: Vec<_> = events.iter().map(|event| (event.cycle, event.late_ns)).collect();
+    assert_eq!(reported, [(300, 900_000), (102, 700_000)]);
 }
 
 #[test]
@@ -205,8 +205,8 @@ fn what_two_processes_suffered_at_once_takes_one_place() {
     let mut events = events(0, &run);
     sort_by_severity(&mut events);
     let kept = one_of_each_moment(events);
-    let told: Vec<_> = kept.iter().map(|event| (event.process.as_str(), event.cycle)).collect();
-    assert_eq!(told, [("emulator", 100), ("controller", 300)]);
+    let reported: Vec<_> = kept.iter().map(|event| (event.process.as_str(), event.cycle)).collect();
+    assert_eq!(reported, [("emulator", 100), ("controller", 300)]);
     let last = kept[0].evidence.last().unwrap();
     assert!(last.starts_with("Of the same moment: The controller woke"), "{last}");
 }
@@ -216,10 +216,10 @@ fn a_watched_cpu_without_gaps_is_never_called_unwatched() {
     let mut run = made_up::run(500);
     made_up::stall(&mut run, "emulator", 100, 3_700_000);
     run.gaps = Some(vec![gap(1, 10, 200_000, false)]);
-    let told = |run: &RunFiles| one(run).evidence.join(" ");
-    assert!(told(&run).contains("does not tell whether that CPU was watched"), "{}", told(&run));
+    let reported = |run: &RunFiles| one(run).evidence.join(" ");
+    assert!(reported(&run).contains("does not tell whether that CPU was watched"), "{}", reported(&run));
     run.gaps = Some(vec![gap(0, 0, 0, false), gap(1, 0, 0, false)]);
-    assert!(told(&run).contains("The probe on CPU 0 saw no gap"), "{}", told(&run));
+    assert!(reported(&run).contains("The probe on CPU 0 saw no gap"), "{}", reported(&run));
     run.gaps = Some(vec![gap(1, 0, 0, false)]);
-    assert!(told(&run).contains("No probe watched CPU 0"), "{}", told(&run));
+    assert!(reported(&run).contains("No probe watched CPU 0"), "{}", reported(&run));
 }

@@ -100,9 +100,12 @@ fn lateness_without_rows_is_no_undisturbed_run() {
     run.summary["skipped"] = json!(5);
     assert_eq!(found(run.clone()), [Cause::MachineStoodStill], "its rows tell it");
     run.rows.clear();
-    let told = find(&[run.clone()], &[]);
-    assert_eq!(told[0].cause, Cause::Unknown);
-    assert!(told[0].sentence.starts_with("5 cycles skipped, worst wake-up 5.40 ms; no rows"), "{told:?}");
+    let reported = find(&[run.clone()], &[]);
+    assert_eq!(reported[0].cause, Cause::Unknown);
+    assert!(
+        reported[0].sentence.starts_with("5 cycles skipped, worst wake-up 5.40 ms; no rows"),
+        "{reported:?}"
+    );
     run.summary["skipped"] = json!(0);
     run.summary["wakeup_ns"]["max"] = json!(150_000);
     assert_eq!(found(run.clone()), [], "counts tell that nothing was late");

@@ -51,9 +51,9 @@ fn noise(beyond: Option<bool>) -> &'static str {
 /// The bounds: kept, broken, or not resolved.
 pub(super) fn bounds(bounds: &[BoundResult]) -> String {
     let mut table = Table::new("Bounds", ["figure", "value", "interval", "at least", "at most", "verdict"]);
-    let told = |value: Option<f64>| value.map_or_else(|| NOTHING.into(), number::compact);
+    let reported = |value: Option<f64>| value.map_or_else(|| NOTHING.into(), number::compact);
     for bound in bounds {
-        let value = if bound.value.is_some() { told(bound.value) } else { "not measured".into() };
+        let value = if bound.value.is_some() { reported(bound.value) } else { "not measured".into() };
         let verdict = match bound.verdict() {
             Verdict::Kept => Cell::Judged(true, "kept".into()),
             Verdict::Broken => Cell::Judged(false, "broken".into()),
@@ -69,8 +69,8 @@ pub(super) fn bounds(bounds: &[BoundResult]) -> String {
             text(&bound.figure),
             number(value),
             number(interval),
-            number(told(bound.min)),
-            number(told(bound.max)),
+            number(reported(bound.min)),
+            number(reported(bound.max)),
             verdict,
         ]);
     }

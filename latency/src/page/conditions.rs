@@ -5,7 +5,7 @@ use pagekit::markup::{list, none};
 use pagekit::number;
 use pagekit::page::escaped;
 
-/// Everything that was told of the machine and of how the programs were started.
+/// Everything that was reported of the machine and of how the programs were started.
 pub(super) fn conditions(conditions: &Conditions) -> String {
     let fact = |name: &str, value: &str| Fact { name: name.into(), value: value.into() };
     let load =

@@ -58,16 +58,16 @@ fn card(event: &Event, place: usize, is_probed: bool) -> String {
 
 /// What the flight recorder and the rig noted beside it.
 fn beside(event: &Event) -> String {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     if let Some(dump) = &event.dump {
         let frames: Vec<_> =
             event.frames.iter().map(|(id, n)| format!("{} of {id}", number::count(*n))).collect();
         let frames =
             if frames.is_empty() { "no frames".into() } else { format!("frames {}", frames.join(", ")) };
-        told.push(format!("Flight recorder: {dump}, with {frames}."));
+        reported.push(format!("Flight recorder: {dump}, with {frames}."));
     }
-    told.extend(event.rig_events.iter().map(|noted| format!("The rig noted: {noted}")));
-    if told.is_empty() { String::new() } else { list(&told, "") }
+    reported.extend(event.rig_events.iter().map(|noted| format!("The rig noted: {noted}")));
+    if reported.is_empty() { String::new() } else { list(&reported, "") }
 }
 
 /// What happened, in figures.

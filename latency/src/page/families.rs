@@ -1,7 +1,7 @@
 //! Which distributions stand in one chart and under one heading, and which reference beside them.
 //!
-//! Ours are told by the end of their tag (`emulator-wakeup`, `drive-round-trip`), a reference by the program that measured it:
-//! cyclictest waits for a time as our loops do, a ping-pong sends there and back as a round trip does.
+//! Ours are reported by the end of their tag (`emulator-wakeup`, `drive-round-trip`), a reference by the program that measured
+//! it: cyclictest waits for a time as our loops do, a ping-pong sends there and back as a round trip does.
 
 use crate::model::{Distribution, Source};
 use pagekit::svg::Look;
@@ -131,7 +131,7 @@ mod tests {
             named("something-new", Source::Joined),
         ];
         let families = families(&all);
-        let told: Vec<_> = families
+        let reported: Vec<_> = families
             .iter()
             .map(|family| {
                 let members = family.members.iter().map(|(look, one)| (*look, one.name.as_str()));
@@ -140,7 +140,7 @@ mod tests {
             .collect();
         let (ours, reference) = (Look::Ours(0), Look::Reference(0));
         assert_eq!(
-            told,
+            reported,
             [
                 ("Wake-up latency", vec![(ours, "emulator-wakeup"), (reference, "cyclictest")]),
                 ("Round trip", vec![(ours, "drive-round-trip"), (reference, "ping-pong-bus")]),

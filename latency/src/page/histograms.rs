@@ -177,7 +177,7 @@ fn marked(distribution: &Distribution) -> Vec<(f64, f64)> {
 }
 
 fn description(family: &Family<'_>) -> String {
-    let told = family.members.iter().map(|(_, one)| {
+    let reported = family.members.iter().map(|(_, one)| {
         let of = &one.percentiles_ns;
         let length = |ns: Option<u64>| ns.map_or_else(|| "not measured".to_owned(), number::length);
         format!(
@@ -188,7 +188,7 @@ fn description(family: &Family<'_>) -> String {
             length(of.max)
         )
     });
-    told.collect::<Vec<_>>().join(" ")
+    reported.collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

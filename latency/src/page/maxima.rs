@@ -73,7 +73,7 @@ fn chart(family: &Family<'_>, runs: &Runs, size: &Size) -> String {
     let x = Scale::linear((0.0, runs.length_s.max(1) as f64), (LEFT, size.width - RIGHT));
     let bottom = TOP + (HEADING + PLOT) * members.len() as f64;
     let mut drawn = time(&x, size, runs, bottom);
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for (place, (look, one)) in members.iter().enumerate() {
         let top = TOP + (HEADING + PLOT) * place as f64 + HEADING;
         let y = Scale::logarithmic(range, (top + PLOT, top));
@@ -82,13 +82,13 @@ fn chart(family: &Family<'_>, runs: &Runs, size: &Size) -> String {
         drawn += &levels(&y, (LEFT, size.width - RIGHT));
         drawn += &trace(*look, one, &x, &y, runs);
         drawn += &stroke("edge", (LEFT, top + PLOT), (size.width - RIGHT, top + PLOT));
-        told.push(heading + ".");
+        reported.push(heading + ".");
     }
     let drawing = Drawing {
         identifier: &format!("{}-maxima", family.identifier),
         size: (size.width, bottom + FOOT),
         title: &format!("1-s maxima: {}", family.title),
-        description: &told.join(" "),
+        description: &reported.join(" "),
     };
     let heading = (family.title.as_str(), "Largest value of each second, logarithmic.");
     figure(size, heading, "", &drawing.with(&drawn))

@@ -131,8 +131,9 @@ fn counted(runs: &[RunPart]) -> String {
         for name in names {
             let sum = runs.iter().filter_map(|run| value(run, name)).fold(0, u64::saturating_add);
             let sum = (runs.len() > 1).then(|| number(number::count(sum)));
-            let told = |run| number(value(run, name).map_or_else(|| number::NOTHING.into(), number::count));
-            table.row([text(*name)].into_iter().chain(sum).chain(runs.iter().map(told)));
+            let reported =
+                |run| number(value(run, name).map_or_else(|| number::NOTHING.into(), number::count));
+            table.row([text(*name)].into_iter().chain(sum).chain(runs.iter().map(reported)));
         }
         table.html_or("Nothing was counted.")
     };

@@ -295,8 +295,8 @@ mod tests {
 
     #[test]
     fn every_missed_cycle_is_late_against_its_own_time() {
-        let told = missed(&event(3, &[98, 99, 103]));
-        assert_eq!(told, [(0.0, 3009.0), (1000.0, 2009.0), (2000.0, 1009.0), (3000.0, 9.0)]);
+        let reported = missed(&event(3, &[98, 99, 103]));
+        assert_eq!(reported, [(0.0, 3009.0), (1000.0, 2009.0), (2000.0, 1009.0), (3000.0, 9.0)]);
         assert!(missed(&event(0, &[99, 100])).is_empty(), "its row is there");
         assert!(missed(&event(50_000, &[])).len() <= MOST_MARKERS + 1);
     }

@@ -154,14 +154,14 @@ impl Effects {
         let mut spools = at.spool_after(at.span.spool_to_middle).to_array();
         let (since_period_s, half_s) = (at.since_period_s(), at.span.span_s / 2.0);
         for (axis, spool) in spools.iter_mut().enumerate().filter(|(axis, _)| self.touched[*axis].spool) {
-            let own = &mut carried.axes[axis];
+            let axis_states = &mut carried.axes[axis];
             if at.held.stuck[axis] {
-                (*spool, own.spool_rate_per_s) = (at.from.spool.to_array()[axis], 0.0);
-                own.spool = *spool;
+                (*spool, axis_states.spool_rate_per_s) = (at.from.spool.to_array()[axis], 0.0);
+                axis_states.spool = *spool;
                 continue;
             }
-            *spool = self.spool_over(axis, own, at, at.from.spool.to_array()[axis], since_period_s);
-            own.spool = self.spool_over(axis, own, at, *spool, since_period_s + half_s);
+            *spool = self.spool_over(axis, axis_states, at, at.from.spool.to_array()[axis], since_period_s);
+            axis_states.spool = self.spool_over(axis, axis_states, at, *spool, since_period_s + half_s);
         }
         Pair::new(spools[0], spools[1])
     }
@@ -180,13 +180,14 @@ impl Effects {
         let mut drawn = 0.0;
         for axis in (0..2).filter(|axis| self.touched[*axis].air) {
             let lane = |pair: Pair| pair.to_array()[axis];
-            let own = &mut carried.axes[axis];
-            let exhaust =
-                ExhaustSide { silencer_back_pressure: own.silencer_pa + own.silencer_pa_per_s * half_s };
+            let axis_states = &mut carried.axes[axis];
+            let exhaust = ExhaustSide {
+                silencer_back_pressure: axis_states.silencer_pa + axis_states.silencer_pa_per_s * half_s,
+            };
             for chamber in 0..2 {
                 let air = from.air()[chamber];
                 let worked = lane(volume[chamber]) / lane(volume_from[chamber]) - 1.0;
-                let stored = lane(span.lag.midpoint_air(air)) + own.air_rate_w[chamber] * half_s
+                let stored = lane(span.lag.midpoint_air(air)) + axis_states.air_rate_w[chamber] * half_s
                     - self.work_share(axis) * lane(air.stored) * worked;
                 pressure_pa[chamber][axis] = stored / lane(volume[chamber]);
             }
@@ -203,18 +204,18 @@ impl Effects {
                 },
             );
             drawn += ports.drawn_m3_per_s;
-            own.port_flow_m3_per_s = ports.flow_m3_per_s;
+            axis_states.port_flow_m3_per_s = ports.flow_m3_per_s;
             for (chamber, flow) in flow.iter_mut().enumerate() {
                 let port = ports.flow_m3_per_s[chamber];
                 flow[axis] = self.line(axis, chamber, port, ahead_s).sum(port);
             }
             if let Some(effect) = self.on[axis].silencer_back_pressure {
                 let outside_pa = of.chambers.exhaust_pa();
-                let before_pa = own.silencer_pa;
+                let before_pa = axis_states.silencer_pa;
                 let after_pa =
                     effect.advance(outside_pa + before_pa, outside_pa, ports.exhausted_m3_per_s, span.span_s);
-                own.silencer_pa = after_pa - outside_pa;
-                own.silencer_pa_per_s = (own.silencer_pa - before_pa) / span.span_s;
+                axis_states.silencer_pa = after_pa - outside_pa;
+                axis_states.silencer_pa_per_s = (axis_states.silencer_pa - before_pa) / span.span_s;
             }
         }
         if let Some(effect) = self.on[0].supply_droop {
@@ -235,16 +236,16 @@ impl Effects {
         let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
         let [a, b] = [0, 1].map(|chamber: usize| lane(lanes.air()[chamber].stored) / lane(volumes[chamber]));
         let x = if axis == 0 { lane(lanes.extension) } else { self.stroke_m - lane(lanes.extension) };
-        let (on, own) = (&self.on[axis], &mut self.memory.moving.axes[axis]);
+        let (on, axis_states) = (&self.on[axis], &mut self.memory.moving.axes[axis]);
         for (i, truth) in [x, a, b].into_iter().enumerate() {
-            let (shown, seen) = (own.shown[i], own.seen[i]);
-            own.shown[i] = match i {
+            let (shown, seen) = (axis_states.shown[i], axis_states.seen[i]);
+            axis_states.shown[i] = match i {
                 0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
                 _ => {
                     on.pressure_sensor_lag[i - 1].map_or(truth, |lag| lag.advance(shown, seen, truth, span_s))
                 }
             };
-            own.seen[i] = truth;
+            axis_states.seen[i] = truth;
         }
         for (channel, truth) in [(0, x), (2, a), (3, b)] {
             self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));
@@ -295,12 +296,12 @@ impl Laws for Effects {
     fn sliding(&self, at: At<'_>, middle: &Middle, carried: &Moving, push: Pair, moving: Mask) -> Pair {
         let of = at.of;
         let [drive, load] = [0, 1].map(|axis| {
-            let own = &carried.axes[axis];
+            let axis_states = &carried.axes[axis];
             let velocity = at.from.velocity.to_array()[axis];
             let push = push.to_array()[axis];
-            let rubbing = self.rubbing(of, axis, middle, own);
+            let rubbing = self.rubbing(of, axis, middle, axis_states);
             if let Some(effect) = self.on[axis].presliding {
-                let bristle = Bristle { velocity_m_per_s: velocity, deflection_m: own.deflection_m };
+                let bristle = Bristle { velocity_m_per_s: velocity, deflection_m: axis_states.deflection_m };
                 return effect.force(bristle, self.under(of, axis, &rubbing, velocity, velocity.abs(), push));
             }
             if velocity == 0.0 {
@@ -315,9 +316,9 @@ impl Laws for Effects {
     fn starting(&self, at: At<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair {
         let of = at.of;
         let [drive, load] = [0, 1].map(|axis| {
-            let own = &self.memory.moving.axes[axis];
+            let axis_states = &self.memory.moving.axes[axis];
             let force = force.to_array()[axis];
-            let rubbing = self.rubbing(of, axis, middle, own);
+            let rubbing = self.rubbing(of, axis, middle, axis_states);
             -force.signum() * self.levels(of, axis, &rubbing, 0.0).sliding_n[side(force)]
         });
         Pair::new(drive, load).where_true(starts)
@@ -326,8 +327,8 @@ impl Laws for Effects {
     fn break_away(&self, at: At<'_>, middle: &Middle, force: Pair) -> Pair {
         let of = at.of;
         let [drive, load] = [0, 1].map(|axis| {
-            let own = &self.memory.moving.axes[axis];
-            let rubbing = self.rubbing(of, axis, middle, own);
+            let axis_states = &self.memory.moving.axes[axis];
+            let rubbing = self.rubbing(of, axis, middle, axis_states);
             self.levels(of, axis, &rubbing, 0.0).break_away_n[side(force.to_array()[axis])]
         });
         Pair::new(drive, load)
@@ -347,18 +348,18 @@ impl Laws for Effects {
 
     fn advance(&self, at: At<'_>, middle: &Middle, carried: &mut Moving, axis: usize, force: f64) -> Place {
         let (of, start) = (at.of, at.from.place(axis));
-        let own = &mut carried.axes[axis];
-        let rubbing = self.rubbing(of, axis, middle, own);
+        let axis_states = &mut carried.axes[axis];
+        let rubbing = self.rubbing(of, axis, middle, axis_states);
         let span_s = at.span.span_s;
         let Some(effect) = self.on[axis].presliding else {
             let speed = self.middle_speed(of, axis, &rubbing, start.velocity, force, span_s);
             return of.motion.advance(axis, start, force, &self.levels(of, axis, &rubbing, speed), span_s);
         };
-        let bristle = Bristle { velocity_m_per_s: start.velocity, deflection_m: own.deflection_m };
+        let bristle = Bristle { velocity_m_per_s: start.velocity, deflection_m: axis_states.deflection_m };
         let speed = self.middle_speed(of, axis, &rubbing, start.velocity, force, span_s);
         let under = self.under(of, axis, &rubbing, start.velocity, speed, force);
         let (way_m, bristle) = effect.advance(bristle, under, span_s);
-        own.deflection_m = bristle.deflection_m;
+        axis_states.deflection_m = bristle.deflection_m;
         of.motion
             .stop_at_ends(Place { extension: start.extension + way_m, velocity: bristle.velocity_m_per_s })
     }
@@ -383,7 +384,7 @@ impl Laws for Effects {
                 let outlet = &self.outlets[axis][chamber];
                 *leakage += outlet.inflow(pressure_pa[chamber], of.atmospheric_pa(), most);
             }
-            let own = &mut carried.axes[axis];
+            let axis_states = &mut carried.axes[axis];
             for chamber in 0..2 {
                 // What lag and bounds have let in, as a mean flow over the step.
                 let valve = (stored[chamber][axis] - lane(from.air()[chamber].stored)) / (normal_pa * span_s);
@@ -396,15 +397,16 @@ impl Laws for Effects {
                     HeatAt {
                         stored_j: pressure_pa[chamber] * volume_m3,
                         volume_m3,
-                        normal_volume_m3: own.normal_volume_m3[chamber] + flow_m3_per_s * span_s / 2.0,
+                        normal_volume_m3: axis_states.normal_volume_m3[chamber]
+                            + flow_m3_per_s * span_s / 2.0,
                         flow_m3_per_s,
                     },
                     span_s,
                 );
                 let swept_m3 = lane(volume_to[chamber]) - lane(volume_from[chamber]);
-                own.air_rate_w[chamber] = normal_pa * leakage[chamber] + rate.sum(0.0);
-                own.normal_volume_m3[chamber] += flow_m3_per_s * span_s;
-                stored[chamber][axis] += own.air_rate_w[chamber] * span_s
+                axis_states.air_rate_w[chamber] = normal_pa * leakage[chamber] + rate.sum(0.0);
+                axis_states.normal_volume_m3[chamber] += flow_m3_per_s * span_s;
+                stored[chamber][axis] += axis_states.air_rate_w[chamber] * span_s
                     - self.work_share(axis) * pressure_pa[chamber] * swept_m3;
             }
         }
@@ -426,9 +428,10 @@ impl Laws for Effects {
             let lane = |pair: Pair| pair.to_array()[axis];
             // Bristles never come to rest to the bit.
             let creep = if self.on_bristles()[axis] { CREEP_M_PER_S } else { 0.0 };
-            let own = &mut self.memory.moving.axes[axis];
-            own.rest_s = if lane(lanes.velocity).abs() <= creep { own.rest_s + span_s } else { 0.0 };
-            for (line, flow) in self.memory.lines[axis].iter_mut().zip(own.port_flow_m3_per_s) {
+            let axis_states = &mut self.memory.moving.axes[axis];
+            axis_states.rest_s =
+                if lane(lanes.velocity).abs() <= creep { axis_states.rest_s + span_s } else { 0.0 };
+            for (line, flow) in self.memory.lines[axis].iter_mut().zip(axis_states.port_flow_m3_per_s) {
                 line.iter_mut().for_each(|line| line.push(flow));
             }
             if self.touched[axis].past_readings {

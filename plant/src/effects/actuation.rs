@@ -20,23 +20,23 @@ impl Effects {
     }
 
     /// Terms of the spool's target, given what arrives.
-    pub(crate) fn target(&self, axis: usize, own: &AxisMoving, arriving: f64) -> Target {
+    pub(crate) fn target(&self, axis: usize, axis_states: &AxisMoving, arriving: f64) -> Target {
         let hysteresis = self.on[axis].valve_hysteresis;
-        Target { valve_hysteresis: hysteresis.map_or(0.0, |effect| effect.term(own.play, arriving)) }
+        Target { valve_hysteresis: hysteresis.map_or(0.0, |effect| effect.term(axis_states.play, arriving)) }
     }
 
     /// Terms of the spool's rate at an instant, without and with its limit.
     pub(crate) fn spool_rate(
         &self,
         axis: usize,
-        own: &AxisMoving,
+        axis_states: &AxisMoving,
         spool: f64,
         target: f64,
     ) -> (SpoolRate, LimitedRate) {
         let lag = (target - spool) / self.spool_time_constant_s;
         let on = &self.on[axis];
         let rate = SpoolRate {
-            spool_second_order: on.spool_second_order.map_or(0.0, |_| own.spool_rate_per_s - lag),
+            spool_second_order: on.spool_second_order.map_or(0.0, |_| axis_states.spool_rate_per_s - lag),
         };
         let free = rate.sum(lag);
         let limit = on.spool_rate_limit.map_or(0.0, |effect| effect.limit(0.0, free, 1.0) - free);
@@ -47,7 +47,7 @@ impl Effects {
     pub(super) fn spool_over(
         &self,
         axis: usize,
-        own: &mut AxisMoving,
+        axis_states: &mut AxisMoving,
         at: At<'_>,
         spool: f64,
         local_s: f64,
@@ -55,24 +55,31 @@ impl Effects {
         let span_s = at.span.span_s / 2.0;
         let edge_s = self.on[axis].command_dead_time.map_or(0.0, |effect| effect.delay_s % PERIOD_S);
         if local_s < edge_s && edge_s < local_s + span_s {
-            let at_edge = self.spool_leg(axis, own, at, spool, [local_s, edge_s]);
-            return self.spool_leg(axis, own, at, at_edge, [edge_s, local_s + span_s]);
+            let at_edge = self.spool_leg(axis, axis_states, at, spool, [local_s, edge_s]);
+            return self.spool_leg(axis, axis_states, at, at_edge, [edge_s, local_s + span_s]);
         }
-        self.spool_leg(axis, own, at, spool, [local_s, local_s + span_s])
+        self.spool_leg(axis, axis_states, at, spool, [local_s, local_s + span_s])
     }
 
     /// The spool after a leg of time over which its target is held.
-    fn spool_leg(&self, axis: usize, own: &mut AxisMoving, at: At<'_>, from: f64, leg_s: [f64; 2]) -> f64 {
+    fn spool_leg(
+        &self,
+        axis: usize,
+        axis_states: &mut AxisMoving,
+        at: At<'_>,
+        from: f64,
+        leg_s: [f64; 2],
+    ) -> f64 {
         let on = &self.on[axis];
         let span_s = leg_s[1] - leg_s[0];
         let command = at.held.command.to_array()[axis];
         let arriving = self.arriving(axis, command, (leg_s[0] + leg_s[1]) / 2.0).sum(command);
-        let sent = self.target(axis, own, arriving).sum(arriving);
-        own.play = sent;
+        let sent = self.target(axis, axis_states, arriving).sum(arriving);
+        axis_states.play = sent;
         let target = sent.clamp(-1.0, 1.0);
         let mut to = if let Some(effect) = on.spool_second_order {
-            let (spool, rate) = effect.advance(from, own.spool_rate_per_s, target, span_s);
-            own.spool_rate_per_s = rate;
+            let (spool, rate) = effect.advance(from, axis_states.spool_rate_per_s, target, span_s);
+            axis_states.spool_rate_per_s = rate;
             spool
         } else {
             let half_step = at.span.span_s / 2.0;
@@ -86,13 +93,14 @@ impl Effects {
         if let Some(effect) = on.spool_rate_limit {
             let limited = effect.limit(from, to, span_s);
             if limited != to {
-                own.spool_rate_per_s = own.spool_rate_per_s.clamp(-effect.rate_per_s, effect.rate_per_s);
+                axis_states.spool_rate_per_s =
+                    axis_states.spool_rate_per_s.clamp(-effect.rate_per_s, effect.rate_per_s);
             }
             to = limited;
         }
         if to.abs() > 1.0 {
             // The spool meets the end of its way.
-            own.spool_rate_per_s = 0.0;
+            axis_states.spool_rate_per_s = 0.0;
             to = to.clamp(-1.0, 1.0);
         }
         to

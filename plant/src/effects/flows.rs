@@ -90,11 +90,11 @@ impl Effects {
             let connected = usize::from((spool > 0.0) != (chamber == 0));
             let mut pipes = Pipes { conductance: [0.0; 2], far_pa: [at.supply_pa, at.exhaust_pa] };
             for edge in 0..2 {
-                let own = if edge == connected { kv[edge] } else { 0.0 };
-                let floor = on.valve_null_leakage.map_or(0.0, |effect| effect.term(own, kv_max[edge]));
+                let kv_open = if edge == connected { kv[edge] } else { 0.0 };
+                let floor = on.valve_null_leakage.map_or(0.0, |effect| effect.term(kv_open, kv_max[edge]));
                 ports.edges[chamber][edge] = Edge { valve_null_leakage: floor };
                 let shut = if at.shut { 0.0 } else { 1.0 };
-                pipes.conductance[edge] = ports.edges[chamber][edge].sum(own) * FLOW_PER_KV * shut;
+                pipes.conductance[edge] = ports.edges[chamber][edge].sum(kv_open) * FLOW_PER_KV * shut;
             }
             let to_end_m = if chamber == 0 { at.extension_m } else { of.motion.stroke_m() - at.extension_m };
             let (flow, port) = self.through(axis, &pipes, at.pressure_pa[chamber], to_end_m);

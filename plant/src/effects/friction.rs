@@ -156,12 +156,18 @@ impl Effects {
         }
     }
 
-    pub(super) fn rubbing(&self, of: &Integrator, axis: usize, middle: &Middle, own: &AxisMoving) -> Rubbing {
+    pub(super) fn rubbing(
+        &self,
+        of: &Integrator,
+        axis: usize,
+        middle: &Middle,
+        axis_states: &AxisMoving,
+    ) -> Rubbing {
         let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
         Rubbing {
             extension_m: middle.extension.to_array()[axis],
             gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa()),
-            rest_s: own.rest_s,
+            rest_s: axis_states.rest_s,
         }
     }
 

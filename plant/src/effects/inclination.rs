@@ -7,7 +7,7 @@
 //! F_g force in +x of the rig, N, either sign: on the drive along its extension, on the load against it (the load faces the
 //! drive). Acts always, at rest too, whatever position and velocity. No regularisation.
 //!
-//! It does not grow with added weights: the file holds a force, not an angle, because only the force can be told from a
+//! It does not grow with added weights: the file holds a force, not an angle, because only the force can be distinguished from a
 //! record.
 //!
 //! Properties: a constant of either sign; 0 changes nothing.

@@ -172,12 +172,12 @@ impl Memory {
 
     /// What sensors saw (position, force, pressures of each axis), moved along with what they see now.
     pub(crate) fn move_seen(&mut self, before: [[f64; 4]; 2], now: [[f64; 4]; 2]) {
-        for (axis, own) in self.moving.axes.iter_mut().enumerate() {
+        for (axis, axis_states) in self.moving.axes.iter_mut().enumerate() {
             let by: [f64; 4] = std::array::from_fn(|channel| now[axis][channel] - before[axis][channel]);
             let [position, _, a, b] = by;
             for (i, by) in [position, a, b].into_iter().enumerate() {
-                own.shown[i] += by;
-                own.seen[i] += by;
+                axis_states.shown[i] += by;
+                axis_states.seen[i] += by;
             }
             for (history, by) in self.channels[axis].iter_mut().zip(by) {
                 history.iter_mut().for_each(|history| history.shift(by));
@@ -187,9 +187,9 @@ impl Memory {
 
     /// The masses that have, in the new state, the temperatures of the old one.
     pub(crate) fn keep_temperatures(&mut self, old: &State, new: &State) {
-        for ((own, old), new) in self.moving.axes.iter_mut().zip(&old.axes).zip(&new.axes) {
-            own.normal_volume_m3[0] *= new.stored_air_a_j / old.stored_air_a_j;
-            own.normal_volume_m3[1] *= new.stored_air_b_j / old.stored_air_b_j;
+        for ((axis_states, old), new) in self.moving.axes.iter_mut().zip(&old.axes).zip(&new.axes) {
+            axis_states.normal_volume_m3[0] *= new.stored_air_a_j / old.stored_air_a_j;
+            axis_states.normal_volume_m3[1] *= new.stored_air_b_j / old.stored_air_b_j;
         }
     }
 }

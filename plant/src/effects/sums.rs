@@ -30,7 +30,7 @@ macro_rules! balance {
         impl $name {
             /// Baseline and all terms.
             #[inline(always)]
-            #[allow(dead_code)] // one is only told: the spool's own law integrates what it sums
+            #[allow(dead_code)] // one is only reported: the spool's own law integrates what it sums
             pub(crate) fn sum(&self, $baseline: f64) -> f64 { $baseline $(+ self.$term)* }
         }
 

@@ -1,7 +1,7 @@
 //! The list of all terms at an instant: what each switched-on effect adds to which balance, for `truth.csv` and for tests.
 //!
-//! The balances are told in the order of `sums.rs`, axis by axis, then those of linkage and supply. A term of an effect that
-//! is off is not told.
+//! The balances are reported in the order of `sums.rs`, axis by axis, then those of linkage and supply. A term of an effect that
+//! is off is not reported.
 
 use super::OpenBalance;
 use super::acting::Effects;
@@ -73,7 +73,7 @@ impl Term {
 /// Chambers by name, as they are counted.
 const CHAMBERS: [(&str, Element); 2] = [("a", Element::A), ("b", Element::B)];
 
-/// A list that is being told.
+/// A list that is being reported.
 struct Teller<'t> {
     effects: &'t Effects,
     part: Part,
@@ -116,16 +116,16 @@ impl Effects {
         let forces = Forces::at(of, Some(self), &lanes, hand_forces(inputs), state.linked);
         for (axis, part) in [Part::Drive, Part::Load].into_iter().enumerate() {
             let mut teller = Teller { effects: self, part, tell };
-            let own = &self.memory.moving.axes[axis];
+            let axis_states = &self.memory.moving.axes[axis];
             let lane = |pair: Pair| pair.to_array()[axis];
             let place = lanes.place(axis);
 
             // From the command to the flows.
             let command = if state.emergency_stop { 0.0 } else { inputs.valve[axis] };
             let arriving = self.arriving(axis, command, 0.0);
-            let target = self.target(axis, own, arriving.sum(command));
+            let target = self.target(axis, axis_states, arriving.sum(command));
             let sent = target.sum(arriving.sum(command)).clamp(-1.0, 1.0);
-            let (rate, limited) = self.spool_rate(axis, own, state.axes[axis].spool, sent);
+            let (rate, limited) = self.spool_rate(axis, axis_states, state.axes[axis].spool, sent);
             teller.balance(&arriving, None, None);
             teller.balance(&target, None, None);
             teller.balance(&rate, None, None);
@@ -136,7 +136,7 @@ impl Effects {
             for (edge, name) in ["supply", "exhaust"].into_iter().enumerate() {
                 teller.balance(&ports.characteristic[edge], Some(name), None);
             }
-            teller.balance(&ExhaustSide { silencer_back_pressure: own.silencer_pa }, None, None);
+            teller.balance(&ExhaustSide { silencer_back_pressure: axis_states.silencer_pa }, None, None);
 
             // The chambers.
             let seen = Seen::at(&lanes, &air, axis);
@@ -155,7 +155,7 @@ impl Effects {
                 let heat = HeatAt {
                     stored_j: lane(lanes.air()[chamber].stored),
                     volume_m3: lane(air.volume[chamber]),
-                    normal_volume_m3: own.normal_volume_m3[chamber],
+                    normal_volume_m3: axis_states.normal_volume_m3[chamber],
                     flow_m3_per_s: flows[chamber] + leakage[chamber].sum(0.0),
                 };
                 // With the piston's work, which the step takes from the volume swept.

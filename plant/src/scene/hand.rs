@@ -9,7 +9,7 @@
 //!
 //! t: start of the cycle, s. x, v: of the part, in +x, m and m/s; x_from: where it was at `from`. F acts in +x over the whole
 //! cycle, N. Beyond [from, to) a hand is off the part. A guiding hand has no integral part: against F_stat of 35 N or
-//! against trapped air it stops where k (x_target - x) is what it meets, as an arm does that is not told to push harder.
+//! against trapped air it stops where k (x_target - x) is what it meets, as an arm does that is not asked to push harder.
 
 use std::f64::consts::TAU;
 use std::ops::Add;

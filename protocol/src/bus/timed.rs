@@ -9,7 +9,7 @@
 //!
 //! The model's time never depends on when the host came round: a frame enters when it arrived in the host's queue, and a late
 //! turn of the host makes deliveries late, which is counted apart, and nothing else. Before time goes on, all queues are read
-//! up to it (`Host::turn`), so that no frame is told of too late, save one whose sender was interrupted between stamp and
+//! up to it (`Host::turn`), so that no frame is reported too late, save one whose sender was interrupted between stamp and
 //! queue: it enters a little late, and is counted.
 //!
 //! A timer descriptor wakes the host, since epoll by itself knows whole milliseconds.
@@ -30,7 +30,7 @@ const NS_PER_S: u64 = 1_000_000_000;
 /// Nanoseconds of simulated time in a cycle of the barrier.
 pub(super) const CYCLE_NS: u64 = 1_000_000;
 
-/// How a node is told of.
+/// How a node is reported.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Reported {
     /// The rig that lives in the host's process.
@@ -45,7 +45,7 @@ pub(super) enum Reported {
 pub(super) struct TimedWire {
     model: WireModel,
     nodes: BTreeMap<PeerId, NodeId>,
-    /// Each node as it is told of.
+    /// Each node as it is reported.
     reported: Vec<Reported>,
     timer: OwnedFd,
     /// What the timer was set to, ns of the model's time.
@@ -137,7 +137,7 @@ impl TimedWire {
         self.timer.as_fd()
     }
 
-    /// Sets the timer to what the model does next. Setting it clears what it has told, so that it need not be read.
+    /// Sets the timer to what the model does next. Setting it clears what it has reported, so that it need not be read.
     pub(super) fn arm(&mut self) -> rustix::io::Result<()> {
         let next_ns = self.model.next_ns();
         let told = self.armed_ns.is_some_and(|armed_ns| armed_ns <= self.model.now_ns());

@@ -62,7 +62,7 @@ pub enum UrlError {
     NeedsBitRate(String),
 }
 
-/// Longest time that a bus-off node may be told to wait, ms.
+/// Longest time that a bus-off node may be asked to wait, ms.
 const LONGEST_RESTART_MS: u32 = 60_000;
 
 /// Longest name of a bus, bytes.

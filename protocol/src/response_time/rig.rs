@@ -88,7 +88,8 @@ impl RigFrame {
         Self { message, bits: worst_case_bits(message.length), arrivals, reason }
     }
 
-    /// Allows for frames that came closer than they may: a late machine makes them. What was seen is told by the model's report.
+    /// Allows for frames that came closer than they may: a late machine makes them. What was seen is reported by the model's
+    /// report.
     pub fn allow_for(&mut self, least_distance_ns: Option<u64>, release_jitter_ns: Option<u64>) {
         let Arrivals { jitter_ns, distance_ns, .. } = &mut self.arrivals;
         if let Some(seen_ns) = least_distance_ns {
@@ -100,8 +101,8 @@ impl RigFrame {
         }
     }
 
-    /// Whether frames that came so kept to what is declared here; what was seen is told by the model's report. Its jitter counts
-    /// against the period of `rig.dbc`, and says nothing of frames that come on a change too.
+    /// Whether frames that came so kept to what is declared here; what was seen is reported by the model's report. Its jitter
+    /// counts against the period of `rig.dbc`, and says nothing of frames that come on a change too.
     #[must_use]
     pub fn kept_to(&self, least_distance_ns: Option<u64>, release_jitter_ns: Option<u64>) -> bool {
         let close = least_distance_ns.is_some_and(|seen_ns| seen_ns < self.arrivals.earliest_ns(1));
@@ -339,7 +340,7 @@ mod tests {
     #[test]
     fn one_mbit_carries_all_and_half_a_mbit_does_not() {
         assert_eq!(check(1_000_000), Ok(()));
-        let told = check(500_000).unwrap_err().to_string();
+        let reported = check(500_000).unwrap_err().to_string();
         for part in [
             "at 500000 bit/s",
             "DriveSensors           0x120 135 bits each   1 ms = 27.00 %",
@@ -348,7 +349,7 @@ mod tests {
             "reserve: one DAQ frame",
             "load 137.60 %, limit 70 %",
         ] {
-            assert!(told.contains(part), "'{part}' is not in\n{told}");
+            assert!(reported.contains(part), "'{part}' is not in\n{reported}");
         }
     }
 

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! A sender's TEC goes up by 8 with an error and down by 1 with a frame; the REC of everyone else by 1 and 1. What a node is
-//! told is an error frame as a SocketCAN interface gives it to its listeners.
+//! reported is an error frame as a SocketCAN interface gives it to its listeners.
 //!
 //! Source: ISO 11898-1, fault confinement; Linux `include/uapi/linux/can/error.h`.
 
@@ -69,7 +69,7 @@ pub(super) struct Off {
     pub(super) missing: u64,
 }
 
-/// What happened to a node that it has to be told.
+/// What happened to a node that has to be reported to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Change {
     Passive,

@@ -217,7 +217,7 @@ fn control_packets_reach_nobody_who_did_not_join() {
     let path = place.socket();
     let host = RunningHost::plain(&path);
     let [mut one, mut two] = connected(&path);
-    // A host without a barrier is asked to join, and told things.
+    // A host without a barrier is asked to join, and given things.
     one.join_lockstep(Role::Member, "drive").unwrap();
     one.done(0);
     send_fence(one.as_mut());

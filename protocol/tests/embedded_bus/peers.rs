@@ -192,7 +192,7 @@ fn a_peer_that_comes_back_by_sending_stays() {
         assert!(a.is_up(), "round {number}");
         a.send(&numbered(0x55, number)).unwrap();
     }
-    // `b` may have been accepted after the first of them, but hears the last whenever it was: that one is told again.
+    // `b` may have been accepted after the first of them, but hears the last whenever it was: that one is reported again.
     b.send(&CanFrame::new(HELLO_ID, &[])).unwrap();
     next_frame(a.as_mut());
     send_fence(a.as_mut());

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Build {
     /// Version of airbench.
     pub version: Cow<'static, str>,
-    /// The commit that was checked out; changes that nobody committed are not told.
+    /// The commit that was checked out; changes that nobody committed are not reported.
     pub commit: Cow<'static, str>,
     /// `release` or `debug`, and the level of optimisation.
     pub profile: Cow<'static, str>,

@@ -11,7 +11,7 @@ use std::io::Read;
 pub struct Preemption {
     /// `PREEMPT_RT`, `full`, `lazy`, `voluntary`, `none`, or `unknown`.
     pub model: String,
-    /// What told it, or why nobody does.
+    /// What reported it, or why nobody does.
     pub told_by: String,
 }
 

@@ -36,7 +36,7 @@ pub(super) fn smt(root: &Root) -> String {
 pub(super) fn frequency(root: &Root) -> Vec<String> {
     let policies: Vec<_> = root.names(&format!("{CPUS}/cpufreq"));
     let policies = policies.iter().filter(|name| name.starts_with("policy"));
-    let told: Vec<String> = policies
+    let reported: Vec<String> = policies
         .map(|policy| {
             let get = |name: &str| root.text(&format!("{CPUS}/cpufreq/{policy}/{name}"));
             let known = |name: &str| get(name).unwrap_or_else(|| "unknown".to_owned());
@@ -54,10 +54,10 @@ pub(super) fn frequency(root: &Root) -> Vec<String> {
             )
         })
         .collect();
-    if told.is_empty() {
+    if reported.is_empty() {
         return vec!["no cpufreq: whoever sets the frequency is not in this kernel".to_owned()];
     }
-    told
+    reported
 }
 
 pub(super) fn idle_driver(root: &Root) -> String {

@@ -27,7 +27,7 @@ const VERSION: &str = "proc/version";
 const DYNAMIC: &str = "Linux version 6.1.0 (gcc 12) #1 SMP PREEMPT_DYNAMIC Debian\n";
 const CPU: &str = "sys/devices/system/cpu";
 
-/// Files, the model, and a part of what told it.
+/// Files, the model, and a part of what reported it.
 type Case<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
 
 fn preemption(files: &[(&str, &str)]) -> (String, String) {
@@ -75,9 +75,9 @@ fn the_packed_configuration_is_read() {
         .unwrap();
     write(&folder, "proc/config.gz", &packed.finish().unwrap());
     write(&folder, VERSION, DYNAMIC.as_bytes());
-    let told = Machine::below(folder.path(), "0123456789ab").preemption;
-    assert_eq!(told.model, "none");
-    assert!(told.told_by.ends_with("/proc/config.gz"), "{}", told.told_by);
+    let reported = Machine::below(folder.path(), "0123456789ab").preemption;
+    assert_eq!(reported.model, "none");
+    assert!(reported.told_by.ends_with("/proc/config.gz"), "{}", reported.told_by);
 }
 
 #[test]
@@ -131,7 +131,9 @@ fn processors_are_read_with_their_frequency_idle_states_and_interrupts() {
         ("CPU 1", "may come: 9; do come: 9 ttyS0"),
         ("CPU 10", "may come: none; do come: none"),
     ];
-    assert!(machine.interrupts.iter().map(|(cpu, told)| (cpu.as_str(), told.as_str())).eq(interrupts));
+    assert!(
+        machine.interrupts.iter().map(|(cpu, reported)| (cpu.as_str(), reported.as_str())).eq(interrupts)
+    );
     assert_eq!(machine.hypervisor, "none");
 }
 

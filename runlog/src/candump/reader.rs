@@ -1,7 +1,7 @@
 //! A log from whatever can be read by lines, frame by frame; hostile bytes give an error with line and column, never more.
 //!
 //! Empty lines are passed over. A last line without its line feed that is none is cut: its writer was killed in the midst. It
-//! is left out and told ([`LogReader::cut_line`]). A line is at most [`MOST_LINE_BYTES`] long, so that a file
+//! is left out and reported ([`LogReader::cut_line`]). A line is at most [`MOST_LINE_BYTES`] long, so that a file
 //! without line feeds, or an endless one, fills no memory.
 
 use super::{FrameRecord, parse_line};

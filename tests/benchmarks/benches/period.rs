@@ -95,7 +95,7 @@ fn check_the_same_scheme(rig: &RigParameters, scenario: &Scenario) {
     println!("same trajectory over {} ms to {worst:.1e}", scenario.inputs.len());
 }
 
-/// Rigs of the batches that are timed; the floor's ratios are told for all of them.
+/// Rigs of the batches that are timed; the floor's ratios are reported for all of them.
 const BATCHES: [usize; 4] = [3, 8, 64, 256];
 
 /// A batch that shares a record out among its rigs, and the inputs of each of its periods.

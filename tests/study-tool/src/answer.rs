@@ -1,4 +1,4 @@
-//! What a campaign is told of a draw: the keys that its file may collect.
+//! What a campaign is given of a draw: the keys that its file may collect.
 //!
 //! ```text
 //! run, leave-out   kind, axis, hidden, where, over_limit, called, wall_s, memory_mib
@@ -18,7 +18,8 @@ use serde_json::{Map, Value, json};
 pub fn of_case(case: &Case) -> Value {
     let judgement = &case.judgement;
     let hidden = &judgement.hidden;
-    let names = |told: Vec<String>| if told.is_empty() { "nothing".to_owned() } else { told.join("+") };
+    let names =
+        |reported: Vec<String>| if reported.is_empty() { "nothing".to_owned() } else { reported.join("+") };
     let mut answer = Map::new();
     let mut tell = |name: &str, value: Value| {
         answer.insert(name.to_owned(), value);

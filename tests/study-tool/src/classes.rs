@@ -9,8 +9,8 @@
 //! from the truth of the very record ([`super::signature`]). Union is by draw: what is alike in one record need not be in
 //! another.
 //!
-//! Parameters of the baseline are compared too, by 5 %. A wrong parameter is no missing effect, so such a twin is told but is not
-//! in the class.
+//! Parameters of the baseline are compared too, by 5 %. A wrong parameter is no missing effect, so such a twin is reported but is
+//! not in the class.
 
 use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, axis_of};
@@ -133,8 +133,8 @@ pub fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<DrawClasses
             })
             .collect();
         members.sort_by(|left, right| right.cosine.total_cmp(&left.cosine));
-        let told = members.iter().take_while(|member| member.cosine > TOLD_COSINE).count();
-        members.truncate(told.max(1));
+        let reported = members.iter().take_while(|member| member.cosine > TOLD_COSINE).count();
+        members.truncate(reported.max(1));
         let two_sided = sheet.keys[0].signed;
         let strength = length(&own) / threshold(two_sided);
         hidden_classes.push(HiddenClass { effect: hidden.name.to_owned(), place, strength, members });

@@ -66,7 +66,7 @@ struct Row {
 }
 
 /// `166/223 (68 to 80 %)`.
-pub(crate) fn told(rate: &Rate) -> String {
+pub(crate) fn reported(rate: &Rate) -> String {
     if rate.of == 0 {
         return "none".to_owned();
     }
@@ -84,7 +84,7 @@ fn told_low(rate: &Rate) -> String {
 
 /// Of a line whose rate should be low, the bound above; else the interval.
 pub(crate) fn told_line(line: &Line) -> String {
-    if line.is_low() { told_low(&line.rate) } else { told(&line.rate) }
+    if line.is_low() { told_low(&line.rate) } else { reported(&line.rate) }
 }
 
 fn quantile(spread: &Spread, at: usize, scale: f64, unit: &str) -> String {
@@ -98,7 +98,7 @@ fn figures(scores: &[Score]) -> Vec<Row> {
         wanted: wanted.to_owned(),
     };
     let mut rows = vec![
-        row("program, CRC-32", "", &|score| score.program.told()),
+        row("program, CRC-32", "", &|score| score.program.reported()),
         row("draws, seed", "", &|score| format!("{}, {}", score.cases.len(), score.seed)),
     ];
     let lines = scores.first().map_or(&[][..], |first| &first.tables.headline);
@@ -114,7 +114,7 @@ fn figures(scores: &[Score]) -> Vec<Row> {
             ("the same, all numbers", "90 to 98 %", |score| &score.tables.numbers.all_covered),
             ("the same, all numbers, another form", "", |score| &score.tables.numbers.foreign_covered),
         ];
-        rows.extend(rates.map(|(name, wanted, pick)| row(name, wanted, &|score| told(pick(score)))));
+        rows.extend(rates.map(|(name, wanted, pick)| row(name, wanted, &|score| reported(pick(score)))));
         type Figure = fn(&Score) -> &Spread;
         let medians: [(&str, &str, Figure); 4] = [
             ("amplitude off by, of itself, median", "", |score| &score.tables.numbers.off_ratio),
@@ -146,7 +146,7 @@ fn parts(scores: &[Score], of: impl Fn(&Score) -> &Vec<Split>) -> Vec<Row> {
         name: split.name.clone(),
         cells: scores
             .iter()
-            .map(|score| of(score).get(at).map_or(String::new(), |own| told(&own.class_right)))
+            .map(|score| of(score).get(at).map_or(String::new(), |own| reported(&own.class_right)))
             .collect(),
         wanted: String::new(),
     };
@@ -195,7 +195,7 @@ fn left_out<'a>(first: &str, score: &Score, splits: impl Iterator<Item = &'a Lef
     let row = |split: &LeftSplit| {
         let rates = [split.no_wrong_name, split.balance_right, split.variable_right, split.both_right];
         let mut cells = vec![split.name.clone()];
-        cells.extend(rates.iter().map(told));
+        cells.extend(rates.iter().map(reported));
         cells.extend(
             [split.claimed_closed_ratio, split.claimed_joint_ratio]
                 .iter()
@@ -209,8 +209,9 @@ fn left_out<'a>(first: &str, score: &Score, splits: impl Iterator<Item = &'a Lef
 
 /// `named 2, outside-catalogue 4`.
 pub(crate) fn verdicts(split: &LeftSplit) -> String {
-    let told: Vec<_> = split.verdicts.iter().map(|(verdict, count)| format!("{verdict} {count}")).collect();
-    told.join(", ")
+    let reported: Vec<_> =
+        split.verdicts.iter().map(|(verdict, count)| format!("{verdict} {count}")).collect();
+    reported.join(", ")
 }
 
 /// A table in Markdown.
@@ -249,7 +250,7 @@ mod tests {
         for line in text.lines().take(20) {
             assert_eq!(line.matches('|').count(), 5, "{line}");
         }
-        // What no draw is of is not told.
+        // What no draw is of is not reported.
         assert!(!text.contains("| below the limit |"));
     }
 

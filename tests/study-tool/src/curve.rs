@@ -12,7 +12,7 @@
 //! What is drawn lies mostly far above the limits. A study of the same noise whose amplitudes are divided by a factor
 //! (`draws --weaker`) adds its draws to the curve over amplitude, and to no other.
 
-use crate::compare::{grid, told, told_line};
+use crate::compare::{grid, reported, told_line};
 use crate::draws::Kind;
 use crate::interval::Rate;
 use crate::score::tables::{Line, hidden, over_limit};
@@ -93,7 +93,7 @@ impl<'a> Curves<'a> {
                 .collect::<Vec<_>>()
         };
         let heads = row("noise", &|score| format!("times {}", noise(score)));
-        let programs = row("program, CRC-32", &|score| score.program.told());
+        let programs = row("program, CRC-32", &|score| score.program.reported());
         let draws = row("draws, seed", &|score| format!("{}, {}", score.cases.len(), score.seed));
         let lines = self.scores[0].tables.headline.iter().map(|line| {
             row(&line.name, &|score| rate_of(score, &line.name).as_ref().map_or(String::new(), told_line))
@@ -103,7 +103,7 @@ impl<'a> Curves<'a> {
         let curves = self.over_amplitude();
         heads.extend(curves.iter().map(|curve| curve.name.clone()));
         let rows = (0..=ENDS.len()).map(|bin| {
-            let rates = curves.iter().map(|curve| told(&curve.points[bin].1));
+            let rates = curves.iter().map(|curve| reported(&curve.points[bin].1));
             std::iter::once(bin_name(bin)).chain(rates).collect()
         });
         format!("{over_noise}\nClass among the names, draws of one effect:\n\n{}", grid(&heads, rows))
@@ -221,7 +221,7 @@ mod tests {
         // In the order of the noise, however they were given.
         assert_eq!(text.lines().next().unwrap(), "| noise | times 0.5 | times 4 |");
         // Two programs on one curve are seen.
-        let [noisy, quiet] = scores.each_ref().map(|score| score.program.told());
+        let [noisy, quiet] = scores.each_ref().map(|score| score.program.reported());
         assert_eq!(row("| program"), format!("| program, CRC-32 | {quiet} | {noisy} |"));
         assert_eq!(row("| 1 to 3"), "| 1 to 3 | none | 38/38 (91 to 100 %) |");
         assert_eq!(row("| 10 to 30"), "| 10 to 30 | 38/38 (91 to 100 %) | none |");

@@ -64,7 +64,7 @@ fn digits(value: f64) -> String {
 
 /// The table of twins: for each effect with whom, in how many of its draws, and the largest cosine of all.
 pub fn twin_table(classes: &Classes) -> String {
-    /// What is told of an effect.
+    /// What is reported of an effect.
     #[derive(Default)]
     struct Row<'a> {
         draws: usize,

@@ -5,8 +5,8 @@
 //! Clopper, Pearson    upper u with P(at most k of n | u) = 0.05                  one-sided, 95 %: at most so much
 //! ```
 //!
-//! Rates that should be high are told with Wilson's interval, whose mean coverage is near 95 %; false alarms with the exact upper
-//! bound, which never promises too much: 0 of 200 proves less than 1.5 %.
+//! Rates that should be high are reported with Wilson's interval, whose mean coverage is near 95 %; false alarms with the exact
+//! upper bound, which never promises too much: 0 of 200 proves less than 1.5 %.
 //!
 //! Source: Wilson 1927, J. Am. Stat. Assoc. 22(158); Clopper, Pearson 1934, Biometrika 26(4); Brown, Cai, DasGupta 2001, Stat.
 //! Sci. 16(2).

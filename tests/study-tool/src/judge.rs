@@ -142,7 +142,7 @@ fn reported(report: &Report, draw: &Draw) -> bool {
     draw.recipe
         .wrong_parameters
         .iter()
-        .all(|(name, _)| report.parameters.iter().any(|told| told.name == *name))
+        .all(|(name, _)| report.parameters.iter().any(|reported| reported.name == *name))
 }
 
 fn called(verdict: Option<Verdict>, first: Option<&Named>) -> String {
@@ -246,11 +246,14 @@ fn hidden_judged(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> Hid
     let keys = plant::effects::sheet(hidden.name).map_or(&[][..], |sheet| sheet.keys);
     let mut numbers = Vec::new();
     for (at, (key, truth)) in keys.iter().zip(&hidden.numbers).enumerate() {
-        let told = own.and_then(|name| name.parameters.iter().find(|told| told.name == key.name));
-        // A number in another unit is not told at all; relative to nothing there is no error.
-        let Some(told) = told.filter(|told| told.unit == key.unit.name() && *truth != 0.0) else { continue };
-        let off = (told.value - truth).abs();
-        let error = told.error_value.filter(|error| *error >= 0.0);
+        let reported = own.and_then(|name| name.parameters.iter().find(|reported| reported.name == key.name));
+        // A number in another unit is not reported at all; relative to nothing there is no error.
+        let Some(reported) = reported.filter(|reported| reported.unit == key.unit.name() && *truth != 0.0)
+        else {
+            continue;
+        };
+        let off = (reported.value - truth).abs();
+        let error = reported.error_value.filter(|error| *error >= 0.0);
         numbers.push(NumberJudged {
             name: key.name,
             amplitude: at == 0,

@@ -70,11 +70,11 @@ pub struct LeftOut {
     pub verdict: &'static str,
     /// Whether there is a good report that names nothing.
     pub no_wrong_name: bool,
-    /// The balance it told.
+    /// The balance it reported.
     pub balance: Option<String>,
-    /// All variables it told, the strongest first.
+    /// All variables it reported, the strongest first.
     pub variables: Vec<String>,
-    /// The formula it told.
+    /// The formula it reported.
     pub formula: Option<String>,
     /// Whether the balance is right.
     pub balance_right: bool,
@@ -116,8 +116,8 @@ pub fn judge(
         let (outside, expected) = (outside?, expected?);
         Some(is_expected(&outside.balance, place, &expected.balances))
     };
-    let variable_right =
-        expected.is_some_and(|own| variables.iter().take(FIRST).any(|told| own.variables.contains(told)));
+    let variable_right = expected
+        .is_some_and(|own| variables.iter().take(FIRST).any(|reported| own.variables.contains(reported)));
     LeftOut {
         without: without.to_vec(),
         verdict: report.map_or("error", |report| verdict_name(report.verdict)),
@@ -135,7 +135,7 @@ pub fn judge(
 fn is_expected(balance: &str, place: Place, expected: &[String]) -> bool {
     let (axis, name) = balance.split_once('.').map_or((None, balance), |(axis, name)| (Some(axis), name));
     let on_axis = match (axis, axis_of(place)) {
-        (Some(told), Some(own)) => told == own.name(),
+        (Some(reported), Some(own)) => reported == own.name(),
         _ => true,
     };
     on_axis && expected.iter().any(|own| own == name)

@@ -13,7 +13,7 @@
 //! | [`folder`] | the files of a study's folder; each is whole or absent |
 //! | [`program`] | one start of the program under study: time limit, wall time, memory |
 //! | [`step`] | one draw: records, program, what it wrote |
-//! | [`answer`] | what a campaign is told of it |
+//! | [`answer`] | what a campaign is given of it |
 //! | [`report`] | `report.json`, read as strictly as it is promised |
 //! | [`judge`] | one case: what was hidden against what was named |
 //! | [`leave_out`] | one case whose effect is left out of the program's catalogue |

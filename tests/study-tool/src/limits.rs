@@ -14,7 +14,7 @@
 //! | 0 | the magnitude |
 //! | a number of the rig file | magnitude of the logarithm of the ratio, upwards and downwards each with its own limit |
 //! | infinity | 1 / value |
-//! | none | no limit: the weakest of the drawn range is told in standard deviations |
+//! | none | no limit: the weakest of the drawn range is reported in standard deviations |
 //!
 //! An effect that is seen at the weakest that a rig file takes (a stiffness or a coefficient that would have to be larger) has
 //! no limit either: it is always seen.

@@ -117,7 +117,7 @@ fn percent(share: f64) -> String {
 }
 
 /// `19 of 20, 95.0 % (76.4 to 99.1)`.
-fn told(rate: &Rate) -> String {
+fn reported(rate: &Rate) -> String {
     let Some(share) = rate.share else { return "<span class=\"none\">none</span>".to_owned() };
     let [low, high] = rate.interval.map(percent);
     format!(
@@ -131,7 +131,7 @@ fn told(rate: &Rate) -> String {
 fn headline(score: &Score) -> String {
     let row = |line: &crate::score::tables::Line| {
         let most = format!("{} %", percent(line.rate.at_most));
-        vec![escaped(&line.name), told(&line.rate), most, escaped(line.wanted)]
+        vec![escaped(&line.name), reported(&line.rate), most, escaped(line.wanted)]
     };
     table(&["what", "rate", "at most", "wanted"], score.tables.headline.iter().map(row))
 }
@@ -139,7 +139,7 @@ fn headline(score: &Score) -> String {
 fn splits(head: &str, splits: &[Split]) -> String {
     let row = |split: &Split| {
         let rates = [split.class_right, split.top, split.alone, split.where_right];
-        std::iter::once(escaped(&split.name)).chain(rates.iter().map(told)).collect()
+        std::iter::once(escaped(&split.name)).chain(rates.iter().map(reported)).collect()
     };
     let heads =
         [head, "class among the names", "first name right", "right alone, where alone in class", "where"];
@@ -231,7 +231,7 @@ fn numbers(score: &Score) -> String {
          error.</p>\n{}",
         table(&["what", "cases", "least", "median", "90 %", "largest"], spreads),
         numbers.untold,
-        table(&["numbers", "covered"], covered.map(|(name, rate)| vec![name.to_owned(), told(rate)]))
+        table(&["numbers", "covered"], covered.map(|(name, rate)| vec![name.to_owned(), reported(rate)]))
     )
 }
 

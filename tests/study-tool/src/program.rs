@@ -57,7 +57,7 @@ pub struct Identity {
 
 impl Identity {
     /// Name and checksum in a table's cell.
-    pub fn told(&self) -> String {
+    pub fn reported(&self) -> String {
         format!("{} {:08x}", self.name, self.crc32)
     }
 }
@@ -98,7 +98,7 @@ pub struct Start<'a> {
     pub own: &'a [String],
 }
 
-/// The study was told to stop while the program ran; it was killed.
+/// The study was asked to stop while the program ran; it was killed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
@@ -145,11 +145,11 @@ impl Program {
             // Nobody left to kill is what is wanted.
             let _ = kill_process_group(group, Signal::KILL);
         };
-        let (tell, told) = mpsc::channel();
+        let (tell, reported) = mpsc::channel();
         let waiter = std::thread::spawn(move || tell.send(child.wait4()));
         let mut end = None;
         let used = loop {
-            match told.recv_timeout(POLL) {
+            match reported.recv_timeout(POLL) {
                 Ok(used) => break used.ok(),
                 Err(RecvTimeoutError::Disconnected) => break None,
                 Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {

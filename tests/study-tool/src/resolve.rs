@@ -131,7 +131,7 @@ pub enum Found {
     Measured(Resolution),
 }
 
-/// Measures what is proposed for a draw, unless it was, and runs the program on both records; `None` when it was told to stop.
+/// Measures what is proposed for a draw, unless it was, and runs the program on both records; `None` when it was asked to stop.
 ///
 /// # Errors
 /// [`StepError`] when a file of the study cannot be used, or the results are another program's.
@@ -167,7 +167,7 @@ pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Fou
 /// What to do where a proposal is another program's.
 const SAME_PROGRAM: &str = "give the one that was run, with its arguments";
 
-/// Fills the folder of a draw; `None` when the study was told to stop.
+/// Fills the folder of a draw; `None` when the study was asked to stop.
 fn resolve(
     step: &Step<'_>,
     program: &Program,
@@ -202,7 +202,7 @@ fn resolve(
     Ok(Some(resolution))
 }
 
-/// Text of the proposed experiment, or why there is none; `None` when the study was told to stop.
+/// Text of the proposed experiment, or why there is none; `None` when the study was asked to stop.
 fn proposal(
     step: &Step<'_>,
     program: &Program,

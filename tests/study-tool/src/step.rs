@@ -112,7 +112,7 @@ impl Step<'_> {
         self.make_records(draw)
     }
 
-    /// Lets the program loose on a draw, unless it was; `None` when it was told to stop in its midst.
+    /// Lets the program loose on a draw, unless it was; `None` when it was asked to stop in its midst.
     ///
     /// # Errors
     /// [`StepError`] for what is no result of the program's.
@@ -145,8 +145,8 @@ impl Step<'_> {
 
     pub(crate) fn check_disk(&self) -> Result<(), StepError> {
         // A system that does not tell is no reason to stop.
-        let Ok(told) = rustix::fs::statvfs(&self.study.root) else { return Ok(()) };
-        let free_mib = told.f_bavail.saturating_mul(told.f_frsize) >> 20;
+        let Ok(reported) = rustix::fs::statvfs(&self.study.root) else { return Ok(()) };
+        let free_mib = reported.f_bavail.saturating_mul(reported.f_frsize) >> 20;
         let least_free_mib = self.least_free_mib;
         if free_mib < least_free_mib { Err(StepError::Disk { free_mib, least_free_mib }) } else { Ok(()) }
     }
@@ -224,8 +224,8 @@ impl Step<'_> {
             Ok(taken) => taken,
             Err(Interrupted) => return Ok(None),
         };
-        let told = fs::metadata(&said).map_err(files)?.len();
-        if told > MOST_SAID {
+        let reported = fs::metadata(&said).map_err(files)?.len();
+        if reported > MOST_SAID {
             File::options()
                 .write(true)
                 .open(&said)
@@ -271,7 +271,7 @@ pub(crate) fn check_program(
     Err(FolderError::content(path, what))
 }
 
-/// Makes the folder of a run, whole or absent; `None` when the study was told to stop in its midst.
+/// Makes the folder of a run, whole or absent; `None` when the study was asked to stop in its midst.
 pub(crate) fn whole_run<T>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<Option<T>, StepError>,

@@ -97,7 +97,7 @@ fn what_is_no_result_ends_the_study_and_leaves_the_draw_missing() {
     let _ = place.run(&["--jobs", "1"]).expect_code(BAD_INPUT).expect_said(&["needs draws = 3", "kept"]);
     assert!(place.folder.path().join("out/parts/000002.csv").exists());
     assert!(!place.folder.path().join("out/parts/000003.csv").exists());
-    // Another program under the same label is told, whatever the campaign thinks.
+    // Another program under the same label is reported, whatever the campaign thinks.
     fs::write(place.folder.path().join("program"), "#!/bin/sh\nexit 1\n").expect("another program");
     let again = Running::start("campaign", &mut place.campaign("again", &[])).wait();
     let _ = again.expect_code(BAD_INPUT).expect_said(&["another --label"]);
@@ -114,7 +114,7 @@ fn shipped_studies_are_campaigns_of_all_their_draws() {
         let file: toml::Table = fs::read_to_string(&path).expect("a file").parse().expect("TOML");
         let words: Vec<_> =
             file["command"].as_array().expect("words").iter().filter_map(toml::Value::as_str).collect();
-        // One draw beyond the last, in a folder of its own: told before anything is done.
+        // One draw beyond the last, in a folder of its own: reported before anything is done.
         let out = tempfile::tempdir().expect("a folder");
         let place = words.iter().position(|word| *word == "--out").expect("a folder of the study");
         let mut words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
@@ -122,12 +122,12 @@ fn shipped_studies_are_campaigns_of_all_their_draws() {
         let draws = file["draws"].as_integer().expect("how many");
         words.splice(3..3, ["--draw".to_owned(), "1000000".to_owned()]);
         let mut command = Command::new(STUDY);
-        let told = Running::start("study", command.args(&words[1..])).wait().expect_code(75).stderr;
+        let reported = Running::start("study", command.args(&words[1..])).wait().expect_code(75).stderr;
         let singles = plant::effects::SHEETS.len() as i64 * 6;
-        let all = told.split("draws = ").nth(1).and_then(|all| all.trim().parse::<i64>().ok());
+        let all = reported.split("draws = ").nth(1).and_then(|all| all.trim().parse::<i64>().ok());
         let expected =
             if ["leave-out", "resolve"].contains(&words[2].as_str()) { Some(singles) } else { all };
-        assert_eq!(Some(draws), expected, "{}: {told}", path.display());
+        assert_eq!(Some(draws), expected, "{}: {reported}", path.display());
         seen += 1;
     }
     assert!(seen >= 3, "{seen} studies");

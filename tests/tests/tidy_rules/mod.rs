@@ -26,7 +26,7 @@ pub(crate) struct Problem {
 
 /// One rule with its samples.
 pub(crate) struct Rule {
-    /// Short name, told with each complaint.
+    /// Short name, reported with each complaint.
     pub(crate) name: &'static str,
     /// Whether the rule looks at the file of this path.
     pub(crate) applies: fn(&str) -> bool,

@@ -442,7 +442,7 @@ pub(super) const LINE_LENGTH: Rule = Rule {
     check: |file| {
         file.each_line(|line| {
             let length = line.chars().count();
-            // A text that is told in one piece cannot be broken without a continuation in its midst.
+            // A text that is reported in one piece cannot be broken without a continuation in its midst.
             let one_text = line.trim_start().starts_with(['"', 'b']) || line.contains(" = \"");
             (length > LONGEST_LINE && !(one_text && line.matches('"').count() == 2))
                 .then(|| format!("{length} characters, {LONGEST_LINE} at most: break the line"))

@@ -74,10 +74,10 @@ pub fn record(run: &Run) -> Record {
 pub fn figures(run: &Run) -> impl Fn(&str) -> Option<f64> + use<> {
     let record = record(run);
     let figures: Figures = figures::of(&record);
-    let told = [position::error_dynamic_m(&record), position::error_static_m(&record)];
+    let reported = [position::error_dynamic_m(&record), position::error_static_m(&record)];
     move |name| match name {
-        "position_error_dynamic_m" => told[0],
-        "position_error_static_m" => told[1],
+        "position_error_dynamic_m" => reported[0],
+        "position_error_static_m" => reported[1],
         name => figures.get(name),
     }
 }

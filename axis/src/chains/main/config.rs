@@ -1,4 +1,4 @@
-//! What the main chain is told once: lengths, repetitions, and how it begins and goes on.
+//! What the main chain is given once: lengths, repetitions, and how it begins and goes on.
 
 use super::{APPROACH_M_PER_S, APPROACH_SHORTEST_S};
 use crate::chains::AfterStop;

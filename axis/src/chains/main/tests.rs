@@ -23,8 +23,8 @@ fn order(one: &One) -> Vec<S> {
     one.seen.iter().map(|(_, state)| *state).collect()
 }
 
-/// What an axis at the start is told in a cycle in which its partner says this.
-fn told(cycle: u64, status: ChainStatus) -> MainInputs {
+/// What an axis at the start is given in a cycle in which its partner says this.
+fn reported(cycle: u64, status: ChainStatus) -> MainInputs {
     MainInputs {
         cycle,
         own: Some(OwnAxis { position_m: 0.1, error: ControlError::None }),
@@ -181,7 +181,7 @@ fn a_start_that_only_one_heard_travels_by_the_ok_flag() {
     duo.run(3000);
     let status = ChainStatus { main_chain: S::Settling, ..ChainStatus::default() };
     let console = Console { start: true, ..Console::default() };
-    duo.axes[1].leading.main.advance(&MainInputs { console, ..told(duo.cycle, status) });
+    duo.axes[1].leading.main.advance(&MainInputs { console, ..reported(duo.cycle, status) });
     duo.run(10);
     assert_eq!(duo.states(), [S::Experiment; 2]);
 }

@@ -120,22 +120,22 @@ fn without_full_timing_there_is_no_table() {
 
 #[test]
 fn late_slow_overtaken_and_faulty_freeze_the_recorder_and_the_rest_does_not() {
-    let told = |of: &dyn Fn(&mut Bench)| {
+    let reported = |of: &dyn Fn(&mut Bench)| {
         let mut bench = Bench::new(false);
         bench.tell(bench.row(6, 20_000, 50_000));
         of(&mut bench);
         bench.queues.finish().unwrap();
         bench.dumps()
     };
-    assert_eq!(told(&|bench| bench.tell(bench.row(7, 500_000, 500_000))), [""; 0]);
-    assert_eq!(told(&|bench| bench.tell(bench.row(7, 500_001, 0))), ["controller-0000000007-late"]);
-    assert_eq!(told(&|bench| bench.tell(bench.row(7, 0, 500_001))), ["controller-0000000007-slow"]);
+    assert_eq!(reported(&|bench| bench.tell(bench.row(7, 500_000, 500_000))), [""; 0]);
+    assert_eq!(reported(&|bench| bench.tell(bench.row(7, 500_001, 0))), ["controller-0000000007-late"]);
+    assert_eq!(reported(&|bench| bench.tell(bench.row(7, 0, 500_001))), ["controller-0000000007-slow"]);
     let overrun = |bench: &mut Bench| {
         bench.measured.send(Measured::Waited { arrived_ns: 0, woke_ns: 3 * MS }).unwrap();
         bench.tell(CycleTiming { skipped: 2, ..bench.row(9, 0, 0) });
     };
-    assert_eq!(told(&overrun), ["controller-0000000009-overrun"]);
-    assert_eq!(told(&|bench| bench.queues.fault(7)), ["controller-0000000007-fault"]);
+    assert_eq!(reported(&overrun), ["controller-0000000009-overrun"]);
+    assert_eq!(reported(&|bench| bench.queues.fault(7)), ["controller-0000000007-fault"]);
 }
 
 #[test]
@@ -171,8 +171,8 @@ fn a_dump_that_fails_is_told_though_the_next_one_is_good() {
     for (cycle, s) in [(7, 1), (8, 5)] {
         bench.queues.recorder.fault(cycle, Instant::from_nanos(s * 1000 * MS));
     }
-    let told = bench.queues.finish().unwrap_err().to_string();
-    assert!(told.contains("controller-0000000007-fault"), "{told}");
+    let reported = bench.queues.finish().unwrap_err().to_string();
+    assert!(reported.contains("controller-0000000007-fault"), "{reported}");
     assert_eq!(bench.dumps()[1], "controller-0000000008-fault");
 }
 

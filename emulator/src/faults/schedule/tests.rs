@@ -25,25 +25,25 @@ impl Bench {
 
     /// Cycles up to `end`, and what began and ended when.
     fn run(&mut self, from: u64, end: u64) -> Vec<(u64, u16, &'static str)> {
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         for cycle in from..end {
             let Self { schedule, plant, sensors, inputs } = self;
             let broken = Broken { plant, sensors, inputs };
-            schedule.begin_cycle(cycle, broken, |mark| told.push((cycle, mark.number, mark.what.name())));
+            schedule.begin_cycle(cycle, broken, |mark| reported.push((cycle, mark.number, mark.what.name())));
             schedule.hands().put_into(&mut self.inputs);
             self.plant.step(&self.inputs);
         }
-        told
+        reported
     }
 
     fn by_hand(
         &mut self,
         act: impl FnOnce(&mut FaultSchedule, Broken<'_>, &mut dyn FnMut(Mark)),
     ) -> Vec<What> {
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         let Self { schedule, plant, sensors, inputs } = self;
-        act(schedule, Broken { plant, sensors, inputs }, &mut |mark| told.push(mark.what));
-        told
+        act(schedule, Broken { plant, sensors, inputs }, &mut |mark| reported.push(mark.what));
+        reported
     }
 }
 
@@ -55,8 +55,8 @@ fn faults_begin_and_end_by_time_and_the_plant_is_whole_again() {
         false,
     );
     assert!(bench.schedule.possible());
-    let told = bench.run(0, 50);
-    assert_eq!(told, [(10, 1, "begins"), (20, 2, "begins"), (30, 1, "ends"), (40, 2, "ends")]);
+    let reported = bench.run(0, 50);
+    assert_eq!(reported, [(10, 1, "begins"), (20, 2, "begins"), (30, 1, "ends"), (40, 2, "ends")]);
     assert_eq!(bench.schedule.overlay, Overlay::default());
     assert!(!bench.schedule.busy && bench.schedule.active() == 0);
     let sent: Vec<_> = std::iter::from_fn(|| bench.schedule.next_to_tell()).collect();
@@ -70,9 +70,9 @@ fn a_condition_begins_it_once_and_one_that_never_holds_is_told() {
          [[fault]]\nname = \"valve-dead\"\nat = \"load\"\nwhen = \"drive.position_m\"\nbelow = 0.1\nto_s = 0.2\n",
         false,
     );
-    let told = bench.run(0, 1000);
-    let [(began, 1, "begins"), (ended, 1, "ends"), (200, 2, "never-began")] = told[..] else {
-        panic!("{told:?}")
+    let reported = bench.run(0, 1000);
+    let [(began, 1, "begins"), (ended, 1, "ends"), (200, 2, "never-began")] = reported[..] else {
+        panic!("{reported:?}")
     };
     assert_eq!(ended, began + 50);
     assert!(bench.plant.state().axes[0].extension_m > 0.26);
@@ -87,8 +87,10 @@ fn an_end_stop_is_hit_and_rods_part_once() {
     );
     // Against the air that a shut valve traps, 3000 N would not do.
     bench.inputs.valve[1] = 1.0;
-    let told = bench.run(0, 2000);
-    let [(10, 1, "begins"), (20, 2, "begins"), (hit, 2, "ends")] = told[..] else { panic!("{told:?}") };
+    let reported = bench.run(0, 2000);
+    let [(10, 1, "begins"), (20, 2, "begins"), (hit, 2, "ends")] = reported[..] else {
+        panic!("{reported:?}")
+    };
     assert!(!bench.plant.linked());
     assert!(hit < 1000, "{hit}");
     assert_eq!(bench.schedule.hands(), HandForces::default(), "let go");

@@ -8,8 +8,8 @@ use std::io;
 const LAST_FRAMES_NS: u64 = 50_000_000;
 
 impl Host {
-    /// What peers have sent is still carried on, to whoever is there; what they send from now on they are told is refused, which
-    /// they count. So every frame that a peer sent was either taken and carried, or is none.
+    /// What peers have sent is still carried on, to whoever is there; what they send from now on they are informed is refused,
+    /// which they count. So every frame that a peer sent was either taken and carried, or is none.
     pub(super) fn close(&mut self) -> io::Result<()> {
         self.closing = true;
         for peer in self.peers.values() {

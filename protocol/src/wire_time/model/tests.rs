@@ -35,7 +35,7 @@ fn delivered(events: &[WireEvent]) -> Vec<(u32, NodeId, u64)> {
     events.iter().filter_map(of).collect()
 }
 
-fn told(events: &[WireEvent], whom: NodeId) -> Vec<(u32, u64)> {
+fn reported(events: &[WireEvent], whom: NodeId) -> Vec<(u32, u64)> {
     let of = |event: &WireEvent| match event {
         WireEvent::Told { node, frame, at_ns } if *node == whom => Some((frame.raw_id() & 0x1FF, *at_ns)),
         _ => None,
@@ -158,7 +158,7 @@ fn a_node_whose_frames_all_fail_goes_off_the_bus_and_recovers() {
     model.enter(bad, frame(0x110), 0);
     model.enter(bad, frame(0x300), 0);
     let events = run(&mut model, 20_000_000);
-    let changes = told(&events, bad);
+    let changes = reported(&events, bad);
     assert_eq!(changes.iter().map(|(class, _)| *class).collect::<Vec<_>>(), [0x004, 0x040]);
     let off_ns = changes[1].1;
     // 16 of the attempts were those of a passive sender, in whose wait the other frame cannot begin: it is the same node's.
@@ -178,7 +178,7 @@ fn a_node_whose_frames_all_fail_goes_off_the_bus_and_recovers() {
 
     let events = run(&mut model, 300_000_000);
     let back_ns = off_ns + 100_000_000 + 128 * 11 * BIT_NS;
-    assert_eq!(told(&events, bad), [(0x100, back_ns)]);
+    assert_eq!(reported(&events, bad), [(0x100, back_ns)]);
     model.enter(bad, frame(0x110), 300_000_000);
     assert_eq!(delivered(&run(&mut model, 400_000_000)).len(), 1);
     let node = &model.report().nodes[bad];
@@ -197,7 +197,7 @@ fn recovery_counts_recessive_bits_of_a_busy_wire() {
     model.enter(bad, frame(0x110), 0);
     (0..400).for_each(|k| model.enter(good, frame(0x300), k * length_ns(0x300)));
     let events = run(&mut model, 400_000_000);
-    let changes = told(&events, bad);
+    let changes = reported(&events, bad);
     assert_eq!(changes.iter().map(|(class, _)| *class).collect::<Vec<_>>(), [0x004, 0x040, 0x100]);
     let (off_ns, back_ns) = (changes[1].1, changes[2].1);
     let meanwhile = |end_ns: &u64| (off_ns + 1..=back_ns).contains(end_ns);
@@ -214,7 +214,7 @@ fn a_passive_sender_lets_others_begin() {
     let events = run(&mut model, 50_000_000);
     // 16 failures in a row, then the other frame although its identifier is higher.
     assert_eq!(delivered(&events).len(), 1);
-    let passive_ns = told(&events, bad)[0].1;
+    let passive_ns = reported(&events, bad)[0].1;
     assert_eq!(delivered(&events)[0].2, passive_ns + length_ns(0x300));
 }
 

@@ -13,7 +13,7 @@ pub(super) struct Panel<'a> {
     pub(super) curves: &'a [Curve],
 }
 
-/// Colours of Okabe and Ito, told apart by colour-blind people.
+/// Colours of Okabe and Ito, distinguished by colour-blind people.
 const COLOURS: [RGBColor; 5] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -82,11 +82,11 @@ fn draw_panel(area: &Area<'_>, panel: &Panel<'_>) -> Result<(), Failure> {
         let colour = COLOURS[at % COLOURS.len()];
         // Curves stand side by side where their intervals would hide each other.
         let aside = 4 * at as i32 - 2 * (panel.curves.len() as i32 - 1);
-        let told =
+        let reported =
             || curve.points.iter().filter_map(|(place, rate)| Some((*place, rate.share?, rate.interval)));
-        let line: Vec<_> = told().map(|(place, share, _)| (x(place) + aside, y(share))).collect();
+        let line: Vec<_> = reported().map(|(place, share, _)| (x(place) + aside, y(share))).collect();
         area.draw(&PathElement::new(line.clone(), colour.stroke_width(2)))?;
-        for ((place, _, [low, high]), point) in told().zip(line) {
+        for ((place, _, [low, high]), point) in reported().zip(line) {
             let bar = [low, high].map(|end| (x(place) + aside, y(end)));
             area.draw(&PathElement::new(bar.to_vec(), colour))?;
             area.draw(&Circle::new(point, 4, colour.filled()))?;

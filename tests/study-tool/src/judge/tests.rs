@@ -184,9 +184,9 @@ fn numbers_are_compared_in_their_unit_and_with_two_standard_errors() {
         let report = parse(format!(r#"{{"verdict": "named", "named": [{text}]}}"#).as_bytes());
         judge(&case, &[], &TAKEN, &report).hidden[0].numbers.clone()
     };
-    let told = &numbers(-19.0, "N", "0.5")[0];
-    assert!(told.amplitude && told.covered == Some(true));
-    assert!((told.off_ratio - 0.05).abs() < 1e-12 && told.error_ratio == Some(0.025));
+    let reported = &numbers(-19.0, "N", "0.5")[0];
+    assert!(reported.amplitude && reported.covered == Some(true));
+    assert!((reported.off_ratio - 0.05).abs() < 1e-12 && reported.error_ratio == Some(0.025));
     assert_eq!(numbers(-18.9, "N", "0.5")[0].covered, Some(false));
     assert_eq!(numbers(20.0, "N", "0.5")[0].covered, Some(false));
     assert_eq!(numbers(-20.0, "N", "null")[0].covered, None);

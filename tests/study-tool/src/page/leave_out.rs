@@ -1,6 +1,6 @@
 //! The sections of a score whose effects were left out of the program's catalogue.
 
-use super::{percent, table, told};
+use super::{percent, reported, table};
 use crate::compare::verdicts;
 use crate::leave_out::tables::{Split, Tables};
 use crate::score::tables::Spread;
@@ -20,7 +20,7 @@ fn splits(head: &str, splits: &[Split]) -> String {
     let row = |split: &Split| {
         let rates = [split.no_wrong_name, split.balance_right, split.variable_right, split.both_right];
         let mut row = vec![escaped(&split.name)];
-        row.extend(rates.iter().map(told));
+        row.extend(rates.iter().map(reported));
         row.extend([split.claimed_closed_ratio, split.claimed_joint_ratio].iter().map(median));
         row.push(escaped(&verdicts(split)));
         row

@@ -2,7 +2,7 @@
 
 use super::{Outcome, ambiguous, judge, label, leaves_open, names, read_resolution};
 use crate::SCHEMA_VERSION;
-use crate::compare::{grid, told};
+use crate::compare::{grid, reported};
 use crate::draws::{Draw, Kind, Shape};
 use crate::folder::{FolderError, Study};
 use crate::interval::Rate;
@@ -44,7 +44,7 @@ pub struct Case {
     pub number: usize,
     /// The hidden effect and its place.
     pub truth: String,
-    /// What could not be told apart, each with its place, the best first.
+    /// What could not be distinguished, each with its place, the best first.
     pub between: Vec<String>,
     /// Which class that is.
     pub class: String,
@@ -162,8 +162,8 @@ impl Class {
         let ended = |outcome| count(&|case| case.outcome == Some(outcome));
         let tally = |of: &dyn Fn(&Case) -> Option<String>| {
             let mut tally = BTreeMap::new();
-            for told in cases.iter().filter_map(|case| of(case)) {
-                *tally.entry(told).or_default() += 1;
+            for reported in cases.iter().filter_map(|case| of(case)) {
+                *tally.entry(reported).or_default() += 1;
             }
             tally
         };
@@ -196,7 +196,7 @@ impl Class {
             self.no_experiment.to_string(),
             all(listed(&self.otherwise)),
             if self.name == "all" { proposed.to_string() } else { listed(&self.experiments) },
-            told(&self.resolved),
+            reported(&self.resolved),
             self.still_ambiguous.to_string(),
             self.wrong.to_string(),
             self.errors.to_string(),

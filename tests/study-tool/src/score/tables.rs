@@ -46,7 +46,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// Whether the rate should be low: then its upper bound is told.
+    /// Whether the rate should be low: then its upper bound is reported.
     pub fn is_low(&self) -> bool {
         self.wanted == "none" || self.wanted.starts_with("at most")
     }
@@ -313,10 +313,10 @@ fn nothing_hidden(cases: &[Case]) -> Vec<ConfusionRow> {
 }
 
 fn numbers(singles: &[&Case]) -> Numbers {
-    let told = |foreign| {
+    let reported = |foreign| {
         singles.iter().filter(move |case| case.foreign_form == foreign).flat_map(|case| &hidden(case).numbers)
     };
-    let amplitudes = || told(false).filter(|number| number.amplitude);
+    let amplitudes = || reported(false).filter(|number| number.amplitude);
     let covered = |numbers: &mut dyn Iterator<Item = &NumberJudged>| {
         Rate::of(numbers.filter_map(|number| number.covered), |covered| covered)
     };
@@ -324,8 +324,8 @@ fn numbers(singles: &[&Case]) -> Numbers {
         off_ratio: Spread::of(amplitudes().map(|number| number.off_ratio)),
         error_ratio: Spread::of(amplitudes().filter_map(|number| number.error_ratio)),
         covered: covered(&mut amplitudes()),
-        all_covered: covered(&mut told(false)),
-        foreign_covered: covered(&mut told(true)),
+        all_covered: covered(&mut reported(false)),
+        foreign_covered: covered(&mut reported(true)),
         untold: singles
             .iter()
             .filter(|case| case.judgement.top && hidden(case).where_right)

@@ -48,7 +48,7 @@ pub(crate) fn table() -> Result<(), Box<dyn Error>> {
         let set: Vec<_> = subject.set.iter().map(|set| (*set).to_owned()).collect();
         let case =
             Case::new(&Made { experiment: EXPERIMENT, load: Some(subject.load), set: &set, drive: None })?;
-        let runs = in_parallel(&SEEDS, |seed| told(&case, *seed));
+        let runs = in_parallel(&SEEDS, |seed| reported(&case, *seed));
         let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
         let scales = [1e3, 1.0, 1.0, 1.0, 1e3, 1e3, 1e2, 1e3];
         let cell = |place: usize| Spread::cell(Spread::of(runs.iter().map(|run| run[place])), scales[place]);
@@ -57,7 +57,7 @@ pub(crate) fn table() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn told(case: &Case, seed: u64) -> Result<[Option<f64>; 8], TrialError> {
+fn reported(case: &Case, seed: u64) -> Result<[Option<f64>; 8], TrialError> {
     let trial = Trial { seed, ..Trial::default() };
     let run = case.run(&trial)?;
     let mut pulled = case.scene.clone();

@@ -65,15 +65,15 @@ impl Sheet<'_> {
         let heads: Vec<_> = self.columns.iter().map(|column| column.head).collect();
         println!("| | {} |", heads.join(" | "));
         println!("|---{}|", "|---".repeat(heads.len()));
-        let told =
+        let reported =
             self.subjects.iter().map(|subject| self.figures(subject)).collect::<Result<Vec<_>, _>>()?;
-        for (subject, told) in self.subjects.iter().zip(&told) {
+        for (subject, reported) in self.subjects.iter().zip(&reported) {
             let cells =
-                told.iter().zip(self.columns).map(|(spread, column)| Spread::cell(*spread, column.scale));
+                reported.iter().zip(self.columns).map(|(spread, column)| Spread::cell(*spread, column.scale));
             println!("| {} | {} |", subject.name, cells.collect::<Vec<_>>().join(" | "));
         }
         println!("\nAt most half, and by how much (ratio of the means)?\n");
-        let all = || self.subjects.iter().zip(&told);
+        let all = || self.subjects.iter().zip(&reported);
         for (subject, own) in all().filter(|(subject, _)| !subject.papers) {
             for (paper, papers) in all().filter(|(subject, _)| subject.papers) {
                 self.verdicts(papers, own).iter().for_each(|verdict| {

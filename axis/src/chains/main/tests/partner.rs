@@ -271,7 +271,7 @@ fn nobody_goes_back_before_the_partner_has_ended_and_its_emergency_stop_chain_is
         duo.console_holds = true;
         duo.step();
         let status = ChainStatus { main_chain, emergency_stop_chain, ..ChainStatus::default() };
-        let output = duo.axes[0].leading.main.advance(&told(duo.cycle, status));
+        let output = duo.axes[0].leading.main.advance(&reported(duo.cycle, status));
         assert_eq!(output.state, state, "{main_chain} {emergency_stop_chain}");
     }
 }
@@ -283,7 +283,7 @@ fn a_partner_that_had_ended_before_ends_the_waiting_for_the_rig_too() {
         let mut chain = MainChain::new(short());
         for cycle in 0..102 {
             let status = ChainStatus { main_chain, ..ChainStatus::default() };
-            let output = chain.advance(&told(cycle, status));
+            let output = chain.advance(&reported(cycle, status));
             // A rig that began anew has both in waiting, and the last status may be of before.
             let expected = if cycle > 100 { S::Aborted } else { S::WaitingForRig };
             assert_eq!(output.state, expected, "cycle {cycle}");

@@ -18,7 +18,7 @@ use study::folder::{Study, read, write_whole};
 use study::resolve::Table;
 use study::{compute, document};
 
-/// Exit code of a study that was told to stop: everything that is done is kept.
+/// Exit code of a study that was asked to stop: everything that is done is kept.
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {

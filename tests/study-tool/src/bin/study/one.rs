@@ -46,7 +46,7 @@ pub(crate) fn one(arguments: &OneArguments, stop: &AtomicBool) -> ExitCode {
     }
 }
 
-/// Takes the step; `None` when it was told to stop in its midst.
+/// Takes the step; `None` when it was asked to stop in its midst.
 fn take(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>, Box<dyn Error>> {
     let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
     let (number, again) = arguments.draw.map_or_else(asked, |draw| Ok((draw, true)))?;

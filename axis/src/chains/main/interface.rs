@@ -1,0 +1,99 @@
+//! What the main chain is given each cycle, what it says, and why it entered a state.
+
+use crate::chains::settled::ControlError;
+use crate::chains::{Console, Fault, Partner};
+use protocol::frames::{EmergencyStopChainState, MainChainState};
+use std::fmt;
+
+/// Own sensors in this cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OwnAxis {
+    /// Position sensor as it came, less the matched offset, rig coordinates, m.
+    pub position_m: f64,
+    /// What keeps the axis from its set-point.
+    pub error: ControlError,
+}
+
+/// What the chain is given each cycle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MainInputs {
+    pub cycle: u64,
+    /// Own sensors; `None` before the first.
+    pub own: Option<OwnAxis>,
+    /// The steps of preparing are done.
+    pub prepared: bool,
+    pub partner: Partner,
+    /// State of the own emergency stop chain in this cycle.
+    pub emergency_stop: EmergencyStopChainState,
+    /// What the console said since the last cycle.
+    pub console: Console,
+    /// A fault of the own axis: sensors, limits, algorithm, force or matching chain.
+    pub fault: Option<Fault>,
+}
+
+/// What is asked of the axis. `elapsed_s` is the time since the phase began, s, and may go on beyond its duration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Phase {
+    /// Hold the valve shut.
+    Shut,
+    /// Move from `from_m`, where the carriage was, to the start along a Bestehorn sinoid. An axis that is not
+    /// positioned holds still; its `duration_s` is 0.
+    Approach { elapsed_s: f64, from_m: f64, duration_s: f64 },
+    /// Take the steps before the initial force.
+    Prepare,
+    /// Ramp to the initial force; the position stays at the start.
+    RampForce { elapsed_s: f64 },
+    /// Stay at the start with the initial force.
+    HoldStart,
+    /// Run the experiment.
+    Experiment { elapsed_s: f64 },
+    /// Stay at the end.
+    HoldEnd,
+}
+
+/// What the chain says each cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MainOutput {
+    pub state: MainChainState,
+    /// Repetitions before this one; the bus has its low 8 bits.
+    pub repetition: u32,
+    /// The condition for leaving the state is fulfilled on this side.
+    pub ok: bool,
+    pub phase: Phase,
+    /// The fault, while in fault.
+    pub fault: Option<Fault>,
+}
+
+/// Why a state was entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MainCause {
+    Began,
+    RigRestarted,
+    Ready,
+    NextRepetition,
+    EmergencyStop,
+    Console,
+    PartnerAborted,
+    PartnerFault,
+    Fault(Fault),
+    Recovered,
+    Started,
+}
+
+impl fmt::Display for MainCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Began => "the controller began",
+            Self::RigRestarted => "the rig began anew",
+            Self::Ready => "both axes are ready",
+            Self::NextRepetition => "another repetition follows",
+            Self::EmergencyStop => "the emergency stop is tripped",
+            Self::Console => "the console ended the run",
+            Self::PartnerAborted => "the other axis's controller ended the run",
+            Self::PartnerFault => "the other axis's controller has a fault",
+            Self::Fault(fault) => return write!(f, "{fault}"),
+            Self::Recovered => "the rig has recovered from the emergency stop",
+            Self::Started => "the console started the run anew",
+        })
+    }
+}
