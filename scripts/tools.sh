@@ -99,7 +99,7 @@ install_valgrind() {
 install_python() {
     local stamp="$tools/venv/packages"
     [ "$(cat "$stamp" 2>/dev/null)" = "${python_packages[*]}" ] && return
-    make_venv venv && "$tools/venv/bin/python" -m pip install --quiet --disable-pip-version-check "${python_packages[@]}" &&
+    make_venv venv && "$tools/venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check "${python_packages[@]}" &&
         echo "${python_packages[*]}" >"$stamp"
 }
 
@@ -122,7 +122,7 @@ make_venv() {
 install_requirements() {
     local venv="$tools/$1" file=$2
     cmp -s "$file" "$venv/requirements.txt" && return
-    make_venv "$1" && "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --requirement "$file" &&
+    make_venv "$1" && "$venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check --requirement "$file" &&
         cp "$file" "$venv/requirements.txt"
 }
 
