@@ -9,7 +9,8 @@ use system_tests::turn;
 const NOBODY: u32 = 65534;
 /// Limits under which no user but root may have FIFO priority or locked memory.
 const NO_LIMITS_RAISED: &str = "ulimit -r 0 && ulimit -l 64";
-/// What a controller says that was left without a processor for too long (axis/src/chains/fault.rs), as one without priority may be.
+/// What a controller says that was left without a processor for too long (axis/src/chains/fault.rs), as one without priority may
+/// be.
 const LATENESS: [&str; 3] = ["missed its time", "fell silent", "did not come to rest"];
 
 #[test]

@@ -178,13 +178,15 @@ fn how(status: ExitStatus) -> Ended {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use std::os::unix::fs::PermissionsExt;
 
     /// A shell script as the program under study.
     pub(crate) fn script(folder: &Path, text: &str, arguments: &[&str], limit: Duration) -> Program {
-        let path = folder.join("program");
-        fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        let (source, path) = (folder.join("program.sh"), folder.join("program"));
+        fs::write(&source, format!("#!/bin/sh\n{text}\n")).unwrap();
+        // Copied by another process: a child that another thread starts meanwhile would inherit a file that is open for writing
+        // here, and the system starts no program that somebody has open for writing (ETXTBSY).
+        let copied = Command::new("install").args(["-m", "755"]).args([&source, &path]).status();
+        assert!(copied.expect("install of coreutils").success());
         Program::new(&path, arguments.iter().map(|word| (*word).to_owned()).collect(), limit).unwrap()
     }
 
