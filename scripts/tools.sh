@@ -11,6 +11,7 @@ python_packages=(
     pyxcp==0.29.20 pya2ldb==1.0.355 # clients of XCP
     prometheus-client==0.26.0 # reads /metrics
 )
+uv_version=0.13.9
 gungraun_version=0.20.0
 cargo_fuzz_version=0.13.2
 
@@ -99,31 +100,40 @@ install_valgrind() {
 install_python() {
     local stamp="$tools/venv/packages"
     [ "$(cat "$stamp" 2>/dev/null)" = "${python_packages[*]}" ] && return
-    make_venv venv && "$tools/venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check "${python_packages[@]}" &&
-        echo "${python_packages[*]}" >"$stamp"
+    make_venv venv "${python_packages[@]}" && echo "${python_packages[*]}" >"$stamp"
 }
 
-# make_venv NAME: an empty virtual environment $tools/NAME. Debian's python3 comes without ensurepip; its pip wheel does as well.
+# make_venv NAME OPTION…: a virtual environment $tools/NAME with what the options of `uv pip install` say.
 make_venv() {
-    local venv="$tools/$1"
+    install_uv || return 1
+    export UV_CACHE_DIR="$tools/uv/cache"
+    "$tools/uv/bin/uv" venv --quiet --clear --python python3 "$tools/$1" &&
+        "$tools/uv/bin/uv" pip install --quiet --python "$tools/$1/bin/python" "${@:2}"
+}
+
+# uv installs in a tenth of pip's CPU time. Debian's python3 comes without ensurepip; its pip wheel does as well.
+install_uv() {
+    local venv="$tools/uv"
+    [ -x "$venv/bin/uv" ] && "$venv/bin/uv" --version | grep -q "^uv $uv_version\b" && return
     command -v python3 >/dev/null || need_packages python3
     rm -rf "$venv"
-    python3 -m venv "$venv" 2>/dev/null && return
-    rm -rf "$venv"
-    if [ "$(id -u)" = 0 ]; then
-        need_packages python3-venv && python3 -m venv "$venv"
-    else
-        need_packages python3-pip-whl && python3 -m venv --without-pip "$venv" &&
-            "$venv/bin/python" "$(ls "$tools"/debian/usr/share/python-wheels/pip-*.whl)/pip" install --quiet pip
+    if ! python3 -m venv "$venv" 2>/dev/null; then
+        rm -rf "$venv"
+        if [ "$(id -u)" = 0 ]; then
+            need_packages python3-venv && python3 -m venv "$venv" || return 1
+        else
+            need_packages python3-pip-whl && python3 -m venv --without-pip "$venv" &&
+                "$venv/bin/python" "$(ls "$tools"/debian/usr/share/python-wheels/pip-*.whl)/pip" install --quiet pip || return 1
+        fi
     fi
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "uv==$uv_version"
 }
 
 # install_requirements NAME FILE: a virtual environment with what the file pins; made anew when the file changes.
 install_requirements() {
     local venv="$tools/$1" file=$2
     cmp -s "$file" "$venv/requirements.txt" && return
-    make_venv "$1" && "$venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check --requirement "$file" &&
-        cp "$file" "$venv/requirements.txt"
+    make_venv "$1" --requirement "$file" && cp "$file" "$venv/requirements.txt"
 }
 
 # The reference competitors of the study (tests/competitors): $tools/competitors/bin/python runs them.
