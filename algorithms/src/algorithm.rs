@@ -9,7 +9,7 @@
 //! An algorithm holds its state and nothing else: parameters come with each step, since they may change while running.
 //! It neither allocates nor blocks; that its result is a number is checked behind it.
 
-use plant::RigParameters;
+use nominal::RigParameters;
 use settings::parameters::{Declared, Parameter};
 
 /// What the pre-controller has made ready. The C interface has the same layout: numbers of 8 bytes, in this order.

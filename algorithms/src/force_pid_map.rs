@@ -28,7 +28,7 @@
 
 use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use crate::linearisation::Air;
-use plant::RigParameters;
+use nominal::RigParameters;
 use settings::parameters::declare;
 use std::f64::consts::TAU;
 

@@ -1,7 +1,7 @@
 //! What every algorithm must keep, whatever its law: for their tests.
 
 use crate::algorithm::{Kind, Ready};
-use plant::RigParameters;
+use nominal::RigParameters;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 

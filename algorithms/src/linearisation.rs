@@ -29,13 +29,13 @@
 //! Source: [Neugebauer 2011, eqs. 1 to 4] and its linearisation of the manipulated variable; tables of the rig file.
 
 use crate::algorithm::Ready;
-use plant::RigParameters;
+use nominal::RigParameters;
 
 /// Normal volume flow of a choked edge in m^3/h for each K_V (m^3/h) and upstream pressure (bar): [Neugebauer 2011, eq. 4].
 const CHOKED_FLOW: f64 = 12.95;
 const PASCAL_PER_BAR: f64 = 1e5;
 const SECONDS_PER_HOUR: f64 = 3600.0;
-const POINTS: usize = plant::parameters::VALVE_POINTS;
+const POINTS: usize = nominal::VALVE_POINTS;
 
 /// How an opening follows from a velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

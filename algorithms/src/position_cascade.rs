@@ -33,7 +33,7 @@ use super::position_p::{VELOCITY_FEED_FORWARD, gain};
 use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
 use crate::linearisation::Air;
 use crate::rest_zone::{self, RestZone};
-use plant::RigParameters;
+use nominal::RigParameters;
 use settings::parameters::declare;
 
 pub(crate) const KIND: Kind = Kind {

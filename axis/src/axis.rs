@@ -32,7 +32,7 @@ use algorithms::guard::AlgorithmFault;
 use average::Average;
 use changes::Changes;
 use heard::Heard;
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::{
     ALIVE_RANGE, ECHO_RANGE, EmergencyStop, EmergencyStopChainState, Frame, MainChainState, RigStatus,
     Sensors, ValveCommand,

@@ -13,7 +13,7 @@ use crate::chains::main::MainCause;
 use crate::program::Program;
 use crate::rig_view::{RigView, TickNews};
 use crossbeam_channel::{Receiver, Sender};
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::{DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand};
 use protocol::{bus::Bus, can::CanFrame, periods::TICK_CYCLES};
 use runlog::controller_report::IgnoredFrames;

@@ -12,7 +12,7 @@
 //! `--set`.
 
 use crate::program::Variable;
-use plant::Axis;
+use nominal::Axis;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -98,7 +98,7 @@ pub fn text(axis: Axis, variables: &[Variable], values: &[f64]) -> String {
 mod tests {
     use super::*;
     use crate::program::file::Source;
-    use plant::RigParameters;
+    use nominal::RigParameters;
 
     #[test]
     fn what_is_written_is_read_to_the_bit() {

@@ -80,7 +80,7 @@ impl PostController {
 mod tests {
     use super::*;
     use algorithms::linearisation::Law;
-    use plant::RigParameters;
+    use nominal::RigParameters;
     use proptest::prelude::*;
 
     fn post() -> PostController {

@@ -11,7 +11,7 @@
 //! T is the time between the two samples that there are: cycles that the rig skipped pass for the filters too.
 
 use algorithms::algorithm::Ready;
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::Sensors;
 use settings::parameters::declare;
 use std::f64::consts::TAU;

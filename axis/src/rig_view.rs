@@ -15,7 +15,7 @@
 
 mod recent;
 
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::{ALIVE_RANGE, RigStatus, Sensors, Tick};
 use recent::{Coming, Recent};
 

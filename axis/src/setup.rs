@@ -12,7 +12,7 @@ use crate::program::{Program, Task};
 use crate::set_point::ForceSource;
 use algorithms::algorithm::Quantity;
 use clap::Args;
-use plant::{Axis, RigParameters};
+use nominal::{Axis, RigParameters};
 use protocol::frames::DRIVE_CHAIN_VALUES;
 use runlog::run_folder;
 use std::path::{Path, PathBuf};

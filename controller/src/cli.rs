@@ -2,7 +2,7 @@
 
 use axis_control::setup::FileArguments;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use plant::Axis;
+use nominal::Axis;
 use protocol::bus::BusUrl;
 use protocol::exit::EXIT_CODE_HELP;
 use std::path::PathBuf;

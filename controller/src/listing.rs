@@ -7,7 +7,7 @@ use axis_control::axis::AxisController;
 use axis_control::chains::{force, matching, settled};
 use axis_control::setup::{FileArguments, Inputs, Mode};
 use axis_control::{parameter_set, post_controller, pre_controller};
-use plant::Axis;
+use nominal::Axis;
 use protocol::exit::Exit;
 use settings::parameters::Parameter;
 use std::io::{self, Write};

@@ -8,7 +8,7 @@ use algorithms::guard::Stuck;
 use axis_control::axis::AxisRecord;
 use axis_control::node::News;
 use crossbeam_channel::{Receiver, TryRecvError};
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::MainChainState;
 use runlog::run_folder::LineFile;
 use runlog::timing_recorder::TimingFigures;

@@ -9,7 +9,7 @@ use crate::run::RunError;
 use algorithms::guard::{STUCK, Stuck};
 use axis_control::node::News;
 use axis_control::setup::Inputs;
-use plant::Axis;
+use nominal::Axis;
 use protocol::bus::BusCounters;
 use protocol::exit::Exit;
 use realtime::{Interrupt, Recorder};

@@ -8,7 +8,7 @@ use axis_control::program::Variable;
 use axis_control::program::file::{Makings, ProgramError, Source};
 use axis_control::setup::Inputs;
 use crossbeam_channel::Sender;
-use plant::{Axis, RigParameters};
+use nominal::{Axis, RigParameters};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 

@@ -3,7 +3,7 @@
 use axis_control::axis::AxisController;
 use axis_control::node::{CalibrationPort, ControllerNode, News};
 use axis_control::setup::Inputs;
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::MainChainState;
 use runlog::controller_report::{self, ControllerReport};
 use std::collections::BTreeMap;

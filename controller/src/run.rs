@@ -13,7 +13,7 @@ use axis_control::axis::AxisController;
 use axis_control::node::{Change, ControllerNode, Outlets};
 use axis_control::setup::{InputError, Inputs, Mode};
 use crossbeam_channel::{Sender, bounded};
-use plant::Axis;
+use nominal::Axis;
 use plugin::PluginError;
 use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl};
 use protocol::exit::Exit;

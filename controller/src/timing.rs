@@ -25,7 +25,7 @@ pub(crate) mod setup;
 mod timed_bus;
 
 use crossbeam_channel::Sender;
-use plant::Axis;
+use nominal::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use realtime::{Clock, VitalCounts};

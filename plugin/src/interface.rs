@@ -4,7 +4,7 @@
 //! them with those here. `airbench_ready` is [`Ready`] itself.
 
 use algorithms::algorithm::Ready;
-use plant::RigParameters;
+use nominal::RigParameters;
 use std::ffi::{c_char, c_void};
 
 /// `AIRBENCH_INTERFACE_VERSION`.

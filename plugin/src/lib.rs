@@ -30,7 +30,7 @@ mod interface;
 mod wrong;
 
 use algorithms::algorithm::{Algorithm, Quantity, Ready};
-use plant::RigParameters;
+use nominal::RigParameters;
 use settings::parameters::Parameter;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -21,7 +21,7 @@ use a2lfile::{
 };
 use axis_control::program::Variable;
 use crc::{CRC_32_ISO_HDLC, Crc};
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::BIT_RATE_PER_S;
 use settings::parameters::Parameter;
 

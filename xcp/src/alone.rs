@@ -5,7 +5,7 @@ use crate::image::{Desk, Image};
 use crate::lock::Lock;
 use crate::slave::{Slave, SlaveParts};
 use axis_control::program::file::Source;
-use plant::{Axis, RigParameters};
+use nominal::{Axis, RigParameters};
 
 /// Nobody acts on what is written.
 impl Desk for () {

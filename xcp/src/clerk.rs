@@ -7,7 +7,7 @@ use axis_control::node::Change;
 use axis_control::parameter_set;
 use axis_control::program::Variable;
 use crossbeam_channel::{Receiver, Sender};
-use plant::Axis;
+use nominal::Axis;
 use std::path::{Path, PathBuf};
 
 /// What a port tells of its axis, with the rig's cycle that was answered last.

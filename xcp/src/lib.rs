@@ -25,7 +25,7 @@ pub mod signals;
 pub mod slave;
 pub mod trace;
 
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::{DRIVE_XCP_COMMAND, DRIVE_XCP_RESPONSE, LOAD_XCP_COMMAND, LOAD_XCP_RESPONSE};
 
 /// Name of the only event: a cycle was answered.

@@ -18,7 +18,7 @@ use axis_control::axis::AxisController;
 use axis_control::node::CalibrationPort;
 use axis_control::program::Program;
 use crossbeam_channel::{Receiver, Sender, TrySendError};
-use plant::Axis;
+use nominal::Axis;
 use protocol::bus::Bus;
 use protocol::can::CanFrame;
 use protocol::frames::{Sensors, ValveCommand};

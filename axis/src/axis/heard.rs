@@ -1,7 +1,7 @@
 //! What an axis heard since its last answer: partner, emergency stops, console, set-points by hand.
 
 use crate::chains::{Console, Partner};
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis};
 
 /// What was heard.

@@ -7,7 +7,7 @@
 
 use crate::chains::Fault;
 use crate::chains::main::Phase;
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::RigStatus;
 
 /// Cycles after which a sensor that is saturated in all of them is a fault.

@@ -3,7 +3,7 @@
 use super::AxisController;
 use crate::node::News;
 use crate::set_point::{ForceSetPoint, SetPoint};
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::{
     ChainStatus, ChainValues, EmergencyStop, EmergencyStopChainState, ForceChainState, MainChainState,
     MatchingChainState, Sensors, ValveCommand,

@@ -1,7 +1,7 @@
 //! Status and values of an axis: what they are, and when they are sent: every ten cycles, and at once when the status is another.
 
 use super::AxisController;
-use plant::Axis;
+use nominal::Axis;
 use protocol::frames::{ChainStatus, ChainValues, DRIVE_CHAIN_VALUES, MainChainState};
 
 /// Period of status and values, in cycles.

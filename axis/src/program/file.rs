@@ -27,7 +27,7 @@ use crate::pre_controller::{self, Geometry, PreController};
 use algorithms::algorithm::{Algorithm, Quantity};
 use algorithms::guard::Guarded;
 use algorithms::linearisation::{Law, Linearisation};
-use plant::{Axis, RigParameters};
+use nominal::{Axis, RigParameters};
 use realtime::MonotonicClock;
 use serde::Deserialize;
 use settings::parameters::Parameter;

@@ -4,7 +4,7 @@ use super::file::Source;
 use super::{Demand, Hand, Program};
 use crate::chains::force::ForceOutput;
 use crate::set_point::{ForceSetPoint, SetPoint};
-use plant::{Axis, RigParameters};
+use nominal::{Axis, RigParameters};
 use protocol::frames::{ForceChainState, Sensors};
 
 const LOAD: &str = r#"title = "presses"

@@ -3,7 +3,7 @@
 use crate::build::{Libraries, trier};
 use algorithms::algorithm::Ready;
 use algorithms::guard::{AlgorithmFault, Guarded, LONGEST_ONCE};
-use plant::RigParameters;
+use nominal::RigParameters;
 use plugin::load_tried_by;
 use realtime::MonotonicClock;
 

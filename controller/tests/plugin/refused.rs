@@ -1,7 +1,7 @@
 //! Libraries that are refused when they are loaded, each with its words.
 
 use crate::build::{Libraries, trier, trier_with};
-use plant::RigParameters;
+use nominal::RigParameters;
 use plugin::{describe, load_tried_by, probe};
 use std::process::Command;
 use std::time::Duration;

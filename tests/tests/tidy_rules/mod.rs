@@ -42,7 +42,6 @@ pub(crate) struct Rule {
 pub(crate) const RULES: &[&Rule] = &[
     &rust::PURPOSE,
     &rust::CRATE_EDGES,
-    &rust::NOMINAL_NUMBERS_ONLY,
     &rust::PURE_PLANT,
     &rust::EFFECTS,
     &rust::UNITS_IN_NAMES,

@@ -6,7 +6,7 @@ use crate::image::Image;
 use algorithms::SHIPPED;
 use axis_control::program::Program;
 use axis_control::program::file::Source;
-use plant::RigParameters;
+use nominal::RigParameters;
 
 fn program(axis: Axis, algorithm: &str) -> Program {
     let text = format!(
