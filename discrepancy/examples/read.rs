@@ -1,7 +1,7 @@
 //! Reads a record of any form and says what is in it: `cargo run -p discrepancy --example read -- FILE [MAPPING]`.
 #![allow(clippy::print_stdout)] // what it is for
 
-use discrepancy::records::{self, ReadOptions};
+use records::ReadOptions;
 use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -23,12 +23,12 @@ mod stuck;
 mod time;
 mod units;
 
-use crate::records::{Channel, Record, Signal};
 use crate::report::{ChannelCheck, Finding, RecordCheck};
 use grid::Grid;
 pub(crate) use grid::SPARSEST;
 use notes::Notes;
 use plant::{Axis, RigParameters};
+use records::{Channel, Record, Signal};
 use std::collections::BTreeMap;
 pub(crate) use time::FEWEST_ROWS;
 

@@ -1,8 +1,8 @@
 //! The command line: the whole workflow, and its steps alone.
 
-use crate::records::{ReadOptions, Unknown};
 use clap::{Args, Parser, Subcommand};
 use protocol::exit::EXIT_CODE_HELP;
+use records::{ReadOptions, Unknown};
 use std::path::PathBuf;
 
 /// Finds where model and records disagree, names the missing effect, adds it to the model and shows the gap shrink.

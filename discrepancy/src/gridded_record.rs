@@ -16,9 +16,9 @@ mod rest;
 mod subsample;
 
 use crate::check::Checked;
-use crate::records::{Channel, Record, Signal};
 use crate::stats::{mean, mean_and_variance, median};
 use plant::{Axis, Inputs, PERIOD_S, RigParameters, quantise_valve};
+use records::{Channel, Record, Signal};
 use rest::{Rate, Still};
 pub(crate) use subsample::searched_share;
 

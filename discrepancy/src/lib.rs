@@ -1,8 +1,8 @@
-//! Model discrepancy: where a measurement and its simulation disagree, and which effect is missing.
+//! Model discrepancy: where a measurement and its simulation disagree, and which effect is missing. Records are read by the crate
+//! [`records`].
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`records`] | readers of records: `measurement.csv`, `bus.log`, foreign CSV with a mapping |
 //! | [`check`] | fitness of a record, and its noise |
 //! | [`gridded_record`] | a record on the grid of the simulation, with smoothed states |
 //! | `sensor_inverse` | from readings to states, by the sensor models of a rig |
@@ -33,7 +33,6 @@ pub mod check;
 pub mod cli;
 pub mod commands;
 pub(crate) mod descent;
-pub mod description_error;
 pub mod engine;
 pub mod extend;
 pub(crate) mod fit;
@@ -45,7 +44,6 @@ pub mod next;
 pub mod outside;
 pub(crate) mod page;
 pub mod parameters;
-pub mod records;
 pub mod refit;
 pub mod report;
 pub(crate) mod screen;

@@ -37,13 +37,13 @@ pub use extended::extended_model_text;
 pub(crate) use model::Model;
 
 use crate::check::FEWEST_ROWS;
-use crate::description_error::DescriptionError;
 use crate::page::Pictures;
-use crate::records::{self, ReadError, ReadOptions, Record};
 use crate::report::{Report, Verdict};
 use crate::stats::order_statistic;
 use fit::{Columns, Cut, Fit, Rows, residual, rms};
 use plant::RigParameters;
+use records::description_error::DescriptionError;
+use records::{ReadError, ReadOptions, Record};
 use runs::Run;
 use select::{Cuts, Found, Prepared};
 use std::path::{Path, PathBuf};

@@ -29,13 +29,13 @@ mod traces;
 use crate::fit::LEAST;
 use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::page::Trace;
-use crate::records::Channel;
 use crate::report::{BeforeAfter, Gap, Verification};
 use crate::stats::mean_and_variance;
 use crate::windows::Windows;
 use null_power::NullPower;
 use plant::{Axis, RigParameters};
 use power::{Power, kept, levels, pooled};
+use records::Channel;
 use std::collections::BTreeMap;
 
 /// Bounds of the noise level correction, as a factor on the power.

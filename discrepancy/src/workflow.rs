@@ -20,7 +20,6 @@ use crate::name::{name, on_all};
 use crate::next::{self, Explanation, Proposal};
 use crate::outside::outside;
 use crate::page::Pictures;
-use crate::records::{self, ReadError, ReadOptions};
 use crate::report::{self, InputFiles, NamedEffect, Next, Report, Verdict};
 use crate::single_equation::is_model_file;
 use crate::tabulate::{tables, tabulate};
@@ -29,6 +28,7 @@ pub(crate) use findings::empty;
 pub(crate) use findings::place_name;
 use findings::{report_of, summary};
 use plant::{Axis, ParameterError, RigParameters};
+use records::{ReadError, ReadOptions};
 pub use reported::Reported;
 use std::path::{Path, PathBuf};
 

@@ -4,9 +4,9 @@
 
 use discrepancy::check::{Checked, check};
 use discrepancy::gridded_record::GriddedRecord;
-use discrepancy::records::{Channel, ReadOptions, Record, Signal, read};
 use plant::tables::{CycleRecord, write_measurement, write_measurement_head};
 use plant::{Axis, Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
+use records::{Channel, ReadOptions, Record, Signal, read};
 use std::sync::OnceLock;
 
 const HEAD_LINES: usize = 2;

@@ -1,8 +1,8 @@
 //! A run's log of the bus says the same as its measurement, row for row.
 
-use discrepancy::records::{self, Channel, LoggedBy, ReadOptions, Record, Signal};
 use plant::Axis;
 use protocol::frames::{DRIVE_SENSORS, DRIVE_VALVE_COMMAND};
+use records::{Channel, LoggedBy, ReadOptions, Record, Signal};
 use std::path::{Path, PathBuf};
 
 /// A run of 400 cycles in lockstep with a stop of the rig in its midst; how it was made stands in `tests/data/README.md`.

@@ -1,8 +1,8 @@
 //! The real records beside the project read with the mappings that ship; skipped aloud where they are not there.
 
 use crate::real::{crate_folder, data};
-use discrepancy::records::{self, Channel, Form, ReadOptions, Record, Signal};
 use plant::Axis;
+use records::{Channel, Form, ReadOptions, Record, Signal};
 use std::path::Path;
 
 const POSITION: Channel = Channel::Of(Axis::Drive, Signal::Position);

@@ -4,7 +4,7 @@
 //! `m` a measurement, `l` a log, `f` a mapping, a line `---`, and its CSV.
 #![no_main]
 
-use discrepancy::records::{self, Mapping, ReadOptions, Unknown};
+use records::{Mapping, ReadOptions, Unknown};
 use libfuzzer_sys::fuzz_target;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

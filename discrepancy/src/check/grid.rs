@@ -1,8 +1,8 @@
 //! Rows on a regular grid of the record's period, so that lags and differences stay right where rows are missing.
 
 use super::notes::Notes;
-use crate::records::{Channel, Record};
 use crate::stats::median;
+use records::{Channel, Record};
 
 /// Indices of a record's rows in units of its period.
 #[derive(Debug)]

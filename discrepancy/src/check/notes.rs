@@ -1,8 +1,8 @@
 //! Findings of a check, and samples that are left out.
 
-use crate::records::{Channel, Record, Signal};
 use crate::report::Finding;
 use plant::Axis;
+use records::{Channel, Record, Signal};
 
 #[derive(Debug)]
 pub(super) struct Notes<'a> {

@@ -11,8 +11,8 @@ use super::grid::Grid;
 use super::notes::{Notes, Subject};
 use super::quantum;
 use super::stuck::{by_chance, is_rest, runs};
-use crate::records::{Channel, Quantity, Signal};
 use plant::RigParameters;
+use records::{Channel, Quantity, Signal};
 
 /// Rows to each side of a clipped sample that are left out with it.
 const NEIGHBOURS: usize = 3;

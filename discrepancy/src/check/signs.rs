@@ -14,9 +14,9 @@
 
 use super::grid::Grid;
 use super::notes::{Notes, Subject};
-use crate::records::{Channel, Signal};
 use crate::stats::{means, slopes};
 use plant::{Axis, RigParameters, StaticValve};
+use records::{Channel, Signal};
 
 /// Places to each side of a mean, and of a slope: 15 ms together keep noise down and edges in.
 const REACH: usize = 7;

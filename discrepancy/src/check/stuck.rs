@@ -8,8 +8,8 @@
 use super::grid::Grid;
 use super::notes::{Notes, Subject};
 use super::quantum;
-use crate::records::{Channel, Quantity, Signal};
 use plant::RigParameters;
+use records::{Channel, Quantity, Signal};
 use std::ops::Range;
 
 /// Chance of a run, in records.

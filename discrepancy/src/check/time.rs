@@ -6,9 +6,9 @@
 use super::grid::{SPARSEST, period_s};
 use super::notes::Notes;
 use crate::gridded_record::{HELD_LONGEST, SHORTEST};
-use crate::records::{Channel, Signal};
 use crate::stats::quantile;
 use plant::{Axis, PERIOD_S};
+use records::{Channel, Signal};
 
 /// Shortest record of the rig, s.
 const SHORTEST_S: f64 = SHORTEST as f64 * PERIOD_S;

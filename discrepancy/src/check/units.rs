@@ -5,9 +5,9 @@
 //! are tested elsewhere.
 
 use super::notes::{Notes, Subject};
-use crate::records::{Channel, Signal};
 use crate::stats::quantile;
 use plant::{Axis, RigParameters};
+use records::{Channel, Signal};
 
 /// How far beyond the supply a pressure may read: sensors and supplies are off by a tenth.
 const ABOVE_SUPPLY: f64 = 1.5;

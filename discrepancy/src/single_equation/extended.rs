@@ -6,9 +6,9 @@
 use super::BalanceError;
 use super::model::TermEntry;
 use super::terms::{shown, term};
-use crate::description_error::DescriptionError;
 use crate::report::Quantity;
 use crate::workflow::Reported;
+use records::description_error::DescriptionError;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 

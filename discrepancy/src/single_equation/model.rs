@@ -3,8 +3,8 @@
 //! Keys with defaults, and two examples that run: `discrepancy/docs/one-balance.md`, `discrepancy/models/`.
 
 use super::BalanceError;
-use crate::description_error::DescriptionError;
-use crate::records::{Channel, Mapping};
+use records::description_error::DescriptionError;
+use records::{Channel, Mapping};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -263,7 +263,7 @@ impl Model {
             return Err(refuse(&format!("channels.{name}"), column.clone(), &known.join(", ")));
         }
         if let Some(mapping) = &read.mapping {
-            Mapping::read(&folder.join(mapping)).map_err(crate::records::ReadError::from)?;
+            Mapping::read(&folder.join(mapping)).map_err(records::ReadError::from)?;
         }
         let terms = read.terms.into_iter();
         let terms =

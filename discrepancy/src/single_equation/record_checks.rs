@@ -2,9 +2,9 @@
 
 use super::Study;
 use super::terms;
-use crate::records::Record;
 use crate::report::{Finding, RecordCheck};
 use plant::RigParameters;
+use records::Record;
 
 /// What the check finds that holds for a balance alone: it has neither the rig's period nor its sensors.
 const KINDS: [&str; 5] = ["reader", "stuck", "clipped", "absent-values", "repeated-time"];

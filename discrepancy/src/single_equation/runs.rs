@@ -14,8 +14,8 @@ use super::BalanceError;
 use super::filter::LowPass;
 use super::model::{Kind, Model};
 use crate::check::{FEWEST_ROWS, SPARSEST};
-use crate::records::{Channel, Record};
 use plant::{Inputs, Plant, RigParameters, Setup};
+use records::{Channel, Record};
 
 /// Standard atmosphere, Pa [ISO 2533]: what readers add to gauge pressures.
 pub(super) const ATMOSPHERE_PA: f64 = 101_325.0;

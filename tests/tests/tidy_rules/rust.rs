@@ -24,7 +24,7 @@ pub(super) const PURPOSE: Rule = Rule {
 };
 
 /// Rooms that not everybody may know.
-const ROOMS: [&str; 22] = [
+const ROOMS: [&str; 23] = [
     "settings",
     "protocol",
     "realtime",
@@ -44,6 +44,7 @@ const ROOMS: [&str; 22] = [
     "latency",
     "live",
     "bench",
+    "records",
     "discrepancy",
     "campaign",
     "system-tests",
@@ -83,6 +84,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("figures", &["runlog", "pagekit"]),
     ("latency", &["protocol", "realtime", "runlog", "pagekit", "figures"]),
     ("live", &["protocol", "realtime", "runlog", "pagekit", "latency"]),
+    ("records", &["protocol", "runlog", "plant"]),
     (
         "discrepancy",
         &["records", "protocol", "realtime", "runlog", "plant", "axis-control", "rehearsal", "pagekit"],

@@ -73,7 +73,7 @@ fn goes_on(record: &Record, time_s: f64, present: &[(Channel, f64)]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::records::Signal;
+    use crate::Signal;
     use plant::Axis;
 
     const X: Channel = Channel::Of(Axis::Drive, Signal::Position);

@@ -79,7 +79,7 @@ impl Channel {
 
     /// Its place in [`Channel::ALL`].
     #[must_use]
-    pub(crate) fn index(self) -> usize {
+    pub fn index(self) -> usize {
         match self {
             Channel::Of(axis, signal) => axis.index() * Signal::ALL.len() + signal as usize,
             Channel::SupplyPressure => Self::COUNT - 1,
@@ -98,7 +98,7 @@ impl Channel {
     }
 
     /// The channel that a mapping calls so.
-    pub(crate) fn of_mapping(name: &str) -> Option<Channel> {
+    pub fn of_mapping(name: &str) -> Option<Channel> {
         Self::ALL.into_iter().find(|channel| channel.to_string() == name)
     }
 

@@ -12,6 +12,7 @@
 //! Forms and keys: `discrepancy/docs/records.md`. Sources: rig-model.md, Measurement file; bus.md, Time and Frames.
 
 pub mod channel;
+pub mod description_error;
 pub mod error;
 pub mod mapping;
 
@@ -22,8 +23,7 @@ mod foreign;
 mod measurement;
 mod table;
 
-pub(crate) use channel::Quantity;
-pub use channel::{Channel, Signal};
+pub use channel::{Channel, Quantity, Signal};
 pub use error::ReadError;
 pub use mapping::Mapping;
 
@@ -213,7 +213,7 @@ impl Record {
     }
 
     /// Whether the record has any channel of the axis.
-    pub(crate) fn has_axis(&self, axis: Axis) -> bool {
+    pub fn has_axis(&self, axis: Axis) -> bool {
         self.channels().any(|channel| matches!(channel, Channel::Of(channel_axis, _) if channel_axis == axis))
     }
 
