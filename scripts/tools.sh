@@ -12,11 +12,10 @@ python_packages=(
     prometheus-client==0.26.0 # reads /metrics
 )
 uv_version=0.13.9
-gungraun_version=0.20.0
 cargo_fuzz_version=0.13.2
 
 install_tools() {
-    install_strace && install_valgrind && install_python && install_dask && install_gungraun && install_browser && install_machines
+    install_strace && install_valgrind && install_python && install_dask && install_browser && install_machines
 }
 
 apt_updated=no
@@ -63,16 +62,12 @@ install_stress_ng() {
     need_program stress-ng stress-ng $(apt-cache depends stress-ng 2>/dev/null | sed -n 's/^ *Depends: \(lib[a-z0-9.+-]*\)$/\1/p')
 }
 
-# cargo_install CRATE VERSION: unoptimised, since what takes time is what these programs start; they share what they depend on.
-cargo_install() {
-    CARGO_PROFILE_DEV_DEBUG=0 cargo install --quiet --locked --debug "$1" --version "$2" --root "$tools" --target-dir "$tools/build"
-}
-
-# Builds the targets of fuzz/.
+# Builds the targets of fuzz/; unoptimised, since what takes time is what it starts.
 install_cargo_fuzz() {
     install_compiler || return 1
     [ -x "$tools/bin/cargo-fuzz" ] && "$tools/bin/cargo-fuzz" --version | grep -q "$cargo_fuzz_version" && return
-    cargo_install cargo-fuzz "$cargo_fuzz_version" # it starts others
+    CARGO_PROFILE_DEV_DEBUG=0 cargo install --quiet --locked --debug cargo-fuzz --version "$cargo_fuzz_version" --root "$tools" \
+        --target-dir "$tools/build"
 }
 
 # The benchmark's floor is C, libFuzzer is C++; a Rust toolchain links with a C compiler anyway.
@@ -152,11 +147,6 @@ install_book() { install_requirements book "$(dirname "${BASH_SOURCE[0]}")/../do
 install_machines() {
     local kernel
     for kernel in stock rt; do scripts/vcan-vm --fetch --kernel "$kernel" || return 1; done
-}
-
-install_gungraun() {
-    [ -x "$tools/bin/gungraun-runner" ] && "$tools/bin/gungraun-runner" --version 2>/dev/null | grep -q "$gungraun_version" && return
-    cargo_install gungraun-runner "$gungraun_version" # it starts valgrind
 }
 
 # The browser of the live page's tests: Debian's chromium, Node, and what drives the one from the other, as its lock file pins it.

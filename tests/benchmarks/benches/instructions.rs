@@ -1,16 +1,16 @@
 //! Instructions of one period of 1 ms, counted by valgrind: a figure that no other process on the machine moves.
 //!
-//! `cargo install gungraun-runner --version 0.20.0 --root target/tools`, then
-//! `PATH="$PWD/target/tools/bin:$PATH" cargo bench -p benchmarks --bench instructions`
+//! `cargo bench -p benchmarks --bench instructions [-- CASE]` starts itself under `valgrind --tool=callgrind` for each case, and callgrind
+//! counts inside one function.
 //!
 //! Both motions start in the middle of the recorded one; a thousand periods are counted together, so one period is the
 //! figure over a thousand. With effects: all of them, every fourth, and a few alone; `plant/docs/effects-cost.md` has each.
 
-#![allow(missing_docs, unused_qualifications)] // the macros below make items and paths of their own
+#![allow(clippy::print_stdout, reason = "the figures are its output")]
 
 use std::hint::black_box;
+use std::process::Command;
 
-use gungraun::{library_benchmark, library_benchmark_group, main};
 use plant::effects::SHEETS;
 use plant::effects::sheet::Sheet;
 use plant::{Inputs, Plant, RigParameters, Setup};
@@ -59,18 +59,54 @@ fn resting() -> (Plant, Vec<Inputs>) {
     (plant, vec![Inputs::default(); 1000])
 }
 
-#[library_benchmark]
-#[bench::moving_linked(moving())]
-#[bench::resting_linked(resting())]
-#[bench::inclination(moving_with_one("inclination"))]
-#[bench::line_resistance(moving_with_one("line-resistance"))]
-#[bench::presliding(moving_with_one("presliding"))]
-#[bench::ten_effects(moving_with_ten())]
-#[bench::all_effects(moving_with(|_| true))]
-fn a_thousand_periods((mut plant, inputs): (Plant, Vec<Inputs>)) -> Plant {
+type Case = (&'static str, fn() -> (Plant, Vec<Inputs>));
+
+const CASES: [Case; 7] = [
+    ("moving_linked", moving),
+    ("resting_linked", resting),
+    ("inclination", || moving_with_one("inclination")),
+    ("line_resistance", || moving_with_one("line-resistance")),
+    ("presliding", || moving_with_one("presliding")),
+    ("ten_effects", moving_with_ten),
+    ("all_effects", || moving_with(|_| true)),
+];
+
+/// Which case the process under callgrind runs.
+const COUNTED: &str = "AIRBENCH_COUNTED_CASE";
+
+/// What is counted; never inlined, so that callgrind finds it by its name.
+#[inline(never)]
+fn a_thousand_periods(plant: &mut Plant, inputs: &[Inputs]) {
     inputs.iter().for_each(|inputs| plant.step(black_box(inputs)));
-    plant
 }
 
-library_benchmark_group!(name = period; benchmarks = a_thousand_periods);
-main!(library_benchmark_groups = period);
+/// Instructions of a case, counted in a process of its own.
+fn count(name: &str) -> u64 {
+    let own = std::env::current_exe().expect("the path of this executable");
+    let counted = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*a_thousand_periods*"])
+        .arg(own)
+        .env(COUNTED, name)
+        .output()
+        .expect("valgrind is installed");
+    let report = String::from_utf8_lossy(&counted.stderr);
+    let collected = report.lines().find_map(|line| line.split_once("Collected : ")?.1.trim().parse().ok());
+    collected
+        .filter(|count| *count > 0)
+        .unwrap_or_else(|| panic!("callgrind counted nothing for {name}:\n{report}"))
+}
+
+fn main() {
+    if let Ok(name) = std::env::var(COUNTED) {
+        let (_, set_up) = CASES.iter().find(|case| case.0 == name).expect("a case");
+        let (mut plant, inputs) = set_up();
+        a_thousand_periods(&mut plant, &inputs);
+        black_box(plant);
+        return;
+    }
+    // cargo adds --bench.
+    let chosen = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
+    for (name, _) in CASES.iter().filter(|case| case.0.contains(&chosen)) {
+        println!("{name}: {} instructions in 1000 periods of 1 ms", count(name));
+    }
+}
