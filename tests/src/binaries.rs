@@ -10,23 +10,16 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-/// A program under test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Program {
-    /// Process 1: the rig.
     Emulator,
-    /// Process 2: the axis controllers.
     Controller,
-    /// What sums runs up.
     Bench,
-    /// The workflow that names what a model is missing.
     Discrepancy,
-    /// Thousands of runs from a file.
     Campaign,
 }
 
 impl Program {
-    /// Name of package and binary.
     pub fn name(self) -> &'static str {
         match self {
             Self::Emulator => "emulator",
@@ -37,24 +30,19 @@ impl Program {
         }
     }
 
-    /// A command line of the shipped build.
     pub fn command(self) -> Command {
         Command::new(executable(self, Build::Shipped))
     }
 
-    /// Starts the shipped build.
     pub fn start(self, arguments: &[&dyn AsRef<OsStr>]) -> Running {
         let name = format!("{} {}", self.name(), arguments[0].as_ref().display());
         Running::start(&name, self.command().args(arguments.iter().map(|argument| argument.as_ref())))
     }
 }
 
-/// Which build of the programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Build {
-    /// As they ship.
     Shipped,
-    /// As they ship, with the counting allocator.
     CountingAllocations,
 }
 

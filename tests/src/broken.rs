@@ -9,16 +9,13 @@ use protocol::frames::{Frame, ValveCommand};
 use serde_json::Value;
 use std::path::Path;
 
-/// A run to be made.
 #[derive(Clone, Copy)]
 pub struct Plan<'a> {
     /// `[rig]` of the experiment, with what follows it.
     pub rig: &'a str,
-    /// The script; empty for none.
     pub faults: &'a str,
     /// Options of the bus's URL.
     pub bus: &'a str,
-    /// Length, cycles.
     pub cycles: usize,
     /// Openings of drive and load that are commanded in answer to a cycle; `None` says nothing.
     pub act: fn(u32) -> Option<[f64; 2]>,
@@ -31,14 +28,10 @@ impl Default for Plan<'_> {
     }
 }
 
-/// What a run left.
 pub struct Left {
     pub scene: Scene,
-    /// `measurement.csv`.
     pub measurement: Table,
-    /// `truth.csv`.
     pub truth: Table,
-    /// `summary.json`.
     pub summary: Value,
     /// `bus.log`, as the rig had it.
     pub log: Vec<CanFrame>,
@@ -46,16 +39,12 @@ pub struct Left {
     pub heard: Vec<Vec<CanFrame>>,
 }
 
-/// A row of `faults.csv`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Row {
-    /// Cycle.
     pub cycle: usize,
-    /// Number of the fault.
     pub number: u16,
     /// `begins`, `ends`, …
     pub what: String,
-    /// Name of the fault.
     pub fault: String,
     pub at: String,
     /// Its numbers, as `key=value;key=value`.
@@ -64,7 +53,6 @@ pub struct Row {
     pub cause: String,
 }
 
-/// The rows of a `faults.csv`.
 pub fn rows(path: &Path) -> Vec<Row> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut lines = text.lines();
@@ -85,7 +73,6 @@ pub fn rows(path: &Path) -> Vec<Row> {
 }
 
 impl Plan<'_> {
-    /// Makes the run.
     pub fn run(&self) -> Left {
         let scene = Scene::new(&format!("title = \"broken\"\n[rig]\n{}", self.rig));
         let mut emulator = scene.emulator(Pace::Lockstep).with("--seconds");
@@ -126,7 +113,6 @@ impl Plan<'_> {
 }
 
 impl Left {
-    /// The rows of its `faults.csv`.
     pub fn rows(&self) -> Vec<Row> {
         rows(&self.scene.path("emulator/faults.csv"))
     }

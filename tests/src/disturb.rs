@@ -15,7 +15,6 @@ use rustix::time::{ClockId, Timespec, clock_gettime, clock_settime};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Length of each run, s of the rig's time.
 const RUN_S: u64 = 4;
 /// A process stands still for so long.
 const STOP: Duration = Duration::from_millis(5);
@@ -28,10 +27,8 @@ const STEP_HOLDS: Duration = Duration::from_millis(700);
 /// Where the rig's loop is pinned, and so where the hog goes.
 const RIG_CPU: usize = 0;
 
-/// What is done to a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Disturbance {
-    /// Nothing.
     Nothing,
     /// SIGSTOP of the rig's process for 5 ms.
     EmulatorStopped,
@@ -50,7 +47,6 @@ pub enum Disturbance {
 }
 
 impl Disturbance {
-    /// All of them.
     pub const ALL: [Self; 8] = [
         Self::Nothing,
         Self::EmulatorStopped,
@@ -76,16 +72,13 @@ impl Disturbance {
         }
     }
 
-    /// Whether only root can do it.
     pub fn needs_root(self) -> bool {
         matches!(self, Self::CpuContention | Self::ClockStep)
     }
 }
 
-/// What became of a disturbed run.
 #[derive(Clone, Debug)]
 pub struct Named {
-    /// The cause that `bench cause` named.
     pub cause: String,
     pub sentence: String,
 }
@@ -165,7 +158,6 @@ fn step_the_clock() {
     ahead(-STEP_S);
 }
 
-/// Has the run reported, and the cause named from the report.
 fn name_cause(out: &Path) -> Named {
     let report = out.join("report");
     let _ = Program::Bench.start(&[&"report", &out, &"--out", &report]).wait().expect_code(0);

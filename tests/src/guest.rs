@@ -35,7 +35,6 @@ fn only_one() -> MutexGuard<'static, ()> {
     MACHINE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// Machines that this process started.
 static STARTED: AtomicU32 = AtomicU32::new(0);
 
 /// A machine that has run its job and is gone.
@@ -82,7 +81,6 @@ impl Guest {
         self.folder.path().join("run")
     }
 
-    /// A file beside it, such as `candump.log`.
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -145,7 +143,6 @@ pub fn data_frames(lines: &str) -> Vec<CanFrame> {
 /// What an interface counted during a run, from two snapshots of `ip -json -details -statistics link`.
 #[derive(Clone, Copy, Debug)]
 pub struct InterfaceCounters {
-    /// Frames sent.
     pub sent: u64,
     /// Frames that the driver took from the card.
     pub received: u64,

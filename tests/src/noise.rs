@@ -25,9 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Identifiers of valve commands.
 const COMMANDS: [u32; 2] = [0x110, 0x111];
-/// Bytes of a valve command.
 const COMMAND_BYTES: usize = 5;
 /// Bits of its fourth byte that no signal covers.
 const RESERVED: u8 = 0xE0;
@@ -43,10 +41,8 @@ const OPENING_STEPS: f64 = 2047.0;
 const ROUNDING_STEPS: f64 = 0.51;
 const AXES: [&str; 2] = ["drive", "load"];
 
-/// What was sent.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sent {
-    /// Frames in all.
     pub frames: u64,
     /// Those on an identifier of `rig.dbc`, wrong in length, value or checksum.
     pub malformed: u64,
@@ -70,7 +66,6 @@ impl Noise {
         Self { stop, thread }
     }
 
-    /// Ends it.
     pub fn end(self) -> Sent {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().expect("the noise does not panic")
@@ -144,9 +139,7 @@ fn is_command(frame: &CanFrame) -> bool {
 /// What became of a run in real time, with noise or without.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// What was sent.
     pub sent: Sent,
-    /// Cycles that the rig missed.
     pub missed: u64,
     /// Its wake-ups that came late enough to be counted.
     pub overruns: u64,

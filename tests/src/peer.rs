@@ -14,7 +14,6 @@ use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What came from the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Packet {
     Frame(CanFrame),
@@ -24,7 +23,6 @@ pub enum Packet {
     Closed,
 }
 
-/// A client of the embedded bus.
 pub struct Peer {
     socket: OwnedFd,
 }
@@ -48,7 +46,6 @@ impl Peer {
         }
     }
 
-    /// Sends a packet as it is.
     pub fn send(&self, packet: &[u8]) {
         send(&self.socket, packet, SendFlags::NOSIGNAL).expect("the host takes the packet");
     }

@@ -13,10 +13,8 @@ use std::time::Duration;
 /// Viewers that listen and read; with the browser and the one that stands still there are ten.
 const LISTENERS: usize = 8;
 
-/// What became of a run in real time.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Cycles that the rig missed.
     pub missed: u64,
     /// Its wake-ups that came late enough to be counted.
     pub overruns: u64,
@@ -61,7 +59,6 @@ pub fn run(seconds: u32, with: bool) -> Outcome {
     }
 }
 
-/// Ten viewers.
 struct Audience {
     _browser: Running,
     _still: TcpStream,

@@ -117,7 +117,6 @@ fn the_c_firmware_keeps_the_contract_in_lockstep_and_in_real_time() {
     }
 }
 
-/// Where a controller breaks the contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     None,

@@ -42,10 +42,8 @@ const CHAMBERS: [&str; 4] =
 /// A Bestehorn sinoid at 0.1 m/s on average reaches twice that; half as much again for the control error.
 const RESTART_M_PER_MS: f64 = 0.3e-3;
 
-/// Who trips it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum By {
-    /// A frame of the console.
     Bus,
     /// The script at the rig's own button.
     Rig,

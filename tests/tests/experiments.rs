@@ -53,7 +53,6 @@ fn every_experiment_is_rehearsed_to_its_end_and_passes_its_own_bounds() {
     assert!(failures.is_empty(), "{} failed:\n{}", failures.len(), failures.join("\n"));
 }
 
-/// The text of point-to-point.
 fn point_to_point() -> (PathBuf, String) {
     let (_, path) = shipped().into_iter().find(|(name, _)| name == "point-to-point").expect("shipped");
     let text = std::fs::read_to_string(&path).expect("it is listed");

@@ -13,7 +13,6 @@ use system_tests::process::{Ended, Running};
 use system_tests::records::Table;
 use system_tests::scene::{SHORT, Scene};
 
-/// A run in lockstep, made once.
 fn run_folder() -> PathBuf {
     static RUN: OnceLock<Scene> = OnceLock::new();
     let scene = RUN.get_or_init(|| {

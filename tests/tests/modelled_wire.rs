@@ -11,7 +11,6 @@ use system_tests::process::Ended;
 use system_tests::records::{bus_log, count, json};
 use system_tests::scene::{LINKED, SHORT, Scene};
 
-/// A cycle of the rig.
 const CYCLE_NS: u64 = 1_000_000;
 
 /// Runs emulator and controller over a bus with these options; the emulator ends well with the controllers, or after some time.
