@@ -34,7 +34,6 @@ unsafe extern "C" {
 #[derive(Clone, Debug)]
 pub struct Floor {
     constants: Vec<u64>,
-    /// Drive and load.
     pub axes: [FloorAxis; 2],
 }
 

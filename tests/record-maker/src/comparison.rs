@@ -13,7 +13,6 @@ use super::closed_loop::{replay_windows, run};
 use super::{MakeError, Recipe, Record, Row};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, SetupError, State};
 
-/// Length of a window, rows.
 pub const WINDOW: usize = 100;
 
 /// Names of the signals of an axis, in the order of [`Row::without_noise`].

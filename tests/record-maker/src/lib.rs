@@ -94,7 +94,6 @@ impl Default for Recipe {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hidden {
-    /// Name of its sheet.
     pub name: &'static str,
     pub place: Place,
     /// One number for each key of its sheet, in the file's units.
@@ -164,7 +163,6 @@ pub struct TrueAxis {
     pub friction_n: f64,
 }
 
-/// Why a record cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
     #[error("{name} = {factor}: allowed are the names {PARAMETERS:?}, with factors from 0.5 to 2")]

@@ -58,7 +58,6 @@ impl Plan {
     }
 }
 
-/// Why a study's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     #[error("{path}: {error}")]
@@ -72,7 +71,6 @@ impl FolderError {
         move |error| FolderError::File { path: path.display().to_string(), error }
     }
 
-    /// A file whose content is wrong.
     pub(crate) fn content(path: &Path, what: impl ToString) -> Self {
         FolderError::Content { path: path.display().to_string(), what: what.to_string() }
     }
@@ -123,7 +121,6 @@ impl Study {
         self.root.join("truth").join(name(number))
     }
 
-    /// Folder of what a program made of a draw.
     pub fn run(&self, label: &str, number: usize) -> PathBuf {
         self.root.join("runs").join(label).join(name(number))
     }

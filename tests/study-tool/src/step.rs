@@ -28,9 +28,7 @@ pub const EXPERIMENTS: [(Experiment, &str); 3] = [
     (Experiment::HeldOut(1), "held-out-1"),
 ];
 
-/// Largest report that is kept.
 const LARGEST_REPORT: u64 = 64 << 20;
-/// Largest experiment that is kept.
 const LARGEST_EXPERIMENT: u64 = 1 << 20;
 /// Most that is kept of what a program says.
 const MOST_SAID: u64 = 1 << 20;
@@ -68,7 +66,6 @@ pub struct Step<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// Why a step cannot be taken; what is done stays.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
     #[error(transparent)]
@@ -92,7 +89,6 @@ pub struct RunResult {
     pub schema_version: u32,
     pub number: usize,
     pub program: Identity,
-    /// How it ended, time, memory.
     pub taken: Taken,
     /// Effects that were left out of its catalogue; absent in a file when none was.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -257,7 +253,6 @@ fn keep(out: &Path, folder: &Path, name: &str, largest: u64) -> io::Result<()> {
     Ok(())
 }
 
-/// Refuses what another program left.
 pub(crate) fn check_program(
     path: &Path,
     own: &Identity,
@@ -284,7 +279,6 @@ pub(crate) fn whole_run<T>(
     }
 }
 
-/// Why a run's folder is not finished.
 enum StepEnd {
     Interrupted,
     Error(StepError),

@@ -23,9 +23,7 @@ pub struct Case {
 #[derive(Clone, Copy, Default)]
 pub struct Made<'a> {
     pub experiment: &'a str,
-    /// The drive's program, if not the experiment's.
     pub drive: Option<&'a str>,
-    /// The load's program, if not the experiment's.
     pub load: Option<&'a str>,
     /// Numbers in place of the programs', such as `drive.algorithm.gain_per_s=30`.
     pub set: &'a [String],
@@ -57,7 +55,6 @@ impl Case {
     }
 }
 
-/// The tables that the run would have left.
 pub fn record(run: &Run) -> Record {
     let rows = |axis: Axis| {
         run.rows.iter().filter_map(move |row| Some((time_s(row), row.axes[axis.index()].as_ref()?)))
@@ -100,7 +97,6 @@ fn measured(run: &Run) -> Table {
     table
 }
 
-/// A controller's table.
 fn controller<'a>(rows: impl Iterator<Item = (f64, &'a AxisRecord)> + Clone) -> Table {
     let mut table = Table::default();
     let mut put = |name, of: fn(&AxisRecord) -> Option<f64>| {

@@ -26,12 +26,9 @@ pub const MASSES_KG: [f64; 4] = [0.0, 5.0, 10.0, 20.0];
 /// Supply pressures of the corners, bar.
 pub const SUPPLIES_BAR: [f64; 4] = [5.0, 6.0, 7.0, 8.0];
 
-/// Under which conditions a program is tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// Weights on the carriage, kg.
     pub added_mass_kg: f64,
-    /// Absolute supply pressure, bar.
     pub supply_bar: f64,
     /// What the valves pass more than their table says.
     pub loop_factor: f64,
@@ -46,7 +43,6 @@ impl Default for Trial {
 }
 
 impl Trial {
-    /// All corners of mass and supply, row by row.
     pub fn corners() -> Vec<Self> {
         let corner = |added_mass_kg, supply_bar| Self { added_mass_kg, supply_bar, ..Self::default() };
         let row = |mass_kg| SUPPLIES_BAR.map(|supply_bar| corner(mass_kg, supply_bar));
@@ -67,7 +63,6 @@ impl Trial {
     }
 }
 
-/// Why a trial could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
     #[error(transparent)]

@@ -41,7 +41,6 @@ const fn to(to_m: f64, duration_s: f64, rest_s: f64) -> Move {
     Move { to_m, duration_s, rest_s }
 }
 
-/// Where all moves start, m.
 const START_M: f64 = 0.1;
 /// The paper's positioning, Fig. 8, twice: the first repetition has the chamber pressures of the start, the others do not.
 pub const POINT_TO_POINT: &[Move] =
@@ -53,7 +52,6 @@ pub const STEP: &[Move] = &[to(0.3, 0.0, 2.0), to(0.1, 0.0, 2.0)];
 /// What wakes up an oscillation: both ends, the soft middle, a step.
 pub const EXCITATION: &[Move] = &[to(0.4, 3.0, 3.0), to(0.1, 3.0, 3.0), to(0.25, 0.0, 4.0)];
 
-/// What came of a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Largest |error| while the set-point moves, m.
@@ -153,7 +151,6 @@ pub fn delay_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<Opti
     Ok(Some(20))
 }
 
-/// The closed loop: plant, sensors, and the commands on their way.
 struct Bench {
     plant: Plant,
     sensors: plant::Sensors,

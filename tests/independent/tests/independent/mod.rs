@@ -88,7 +88,6 @@ pub(crate) const PUSHING: Motion = Motion {
     ..EXTENDING
 };
 
-/// All motions.
 pub(crate) const MOTIONS: [Motion; 6] = [EXTENDING, RETRACTING, SWEEP, CREEPING, INTO_THE_END, PUSHING];
 
 impl Motion {
@@ -157,7 +156,6 @@ pub(crate) fn with(rig: &RigParameters, sheet: &Sheet, place: &str) -> RigParame
     rig.with_effect(sheet.name, place, &numbers).expect("the middle is allowed")
 }
 
-/// The baseline with one effect at all its places.
 pub(crate) fn alone(sheet: &Sheet) -> RigParameters {
     sheet.place.names().iter().fold(RigParameters::baseline(), |rig, place| with(&rig, sheet, place))
 }
@@ -203,7 +201,6 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Solves a motion of a rig.
     pub(crate) fn new(rig: RigParameters, motion: &Motion) -> Self {
         let numbers = Numbers::of(&rig).expect("only smooth effects");
         let start = motion.start();

@@ -14,7 +14,6 @@ pub(crate) struct Subject {
     pub(crate) papers: bool,
 }
 
-/// A figure and how it is shown.
 pub(crate) struct Column {
     pub(crate) head: &'static str,
     pub(crate) figure: &'static str,
@@ -60,7 +59,6 @@ impl Spread {
 }
 
 impl Sheet<'_> {
-    /// Rehearses everything and prints the table.
     pub(crate) fn print(&self) -> Result<(), Box<dyn Error>> {
         let heads: Vec<_> = self.columns.iter().map(|column| column.head).collect();
         println!("| | {} |", heads.join(" | "));

@@ -125,7 +125,6 @@ impl Told {
         })
     }
 
-    /// The cells under [`HEAD`].
     fn cells(&self) -> String {
         let Self { nominal: figures, corners, margin, worst_margin } = self;
         let overshoots = [figures, corners].map(|figures| number(figures.overshoot * 1e2, 1)).join(" / ");
@@ -145,7 +144,6 @@ impl Told {
     }
 }
 
-/// Figures and margins over the gain.
 fn by_gain(ladder: &Ladder) -> Result<(), Box<dyn Error>> {
     println!("| gain, {} | {HEAD}", ladder.unit);
     println!("|---|---|---|---|---|---|---|---|---|");
@@ -156,7 +154,6 @@ fn by_gain(ladder: &Ladder) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The paper's force program over both its numbers.
 fn by_feed_forward() -> Result<(), Box<dyn Error>> {
     println!("| gain, m/(N s) | {} |", SHARES.map(|share| format!("feed-forward {share}")).join(" | "));
     println!("|---{}|", "|---".repeat(SHARES.len()));
@@ -182,7 +179,6 @@ fn by_feed_forward() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Programs of the drive under both force programs.
 fn by_drive() -> Result<(), Box<dyn Error>> {
     println!("| load, drive | {HEAD}");
     println!("|---|---|---|---|---|---|---|---|---|");
