@@ -41,7 +41,6 @@ use range::Range;
 use slow::Slow;
 use work::{Asked, Seen, Work};
 
-/// What an axis controller is made of.
 pub struct AxisParts {
     pub axis: Axis,
     pub program: Program,
@@ -55,7 +54,6 @@ pub struct AxisParts {
     pub record_every: u64,
 }
 
-/// The controller of one axis.
 pub struct AxisController {
     axis: Axis,
     program: Program,
@@ -79,7 +77,6 @@ pub struct AxisController {
 }
 
 impl AxisController {
-    /// A controller that waits for its rig.
     pub fn new(parts: AxisParts) -> Self {
         let AxisParts { axis, program, plan, main, supply_pressure_pa, changes, record_every } = parts;
         Self {
@@ -255,7 +252,6 @@ impl AxisController {
         self.status().main_chain
     }
 
-    /// Why the main chain came to its state.
     pub fn cause(&self) -> MainCause {
         self.leading.main.entered.cause
     }
@@ -278,7 +274,6 @@ impl AxisController {
         &self.program
     }
 
-    /// Figures of the position control so far.
     pub fn figures(&self) -> &PositionFigures {
         &self.figures
     }

@@ -12,10 +12,8 @@ use plant::{Axis, RigParameters};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
-/// How often the files are looked at.
 const LOOK_PERIOD: Duration = Duration::from_millis(250);
 
-/// A program file and the numbers in use.
 struct ProgramFile {
     axis: Axis,
     path: PathBuf,
@@ -26,7 +24,6 @@ struct ProgramFile {
     values: Vec<f64>,
 }
 
-/// Looks for changes in the program files of a process.
 pub(crate) struct Reloader {
     rig: RigParameters,
     files: Vec<ProgramFile>,

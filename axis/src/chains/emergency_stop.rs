@@ -46,15 +46,12 @@ const RECOVERED_SHARE: f64 = 0.9;
 /// How long the rig must have been recovered.
 const RECOVERED_S: f64 = 0.2;
 
-/// What the chain is given once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopConfig {
     pub after_emergency_stop: AfterStop,
-    /// Nominal supply pressure, absolute, Pa.
     pub supply_pressure_pa: f64,
 }
 
-/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StopInputs {
     pub cycle: u64,
@@ -62,7 +59,6 @@ pub struct StopInputs {
     pub rig: Option<RigStatus>,
     /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
     pub frame: Option<EmergencyStopReason>,
-    /// What the console said since the last cycle.
     pub console: Console,
     pub at_standstill: bool,
     /// A status of the partner came lately, or none is needed.
@@ -71,7 +67,6 @@ pub struct StopInputs {
     pub sensors_fresh: bool,
 }
 
-/// Why a state was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopCause {
     Began,
@@ -82,14 +77,11 @@ pub enum StopCause {
     Frame(EmergencyStopReason),
     /// This controller tripped it.
     Own(Fault),
-    /// The axis stands still.
     Standstill,
-    /// It did not stand still in time.
     NoStandstill,
     /// Everybody has released.
     Released,
     Recovered,
-    /// The console said start.
     Started,
 }
 
@@ -110,7 +102,6 @@ enum State {
     WaitingForStart,
 }
 
-/// What waits to be sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Frames {
     None,
@@ -128,12 +119,10 @@ pub struct EmergencyStopChain {
     config: StopConfig,
     state: State,
     frames: Frames,
-    /// The state entered last, when and why.
     pub(crate) entered: Entered<EmergencyStopChainState, StopCause>,
 }
 
 impl EmergencyStopChain {
-    /// A chain that is ready.
     pub fn new(config: StopConfig) -> Self {
         let entered = Entered { cycle: 0, state: EmergencyStopChainState::Ready, cause: StopCause::Began };
         Self { config, state: State::Ready, frames: Frames::None, entered }

@@ -31,9 +31,7 @@ pub enum Start {
 /// Configuration of the main chain of one axis. Both axes must be given the same, save for what is called own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MainConfig {
-    /// Number of the experiment, 1 to 255.
     pub experiment: u8,
-    /// Whether the other axis's controller is waited for.
     pub partner_needed: bool,
     /// Own: where the initial positioning ends, m; `None` for an axis that is not positioned.
     pub start_m: Option<f64>,
@@ -51,11 +49,8 @@ pub struct MainConfig {
     pub settling_s: f64,
     /// How long each state may take beyond what it is meant to, s.
     pub settling_timeout_s: f64,
-    /// What begins the experiment.
     pub start: Start,
-    /// What follows an emergency stop.
     pub after_emergency_stop: AfterStop,
-    /// What counts as settled.
     pub settled: Bounds,
 }
 

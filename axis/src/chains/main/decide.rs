@@ -73,7 +73,6 @@ impl MainChain {
         partner_ended(status.main_chain)
     }
 
-    /// Both are ready.
     fn decide_ready(&self, inputs: &MainInputs) -> Option<Edge> {
         use MainChainState as S;
         let partner_ok = !self.config.partner_needed || self.relation(inputs).ok();
@@ -159,7 +158,6 @@ impl MainChain {
         }
     }
 
-    /// The OK flag.
     pub(super) fn ok(&self, inputs: &MainInputs) -> bool {
         let waits = self.entered.state == MainChainState::Settling && self.config.start == Start::OnStart;
         self.held(inputs) && (self.started || !waits)
