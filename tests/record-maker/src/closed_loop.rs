@@ -105,9 +105,6 @@ fn next_row(rehearsal: &mut Rehearsal<Made>) -> Result<Row, MakeError> {
 
 /// The recipe's rig under given valve commands of drive and load, one pair for each row: what the record would have been with
 /// other hidden effects under the same inputs. The valve of an axis that rests stays shut.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn replay(recipe: &Recipe, rig: &RigParameters, valves: &[[f64; 2]]) -> Result<Record, MakeError> {
     replay_with(recipe, rig, valves, STEPS_PER_MS)
 }

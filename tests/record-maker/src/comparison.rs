@@ -174,9 +174,6 @@ pub fn with_effects(
 
 /// What halving the step changes: rms of the null record with so many steps in a millisecond against twice as many, in windows of
 /// equal start, in units of the noise; for drive and load and their signals.
-///
-/// # Errors
-/// As [`super::simulate`].
 pub fn of_halved_step(
     recipe: &Recipe,
     rig: &RigParameters,

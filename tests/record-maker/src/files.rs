@@ -46,9 +46,6 @@ pub fn make(recipe: &Recipe, rig: &RigParameters, measurement: &Path, truth: &Pa
 }
 
 /// Writes a record's files into both folders, which are made if missing.
-///
-/// # Errors
-/// [`MakeError::File`].
 pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), MakeError> {
     save(measurement, "measurement.csv", &measurement_csv(record))?;
     save(truth, "truth.csv", &truth_csv(record))?;
@@ -58,9 +55,6 @@ pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), Ma
 }
 
 /// Writes what the sensors read alone into a folder, which is made if missing.
-///
-/// # Errors
-/// [`MakeError::File`].
 pub fn write_measurement(record: &Record, folder: &Path, name: &str) -> Result<(), MakeError> {
     save(folder, name, &measurement_csv(record))
 }

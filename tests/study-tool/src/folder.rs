@@ -165,9 +165,6 @@ fn hidden_as_json(hidden: &Hidden) -> Value {
 }
 
 /// The text of a file.
-///
-/// # Errors
-/// [`FolderError`] with its path.
 pub fn read(path: &Path) -> Result<String, FolderError> {
     fs::read_to_string(path).map_err(FolderError::file(path))
 }
@@ -187,18 +184,12 @@ pub(crate) fn read_left<T: DeserializeOwned>(
 }
 
 /// Writes a file so that it is whole or absent.
-///
-/// # Errors
-/// [`FolderError`] with its path.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
     parts::write_whole(path, bytes).map_err(FolderError::file(path))
 }
 
 /// Makes a folder so that it is whole or absent: `fill` fills another one, which then gets the name. When two starts are at the
 /// same folder, the first that is done has made it.
-///
-/// # Errors
-/// Those of `fill`, and [`FolderError`] with the path.
 pub fn make_whole<T, E: From<FolderError>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<T, E>,

@@ -89,9 +89,6 @@ pub struct Interrupted;
 
 impl Program {
     /// A program that exists.
-    ///
-    /// # Errors
-    /// What the system says of its file.
     pub fn new(path: &Path, arguments: Vec<String>, limit: Duration) -> io::Result<Self> {
         let path = path.canonicalize()?;
         let crc32 = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&fs::read(&path)?);

@@ -144,9 +144,6 @@ pub fn read(path: &Path) -> Result<Report, String> {
 }
 
 /// Reads the text of a report.
-///
-/// # Errors
-/// A sentence for the list of errors.
 pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     let raw: RawReport = serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
     let named = raw.named.into_iter().map(known).collect::<Result<Vec<_>, _>>()?;

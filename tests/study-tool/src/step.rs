@@ -37,9 +37,6 @@ const MOST_SAID: u64 = 1 << 20;
 pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
 
 /// Makes a record with the record maker.
-///
-/// # Errors
-/// What it says.
 pub fn make_record(
     recipe: &Recipe,
     rig: &RigParameters,
@@ -97,9 +94,6 @@ pub struct RunResult {
 
 impl Step<'_> {
     /// Makes the records of a draw, unless they are there.
-    ///
-    /// # Errors
-    /// [`StepError`] when they cannot be made.
     pub fn records(&self, draw: &Draw) -> Result<(), StepError> {
         if self.study.records(draw.number).exists() {
             return Ok(());

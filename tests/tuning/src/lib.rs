@@ -76,9 +76,6 @@ pub enum TrialError {
 }
 
 /// Largest of [`FACTORS`] up to which `is_still`; 0 if it is not even as it is.
-///
-/// # Errors
-/// Those of `is_still`.
 pub fn largest_factor(
     trial: &Trial,
     mut is_still: impl FnMut(&Trial) -> Result<bool, TrialError>,

@@ -83,9 +83,6 @@ pub fn attempt(program: Program, moves: &[Move], trial: &Trial) -> Result<Figure
 }
 
 /// The positioning with each of [`WEIGHTS_KG`]: the worst of all.
-///
-/// # Errors
-/// As [`attempt`].
 pub fn positioning(program: impl Fn() -> Program) -> Result<Figures, TrialError> {
     let mut worst = Figures::default();
     for added_mass_kg in WEIGHTS_KG {
@@ -131,17 +128,11 @@ fn attempt_late(
 }
 
 /// Largest of [`FACTORS`](super::FACTORS) up to which nothing oscillates; 0 if something does as it is.
-///
-/// # Errors
-/// As [`attempt`].
 pub fn gain_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<f64, TrialError> {
     largest_factor(trial, |trial| Ok(attempt(program(), EXCITATION, trial)?.is_still()))
 }
 
 /// How many cycles a command may be late without oscillation, up to 20; `None` if something oscillates as it is.
-///
-/// # Errors
-/// As [`attempt`].
 pub fn delay_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<Option<usize>, TrialError> {
     for late_cycles in 0..=20 {
         if !attempt_late(program(), EXCITATION, trial, late_cycles)?.is_still() {

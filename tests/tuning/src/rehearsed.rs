@@ -78,17 +78,11 @@ pub fn rehearse(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<Run, Tr
 }
 
 /// Largest of [`FACTORS`](super::FACTORS) up to which the rig does not oscillate; 0 if it does as it is.
-///
-/// # Errors
-/// As [`rehearse`].
 pub fn gain_margin(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<f64, TrialError> {
     super::largest_factor(trial, |trial| is_still(inputs, scene, trial))
 }
 
 /// The least margin of all corners, by [`in_parallel`].
-///
-/// # Errors
-/// As [`rehearse`].
 pub fn worst_gain_margin(inputs: &Inputs, scene: &Scene) -> Result<f64, TrialError> {
     super::largest_factor(&Trial::default(), |Trial { loop_factor, .. }| {
         let corners =
