@@ -5,7 +5,7 @@ use crate::launch::Pace;
 use crate::records::{Table, bus_log, json};
 use crate::scene::Scene;
 use protocol::can::CanFrame;
-use protocol::frames::{Frame, ValveCommand};
+use protocol::frames::{Frame, RigStatus, ValveCommand};
 use serde_json::Value;
 use std::path::Path;
 
@@ -72,7 +72,19 @@ pub fn rows(path: &Path) -> Vec<Row> {
     lines.map(row).collect()
 }
 
+/// A fault from 0.2 to 0.3 s, as a script has it.
+pub fn fault(name: &str, at: &str, numbers: &str) -> String {
+    format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = 0.2\nto_s = 0.3\n{numbers}\n")
+}
+
 impl Plan<'_> {
+    /// Makes the run and holds that it left its marks in every log.
+    pub fn run_with_marks(&self) -> Left {
+        let left = self.run();
+        left.expect_marks_in_every_log();
+        left
+    }
+
     pub fn run(&self) -> Left {
         let scene = Scene::new(&format!("title = \"broken\"\n[rig]\n{}", self.rig));
         let mut emulator = scene.emulator(Pace::Lockstep).with("--seconds");
@@ -94,7 +106,7 @@ impl Plan<'_> {
             let echo = (cycle % 4096) as u16;
             let [drive, load] = openings.map(|opening| ValveCommand { opening, alive, echo, enable: true });
             for frame in [Frame::DriveValveCommand(drive), Frame::LoadValveCommand(load)] {
-                peer.send(&frame.encode().expect("an opening").to_bytes());
+                peer.say(&frame);
             }
         });
         let _ = emulator.wait().expect_code(0);
@@ -165,6 +177,14 @@ impl Left {
             };
             assert_eq!(*count as usize, before("begins") - before("ends"), "faults_active in cycle {cycle}");
         }
+    }
+
+    /// What the rig said of itself.
+    pub fn statuses(&self) -> impl Iterator<Item = RigStatus> {
+        self.log.iter().filter_map(|frame| match Frame::decode(frame) {
+            Ok(Frame::RigStatus(status)) => Some(status),
+            _ => None,
+        })
     }
 
     /// Frames of an identifier that the member heard, by the cycle.

@@ -47,29 +47,20 @@ pub enum Disturbance {
 }
 
 impl Disturbance {
-    pub const ALL: [Self; 8] = [
-        Self::Nothing,
-        Self::EmulatorStopped,
-        Self::ControllerStopped,
-        Self::CpuContention,
-        Self::PageFaults,
-        Self::SlowListener,
-        Self::FrameLoss,
-        Self::ClockStep,
+    /// All of them, each with what `bench cause` has to say.
+    pub const ALL: [(Self, &str); 8] = [
+        (Self::Nothing, "nothing"),
+        (Self::EmulatorStopped, "emulator-stopped"),
+        (Self::ControllerStopped, "controller-stopped"),
+        (Self::CpuContention, "cpu-contention"),
+        (Self::PageFaults, "page-faults"),
+        (Self::SlowListener, "slow-listener"),
+        (Self::FrameLoss, "frame-loss"),
+        (Self::ClockStep, "clock-step"),
     ];
 
-    /// What `bench cause` has to say.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Nothing => "nothing",
-            Self::EmulatorStopped => "emulator-stopped",
-            Self::ControllerStopped => "controller-stopped",
-            Self::CpuContention => "cpu-contention",
-            Self::PageFaults => "page-faults",
-            Self::SlowListener => "slow-listener",
-            Self::FrameLoss => "frame-loss",
-            Self::ClockStep => "clock-step",
-        }
+        Self::ALL[self as usize].1
     }
 
     pub fn needs_root(self) -> bool {

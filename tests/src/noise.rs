@@ -157,12 +157,7 @@ pub struct Outcome {
     pub unknown: u64,
     /// Commands that were refused as stale, or grew stale while acting.
     pub stale: u64,
-    /// Openings that acted.
-    pub openings: usize,
-    /// Those that no controller had sent.
-    pub wrong: usize,
-    /// Cycles in which a valve was shut though its controller wanted it open.
-    pub shut: usize,
+    pub obeyed: Obeyed,
 }
 
 /// Runs rig and controllers in real time for so long, with so many frames of noise each second.
@@ -196,18 +191,19 @@ fn outcome(scene: &Scene, sent: Sent) -> Outcome {
         malformed: of("/frames_ignored/malformed"),
         unknown: of("/frames_ignored/unknown"),
         stale: of("/stale_commands"),
-        openings: obeyed.openings,
-        wrong: obeyed.wrong,
-        shut: obeyed.shut,
+        obeyed,
     }
 }
 
 /// Openings that acted against those that a controller recorded as sent.
-#[derive(Default)]
-struct Obeyed {
-    openings: usize,
-    wrong: usize,
-    shut: usize,
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Obeyed {
+    /// Openings that acted.
+    pub openings: usize,
+    /// Those that no controller had sent.
+    pub wrong: usize,
+    /// Cycles in which a valve was shut though its controller wanted it open.
+    pub shut: usize,
 }
 
 impl Obeyed {

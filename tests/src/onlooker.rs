@@ -172,11 +172,16 @@ impl LivePage {
         self.order_with(&format!("X-Airbench-Token: {}\r\n", self.token), order)
     }
 
-    pub fn events(&self) -> Events {
+    /// A connection on which events come.
+    pub fn listen(&self) -> TcpStream {
         let mut stream = self.connect();
         let request = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\n\r\n", self.address);
         stream.write_all(request.as_bytes()).expect("it listens");
-        Events { lines: BufReader::new(stream) }
+        stream
+    }
+
+    pub fn events(&self) -> Events {
+        Events { lines: BufReader::new(self.listen()) }
     }
 
     pub fn close(self) {

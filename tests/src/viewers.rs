@@ -5,7 +5,7 @@ use crate::onlooker::LivePage;
 use crate::process::{PATIENCE, Running};
 use crate::records::{count, json};
 use crate::scene::{RESTLESS, Scene};
-use std::io::{Read, Write};
+use std::io::Read;
 use std::net::TcpStream;
 use std::process::Command;
 use std::time::Duration;
@@ -70,20 +70,14 @@ impl Audience {
         command.args(["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run"]);
         command.arg(format!("--user-data-dir={}", scene.path("browser").display()));
         command.arg("--remote-debugging-port=0").arg(format!("http://{}/", page.address));
-        let listen = || {
-            let mut stream = page.connect();
-            let request = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\n\r\n", page.address);
-            stream.write_all(request.as_bytes()).expect("it listens");
-            stream
-        };
         for _ in 0..LISTENERS {
-            let mut stream = listen();
+            let mut stream = page.listen();
             // Each ends with its connection.
             std::thread::spawn(move || {
                 let mut bytes = [0; 65536];
                 while stream.read(&mut bytes).is_ok_and(|read| read > 0) {}
             });
         }
-        Self { _browser: Running::start("chromium", &mut command), _still: listen() }
+        Self { _browser: Running::start("chromium", &mut command), _still: page.listen() }
     }
 }

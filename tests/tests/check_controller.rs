@@ -179,7 +179,7 @@ impl Breaking {
         };
         if self.silent_cycles == 50 {
             let stop = EmergencyStop { reason: EmergencyStopReason::SensorLoss, release: false };
-            peer.send(&Frame::DriveEmergencyStop(stop).encode().unwrap().to_bytes());
+            peer.say(&Frame::DriveEmergencyStop(stop));
         }
         if answers {
             self.answer(peer, cycle);
