@@ -4,11 +4,12 @@
 //! `bench`, `discrepancy` and `campaign`; a script that has built them sets these. Without them cargo builds the release
 //! profile, and says itself where the results are.
 
-use crate::process::Running;
+use crate::process::{Ended, Running};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+use std::time::Duration;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Program {
@@ -67,6 +68,28 @@ pub fn executable(program: Program, build: Build) -> PathBuf {
 /// The checkout that is tested.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the workspace").to_owned()
+}
+
+/// The shipped experiments: name and file, by name.
+pub fn shipped_experiments() -> Vec<(String, PathBuf)> {
+    let folder = workspace().join("controller/experiments");
+    let entries = std::fs::read_dir(&folder).expect("the folder of experiments");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let mut named: Vec<_> = paths
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .map(|path| (path.file_stem().expect("a name").to_string_lossy().into_owned(), path))
+        .collect();
+    named.sort();
+    assert!(named.iter().any(|(name, _)| name == "point-to-point"), "{named:?}");
+    named
+}
+
+/// Runs one of `scripts` on the shipped build, for so long at most.
+pub fn script(name: &str, arguments: &[&str], limit: Duration) -> Ended {
+    let bench = executable(Program::Bench, Build::Shipped);
+    let mut command = Command::new(workspace().join("scripts").join(name));
+    command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
+    Running::start(&format!("scripts/{name}"), &mut command).wait_within(limit)
 }
 
 fn folder(variable: &str, features: &[&str]) -> PathBuf {
