@@ -29,7 +29,7 @@ impl InputError {
 }
 
 /// What is controlled, how, and where the files go.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct FileArguments {
     /// Rig file, of which nominal numbers are read: valve characteristic, areas, stroke.
     #[arg(long)]

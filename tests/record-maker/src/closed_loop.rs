@@ -193,16 +193,11 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
     let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
     let set = unsettled(moved);
     let files = FileArguments {
-        parameters: None,
         rig: workspace().join("plant/rig.toml"),
         experiment,
-        out: PathBuf::new(),
         programs: Some(workspace().join("controller/programs")),
-        drive_program: None,
-        load_program: None,
         set,
-        repeat: false,
-        after_emergency_stop: None,
+        ..FileArguments::default()
     };
     let mut inputs = Inputs::read(&files)?;
     inputs.rig = rig.without_effects();

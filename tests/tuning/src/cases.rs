@@ -11,7 +11,7 @@ use figures::{self, Figures, position};
 use plant::{Axis, Scene};
 use rehearsal::Rehearsed;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// An experiment with the programs that it is tried with.
 pub struct Case {
@@ -34,16 +34,12 @@ impl Case {
         let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../controller");
         let program = |name: Option<&str>| Some(room.join(format!("programs/{}.toml", name?)));
         let files = FileArguments {
-            parameters: None,
             rig: room.join("../plant/rig.toml"),
             experiment: room.join(format!("experiments/{}.toml", made.experiment)),
-            out: PathBuf::new(),
-            programs: None,
             drive_program: program(made.drive),
             load_program: program(made.load),
             set: made.set.to_vec(),
-            repeat: false,
-            after_emergency_stop: None,
+            ..FileArguments::default()
         };
         let inputs = Inputs::read(&files)?;
         let scene = Scene::from_toml(&inputs.experiment_toml, made.experiment, &inputs.rig)?;
