@@ -103,6 +103,12 @@ fn means(values: &[f64], window: usize) -> Vec<f64> {
     values.windows(window).map(|part| part.iter().sum::<f64>() / window as f64).collect()
 }
 
+/// A number in decimals, without the sign of a zero.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let unit = 10_f64.powi(decimals as i32);
+    format!("{:.decimals$}", (value * unit).round() / unit + 0.0)
+}
+
 /// Largest less least; 0 of nothing.
 fn peak_to_peak(values: &[f64]) -> f64 {
     let ends = values
