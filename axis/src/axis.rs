@@ -48,7 +48,6 @@ pub struct AxisParts {
     pub main: MainConfig,
     /// Nominal supply pressure, absolute, Pa.
     pub supply_pressure_pa: f64,
-    /// Parameters that change, by time.
     pub changes: Vec<PlannedChange>,
     /// A row of the record every so many cycles.
     pub record_every: u64,
@@ -146,7 +145,6 @@ impl AxisController {
         self.leading.stop.frame_due(cycle)
     }
 
-    /// Both chains that lead, moved on.
     fn advance(&mut self, cycle: u64, rig: Option<&RigStatus>, own: Option<OwnAxis>) -> MainOutput {
         let before = self.leading.output.map(|output| output.state);
         let output = self.leading.advance(&LeadingInputs {
@@ -256,7 +254,6 @@ impl AxisController {
         self.leading.main.entered.cause
     }
 
-    /// Whether a stopped axis may begin anew.
     pub fn may_restart(&self) -> bool {
         self.main_config.after_emergency_stop != AfterStop::End
     }

@@ -61,7 +61,6 @@ pub struct Experiment {
     pub passed: toml::Table,
 }
 
-/// `[run]`: what both axes keep to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunSection {
     /// How often it is driven through, each from initial positioning on.

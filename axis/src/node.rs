@@ -41,7 +41,6 @@ pub enum News {
     RigRestarted,
     BusLost,
     BusBack,
-    /// No sensors for a while.
     SensorsSilent,
 }
 

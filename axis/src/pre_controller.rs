@@ -63,7 +63,6 @@ impl Geometry {
     }
 }
 
-/// A first-order low-pass.
 #[derive(Clone, Copy, Debug, Default)]
 struct LowPass {
     /// What `share` was computed for.

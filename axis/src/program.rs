@@ -232,7 +232,6 @@ impl Program {
         }
     }
 
-    /// What the user's algorithm controls.
     pub fn controls(&self) -> Quantity {
         self.user.controls
     }
@@ -294,7 +293,6 @@ impl GivingWay {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Due {
-    /// Its multiple is not over.
     NotYet,
     /// It is, so many cycles after its last step.
     After(f64),

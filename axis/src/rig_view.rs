@@ -70,7 +70,6 @@ struct Account {
 #[derive(Default)]
 pub struct RigView {
     cycle: Option<u64>,
-    /// Cycles that the rig says it skipped.
     pub skipped: u64,
     sensors: [Option<Sensors>; 2],
     recent: [Recent; 2],
@@ -83,7 +82,6 @@ pub struct RigView {
     /// Sensor frames that came again.
     pub duplicate: PerAxis,
     account: Option<Account>,
-    /// Sensor frames that never came.
     pub lost: PerAxis,
     /// Sensor frames that the rig had sent by its first tick that came, and that did not come: lost ones, and those from before
     /// the bus was joined.

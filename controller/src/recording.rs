@@ -27,7 +27,6 @@ pub(crate) struct Tables {
 }
 
 impl Tables {
-    /// Makes a table for each axis in `folder`.
     pub(crate) fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
         let tables = axes.iter().map(|axis| {
             let mut table = LineFile::create(&folder.join(format!("controller-{}.csv", axis.name())))?;

@@ -32,7 +32,6 @@ pub(crate) struct Reloader {
 }
 
 impl Reloader {
-    /// Looks at the programs of `axes` from now on.
     pub(crate) fn new(inputs: &Inputs, axes: &[Axis], changes: Sender<Change>) -> Self {
         let watched = |axis: &Axis| {
             let source = inputs.programs[axis.index()].as_ref()?;

@@ -58,7 +58,6 @@ pub(crate) fn of_node<P: CalibrationPort>(
     node.controllers().map(of).collect()
 }
 
-/// Whether the axis ended what it was asked for.
 pub(crate) fn is_done(axis: &AxisReport) -> bool {
     axis.chain_state == MainChainState::Done.name()
 }

@@ -51,7 +51,6 @@ pub(crate) struct Passed {
     /// When it arrived or was handed over, ns.
     pub(crate) stamp_ns: u64,
     pub(crate) frame: CanFrame,
-    /// Whether it is one of ours.
     pub(crate) sent: bool,
 }
 

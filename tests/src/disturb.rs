@@ -38,7 +38,6 @@ pub enum Disturbance {
     CpuContention,
     /// An own algorithm that touches fresh memory, 300 pages a cycle for 1.5 s.
     PageFaults,
-    /// A peer that connects and never reads.
     SlowListener,
     /// A wire that loses 1 % of the frames.
     FrameLoss,

@@ -45,7 +45,6 @@ impl Door {
         number.and_then(|number| number.parse().ok()).expect("VmHWM in kB")
     }
 
-    /// Ends it, and gives what it counted.
     pub fn close(self) -> Value {
         let _ = self.running.interrupt();
         json(&self.report)

@@ -6,7 +6,6 @@ use std::ops::Range;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// Cycle in which it was noticed.
     pub cycle: usize,
     /// Its name, as `command-stale`.
     pub kind: String,

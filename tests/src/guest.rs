@@ -85,7 +85,6 @@ impl Guest {
         self.folder.path().join(name)
     }
 
-    /// Exit codes by name, from the job's file.
     pub fn codes(&self) -> BTreeMap<String, i32> {
         let text = fs::read_to_string(self.out().join("codes")).expect("the job's codes");
         text.lines()

@@ -45,7 +45,6 @@ set-point = [
 pub enum Extreme {
     /// Each the largest that a file may hold.
     Most,
-    /// Each the smallest.
     Least,
     /// Now this, now that, from key to key and place to place.
     Mixed,

@@ -46,7 +46,6 @@ pub struct Sent {
     pub frames: u64,
     /// Those on an identifier of `rig.dbc`, wrong in length, value or checksum.
     pub malformed: u64,
-    /// How long it took, s.
     pub duration_s: f64,
 }
 
@@ -143,15 +142,12 @@ pub struct Outcome {
     pub missed: u64,
     /// Its wake-ups that came late enough to be counted.
     pub overruns: u64,
-    /// 99th percentile of its wake-up, ns.
     pub wakeup_p99_ns: u64,
-    /// 99th percentile of the drive's round trip, ns.
     pub round_trip_p99_ns: u64,
     /// Commands of the controllers that never reached the rig.
     pub commands_lost: u64,
     /// Sensor frames of the drive that never reached its controller.
     pub sensors_lost: u64,
-    /// Frames that the rig counted as malformed.
     pub malformed: u64,
     /// Frames that the rig counted as none of its own.
     pub unknown: u64,

@@ -68,7 +68,6 @@ impl Viewer {
         }
     }
 
-    /// Everything until the run ends.
     pub fn to_the_end(mut self) -> Told {
         let mut reported = Told::default();
         let json = |text: &str| serde_json::from_str(text).expect("JSON");

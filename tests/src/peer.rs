@@ -89,7 +89,6 @@ impl Peer {
         Some(Packet::Frame(frame.unwrap_or_else(|| panic!("the host sent {bytes:02X?}"))))
     }
 
-    /// All frames from now until the host goes.
     pub fn frames_to_the_end(&self) -> Vec<CanFrame> {
         let mut frames = Vec::new();
         loop {

@@ -178,7 +178,6 @@ impl Said {
 }
 
 impl Ended {
-    /// Holds the exit code against what is documented.
     #[track_caller]
     pub fn expect_code(self, code: i32) -> Self {
         let Self { name, stderr, signal, .. } = &self;
@@ -195,7 +194,6 @@ impl Ended {
         self
     }
 
-    /// Holds that standard output has all of `parts`.
     #[track_caller]
     pub fn expect_printed(&self, parts: &[&str]) {
         for part in parts {

@@ -20,9 +20,7 @@ pub struct Outcome {
     pub overruns: u64,
     /// Median and 99th percentile of its wake-up, ns.
     pub wakeup_ns: [u64; 2],
-    /// 99th percentile of the drive's round trip, ns.
     pub round_trip_p99_ns: u64,
-    /// Records that did not reach the run's files.
     pub records_dropped: u64,
     /// Viewers that the page had when the run was half over.
     pub viewers: u64,

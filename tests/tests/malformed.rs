@@ -17,7 +17,6 @@ const EVERY: u32 = 3;
 const FILES: [&str; 3] =
     ["emulator/measurement.csv", "emulator/truth.csv", "controller/controller-drive.csv"];
 
-/// What the injector does in a cycle.
 type Act<'a> = &'a mut dyn FnMut(&Peer, u32);
 
 /// Runs the short experiment with a member that acts as `act` says; `None` runs it without one.

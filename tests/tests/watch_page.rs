@@ -34,7 +34,6 @@ set-point = [
 
 /// Cases of the script that use the first run; the next one has the emulator started anew.
 const CASES_OF_FIRST_RUN: usize = 10;
-/// A supply that is discharged, Pa.
 const DISCHARGED_PA: f64 = 1.2e5;
 /// An axis that stands, m/s: the air trapped beside its piston has come to rest.
 const STANDS_M_PER_S: f64 = 1e-3;

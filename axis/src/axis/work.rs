@@ -136,7 +136,6 @@ impl Work {
         }
     }
 
-    /// What keeps the axis from what is asked of it.
     pub(super) fn error(&self, demand: &Demand, ready: &Ready) -> ControlError {
         match self {
             Self::Shut => ControlError::None,

@@ -12,7 +12,6 @@ use protocol::frames::{
 
 pub(super) const SUPPLY_PA: f64 = 7e5;
 
-/// One axis controller with what its sensors show.
 pub(super) struct One {
     pub(super) leading: Leading,
     pub(super) position_m: f64,

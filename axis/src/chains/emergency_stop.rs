@@ -71,7 +71,6 @@ pub struct StopInputs {
 pub enum StopCause {
     Began,
     RigRestarted,
-    /// The rig says that it is tripped.
     Rig,
     /// Somebody tripped it over the bus.
     Frame(EmergencyStopReason),
@@ -79,13 +78,11 @@ pub enum StopCause {
     Own(Fault),
     Standstill,
     NoStandstill,
-    /// Everybody has released.
     Released,
     Recovered,
     Started,
 }
 
-/// A stop that this controller holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Own {
     fault: Fault,
@@ -110,7 +107,6 @@ enum Frames {
         next: u64,
         reason: EmergencyStopReason,
     },
-    /// One withdrawal.
     Release,
 }
 
@@ -207,7 +203,6 @@ impl EmergencyStopChain {
         inputs.rig.is_some_and(|rig| !rig.check_valves_shut && rig.supply_pressure_pa >= least_pa)
     }
 
-    /// The edge to go, if any: where to, and why.
     fn decide(&self, inputs: &StopInputs) -> Option<(EmergencyStopChainState, StopCause)> {
         use EmergencyStopChainState as S;
         let rig_tripped = inputs.rig.is_some_and(|rig| rig.emergency_stop);

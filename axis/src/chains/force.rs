@@ -58,13 +58,9 @@ pub enum ForceAsked {
     /// Nothing: valve shut, or held still.
     #[default]
     Idle,
-    /// To relieve the linked system of stress.
     Relieve,
-    /// To give way to a hand.
     Manual,
-    /// The ramp to the initial force.
     InitialRamp,
-    /// The experiment's force.
     LoadProfile,
     /// To hold the last force.
     Done,
@@ -82,7 +78,6 @@ pub struct ForceInputs {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceOutput {
     pub state: ForceChainState,
-    /// Limit of the rod's velocity, m/s.
     pub limit_m_per_s: Option<f64>,
     pub feed_forward: bool,
     pub dead_zone: bool,
@@ -204,7 +199,6 @@ impl ForceChain {
         }
     }
 
-    /// The edge to go, if any: where to, and why.
     fn decide(&self, inputs: &ForceInputs, numbers: &Parameters) -> Option<(ForceChainState, ForceCause)> {
         use ForceChainState as S;
         let asked = inputs.asked;

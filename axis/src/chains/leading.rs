@@ -16,7 +16,6 @@ use protocol::frames::{EmergencyStopReason, RigStatus};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LeadingInputs {
     pub cycle: u64,
-    /// The rig's status if it is fresh.
     pub rig: Option<RigStatus>,
     /// Own sensors; `None` before the first, and while they are lost.
     pub own: Option<OwnAxis>,

@@ -56,7 +56,6 @@ const APPROACH_SHORTEST_S: f64 = 0.5;
 /// For so long after a (re)start a partner that is still aborted or in fault is waited for: ten periods of its status.
 const GRACE_CYCLES: u64 = PARTNER_LOST_CYCLES;
 
-/// How a state is waited in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Wait {
     /// Last cycle in which nothing but the console's start was missing.

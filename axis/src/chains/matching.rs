@@ -171,7 +171,6 @@ impl MatchingChain {
         }
     }
 
-    /// The edge to go, if any: where to, and why.
     fn decide(
         &self,
         inputs: &MatchingInputs,

@@ -110,7 +110,6 @@ impl Settled {
         bucket.samples += 1.0;
     }
 
-    /// The buckets that are not older than the window.
     fn window(&self, cycle: u64) -> impl Iterator<Item = &Bucket> {
         let number = cycle / BUCKET_CYCLES;
         self.buckets.iter().flatten().filter(move |bucket| bucket.number + BUCKETS as u64 > number)

@@ -35,7 +35,6 @@ pub struct AxisExperiment {
     pub start_m: Option<f64>,
     /// What is done after initial positioning, in this order.
     pub prepare: Vec<Prepare>,
-    /// How long the initial force is ramped to, s.
     pub initial_ramp_s: f64,
     /// A hand leads the axis during the experiment, under force control with set-point zero, instead of its set-points.
     pub manual: bool,

@@ -85,12 +85,10 @@ impl ForceProfile {
         Self { row: Row::new(initial_force_n, segments), limit_n }
     }
 
-    /// How long it takes, s.
     pub fn duration_s(&self) -> f64 {
         self.row.duration_s()
     }
 
-    /// The force that it begins with, N.
     pub fn initial_force_n(&self) -> f64 {
         self.row.start()
     }
@@ -114,7 +112,6 @@ struct Memory {
     /// Segment that is being driven, and what has happened in it.
     segment: Option<usize>,
     crossing: at_position::Crossing,
-    /// The force of the last cycle, N.
     last_n: Option<f64>,
 }
 

@@ -148,7 +148,6 @@ impl Scale {
     }
 }
 
-/// How long a segment may be.
 const LONGEST_S: f64 = 86_400.0;
 
 /// The table of one segment, and where its row stands.

@@ -38,7 +38,6 @@ pub struct Floor {
 }
 
 impl Floor {
-    /// The plant of `rig` in the state `axes`.
     pub fn new(rig: &RigParameters, axes: &[AxisState; 2]) -> Self {
         let (supply, gas, valve) = (rig.supply(), rig.gas(), rig.valve());
         let (cylinder, friction, mass, linkage) = (rig.cylinder(), rig.friction(), rig.mass(), rig.linkage());

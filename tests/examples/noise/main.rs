@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use system_tests::noise::{self, Outcome};
 use system_tests::pairs::{self, Figure};
 
-/// Frames of noise each second.
 const PER_SECOND: u32 = 10_000;
 
 const FIGURES: [Figure<Outcome>; 6] = [

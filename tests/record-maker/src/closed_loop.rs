@@ -218,7 +218,6 @@ fn scene(experiment_toml: &str, file: &str, rig: &RigParameters) -> Result<Scene
     }
 }
 
-/// The rig of a recipe as a rehearsal moves it.
 pub(super) struct Made {
     pub(super) rig: Rig,
     pub(super) state: State,

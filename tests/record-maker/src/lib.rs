@@ -113,7 +113,6 @@ pub enum Experiment {
 pub struct Record {
     pub recipe: Recipe,
     pub linked: bool,
-    /// Weights on the carriage, kg.
     pub added_mass_kg: f64,
     /// One for each millisecond.
     pub rows: Vec<Row>,
@@ -130,7 +129,6 @@ pub struct Row {
     /// The same at the nominal time without noise and rounding: position m, force N, pressures Pa. Sensor effects are in it.
     pub without_noise: [[f64; 4]; 2],
     pub axes: [TrueAxis; 2],
-    /// True pressure of the supply node, Pa.
     pub supply_pressure_pa: f64,
     /// F_c, N, positive in +x on the carriage.
     pub contact_force_n: f64,

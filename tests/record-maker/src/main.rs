@@ -74,7 +74,6 @@ fn agree() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What halving the step changes, as Markdown.
 fn steps() -> Result<(), Box<dyn Error>> {
     let rig = RigParameters::baseline();
     println!("| step | record | position | force | pressure a | pressure b |\n|---|---|---|---|---|---|");

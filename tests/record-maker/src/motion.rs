@@ -50,7 +50,6 @@ pub(super) struct At {
     pub(super) extension_m: f64,
     /// Sum of both gauge pressures, Pa.
     pub(super) gauge_pa: f64,
-    /// How long the piston has been at rest, s.
     pub(super) rest_s: f64,
 }
 

@@ -375,7 +375,6 @@ impl Rig {
     }
 }
 
-/// A state as the laws see it.
 struct Instant<'a> {
     y: &'a [Y; 2],
     bristles: [f64; 2],

@@ -71,7 +71,6 @@ pub struct DrawClasses {
 #[serde(deny_unknown_fields)]
 pub struct Classes {
     pub plan: Plan,
-    /// One for each draw that hides something.
     pub draws: Vec<DrawClasses>,
 }
 

@@ -164,7 +164,6 @@ fn hidden_as_json(hidden: &Hidden) -> Value {
     json!({"effect": hidden.name, "where": hidden.place.to_string(), "numbers": numbers})
 }
 
-/// The text of a file.
 pub fn read(path: &Path) -> Result<String, FolderError> {
     fs::read_to_string(path).map_err(FolderError::file(path))
 }

@@ -32,7 +32,6 @@ pub struct Judgement {
     pub hidden: Vec<HiddenJudged>,
     /// Whether the first name is the one hidden effect itself.
     pub top: bool,
-    /// Whether it is right alone.
     pub alone: bool,
     /// Names that stand for nothing hidden.
     pub too_many: usize,

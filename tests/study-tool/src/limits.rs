@@ -137,7 +137,6 @@ pub struct Limits {
     pub schema_version: u32,
     pub window_ms: u32,
     pub seed: u64,
-    /// One for each effect, place and side.
     pub limits: Vec<Limit>,
 }
 

@@ -25,7 +25,6 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use wait4::Wait4;
 
-/// How often a running program is looked at.
 const POLL: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Clone)]
@@ -71,7 +70,6 @@ pub struct Taken {
     pub ended: Ended,
     /// Wall time, s.
     pub wall_s: f64,
-    /// Largest resident set, KiB.
     pub memory_kib: u64,
 }
 

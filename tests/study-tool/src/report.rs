@@ -24,7 +24,6 @@ pub struct Report {
     pub outside: Option<Outside>,
     /// What the program says of its model on the held-out record.
     pub verification: Option<Verification>,
-    /// What the program would measure next.
     pub next: Option<Next>,
 }
 
@@ -143,7 +142,6 @@ pub fn read(path: &Path) -> Result<Report, String> {
     parse(&bytes)
 }
 
-/// Reads the text of a report.
 pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     let raw: RawReport = serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
     let named = raw.named.into_iter().map(known).collect::<Result<Vec<_>, _>>()?;

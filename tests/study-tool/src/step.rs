@@ -36,7 +36,6 @@ const MOST_SAID: u64 = 1 << 20;
 /// Makes a record: measurement into the first folder, truth into the second; says why it cannot.
 pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
 
-/// Makes a record with the record maker.
 pub fn make_record(
     recipe: &Recipe,
     rig: &RigParameters,

@@ -21,9 +21,7 @@ use rayon::prelude::*;
 
 /// Factors that a gain margin is looked for in.
 pub const FACTORS: [f64; 8] = [1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0];
-/// Added masses of the corners, kg.
 pub const MASSES_KG: [f64; 4] = [0.0, 5.0, 10.0, 20.0];
-/// Supply pressures of the corners, bar.
 pub const SUPPLIES_BAR: [f64; 4] = [5.0, 6.0, 7.0, 8.0];
 
 #[derive(Clone, Copy, Debug, PartialEq)]

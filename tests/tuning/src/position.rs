@@ -29,7 +29,6 @@ pub const RIPPLE_M: f64 = 2e-3;
 /// A move along a Bestehorn sinoid and the rest behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Move {
-    /// Where it ends, m.
     pub to_m: f64,
     /// How long it takes, s; 0 is a step.
     pub duration_s: f64,
@@ -62,7 +61,6 @@ pub struct Figures {
     pub rest_peak_to_peak_m: f64,
     /// Largest error during moves beside its mean over 0.3 s, m.
     pub ripple_m: f64,
-    /// Largest overshoot after a step, m.
     pub overshoot_m: f64,
     /// Longest time from a step until the error stays within 2 mm, s.
     pub settling_s: f64,

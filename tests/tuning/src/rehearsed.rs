@@ -39,7 +39,6 @@ pub struct Run {
     pub done: bool,
 }
 
-/// What of a run says whether it oscillated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unrest {
     pub done: bool,
@@ -103,7 +102,6 @@ fn is_still(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<bool, Trial
 }
 
 impl Run {
-    /// What says whether it oscillated.
     pub fn unrest(&self) -> Unrest {
         let drive = |row: &Rehearsed| row.axes[Axis::Drive.index()];
         let in_experiment =

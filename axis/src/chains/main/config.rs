@@ -21,7 +21,6 @@ pub struct Lengths {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
-    /// Nothing.
     #[default]
     ByItself,
     /// `RunControl` start: once for all repetitions, again after an abort.

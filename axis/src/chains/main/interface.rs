@@ -54,7 +54,6 @@ pub struct MainOutput {
     /// The condition for leaving the state is fulfilled on this side.
     pub ok: bool,
     pub phase: Phase,
-    /// The fault, while in fault.
     pub fault: Option<Fault>,
 }
 

@@ -133,7 +133,6 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
-    /// The worst of what the sensors show.
     pub(crate) fn worst_shown(&self) -> f64 {
         self.shown.iter().copied().fold(0.0, f64::max)
     }
@@ -180,7 +179,6 @@ pub(crate) fn is_smooth(sheet: &Sheet) -> bool {
     Numbers::of(&with(&RigParameters::baseline(), sheet, &sheet.place.names()[0])).is_some()
 }
 
-/// The motion in which an effect alone shows.
 pub(crate) fn motion_of(sheet: &Sheet) -> Motion {
     match sheet.name {
         "stribeck-friction" | "presliding" => CREEPING,

@@ -50,7 +50,6 @@ impl Line {
 pub struct Split {
     pub name: String,
     pub class_right: Rate,
-    /// The first name is the effect itself.
     pub top: Rate,
     /// The effect itself alone, of those that are alone in their class.
     pub alone: Rate,

@@ -188,7 +188,6 @@ fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() { rounded(value, decimals) } else { "-".into() }
 }
 
-/// The number in the load's program.
 fn shipped(case: &Case, name: &str) -> Option<f64> {
     let mode = axis_control::setup::Mode { partner_needed: true, real_time: false, forever: false };
     let controller = case.inputs.controller(plant::Axis::Load, mode).ok()?;
