@@ -41,7 +41,6 @@ use range::Range;
 use slow::Slow;
 use work::{Asked, Seen, Work};
 
-/// What an axis controller is made of.
 pub struct AxisParts {
     pub axis: Axis,
     pub program: Program,
@@ -49,13 +48,11 @@ pub struct AxisParts {
     pub main: MainConfig,
     /// Nominal supply pressure, absolute, Pa.
     pub supply_pressure_pa: f64,
-    /// Parameters that change, by time.
     pub changes: Vec<PlannedChange>,
     /// A row of the record every so many cycles.
     pub record_every: u64,
 }
 
-/// The controller of one axis.
 pub struct AxisController {
     axis: Axis,
     program: Program,
@@ -79,7 +76,6 @@ pub struct AxisController {
 }
 
 impl AxisController {
-    /// A controller that waits for its rig.
     pub fn new(parts: AxisParts) -> Self {
         let AxisParts { axis, program, plan, main, supply_pressure_pa, changes, record_every } = parts;
         Self {
@@ -149,7 +145,6 @@ impl AxisController {
         self.leading.stop.frame_due(cycle)
     }
 
-    /// Both chains that lead, moved on.
     fn advance(&mut self, cycle: u64, rig: Option<&RigStatus>, own: Option<OwnAxis>) -> MainOutput {
         let before = self.leading.output.map(|output| output.state);
         let output = self.leading.advance(&LeadingInputs {
@@ -255,12 +250,10 @@ impl AxisController {
         self.status().main_chain
     }
 
-    /// Why the main chain came to its state.
     pub fn cause(&self) -> MainCause {
         self.leading.main.entered.cause
     }
 
-    /// Whether a stopped axis may begin anew.
     pub fn may_restart(&self) -> bool {
         self.main_config.after_emergency_stop != AfterStop::End
     }
@@ -278,7 +271,6 @@ impl AxisController {
         &self.program
     }
 
-    /// Figures of the position control so far.
     pub fn figures(&self) -> &PositionFigures {
         &self.figures
     }

@@ -32,19 +32,15 @@ pub use fault::Fault;
 
 use protocol::frames::{ChainStatus, ChainValues, RunControl, RunControlCommand};
 
-/// Seconds of one cycle.
 const CYCLE_S: f64 = 1e-3;
 
 /// Cycles after which a partner that is needed counts as lost: ten periods of its status. Those that the axis answered itself
 /// count: when the rig skips cycles, or the own process is held up, the partner is not to blame.
 pub const PARTNER_LOST_CYCLES: u64 = 100;
 
-/// The partner as it was heard last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Partner {
-    /// Its last status.
     pub status: Option<ChainStatus>,
-    /// Its last values.
     pub values: Option<ChainValues>,
     /// Cycle in which its last status came.
     pub heard: Option<u64>,
@@ -60,14 +56,11 @@ impl Partner {
     }
 }
 
-/// What the console said since the last cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Console {
     /// `RunControl` start of this experiment, or of any (number 0).
     pub start: bool,
-    /// `RunControl` abort.
     pub abort: bool,
-    /// `ConsoleEmergencyStop` with release.
     pub release: bool,
 }
 
@@ -97,7 +90,6 @@ pub enum AfterStop {
     OnStart,
 }
 
-/// A state that was entered: when and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entered<State, Cause> {
     pub cycle: u64,

@@ -44,7 +44,6 @@ use settings::parameters::Parameter;
 use settings::{Section, SettingsError, Source};
 use std::path::Path;
 
-/// An experiment, checked.
 #[derive(Clone, Debug)]
 pub struct Experiment {
     pub title: String,
@@ -62,7 +61,6 @@ pub struct Experiment {
     pub passed: toml::Table,
 }
 
-/// `[run]`: what both axes keep to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunSection {
     /// How often it is driven through, each from initial positioning on.
@@ -73,11 +71,9 @@ pub struct RunSection {
     pub settling_timeout_s: f64,
     /// What starts the experiment once both axes have settled.
     pub start: Start,
-    /// What follows an emergency stop.
     pub after_emergency_stop: AfterStop,
 }
 
-/// `[recording]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recording {
     /// Cycles between two rows of an axis's file.

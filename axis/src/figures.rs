@@ -7,14 +7,12 @@
 use crate::axis::average::Average;
 use crate::set_point::SetPoint;
 
-/// Both errors.
 #[derive(Clone, Copy, Debug, Default)]
 struct Errors {
     moving_m: Option<f64>,
     resting_m: Option<f64>,
 }
 
-/// The figures so far.
 #[derive(Debug, Default)]
 pub struct PositionFigures {
     /// Of the repetitions that were driven through.
@@ -26,7 +24,6 @@ pub struct PositionFigures {
 }
 
 impl PositionFigures {
-    /// Takes a cycle of the experiment.
     pub fn take(&mut self, set_point: &SetPoint, position_m: f64) {
         let error_m = (set_point.position_m - position_m).abs();
         if set_point.moving {

@@ -26,7 +26,6 @@ pub const STOPPED_CYCLES: u64 = 2000;
 /// Frames of a partner that wait for their cycle; a cycle has three at most.
 const MAIL_ROOM: usize = 16;
 
-/// What a node reports to a person.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum News {
@@ -39,12 +38,9 @@ pub enum News {
         #[serde(serialize_with = "in_words")]
         cause: MainCause,
     },
-    /// The rig's time began again.
     RigRestarted,
-    /// The bus went away.
     BusLost,
     BusBack,
-    /// No sensors for a while.
     SensorsSilent,
 }
 
@@ -60,7 +56,6 @@ fn in_words<S: serde::Serializer>(cause: &MainCause, serializer: S) -> Result<S:
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     pub axis: Axis,
-    /// Place in the list of variables.
     pub place: usize,
     pub value: f64,
 }
@@ -69,9 +64,7 @@ pub struct Change {
 pub struct Outlets {
     /// A row of an axis each recorded cycle.
     pub records: Sender<AxisRecord>,
-    /// What a person is shown.
     pub news: Sender<News>,
-    /// Parameters changed while running.
     pub changes: Receiver<Change>,
     /// Lockstep waits for the recorder rather than lose a row.
     pub waits: bool,
@@ -98,14 +91,12 @@ impl Mail {
     }
 }
 
-/// An axis of this process.
 struct Member<P> {
     controller: AxisController,
     /// From the partner in this process.
     mail: Mail,
     answered: u64,
     stopped_for: u64,
-    /// Ticks since the last own sensors.
     silent_ticks: u64,
     /// Measurement and calibration, if that was asked for.
     port: Option<P>,
@@ -119,7 +110,6 @@ pub trait CalibrationPort {
         false
     }
 
-    /// The rig's time began again.
     fn restart(&mut self) {}
 
     /// Samples the signals of a controller after it has answered the sensors of a cycle.
@@ -135,7 +125,6 @@ pub enum NoPort {}
 
 impl CalibrationPort for NoPort {}
 
-/// The controllers of a process on the bus.
 pub struct ControllerNode<P = NoPort> {
     view: RigView,
     members: Vec<Member<P>>,
@@ -340,17 +329,14 @@ impl<P: CalibrationPort> ControllerNode<P> {
         let _ = self.outlets.news.try_send(news);
     }
 
-    /// Whether the rig said that no more sensors come.
     pub fn ending(&self) -> bool {
         self.ending
     }
 
-    /// The controllers of this process.
     pub fn controllers(&self) -> impl Iterator<Item = &AxisController> {
         self.members.iter().map(|member| &member.controller)
     }
 
-    /// The port of `axis`, if it has one.
     pub fn port(&self, axis: Axis) -> Option<&P> {
         self.member(axis)?.port.as_ref()
     }
@@ -359,17 +345,14 @@ impl<P: CalibrationPort> ControllerNode<P> {
         self.members.iter().find(|member| member.controller.axis() == axis)
     }
 
-    /// Whether all of them are done.
     pub fn done(&self) -> bool {
         self.controllers().all(|controller| controller.state() == MainChainState::Done)
     }
 
-    /// The rig as seen from here.
     pub fn view(&self) -> &RigView {
         &self.view
     }
 
-    /// Frames counted and ignored.
     pub fn ignored(&self) -> IgnoredFrames {
         self.ignored
     }
@@ -389,7 +372,6 @@ impl<P: CalibrationPort> ControllerNode<P> {
         self.members.iter().map(|member| member.stopped_for).max().unwrap_or(0)
     }
 
-    /// Rows lost to a full queue.
     pub fn records_dropped(&self) -> u64 {
         self.records_dropped
     }

@@ -23,7 +23,6 @@ use toml::Spanned;
 #[error("{0}")]
 pub struct ParameterSetError(String);
 
-/// A value of a set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     pub axis: Axis,
@@ -37,7 +36,6 @@ pub struct Setting {
 
 type Sections = BTreeMap<String, BTreeMap<String, BTreeMap<String, Spanned<toml::Value>>>>;
 
-/// Reads a set.
 pub fn read(path: &Path) -> Result<Vec<Setting>, ParameterSetError> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| ParameterSetError(format!("cannot read {}: {error}", path.display())))?;

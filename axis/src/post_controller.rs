@@ -12,7 +12,6 @@ use algorithms::linearisation::Linearisation;
 use settings::parameters::declare;
 
 settings::parameters! {
-    /// Parameters of the post-controller.
     pub struct Parameters {
         every_cycles: crate::program::EVERY_CYCLES,
         opening_limit: declare("", [0.0, 1.0], 1.0, "largest opening in either direction"),
@@ -25,16 +24,13 @@ settings::parameters! {
 /// Share of the dead zone by which the wanted velocity must exceed it to open the valve again.
 const HYSTERESIS: f64 = 0.5;
 
-/// What goes to the valve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
-    /// Opening, -1 to 1.
     pub opening: f64,
     /// The rod velocity that it stands for, m/s.
     pub applied_velocity_m_per_s: f64,
 }
 
-/// The post-controller of one axis.
 #[derive(Clone, Debug)]
 pub struct PostController {
     linearisation: Linearisation,
@@ -42,7 +38,6 @@ pub struct PostController {
 }
 
 impl PostController {
-    /// A post-controller with this linearisation.
     pub fn new(linearisation: Linearisation) -> Self {
         Self { linearisation, shut: true }
     }

@@ -17,7 +17,6 @@ use settings::parameters::declare;
 use std::f64::consts::TAU;
 
 settings::parameters! {
-    /// Parameters of the pre-controller.
     pub struct Parameters {
         every_cycles: crate::program::EVERY_CYCLES,
         velocity_filter_hz: declare("Hz", [1.0, 400.0], 60.0, "cut-off of each of the two low-passes of the velocity"),
@@ -27,7 +26,6 @@ settings::parameters! {
     }
 }
 
-/// Where an axis lies in the rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
     axis: Axis,
@@ -65,7 +63,6 @@ impl Geometry {
     }
 }
 
-/// A first-order low-pass.
 #[derive(Clone, Copy, Debug, Default)]
 struct LowPass {
     /// What `share` was computed for.
@@ -90,7 +87,6 @@ impl LowPass {
     }
 }
 
-/// The filters' memory.
 #[derive(Clone, Copy, Debug)]
 struct Memory {
     extension_m: f64,
@@ -100,7 +96,6 @@ struct Memory {
     pressures: [LowPass; 2],
 }
 
-/// The pre-controller of one axis.
 #[derive(Clone, Debug)]
 pub struct PreController {
     geometry: Geometry,
@@ -108,7 +103,6 @@ pub struct PreController {
 }
 
 impl PreController {
-    /// A pre-controller that has seen nothing yet.
     pub fn new(geometry: Geometry) -> Self {
         Self { geometry, memory: None }
     }

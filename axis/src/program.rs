@@ -27,7 +27,6 @@ use std::ops::Range;
 /// Multiple of the basic cycle of a task; the first parameter of each.
 pub const EVERY_CYCLES: Declaration =
     declare("cycles", [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms").whole();
-/// Seconds of one cycle.
 const CYCLE_S: f64 = 1e-3;
 /// A task that is so many cycles late begins anew: a stall is no reason for a jump.
 const STALLED: u64 = 100;
@@ -43,20 +42,16 @@ pub struct Variable {
 /// What the axis shall do in a cycle, in rig coordinates; an algorithm looks at what it controls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// Position.
     pub position: SetPoint,
-    /// Force.
     pub force: ForceSetPoint,
 }
 
-/// Which algorithm has the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hand {
     User,
     ForceChain,
 }
 
-/// An algorithm in its task.
 struct Slot {
     algorithm: Guarded,
     controls: Quantity,
@@ -89,7 +84,6 @@ struct GivingWay {
     effective: Vec<f64>,
 }
 
-/// The program of one axis.
 pub struct Program {
     pre: PreController,
     post: PostController,
@@ -97,7 +91,6 @@ pub struct Program {
     giving_way: Option<GivingWay>,
     variables: Vec<Variable>,
     values: Vec<f64>,
-    /// Values of each [`Task`].
     tasks: [Range<usize>; 5],
     ready: Ready,
     observed: Option<u64>,
@@ -193,7 +186,6 @@ impl Program {
         }
     }
 
-    /// Whether there is an algorithm for the force chain.
     pub fn gives_way(&self) -> bool {
         self.giving_way.is_some()
     }
@@ -223,7 +215,6 @@ impl Program {
         &self.ready
     }
 
-    /// Where the axis lies.
     pub fn geometry(&self) -> &Geometry {
         self.pre.geometry()
     }
@@ -241,7 +232,6 @@ impl Program {
         }
     }
 
-    /// What the user's algorithm controls.
     pub fn controls(&self) -> Quantity {
         self.user.controls
     }
@@ -255,7 +245,6 @@ impl Program {
         &self.values
     }
 
-    /// Place of the variable called `name`.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|variable| variable.name == name)
     }
@@ -302,10 +291,8 @@ impl GivingWay {
     }
 }
 
-/// Whether a task is due.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Due {
-    /// Its multiple is not over.
     NotYet,
     /// It is, so many cycles after its last step.
     After(f64),
@@ -313,7 +300,6 @@ enum Due {
     Anew,
 }
 
-/// Whether a task is due at `cycle`.
 fn due(last: Option<u64>, cycle: u64, every_cycles: f64) -> Due {
     let every = every_cycles as u64;
     let Some(last) = last else { return Due::Anew };

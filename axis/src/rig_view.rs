@@ -24,17 +24,13 @@ const STATUS_HOLDS_CYCLES: u64 = 100;
 /// The tick counts skipped cycles modulo this.
 const SKIPPED_RANGE: u64 = 1 << 16;
 
-/// Frames of sensors, by axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PerAxis {
-    /// Of the drive.
     pub drive: u64,
-    /// Of the load.
     pub load: u64,
 }
 
 impl PerAxis {
-    /// Of one axis.
     pub fn get(&self, axis: Axis) -> u64 {
         match axis {
             Axis::Drive => self.drive,
@@ -50,14 +46,11 @@ impl PerAxis {
     }
 }
 
-/// What happened to the rig's time with a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TickNews {
-    /// As expected.
     Usual,
     /// The rig is another one, or the same started anew: its cycles begin again.
     Restarted,
-    /// The rig says that no more sensors come.
     Ending,
 }
 
@@ -74,25 +67,21 @@ struct Account {
     late: PerAxis,
 }
 
-/// The rig as seen from the bus.
 #[derive(Default)]
 pub struct RigView {
     cycle: Option<u64>,
-    /// Cycles that the rig says it skipped.
     pub skipped: u64,
     sensors: [Option<Sensors>; 2],
     recent: [Recent; 2],
     /// Cycle of the newest sensors of each axis.
     newest: [Option<u64>; 2],
     fresh: [bool; 2],
-    /// Sensor frames received.
     pub received: PerAxis,
     /// Sensor frames that came after newer ones of their axis.
     pub late: PerAxis,
     /// Sensor frames that came again.
     pub duplicate: PerAxis,
     account: Option<Account>,
-    /// Sensor frames that never came.
     pub lost: PerAxis,
     /// Sensor frames that the rig had sent by its first tick that came, and that did not come: lost ones, and those from before
     /// the bus was joined.
@@ -102,7 +91,6 @@ pub struct RigView {
 }
 
 impl RigView {
-    /// Takes the sensors of an axis.
     pub fn take_sensors(&mut self, axis: Axis, sensors: Sensors) {
         *self.received.of(axis) += 1;
         match self.recent[axis.index()].take(&sensors) {
@@ -130,7 +118,6 @@ impl RigView {
         self.fresh[axis.index()] = true;
     }
 
-    /// Takes a tick.
     pub fn take_tick(&mut self, tick: &Tick) -> TickNews {
         // The tick's counter wraps after 49.7 days, ours does not: what counts is the way from the cycle that we know.
         let ahead = self.cycle.map(|known| i64::from(tick.cycle.wrapping_sub(known as u32).cast_signed()));
@@ -190,7 +177,6 @@ impl RigView {
         self.account = Some(Account { sent, received: counted, late: self.late });
     }
 
-    /// Takes the rig's status.
     pub fn take_status(&mut self, status: RigStatus) {
         self.status = Some((self.cycle.unwrap_or(0), status));
     }

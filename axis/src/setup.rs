@@ -29,7 +29,7 @@ impl InputError {
 }
 
 /// What is controlled, how, and where the files go.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct FileArguments {
     /// Rig file, of which nominal numbers are read: valve characteristic, areas, stroke.
     #[arg(long)]
@@ -63,15 +63,11 @@ pub struct FileArguments {
     pub after_emergency_stop: Option<AfterStop>,
 }
 
-/// Everything that was read.
 pub struct Inputs {
-    /// Nominal numbers of the rig.
     pub rig: RigParameters,
     /// The rig file as it stands; empty where there is none.
     pub rig_toml: String,
-    /// The experiment.
     pub experiment: Experiment,
-    /// Its file as it stands.
     pub experiment_toml: String,
     /// Programs of drive and load, as they stand; `None` for an axis that the experiment leaves out.
     pub programs: [Option<Source>; 2],
@@ -80,7 +76,6 @@ pub struct Inputs {
     experiment_file: PathBuf,
 }
 
-/// How the controllers of a process are run.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
     /// The other axis's controller is waited for.
@@ -92,7 +87,6 @@ pub struct Mode {
 }
 
 impl Inputs {
-    /// Reads and checks the files.
     pub fn read(files: &FileArguments) -> Result<Self, InputError> {
         let rig_toml = read(&files.rig)?;
         let rig =
@@ -199,7 +193,6 @@ impl Inputs {
         Ok(inputs)
     }
 
-    /// The controller of `axis`.
     pub fn controller(&self, axis: Axis, mode: Mode) -> Result<AxisController, InputError> {
         let section =
             sections(&self.experiment).find(|(other, _)| *other == axis).map(|(_, section)| section);
@@ -230,7 +223,6 @@ impl Inputs {
         source.program(axis, &self.rig, real_time).map_err(InputError::of)
     }
 
-    /// Title of the program of an axis.
     pub fn program_title(&self, axis: Axis) -> String {
         self.programs[axis.index()]
             .as_ref()
@@ -362,7 +354,6 @@ fn place(program: &Program, axis: Axis, name: &str) -> Result<usize, InputError>
     })
 }
 
-/// `drive.algorithm.gain_per_s=30`.
 fn parse_override(text: &str) -> Result<Setting, InputError> {
     let parse = || {
         let (name, value) = text.split_once('=')?;

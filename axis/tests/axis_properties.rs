@@ -21,7 +21,6 @@ fn controller(axis: Axis, program: &str) -> AxisController {
     crate::controller(axis, &crate::shipped("controller/experiments/load-step.toml"), true, &further)
 }
 
-/// What happens in a cycle besides the sensors.
 #[derive(Clone, Debug)]
 enum Happening {
     Nothing,

@@ -10,7 +10,6 @@ use protocol::frames::{
     MainChainState, RigStatus, Sensors,
 };
 
-/// Initial force of the experiment.
 const PRESSED_N: f64 = 100.0;
 
 fn linked() -> RigStatus {

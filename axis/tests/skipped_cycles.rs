@@ -4,7 +4,6 @@ use axis_control::axis::{Answer, AxisController};
 use plant::Axis;
 use protocol::frames::{ChainStatus, Frame, MainChainState, RigStatus, Sensors};
 
-/// Experiment number of load-step.
 const NUMBER: u8 = 9;
 
 /// The drive's controller for the shipped experiment load-step.
@@ -18,7 +17,6 @@ fn answer(drive: &mut AxisController, cycle: u64) -> Answer {
     drive.answer(cycle, &sensors, Some(&rig))
 }
 
-/// A partner that goes along with the drive.
 fn speak(drive: &mut AxisController) {
     let main_chain = drive.state();
     let status = ChainStatus { main_chain, ok: true, experiment: NUMBER, ..ChainStatus::default() };

@@ -13,7 +13,6 @@ use settings::parameters::Parameter;
 use std::io::{self, Write};
 use xcp::a2l::{self, Described};
 
-/// Prints the list.
 pub(crate) fn print() -> Exit {
     // A closed pipe is the reader's wish.
     let _ = write(&mut io::stdout().lock());
@@ -34,7 +33,6 @@ pub(crate) fn print_parameters(files: &FileArguments) -> Result<Exit, RunError> 
     Ok(Exit::Good)
 }
 
-/// Prints the A2L file of an axis.
 pub(crate) fn print_a2l(arguments: &A2lArguments) -> Result<Exit, RunError> {
     let inputs = Inputs::read(&arguments.files)?;
     let axis = match arguments.axis {

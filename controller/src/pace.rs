@@ -26,7 +26,6 @@ const LONGEST_STAY: Duration = Duration::from_millis(300);
 /// Answers that the allocation count leaves out at the start.
 const WARM_UP: u64 = 1000;
 
-/// Why the controllers ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum End {
     /// The rig said that it ends, or fell silent after Done.
@@ -48,7 +47,6 @@ pub(crate) struct RunContext<'a> {
     pub(crate) interrupt: &'a Interrupt,
 }
 
-/// How a run ended and what was measured meanwhile.
 pub(crate) struct RunOutcome {
     pub(crate) end: End,
     /// Allocations in the 1 ms path after warm-up, if the counting allocator is built in; `None` when nothing was watched.
@@ -141,7 +139,6 @@ pub(crate) fn hear_out(bus: &mut dyn Bus, rig_ended: bool) {
     take_all(bus);
 }
 
-/// Whether the rig is heard of.
 struct RigLife {
     heard: (PerAxis, Option<u64>),
     last: WallInstant,
@@ -175,7 +172,6 @@ impl RigLife {
     }
 }
 
-/// Answers when the barrier says so.
 pub(crate) fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOutcome, BusError> {
     let RunContext { node, bus, grace, interrupt } = context;
     bus.join_lockstep(Role::Member, name)?;

@@ -17,20 +17,16 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use xcp::clerk::Clerk;
 
-/// Pause between two looks at the queues.
 const POLL_PERIOD: Duration = Duration::from_millis(4);
-/// Longest time that a row stays in memory.
 const FLUSH_PERIOD: Duration = Duration::from_millis(200);
 const HEAD: &str = "time_s,main_chain,force_chain,matching_chain,emergency_stop_chain,set_position_m,\
 set_velocity_m_per_s,set_force_N,position_m,velocity_m_per_s,force_N,wanted_velocity_m_per_s,opening,enabled,moving";
 
-/// The tables of the axes of a process.
 pub(crate) struct Tables {
     tables: Vec<(Axis, LineFile)>,
 }
 
 impl Tables {
-    /// Makes a table for each axis in `folder`.
     pub(crate) fn create(folder: &Path, axes: &[Axis]) -> io::Result<Self> {
         let tables = axes.iter().map(|axis| {
             let mut table = LineFile::create(&folder.join(format!("controller-{}.csv", axis.name())))?;
@@ -80,7 +76,6 @@ impl Tables {
     }
 }
 
-/// The thread that empties the queues.
 pub(crate) struct Writer {
     pub(crate) tables: Tables,
     pub(crate) records: Receiver<AxisRecord>,
@@ -96,7 +91,6 @@ pub(crate) struct Writer {
 /// What is left when the queues' senders are gone.
 pub(crate) struct Written {
     pub(crate) reported: Vec<News>,
-    /// Why writing stopped, if it did.
     pub(crate) failure: Option<String>,
     pub(crate) timing: Option<TimingFigures>,
 }
@@ -159,14 +153,12 @@ impl Writer {
     }
 }
 
-/// Keeps the first failure.
 fn note(failure: &mut Option<String>, written: io::Result<()>) {
     if let (None, Err(error)) = (&failure, written) {
         *failure = Some(error.to_string());
     }
 }
 
-/// News for a person.
 pub(crate) fn sentence(news: News) -> String {
     match news {
         News::State { axis, state, cycle, cause } => {

@@ -12,10 +12,8 @@ use nominal::{Axis, RigParameters};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
-/// How often the files are looked at.
 const LOOK_PERIOD: Duration = Duration::from_millis(250);
 
-/// A program file and the numbers in use.
 struct ProgramFile {
     axis: Axis,
     path: PathBuf,
@@ -26,7 +24,6 @@ struct ProgramFile {
     values: Vec<f64>,
 }
 
-/// Looks for changes in the program files of a process.
 pub(crate) struct Reloader {
     rig: RigParameters,
     files: Vec<ProgramFile>,
@@ -35,7 +32,6 @@ pub(crate) struct Reloader {
 }
 
 impl Reloader {
-    /// Looks at the programs of `axes` from now on.
     pub(crate) fn new(inputs: &Inputs, axes: &[Axis], changes: Sender<Change>) -> Self {
         let watched = |axis: &Axis| {
             let source = inputs.programs[axis.index()].as_ref()?;

@@ -9,9 +9,7 @@ use runlog::controller_report::{self, ControllerReport};
 use std::collections::BTreeMap;
 use xcp::port::PortCounters;
 
-/// The report of a process.
 pub(crate) type Report = ControllerReport<News, PortCounters>;
-/// The report of an axis.
 pub(crate) type AxisReport = controller_report::AxisReport<PortCounters>;
 
 fn of_axis<P: CalibrationPort>(
@@ -60,7 +58,6 @@ pub(crate) fn of_node<P: CalibrationPort>(
     node.controllers().map(of).collect()
 }
 
-/// Whether the axis ended what it was asked for.
 pub(crate) fn is_done(axis: &AxisReport) -> bool {
     axis.chain_state == MainChainState::Done.name()
 }

@@ -38,7 +38,6 @@ const NOTE_QUEUE: usize = 1024;
 /// One copy of an axis's parameters is under way at most.
 const RETURNED_QUEUE: usize = 2;
 
-/// What keeps the controllers from running.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunError {
     #[error("{0}")]
@@ -173,7 +172,6 @@ fn random() -> Result<[u8; 16], RunError> {
     Ok(bytes)
 }
 
-/// Signals that a run looks at.
 struct Signals {
     interrupt: Interrupt,
     freeze: Freeze,
@@ -216,12 +214,10 @@ struct Ended {
     written: Written,
 }
 
-/// What the thread of the controllers works with.
 struct Work<'a> {
     arguments: &'a RunArguments,
     inputs: &'a Inputs,
     node: Node,
-    /// In real time.
     stopwatch: Option<Stopwatch<MonotonicClock>>,
     bus: &'a mut dyn Bus,
     interrupt: &'a Interrupt,
@@ -261,7 +257,6 @@ impl Work<'_> {
     }
 }
 
-/// Name in the lockstep barrier.
 fn member_name(axes: Axes) -> &'static str {
     match axes {
         Axes::Drive => "drive-controller",

@@ -35,7 +35,6 @@ pub(crate) use timed_bus::TimedBus;
 /// Cycles that an answer may be older than the newest one and still belong to the same rig; below, the rig began anew.
 const SAME_RIG: u64 = 16;
 
-/// What was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measured {
     /// Sensors of the axis that wakes us that begin no row.
@@ -47,23 +46,19 @@ pub(crate) enum Measured {
     Cycle(CycleTiming),
 }
 
-/// A frame that came or went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Passed {
     /// When it arrived or was handed over, ns.
     pub(crate) stamp_ns: u64,
     pub(crate) frame: CanFrame,
-    /// Whether it is one of ours.
     pub(crate) sent: bool,
 }
 
-/// The queues to the recorder's thread.
 pub(crate) struct Outlets {
     pub(crate) measured: Sender<Measured>,
     pub(crate) frames: Sender<Passed>,
 }
 
-/// What a stopwatch counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct StopwatchAccount {
     /// Stamps and frames that found no room in a queue.
@@ -72,7 +67,6 @@ pub(crate) struct StopwatchAccount {
     pub(crate) before_start: u64,
 }
 
-/// What of a wake-up is not in a row yet.
 #[derive(Clone, Copy, Default)]
 struct WakeUp {
     woke_ns: u64,
@@ -90,7 +84,6 @@ pub(crate) struct Stopwatch<C> {
     wakes: Axis,
     outlets: Outlets,
     account: StopwatchAccount,
-    /// When the loop began to wait.
     began_ns: u64,
     wake_up: WakeUp,
     /// Arrival of the newest sensors of each own axis; 0: they are answered.
@@ -124,7 +117,6 @@ impl<C: Clock + Send> Stopwatch<C> {
         }
     }
 
-    /// The loop begins to wait for frames.
     pub(crate) fn begin(&mut self) {
         self.began_ns = self.now_ns();
     }

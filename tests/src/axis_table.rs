@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-/// A table of one axis.
 #[derive(Debug)]
 pub struct AxisTable {
     columns: Vec<String>,
@@ -25,7 +24,6 @@ impl AxisTable {
         Self { columns, rows }
     }
 
-    /// A column as it is written.
     pub fn texts(&self, name: &str) -> Vec<&str> {
         let place = self.columns.iter().position(|column| column == name);
         let place = place.unwrap_or_else(|| panic!("no column {name} in {:?}", self.columns));
@@ -46,12 +44,10 @@ impl AxisTable {
         self.numbers("time_s").into_iter().map(|time_s| (time_s * 1000.0).round() as usize).collect()
     }
 
-    /// Number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }

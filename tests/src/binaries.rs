@@ -4,29 +4,23 @@
 //! `bench`, `discrepancy` and `campaign`; a script that has built them sets these. Without them cargo builds the release
 //! profile, and says itself where the results are.
 
-use crate::process::Running;
+use crate::process::{Ended, Running};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+use std::time::Duration;
 
-/// A program under test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Program {
-    /// Process 1: the rig.
     Emulator,
-    /// Process 2: the axis controllers.
     Controller,
-    /// What sums runs up.
     Bench,
-    /// The workflow that names what a model is missing.
     Discrepancy,
-    /// Thousands of runs from a file.
     Campaign,
 }
 
 impl Program {
-    /// Name of package and binary.
     pub fn name(self) -> &'static str {
         match self {
             Self::Emulator => "emulator",
@@ -37,24 +31,19 @@ impl Program {
         }
     }
 
-    /// A command line of the shipped build.
     pub fn command(self) -> Command {
         Command::new(executable(self, Build::Shipped))
     }
 
-    /// Starts the shipped build.
     pub fn start(self, arguments: &[&dyn AsRef<OsStr>]) -> Running {
         let name = format!("{} {}", self.name(), arguments[0].as_ref().display());
         Running::start(&name, self.command().args(arguments.iter().map(|argument| argument.as_ref())))
     }
 }
 
-/// Which build of the programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Build {
-    /// As they ship.
     Shipped,
-    /// As they ship, with the counting allocator.
     CountingAllocations,
 }
 
@@ -79,6 +68,28 @@ pub fn executable(program: Program, build: Build) -> PathBuf {
 /// The checkout that is tested.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the workspace").to_owned()
+}
+
+/// The shipped experiments: name and file, by name.
+pub fn shipped_experiments() -> Vec<(String, PathBuf)> {
+    let folder = workspace().join("controller/experiments");
+    let entries = std::fs::read_dir(&folder).expect("the folder of experiments");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let mut named: Vec<_> = paths
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .map(|path| (path.file_stem().expect("a name").to_string_lossy().into_owned(), path))
+        .collect();
+    named.sort();
+    assert!(named.iter().any(|(name, _)| name == "point-to-point"), "{named:?}");
+    named
+}
+
+/// Runs one of `scripts` on the shipped build, for so long at most.
+pub fn script(name: &str, arguments: &[&str], limit: Duration) -> Ended {
+    let bench = executable(Program::Bench, Build::Shipped);
+    let mut command = Command::new(workspace().join("scripts").join(name));
+    command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
+    Running::start(&format!("scripts/{name}"), &mut command).wait_within(limit)
 }
 
 fn folder(variable: &str, features: &[&str]) -> PathBuf {

@@ -5,20 +5,17 @@ use crate::launch::Pace;
 use crate::records::{Table, bus_log, json};
 use crate::scene::Scene;
 use protocol::can::CanFrame;
-use protocol::frames::{Frame, ValveCommand};
+use protocol::frames::{Frame, RigStatus, ValveCommand};
 use serde_json::Value;
 use std::path::Path;
 
-/// A run to be made.
 #[derive(Clone, Copy)]
 pub struct Plan<'a> {
     /// `[rig]` of the experiment, with what follows it.
     pub rig: &'a str,
-    /// The script; empty for none.
     pub faults: &'a str,
     /// Options of the bus's URL.
     pub bus: &'a str,
-    /// Length, cycles.
     pub cycles: usize,
     /// Openings of drive and load that are commanded in answer to a cycle; `None` says nothing.
     pub act: fn(u32) -> Option<[f64; 2]>,
@@ -31,14 +28,10 @@ impl Default for Plan<'_> {
     }
 }
 
-/// What a run left.
 pub struct Left {
     pub scene: Scene,
-    /// `measurement.csv`.
     pub measurement: Table,
-    /// `truth.csv`.
     pub truth: Table,
-    /// `summary.json`.
     pub summary: Value,
     /// `bus.log`, as the rig had it.
     pub log: Vec<CanFrame>,
@@ -46,16 +39,12 @@ pub struct Left {
     pub heard: Vec<Vec<CanFrame>>,
 }
 
-/// A row of `faults.csv`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Row {
-    /// Cycle.
     pub cycle: usize,
-    /// Number of the fault.
     pub number: u16,
     /// `begins`, `ends`, …
     pub what: String,
-    /// Name of the fault.
     pub fault: String,
     pub at: String,
     /// Its numbers, as `key=value;key=value`.
@@ -64,7 +53,6 @@ pub struct Row {
     pub cause: String,
 }
 
-/// The rows of a `faults.csv`.
 pub fn rows(path: &Path) -> Vec<Row> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut lines = text.lines();
@@ -84,8 +72,19 @@ pub fn rows(path: &Path) -> Vec<Row> {
     lines.map(row).collect()
 }
 
+/// A fault from 0.2 to 0.3 s, as a script has it.
+pub fn fault(name: &str, at: &str, numbers: &str) -> String {
+    format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = 0.2\nto_s = 0.3\n{numbers}\n")
+}
+
 impl Plan<'_> {
-    /// Makes the run.
+    /// Makes the run and holds that it left its marks in every log.
+    pub fn run_with_marks(&self) -> Left {
+        let left = self.run();
+        left.expect_marks_in_every_log();
+        left
+    }
+
     pub fn run(&self) -> Left {
         let scene = Scene::new(&format!("title = \"broken\"\n[rig]\n{}", self.rig));
         let mut emulator = scene.emulator(Pace::Lockstep).with("--seconds");
@@ -107,7 +106,7 @@ impl Plan<'_> {
             let echo = (cycle % 4096) as u16;
             let [drive, load] = openings.map(|opening| ValveCommand { opening, alive, echo, enable: true });
             for frame in [Frame::DriveValveCommand(drive), Frame::LoadValveCommand(load)] {
-                peer.send(&frame.encode().expect("an opening").to_bytes());
+                peer.say(&frame);
             }
         });
         let _ = emulator.wait().expect_code(0);
@@ -126,7 +125,6 @@ impl Plan<'_> {
 }
 
 impl Left {
-    /// The rows of its `faults.csv`.
     pub fn rows(&self) -> Vec<Row> {
         rows(&self.scene.path("emulator/faults.csv"))
     }
@@ -179,6 +177,14 @@ impl Left {
             };
             assert_eq!(*count as usize, before("begins") - before("ends"), "faults_active in cycle {cycle}");
         }
+    }
+
+    /// What the rig said of itself.
+    pub fn statuses(&self) -> impl Iterator<Item = RigStatus> {
+        self.log.iter().filter_map(|frame| match Frame::decode(frame) {
+            Ok(Frame::RigStatus(status)) => Some(status),
+            _ => None,
+        })
     }
 
     /// Frames of an identifier that the member heard, by the cycle.

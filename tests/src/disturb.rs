@@ -15,7 +15,6 @@ use rustix::time::{ClockId, Timespec, clock_gettime, clock_settime};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Length of each run, s of the rig's time.
 const RUN_S: u64 = 4;
 /// A process stands still for so long.
 const STOP: Duration = Duration::from_millis(5);
@@ -28,10 +27,8 @@ const STEP_HOLDS: Duration = Duration::from_millis(700);
 /// Where the rig's loop is pinned, and so where the hog goes.
 const RIG_CPU: usize = 0;
 
-/// What is done to a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Disturbance {
-    /// Nothing.
     Nothing,
     /// SIGSTOP of the rig's process for 5 ms.
     EmulatorStopped,
@@ -41,7 +38,6 @@ pub enum Disturbance {
     CpuContention,
     /// An own algorithm that touches fresh memory, 300 pages a cycle for 1.5 s.
     PageFaults,
-    /// A peer that connects and never reads.
     SlowListener,
     /// A wire that loses 1 % of the frames.
     FrameLoss,
@@ -50,42 +46,29 @@ pub enum Disturbance {
 }
 
 impl Disturbance {
-    /// All of them.
-    pub const ALL: [Self; 8] = [
-        Self::Nothing,
-        Self::EmulatorStopped,
-        Self::ControllerStopped,
-        Self::CpuContention,
-        Self::PageFaults,
-        Self::SlowListener,
-        Self::FrameLoss,
-        Self::ClockStep,
+    /// All of them, each with what `bench cause` has to say.
+    pub const ALL: [(Self, &str); 8] = [
+        (Self::Nothing, "nothing"),
+        (Self::EmulatorStopped, "emulator-stopped"),
+        (Self::ControllerStopped, "controller-stopped"),
+        (Self::CpuContention, "cpu-contention"),
+        (Self::PageFaults, "page-faults"),
+        (Self::SlowListener, "slow-listener"),
+        (Self::FrameLoss, "frame-loss"),
+        (Self::ClockStep, "clock-step"),
     ];
 
-    /// What `bench cause` has to say.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Nothing => "nothing",
-            Self::EmulatorStopped => "emulator-stopped",
-            Self::ControllerStopped => "controller-stopped",
-            Self::CpuContention => "cpu-contention",
-            Self::PageFaults => "page-faults",
-            Self::SlowListener => "slow-listener",
-            Self::FrameLoss => "frame-loss",
-            Self::ClockStep => "clock-step",
-        }
+        Self::ALL[self as usize].1
     }
 
-    /// Whether only root can do it.
     pub fn needs_root(self) -> bool {
         matches!(self, Self::CpuContention | Self::ClockStep)
     }
 }
 
-/// What became of a disturbed run.
 #[derive(Clone, Debug)]
 pub struct Named {
-    /// The cause that `bench cause` named.
     pub cause: String,
     pub sentence: String,
 }
@@ -165,7 +148,6 @@ fn step_the_clock() {
     ahead(-STEP_S);
 }
 
-/// Has the run reported, and the cause named from the report.
 fn name_cause(out: &Path) -> Named {
     let report = out.join("report");
     let _ = Program::Bench.start(&[&"report", &out, &"--out", &report]).wait().expect_code(0);

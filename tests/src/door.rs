@@ -14,7 +14,6 @@ use std::time::Duration;
 pub struct Door {
     running: Running,
     report: PathBuf,
-    /// Where it listens.
     pub address: SocketAddr,
 }
 
@@ -46,7 +45,6 @@ impl Door {
         number.and_then(|number| number.parse().ok()).expect("VmHWM in kB")
     }
 
-    /// Ends it, and gives what it counted.
     pub fn close(self) -> Value {
         let _ = self.running.interrupt();
         json(&self.report)
@@ -59,14 +57,12 @@ impl Door {
     }
 }
 
-/// A client that does what it is asked.
 pub struct DoorClient {
     pub stream: TcpStream,
     text: String,
 }
 
 impl DoorClient {
-    /// Connects, and does nothing more.
     pub fn connect(door: &Door) -> Self {
         let stream = TcpStream::connect(door.address).expect("the gateway listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time-out");
@@ -90,7 +86,6 @@ impl DoorClient {
         client
     }
 
-    /// Sends a text as it is.
     pub fn say(&mut self, text: &str) {
         self.stream.write_all(text.as_bytes()).expect("the gateway takes it");
     }

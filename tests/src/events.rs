@@ -4,10 +4,8 @@ use crate::records::{Table, count};
 use serde_json::Value;
 use std::ops::Range;
 
-/// One event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// Cycle in which it was noticed.
     pub cycle: usize,
     /// Its name, as `command-stale`.
     pub kind: String,
@@ -15,7 +13,6 @@ pub struct Event {
     pub of: Value,
 }
 
-/// All events of a summary.
 pub fn all(summary: &Value) -> Vec<Event> {
     let events = summary["events"].as_array().expect("events");
     assert_eq!(count(summary, "/event_count"), events.len() as u64, "more events than the summary keeps");
@@ -34,7 +31,6 @@ fn read(event: &Value) -> Event {
     }
 }
 
-/// How often an event was reported.
 pub fn times(events: &[Event], kind: &str) -> usize {
     events.iter().filter(|event| event.kind == kind).count()
 }

@@ -44,7 +44,6 @@ pub fn build(folder: &Path, options: &[&str]) -> PathBuf {
     folder.into()
 }
 
-/// What it did, read off the bus.
 #[derive(Debug, Default)]
 pub struct Positioned {
     /// Largest difference of set-point and position sensor while the set-point moves, m.

@@ -35,7 +35,6 @@ fn only_one() -> MutexGuard<'static, ()> {
     MACHINE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// Machines that this process started.
 static STARTED: AtomicU32 = AtomicU32::new(0);
 
 /// A machine that has run its job and is gone.
@@ -82,12 +81,10 @@ impl Guest {
         self.folder.path().join("run")
     }
 
-    /// A file beside it, such as `candump.log`.
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Exit codes by name, from the job's file.
     pub fn codes(&self) -> BTreeMap<String, i32> {
         let text = fs::read_to_string(self.out().join("codes")).expect("the job's codes");
         text.lines()
@@ -145,7 +142,6 @@ pub fn data_frames(lines: &str) -> Vec<CanFrame> {
 /// What an interface counted during a run, from two snapshots of `ip -json -details -statistics link`.
 #[derive(Clone, Copy, Debug)]
 pub struct InterfaceCounters {
-    /// Frames sent.
     pub sent: u64,
     /// Frames that the driver took from the card.
     pub received: u64,

@@ -10,7 +10,6 @@ use plant::effects::draw::{Among, as_toml, draw};
 use plant::effects::sheet::{EffectKey, Sheet, Switched};
 use std::path::{Path, PathBuf};
 
-/// Period of the rig's loop.
 const PERIOD_NS: f64 = 1e6;
 /// Columns of truth.csv that are no terms.
 const STATES: [&str; Truth::COLUMNS.len()] = Truth::COLUMNS;
@@ -46,7 +45,6 @@ set-point = [
 pub enum Extreme {
     /// Each the largest that a file may hold.
     Most,
-    /// Each the smallest.
     Least,
     /// Now this, now that, from key to key and place to place.
     Mixed,
@@ -106,7 +104,6 @@ pub fn rig_with(scene: &Scene, effects: &[Switched]) -> PathBuf {
 /// What a run of both programs in real time showed of the rig's loop.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Live {
-    /// Cycles in all.
     pub cycles: u64,
     /// Cycles computed late and not sent.
     pub missed: u64,
@@ -118,7 +115,6 @@ pub struct Live {
     /// Stage that samples the sensors and sends.
     pub send_ns_p50: u64,
     pub send_ns_p99: u64,
-    /// Everything of a cycle.
     pub execution_ns_p50: u64,
     pub execution_ns_p99: u64,
 }

@@ -56,31 +56,26 @@ impl Launch {
         }
     }
 
-    /// Another bus than the scene's.
     pub fn bus(mut self, url: impl Into<String>) -> Self {
         self.bus = url.into();
         self
     }
 
-    /// Another rig file.
     pub fn rig(mut self, path: &Path) -> Self {
         self.rig = path.into();
         self
     }
 
-    /// Another experiment file.
     pub fn experiment(mut self, path: &Path) -> Self {
         self.experiment = path.into();
         self
     }
 
-    /// Another output folder.
     pub fn out(mut self, folder: &Path) -> Self {
         self.out = folder.into();
         self
     }
 
-    /// Another build.
     pub fn build(mut self, build: Build) -> Self {
         self.build = build;
         self
@@ -104,7 +99,6 @@ impl Launch {
         self
     }
 
-    /// Starts it.
     pub fn start(&self) -> Running {
         let program = executable(self.program, self.build);
         let mut command = match &self.shell {

@@ -25,9 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Identifiers of valve commands.
 const COMMANDS: [u32; 2] = [0x110, 0x111];
-/// Bytes of a valve command.
 const COMMAND_BYTES: usize = 5;
 /// Bits of its fourth byte that no signal covers.
 const RESERVED: u8 = 0xE0;
@@ -43,14 +41,11 @@ const OPENING_STEPS: f64 = 2047.0;
 const ROUNDING_STEPS: f64 = 0.51;
 const AXES: [&str; 2] = ["drive", "load"];
 
-/// What was sent.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sent {
-    /// Frames in all.
     pub frames: u64,
     /// Those on an identifier of `rig.dbc`, wrong in length, value or checksum.
     pub malformed: u64,
-    /// How long it took, s.
     pub duration_s: f64,
 }
 
@@ -70,7 +65,6 @@ impl Noise {
         Self { stop, thread }
     }
 
-    /// Ends it.
     pub fn end(self) -> Sent {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().expect("the noise does not panic")
@@ -144,32 +138,22 @@ fn is_command(frame: &CanFrame) -> bool {
 /// What became of a run in real time, with noise or without.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// What was sent.
     pub sent: Sent,
-    /// Cycles that the rig missed.
     pub missed: u64,
     /// Its wake-ups that came late enough to be counted.
     pub overruns: u64,
-    /// 99th percentile of its wake-up, ns.
     pub wakeup_p99_ns: u64,
-    /// 99th percentile of the drive's round trip, ns.
     pub round_trip_p99_ns: u64,
     /// Commands of the controllers that never reached the rig.
     pub commands_lost: u64,
     /// Sensor frames of the drive that never reached its controller.
     pub sensors_lost: u64,
-    /// Frames that the rig counted as malformed.
     pub malformed: u64,
     /// Frames that the rig counted as none of its own.
     pub unknown: u64,
     /// Commands that were refused as stale, or grew stale while acting.
     pub stale: u64,
-    /// Openings that acted.
-    pub openings: usize,
-    /// Those that no controller had sent.
-    pub wrong: usize,
-    /// Cycles in which a valve was shut though its controller wanted it open.
-    pub shut: usize,
+    pub obeyed: Obeyed,
 }
 
 /// Runs rig and controllers in real time for so long, with so many frames of noise each second.
@@ -203,18 +187,19 @@ fn outcome(scene: &Scene, sent: Sent) -> Outcome {
         malformed: of("/frames_ignored/malformed"),
         unknown: of("/frames_ignored/unknown"),
         stale: of("/stale_commands"),
-        openings: obeyed.openings,
-        wrong: obeyed.wrong,
-        shut: obeyed.shut,
+        obeyed,
     }
 }
 
 /// Openings that acted against those that a controller recorded as sent.
-#[derive(Default)]
-struct Obeyed {
-    openings: usize,
-    wrong: usize,
-    shut: usize,
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Obeyed {
+    /// Openings that acted.
+    pub openings: usize,
+    /// Those that no controller had sent.
+    pub wrong: usize,
+    /// Cycles in which a valve was shut though its controller wanted it open.
+    pub shut: usize,
 }
 
 impl Obeyed {

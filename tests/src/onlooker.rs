@@ -10,7 +10,6 @@ use std::net::{SocketAddr, TcpStream};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 
-/// A viewer of the telemetry.
 pub struct Viewer {
     stream: UnixStream,
     decoder: Decoder,
@@ -19,17 +18,13 @@ pub struct Viewer {
 /// A cycle as a viewer was given it: its number, and a value for each column.
 pub type ToldCycle = (u64, Vec<f64>);
 
-/// Everything that a viewer was sent.
 #[derive(Debug, Default)]
 pub struct Told {
     pub description: Value,
-    /// Cycles.
     pub cycles: Vec<ToldCycle>,
-    /// Events.
     pub events: Vec<Value>,
     /// Lines of the interval log.
     pub histograms: Vec<String>,
-    /// Records lost.
     pub lost: u64,
 }
 
@@ -73,7 +68,6 @@ impl Viewer {
         }
     }
 
-    /// Everything until the run ends.
     pub fn to_the_end(mut self) -> Told {
         let mut reported = Told::default();
         let json = |text: &str| serde_json::from_str(text).expect("JSON");
@@ -94,16 +88,13 @@ impl Viewer {
 /// `bench watch` at a free port of loopback.
 pub struct LivePage {
     running: Running,
-    /// Where it listens.
     pub address: SocketAddr,
     /// What it printed for those who may act; empty without `--control`.
     pub token: String,
 }
 
-/// An answer of the live page.
 #[derive(Debug)]
 pub struct Answer {
-    /// Status, as 200.
     pub status: u16,
     /// Header fields, as they came.
     pub head: String,
@@ -111,7 +102,6 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// The body as JSON.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.body).unwrap_or_else(|error| panic!("{error}: {}", self.body))
     }
@@ -141,7 +131,6 @@ impl LivePage {
         &mut self.running
     }
 
-    /// Sends a request as it is, and gives the answer.
     pub fn send(&self, request: &str) -> Answer {
         let mut stream = self.connect();
         stream.write_all(request.as_bytes()).expect("it listens");
@@ -153,14 +142,12 @@ impl LivePage {
         Answer { status, head: head.to_owned(), body: body.to_owned() }
     }
 
-    /// Connects and does nothing more.
     pub fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time-out");
         stream
     }
 
-    /// Gets a path.
     pub fn get(&self, path: &str) -> Answer {
         self.send(&format!("GET {path} HTTP/1.1\r\nHost: {}\r\n\r\n", self.address))
     }
@@ -184,21 +171,23 @@ impl LivePage {
         self.order_with(&format!("X-Airbench-Token: {}\r\n", self.token), order)
     }
 
-    /// Listens to events.
-    pub fn events(&self) -> Events {
+    /// A connection on which events come.
+    pub fn listen(&self) -> TcpStream {
         let mut stream = self.connect();
         let request = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\n\r\n", self.address);
         stream.write_all(request.as_bytes()).expect("it listens");
-        Events { lines: BufReader::new(stream) }
+        stream
     }
 
-    /// Ends it.
+    pub fn events(&self) -> Events {
+        Events { lines: BufReader::new(self.listen()) }
+    }
+
     pub fn close(self) {
         let _ = self.running.interrupt();
     }
 }
 
-/// A listener to events.
 pub struct Events {
     lines: BufReader<TcpStream>,
 }

@@ -5,6 +5,7 @@
 use crate::process::PATIENCE;
 use protocol::bus::control::{Control, Kind, Role};
 use protocol::can::CanFrame;
+use protocol::frames::Frame;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::{
     AddressFamily, RecvFlags, SendFlags, Shutdown, SocketAddrUnix, SocketFlags, SocketType, connect, recv,
@@ -14,7 +15,6 @@ use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What came from the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Packet {
     Frame(CanFrame),
@@ -24,7 +24,6 @@ pub enum Packet {
     Closed,
 }
 
-/// A client of the embedded bus.
 pub struct Peer {
     socket: OwnedFd,
 }
@@ -48,9 +47,13 @@ impl Peer {
         }
     }
 
-    /// Sends a packet as it is.
     pub fn send(&self, packet: &[u8]) {
         send(&self.socket, packet, SendFlags::NOSIGNAL).expect("the host takes the packet");
+    }
+
+    /// Sends a frame whose values are in range.
+    pub fn say(&self, frame: &Frame) {
+        self.send(&frame.encode().expect("in range").to_bytes());
     }
 
     /// Goes, as a program does that dies: the host sees the end, and so does the next [`Peer::receive`].
@@ -86,7 +89,6 @@ impl Peer {
         Some(Packet::Frame(frame.unwrap_or_else(|| panic!("the host sent {bytes:02X?}"))))
     }
 
-    /// All frames from now until the host goes.
     pub fn frames_to_the_end(&self) -> Vec<CanFrame> {
         let mut frames = Vec::new();
         loop {
@@ -97,6 +99,11 @@ impl Peer {
                 None => panic!("the bus is silent after {} frames, and there", frames.len()),
             }
         }
+    }
+
+    /// Takes part in the lockstep barrier as a console that says something in some cycles.
+    pub fn be_console(&self, mut say: impl FnMut(u32) -> Option<Frame>) {
+        self.take_part("console", |peer, cycle, _| say(cycle).iter().for_each(|frame| peer.say(frame)));
     }
 
     /// Takes part in the lockstep barrier until the host goes: `act` is given the cycle and its frames, and sends through the

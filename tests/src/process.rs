@@ -13,7 +13,6 @@ pub const PATIENCE: Duration = Duration::from_secs(300);
 
 const POLL: Duration = Duration::from_millis(5);
 
-/// A program in a process group of its own.
 #[must_use]
 pub struct Running {
     name: String,
@@ -28,23 +27,17 @@ struct Said {
     reader: Option<JoinHandle<()>>,
 }
 
-/// How a program ended.
 #[derive(Debug)]
 pub struct Ended {
-    /// What was started.
     pub name: String,
     /// Exit code; `None` when a signal ended it.
     pub code: Option<i32>,
-    /// The signal that ended it.
     pub signal: Option<i32>,
-    /// All it wrote to standard error.
     pub stderr: String,
-    /// All it wrote to standard output.
     pub stdout: String,
 }
 
 impl Running {
-    /// Starts `command`.
     pub fn start(name: &str, command: &mut Command) -> Self {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{name} does not start: {error}"));
@@ -74,28 +67,23 @@ impl Running {
         });
     }
 
-    /// Types a line at its standard input.
     pub fn type_line(&mut self, line: &str) {
         let input = self.input.as_mut().expect("the input is open");
         writeln!(input, "{line}").unwrap_or_else(|error| panic!("{} takes no '{line}': {error}", self.name));
     }
 
-    /// Ends its standard input.
     pub fn end_input(&mut self) {
         self.input = None;
     }
 
-    /// What it has written to standard error so far.
     pub fn stderr(&self) -> String {
         self.said[0].so_far()
     }
 
-    /// The number of the process.
     pub fn number(&self) -> u32 {
         self.child.id()
     }
 
-    /// Waits until standard error holds `text`.
     pub fn wait_for(&mut self, text: &str) {
         self.wait_for_times(text, 1);
     }
@@ -116,12 +104,10 @@ impl Running {
         }
     }
 
-    /// Waits for the end.
     pub fn wait(self) -> Ended {
         self.wait_within(PATIENCE)
     }
 
-    /// Waits for the end for so long.
     pub fn wait_within(mut self, limit: Duration) -> Ended {
         let until = Instant::now() + limit;
         let status = loop {
@@ -192,7 +178,6 @@ impl Said {
 }
 
 impl Ended {
-    /// Holds the exit code against what is documented.
     #[track_caller]
     pub fn expect_code(self, code: i32) -> Self {
         let Self { name, stderr, signal, .. } = &self;
@@ -209,7 +194,6 @@ impl Ended {
         self
     }
 
-    /// Holds that standard output has all of `parts`.
     #[track_caller]
     pub fn expect_printed(&self, parts: &[&str]) {
         for part in parts {

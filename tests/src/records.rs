@@ -4,7 +4,6 @@ use protocol::can::CanFrame;
 use serde_json::Value;
 use std::path::Path;
 
-/// A JSON file.
 pub fn json(path: &Path) -> Value {
     serde_json::from_str(&text(path)).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
@@ -25,7 +24,6 @@ pub fn count_of_id(table: &Value, id: &str) -> u64 {
     table.get(id).map_or(0, |count| count.as_u64().expect("a count"))
 }
 
-/// A table of numbers.
 #[derive(Debug)]
 pub struct Table {
     columns: Vec<String>,
@@ -60,24 +58,20 @@ impl Table {
         Self { columns, rows }
     }
 
-    /// A column by its name.
     pub fn column(&self, name: &str) -> Vec<f64> {
         let index = self.columns.iter().position(|column| column == name);
         let index = index.unwrap_or_else(|| panic!("no column {name} in {:?}", self.columns));
         self.rows.iter().map(|row| row[index]).collect()
     }
 
-    /// Names of the columns.
     pub fn names(&self) -> &[String] {
         &self.columns
     }
 
-    /// Number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }

@@ -100,7 +100,6 @@ dead_zone_m_per_s = 0.004
 name = "force-manual"
 "#;
 
-/// A test's folder.
 pub struct Scene {
     folder: TempDir,
 }
@@ -120,12 +119,10 @@ impl Scene {
         scene
     }
 
-    /// A path in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Writes a file of the folder.
     pub fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.path(name);
         std::fs::write(&path, text).expect("the temporary folder can be written");
@@ -139,12 +136,10 @@ impl Scene {
         self.write(name, &rig.replacen(from, to, 1))
     }
 
-    /// The socket of the scene's bus.
     pub fn socket(&self) -> PathBuf {
         self.path("bus")
     }
 
-    /// The scene's bus by its URL.
     pub fn url(&self) -> String {
         format!("unix://{}", self.socket().display())
     }
@@ -222,7 +217,6 @@ impl Scene {
         self.wait_for_rows(folder, now + more);
     }
 
-    /// Whether two files of the scene hold the same bytes.
     pub fn same(&self, one: &Path, other: &Path) -> bool {
         let read =
             |path: &Path| std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

@@ -5,7 +5,6 @@ use std::process::Command;
 
 /// A disk of a few hundred KiB, gone with its value.
 pub struct SmallDisk {
-    /// Where it is.
     pub path: PathBuf,
 }
 

@@ -5,7 +5,7 @@ use crate::onlooker::LivePage;
 use crate::process::{PATIENCE, Running};
 use crate::records::{count, json};
 use crate::scene::{RESTLESS, Scene};
-use std::io::{Read, Write};
+use std::io::Read;
 use std::net::TcpStream;
 use std::process::Command;
 use std::time::Duration;
@@ -13,18 +13,14 @@ use std::time::Duration;
 /// Viewers that listen and read; with the browser and the one that stands still there are ten.
 const LISTENERS: usize = 8;
 
-/// What became of a run in real time.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Cycles that the rig missed.
     pub missed: u64,
     /// Its wake-ups that came late enough to be counted.
     pub overruns: u64,
     /// Median and 99th percentile of its wake-up, ns.
     pub wakeup_ns: [u64; 2],
-    /// 99th percentile of the drive's round trip, ns.
     pub round_trip_p99_ns: u64,
-    /// Records that did not reach the run's files.
     pub records_dropped: u64,
     /// Viewers that the page had when the run was half over.
     pub viewers: u64,
@@ -61,7 +57,6 @@ pub fn run(seconds: u32, with: bool) -> Outcome {
     }
 }
 
-/// Ten viewers.
 struct Audience {
     _browser: Running,
     _still: TcpStream,
@@ -73,20 +68,14 @@ impl Audience {
         command.args(["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run"]);
         command.arg(format!("--user-data-dir={}", scene.path("browser").display()));
         command.arg("--remote-debugging-port=0").arg(format!("http://{}/", page.address));
-        let listen = || {
-            let mut stream = page.connect();
-            let request = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\n\r\n", page.address);
-            stream.write_all(request.as_bytes()).expect("it listens");
-            stream
-        };
         for _ in 0..LISTENERS {
-            let mut stream = listen();
+            let mut stream = page.listen();
             // Each ends with its connection.
             std::thread::spawn(move || {
                 let mut bytes = [0; 65536];
                 while stream.read(&mut bytes).is_ok_and(|read| read > 0) {}
             });
         }
-        Self { _browser: Running::start("chromium", &mut command), _still: listen() }
+        Self { _browser: Running::start("chromium", &mut command), _still: page.listen() }
     }
 }

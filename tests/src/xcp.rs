@@ -59,7 +59,6 @@ impl Talk<'_> {
         rest
     }
 
-    /// Connects and unlocks.
     pub fn unlock(&self) {
         self.good(&[0xFF, 0]);
         let first = self.good(&[0xF8, 0, 1]);
@@ -70,13 +69,11 @@ impl Talk<'_> {
         self.good(&[0xF7, 2, g, h]);
     }
 
-    /// Sets where the next transfer begins.
     pub fn to(&self, address: u32) {
         let [a, b, c, d] = address.to_le_bytes();
         self.good(&[0xF6, 0, 0, 0, a, b, c, d]);
     }
 
-    /// Writes a number of eight bytes.
     pub fn write(&self, address: u32, value: f64) {
         let [a, b, c, d, e, f, g, h] = value.to_le_bytes();
         self.to(address);
@@ -85,7 +82,6 @@ impl Talk<'_> {
     }
 }
 
-/// pyXCP, at work.
 pub struct Foreign {
     running: Running,
     seen: PathBuf,

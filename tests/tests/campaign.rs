@@ -25,7 +25,6 @@ const SMALL: &str = "title = \"small\"\nexperiment = \"step\"\nseconds = 2.5\ndr
     [[vary]]\nexperiment = \"rig.added_mass_kg\"\nlist = [0, 20]\n\
     [[vary]]\nrig = \"friction.sliding_force_n\"\nrange = [20, 34]\n";
 
-/// A campaign file in a folder of its own.
 struct Place {
     folder: TempDir,
 }
@@ -67,7 +66,6 @@ impl Place {
     }
 }
 
-/// The cells of a row by the names of their columns.
 fn row(text: &str, run: usize) -> BTreeMap<String, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let head = reader.headers().expect("a head").clone();

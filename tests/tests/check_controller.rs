@@ -30,21 +30,17 @@ fn check(scene: &Scene, options: &str, controller: &[&str]) -> Running {
 fn results(scene: &Scene, ended: &Ended) -> BTreeMap<String, &'static str> {
     let text = std::fs::read_to_string(scene.path("junit.xml"))
         .unwrap_or_else(|error| panic!("no result: {error}\n{}\n{}", ended.stdout, ended.stderr));
-    let cases = text.lines().filter(|line| line.starts_with("<testcase "));
-    let attribute = |line: &str, name: &str| {
-        let rest = line.split_once(&format!(" {name}=\"")).expect("the attribute").1;
-        rest.split('"').next().expect("its value").to_owned()
-    };
-    let case = |line: &str| {
-        let class = attribute(line, "classname");
-        let name =
-            format!("{} {}", class.strip_prefix("controller.").expect("the suite"), attribute(line, "name"));
-        let result = match line {
-            line if line.contains("<failure ") => "failed",
-            line if line.contains("<skipped ") => "skipped",
+    let document = roxmltree::Document::parse(&text).expect("XML");
+    let cases = document.descendants().filter(|node| node.has_tag_name("testcase"));
+    let case = |case: roxmltree::Node<'_, '_>| {
+        let attribute = |name| case.attribute(name).expect("the attribute");
+        let class = attribute("classname").strip_prefix("controller.").expect("the suite");
+        let result = match case.first_element_child().map(|child| child.tag_name().name()) {
+            Some("failure") => "failed",
+            Some("skipped") => "skipped",
             _ => "passed",
         };
-        (name, result)
+        (format!("{class} {}", attribute("name")), result)
     };
     cases.map(case).collect()
 }
@@ -117,7 +113,6 @@ fn the_c_firmware_keeps_the_contract_in_lockstep_and_in_real_time() {
     }
 }
 
-/// Where a controller breaks the contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     None,
@@ -180,7 +175,7 @@ impl Breaking {
         };
         if self.silent_cycles == 50 {
             let stop = EmergencyStop { reason: EmergencyStopReason::SensorLoss, release: false };
-            peer.send(&Frame::DriveEmergencyStop(stop).encode().unwrap().to_bytes());
+            peer.say(&Frame::DriveEmergencyStop(stop));
         }
         if answers {
             self.answer(peer, cycle);

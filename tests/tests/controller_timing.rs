@@ -18,7 +18,6 @@ fn table(path: &Path) -> Vec<CycleTiming> {
     timing::read(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Samples of each tag of a log, all its seconds together.
 fn samples(path: &Path) -> BTreeMap<String, u64> {
     let mut samples = BTreeMap::new();
     for (tag, _, _, histogram) in hlog::intervals(path) {

@@ -18,7 +18,6 @@ use system_tests::turn;
 
 const MS: u64 = 1_000_000;
 
-/// Both programs under way for a second and more.
 fn under_way(scene: &Scene, options: &str) -> (Running, Running) {
     let emulator = scene.emulator(Pace::Real).with(options).start();
     let controller = scene.controller(Pace::Real).with("--repeat").start();
@@ -40,7 +39,6 @@ fn rows(path: &Path) -> Vec<CycleTiming> {
     timing::read(&std::fs::read_to_string(path).expect("the table")).unwrap()
 }
 
-/// Dumps of the emulator with this trigger.
 fn dumps(scene: &Scene, trigger: &str) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(scene.path("emulator/flight")) else { return Vec::new() };
     let all = entries.map(|entry| entry.expect("an entry").path());

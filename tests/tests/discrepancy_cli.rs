@@ -62,7 +62,6 @@ fn records() -> &'static Records {
     })
 }
 
-/// A step on a training record.
 fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> Ended {
     let rig = rig();
     let mut all: Vec<&dyn AsRef<OsStr>> = vec![&step, &"--rig", &rig, &"--train", &record];
@@ -82,7 +81,6 @@ fn spoilt(folder: &Path, change: impl Fn(usize, Vec<&str>) -> Option<String>) ->
     path
 }
 
-/// What is done to each row.
 type Change = fn(Vec<&str>) -> String;
 
 /// Cells: time, valve, position, force, pressure a, pressure b.

@@ -11,7 +11,6 @@ use system_tests::records::json;
 
 const GOOD: i32 = 0;
 const BAD_INPUT: i32 = 2;
-/// 8 s.
 const ROWS: usize = 8000;
 
 /// A record of an axis in which nothing is hidden.

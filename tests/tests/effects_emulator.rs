@@ -17,7 +17,6 @@ use system_tests::turn;
 
 /// Each slice of a comparison in real time, s.
 const SECONDS: u32 = 2;
-/// Slices of each kind, in turns.
 const ROUNDS: usize = 3;
 
 /// A run in lockstep with these effects, held against what every run must be.

@@ -33,11 +33,7 @@ fn run() -> Scene {
     let options = format!("--members 2 --seconds {seconds}");
     let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
     let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    scene.peer().take_part("console", |peer, cycle, _| {
-        if let Some(frame) = said_in(cycle) {
-            peer.send(&frame.encode().expect("the frames above are in range").to_bytes());
-        }
-    });
+    scene.peer().be_console(said_in);
     let _ = emulator.wait().expect_code(0);
     let _ = controller.wait();
     scene
@@ -70,11 +66,7 @@ fn the_controllers_end_an_aborted_experiment_by_themselves() {
     let scene = Scene::new(RESTLESS);
     let emulator = scene.emulator(Pace::Lockstep).with("--members 2 --seconds 10").start();
     let controller = scene.controller(Pace::Lockstep).with("--repeat").start();
-    scene.peer().take_part("console", |peer, cycle, _| {
-        if cycle == TRIP {
-            peer.send(&Frame::ConsoleEmergencyStop(stop(false)).encode().expect("in range").to_bytes());
-        }
-    });
+    scene.peer().be_console(|cycle| (cycle == TRIP).then(|| Frame::ConsoleEmergencyStop(stop(false))));
     let _ = controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
     let _ = emulator.wait();
     let report = json(&scene.path("controller/controller.json"));

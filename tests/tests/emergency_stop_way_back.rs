@@ -42,10 +42,8 @@ const CHAMBERS: [&str; 4] =
 /// A Bestehorn sinoid at 0.1 m/s on average reaches twice that; half as much again for the control error.
 const RESTART_M_PER_MS: f64 = 0.3e-3;
 
-/// Who trips it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum By {
-    /// A frame of the console.
     Bus,
     /// The script at the rig's own button.
     Rig,
@@ -63,11 +61,7 @@ fn run(scene: &Scene, mut say: impl FnMut(usize) -> Option<Frame>) -> Ended {
     let options = "--members 2 --seconds 30";
     let emulator = scene.emulator(Pace::Lockstep).out(&out).with(options).start();
     let controller = scene.controller(Pace::Lockstep).out(&out).start();
-    scene.peer().take_part("console", |peer, cycle, _| {
-        if let Some(frame) = say(cycle as usize) {
-            peer.send(&frame.encode().expect("in range").to_bytes());
-        }
-    });
+    scene.peer().be_console(|cycle| say(cycle as usize));
     let _ = emulator.wait();
     controller.wait()
 }
@@ -255,7 +249,7 @@ fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release
     load.signal(Signal::CONT);
     // The load has heard of it, and tripped is left after 1 s at the latest.
     scene.wait_for_more_rows("emulator", 1500);
-    scene.peer().send(&stop(true).encode().expect("in range").to_bytes());
+    scene.peer().say(&stop(true));
     for controller in [drive, load] {
         let _ = controller.wait().expect_code(0);
     }

@@ -1,24 +1,10 @@
 //! Every shipped experiment runs to its end, passes its own bounds, and is listed with its sentence.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use system_tests::binaries::{Program, workspace};
-use system_tests::process::Running;
+use system_tests::binaries::{Program, script, shipped_experiments, workspace};
+use system_tests::process::PATIENCE;
 use system_tests::records::json;
 use system_tests::scene::{SHORT, Scene};
-
-fn shipped() -> Vec<(String, PathBuf)> {
-    let folder = workspace().join("controller/experiments");
-    let entries = std::fs::read_dir(&folder).expect("the folder of experiments");
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    let mut named: Vec<_> = paths
-        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
-        .map(|path| (path.file_stem().expect("a name").to_string_lossy().into_owned(), path))
-        .collect();
-    named.sort();
-    assert!(named.iter().any(|(name, _)| name == "point-to-point"), "{named:?}");
-    named
-}
 
 fn about(path: &Path) -> String {
     let text = std::fs::read_to_string(path).expect("it is listed");
@@ -49,13 +35,14 @@ fn rehearse(name: &str, path: &Path) -> Result<(), String> {
 
 #[test]
 fn every_experiment_is_rehearsed_to_its_end_and_passes_its_own_bounds() {
-    let failures: Vec<_> = shipped().iter().filter_map(|(name, path)| rehearse(name, path).err()).collect();
+    let failures: Vec<_> =
+        shipped_experiments().iter().filter_map(|(name, path)| rehearse(name, path).err()).collect();
     assert!(failures.is_empty(), "{} failed:\n{}", failures.len(), failures.join("\n"));
 }
 
-/// The text of point-to-point.
 fn point_to_point() -> (PathBuf, String) {
-    let (_, path) = shipped().into_iter().find(|(name, _)| name == "point-to-point").expect("shipped");
+    let (_, path) =
+        shipped_experiments().into_iter().find(|(name, _)| name == "point-to-point").expect("shipped");
     let text = std::fs::read_to_string(&path).expect("it is listed");
     (path, text)
 }
@@ -110,10 +97,9 @@ fn a_bound_that_is_broken_fails_the_experiment() {
 
 #[test]
 fn the_list_names_each_experiment_with_its_sentence() {
-    let mut script = Command::new(workspace().join("scripts/run"));
-    let listed = Running::start("scripts/run --list", script.arg("--list")).wait().expect_code(0).stdout;
+    let listed = script("run", &["--list"], PATIENCE).expect_code(0).stdout;
     let lines: Vec<_> = listed.lines().filter_map(|line| line.split_once(' ')).collect();
-    let experiments = shipped();
+    let experiments = shipped_experiments();
     assert_eq!(lines.len(), experiments.len(), "{listed}");
     for (name, path) in &experiments {
         let sentence = about(path);

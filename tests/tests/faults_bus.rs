@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use system_tests::account::of_sensors;
 use system_tests::events::{self, expect_valve_shut_between};
-use system_tests::launch::Pace;
-use system_tests::process::{PATIENCE, Running};
+use system_tests::launch::{Pace, run_both};
+use system_tests::process::Running;
 use system_tests::records::{Table, bus_log, count, count_of_id, json};
 use system_tests::scene::{RESTLESS, SHORT, Scene};
 use system_tests::turn;
@@ -211,10 +211,7 @@ fn the_socket_of_a_host_that_was_killed_is_taken_over() {
     let _ = scene.bus_host("").kill();
     assert!(scene.socket().exists(), "a killed host leaves its socket");
     // In lockstep: a machine that stalls for a second would make the controller stop the rig, and the emulator wait for another.
-    let emulator = scene.emulator(Pace::Lockstep).start();
-    let controller = scene.controller(Pace::Lockstep).start();
-    let _ = emulator.wait_within(PATIENCE).expect_code(0);
-    let _ = controller.wait().expect_code(0);
+    let _ = run_both(&scene.emulator(Pace::Lockstep), &scene.controller(Pace::Lockstep));
     assert!(
         json(&scene.path("emulator/summary.json"))["bus_host"].is_object(),
         "the emulator hosted the bus"

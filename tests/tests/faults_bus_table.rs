@@ -9,21 +9,15 @@ use protocol::frames::{
     DRIVE_SENSORS, DRIVE_VALVE_COMMAND, Frame, LOAD_SENSORS, LOAD_VALVE_COMMAND, RIG_STATUS, TICK,
 };
 use serde_json::Value;
-use system_tests::broken::{Left, Plan};
+use system_tests::broken::{Left, Plan, fault};
 use system_tests::events;
 use system_tests::records::{count, count_of_id};
 
 const BEGINS: usize = 200;
 const ENDS: usize = 300;
 
-fn fault(name: &str, at: &str, numbers: &str) -> String {
-    format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = 0.2\nto_s = 0.3\n{numbers}\n")
-}
-
 fn run_over(bus: &str, faults: &str) -> Left {
-    let left = Plan { faults, bus, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
-    left.expect_marks_in_every_log();
-    left
+    Plan { faults, bus, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run_with_marks()
 }
 
 fn run(name: &str, at: &str, numbers: &str) -> Left {

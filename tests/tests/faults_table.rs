@@ -4,69 +4,71 @@
 //! Faults last from 0.2 to 0.3 s of runs of 0.4 s unless a test says otherwise. The truth is what the sensors are held against:
 //! noise of 20 um, 0.5 N and 400 Pa, steps below that.
 
-use protocol::frames::{Frame, RigStatus};
-use system_tests::broken::{Left, Plan, Row};
+use protocol::frames::RigStatus;
+use system_tests::broken::{Left, Plan, Row, fault};
 
 const BEGINS: usize = 200;
 const ENDS: usize = 300;
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
-/// A sensor: its column, that of its truth, what its mounting adds, its noise, its step, the low end of its range.
-struct Channel {
-    at: &'static str,
-    quantity: &'static str,
-    shown: &'static str,
-    truth: &'static str,
-    mounted: f64,
+/// What a kind of sensor measures: the unit that its keys end in, a size of error that is far above the noise and within the
+/// range, its noise, its step, the low end of its range.
+struct Quantity {
+    name: &'static str,
+    unit: &'static str,
+    size: f64,
     noise: f64,
     step: f64,
     least: f64,
 }
 
-const fn channel(
+const POSITION: Quantity =
+    Quantity { name: "position", unit: "m", size: 0.01, noise: 20e-6, step: 0.5 / 65535.0, least: 0.0 };
+const FORCE: Quantity =
+    Quantity { name: "force", unit: "n", size: 100.0, noise: 0.5, step: 2000.0 / 32767.0, least: -2000.0 };
+const PRESSURE: Quantity =
+    Quantity { name: "pressure", unit: "pa", size: 50_000.0, noise: 400.0, step: 1e6 / 16383.0, least: 0.0 };
+
+/// A sensor: its column, that of its truth, what its mounting adds.
+struct Channel {
     at: &'static str,
-    quantity: &'static str,
     shown: &'static str,
     truth: &'static str,
     mounted: f64,
-    [noise, step, least]: [f64; 3],
-) -> Channel {
-    Channel { at, quantity, shown, truth, mounted, noise, step, least }
+    of: Quantity,
 }
 
-const POSITION: [f64; 3] = [20e-6, 0.5 / 65535.0, 0.0];
-const FORCE: [f64; 3] = [0.5, 2000.0 / 32767.0, -2000.0];
-const PRESSURE: [f64; 3] = [400.0, 1e6 / 16383.0, 0.0];
+const fn channel(
+    at: &'static str,
+    shown: &'static str,
+    truth: &'static str,
+    mounted: f64,
+    of: Quantity,
+) -> Channel {
+    Channel { at, shown, truth, mounted, of }
+}
 
 const CHANNELS: [Channel; 8] = [
-    channel("drive", "position", "drive_position_m", "drive_position_m", 0.0, POSITION),
-    channel("load", "position", "load_position_m", "load_position_m", 0.8e-3, POSITION),
-    channel("drive", "force", "drive_force_N", "drive_sensor_force_N", 0.0, FORCE),
-    channel("load", "force", "load_force_N", "load_sensor_force_N", 0.0, FORCE),
-    channel("drive.a", "pressure", "drive_pressure_a_Pa", "drive_pressure_a_Pa", 0.0, PRESSURE),
-    channel("drive.b", "pressure", "drive_pressure_b_Pa", "drive_pressure_b_Pa", 0.0, PRESSURE),
-    channel("load.a", "pressure", "load_pressure_a_Pa", "load_pressure_a_Pa", 0.0, PRESSURE),
-    channel("load.b", "pressure", "load_pressure_b_Pa", "load_pressure_b_Pa", 0.0, PRESSURE),
+    channel("drive", "drive_position_m", "drive_position_m", 0.0, POSITION),
+    channel("load", "load_position_m", "load_position_m", 0.8e-3, POSITION),
+    channel("drive", "drive_force_N", "drive_sensor_force_N", 0.0, FORCE),
+    channel("load", "load_force_N", "load_sensor_force_N", 0.0, FORCE),
+    channel("drive.a", "drive_pressure_a_Pa", "drive_pressure_a_Pa", 0.0, PRESSURE),
+    channel("drive.b", "drive_pressure_b_Pa", "drive_pressure_b_Pa", 0.0, PRESSURE),
+    channel("load.a", "load_pressure_a_Pa", "load_pressure_a_Pa", 0.0, PRESSURE),
+    channel("load.b", "load_pressure_b_Pa", "load_pressure_b_Pa", 0.0, PRESSURE),
 ];
 
-/// Which unit a key of a quantity ends in, and a size of error that is far above the noise and within the range.
-fn unit_and_size(quantity: &str) -> (&'static str, f64) {
-    match quantity {
-        "position" => ("m", 0.01),
-        "force" => ("n", 100.0),
-        _ => ("pa", 50_000.0),
+impl Channel {
+    /// Holds that a sensor is off by noise and a step alone: the largest of some hundred draws.
+    fn expect_near(&self, k: usize, off: f64) {
+        assert!(off.abs() < 6.0 * self.of.noise + self.of.step, "{} {k}: {off}", self.shown);
     }
-}
-
-fn fault(name: &str, at: &str, numbers: &str) -> String {
-    format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = 0.2\nto_s = 0.3\n{numbers}\n")
 }
 
 /// Both axes move throughout.
 fn moving(faults: &str) -> Left {
-    let left = Plan { faults, act: |_| Some([0.3, 0.3]), ..Plan::default() }.run();
-    left.expect_marks_in_every_log();
-    left
+    Plan { faults, act: |_| Some([0.3, 0.3]), ..Plan::default() }.run_with_marks()
 }
 
 /// One kind of fault in all eight sensors at once; `numbers` makes them from unit and size. Errors against the truth follow,
@@ -78,9 +80,8 @@ fn all_sensors(
 ) -> Left {
     let script: String = CHANNELS
         .iter()
-        .map(|channel| {
-            let (unit, size) = unit_and_size(channel.quantity);
-            fault(&format!("{}-sensor-{kind}", channel.quantity), channel.at, &numbers(unit, size))
+        .map(|Channel { at, of, .. }| {
+            fault(&format!("{}-sensor-{kind}", of.name), at, &numbers(of.unit, of.size))
         })
         .collect();
     let left = moving(&script);
@@ -89,14 +90,9 @@ fn all_sensors(
         let truth: Vec<_> =
             left.truth.column(channel.truth).into_iter().map(|truth| truth + channel.mounted).collect();
         let errors: Vec<_> = shown.iter().zip(&truth).map(|(shown, truth)| shown - truth).collect();
-        let label = format!("{kind} of {} {}", channel.at, channel.quantity);
-        // Before and after a sensor is sound: the largest of some hundred draws of noise and a step.
+        // Before and after a sensor is sound.
         for k in (BEGINS - 100..BEGINS).chain(ENDS..ENDS + 80) {
-            assert!(
-                errors[k].abs() < 6.0 * channel.noise + channel.step,
-                "{label}, cycle {k}: {}",
-                errors[k]
-            );
+            channel.expect_near(k, errors[k]);
         }
         check(channel, &shown, &truth, &errors);
     }
@@ -122,34 +118,22 @@ fn sensors_stick_and_drop_out_and_the_status_says_which_are_at_an_end() {
         "dropout",
         |_, _| String::new(),
         |channel, shown, _, _| {
-            let dropped = |value: &f64| (value - channel.least).abs() < channel.step / 2.0;
+            let dropped = |value: &f64| (value - channel.of.least).abs() < channel.of.step / 2.0;
             assert!(shown[BEGINS..ENDS].iter().all(dropped), "{}", channel.shown);
         },
     );
-    let flags = |status: &RigStatus| {
-        let drive = [
-            status.drive_position_saturated,
-            status.drive_force_saturated,
-            status.drive_pressure_a_saturated,
-            status.drive_pressure_b_saturated,
-        ];
-        let load = [
-            status.load_position_saturated,
-            status.load_force_saturated,
-            status.load_pressure_a_saturated,
-            status.load_pressure_b_saturated,
-        ];
-        drive.into_iter().chain(load).filter(|flag| *flag).count()
+    let all_saturated = |status: &RigStatus| {
+        status.drive_position_saturated
+            && status.drive_force_saturated
+            && status.drive_pressure_a_saturated
+            && status.drive_pressure_b_saturated
+            && status.load_position_saturated
+            && status.load_force_saturated
+            && status.load_pressure_a_saturated
+            && status.load_pressure_b_saturated
     };
-    let all = left.log.iter().filter_map(|frame| match Frame::decode(frame) {
-        Ok(Frame::RigStatus(status)) => Some(flags(&status)),
-        _ => None,
-    });
-    assert_eq!(
-        all.filter(|count| *count == 8).count(),
-        11,
-        "ten in 0.1 s, and what came since the last of them"
-    );
+    let all = left.statuses().filter(all_saturated).count();
+    assert_eq!(all, 11, "ten in 0.1 s, and what came since the last of them");
 }
 
 #[test]
@@ -158,30 +142,24 @@ fn sensors_are_off_by_an_offset_a_gain_and_a_drift() {
         "offset",
         |unit, size| format!("offset_{unit} = -{size}"),
         |channel, _, _, errors| {
-            let (_, size) = unit_and_size(channel.quantity);
             // Mean of a hundred draws of noise: a tenth of it, five times.
-            let off = mean(&errors[BEGINS..ENDS]) + size;
-            assert!(off.abs() < 0.5 * channel.noise, "{}: {off}", channel.shown);
+            let off = mean(&errors[BEGINS..ENDS]) + channel.of.size;
+            assert!(off.abs() < 0.5 * channel.of.noise, "{}: {off}", channel.shown);
         },
     );
     all_sensors(
         "gain",
         |_, _| "gain = 0.95".into(),
         |channel, shown, truth, _| {
-            for k in BEGINS..ENDS {
-                let off = shown[k] - 0.95 * truth[k];
-                assert!(off.abs() < 6.0 * channel.noise + channel.step, "{} {k}: {off}", channel.shown);
-            }
+            (BEGINS..ENDS).for_each(|k| channel.expect_near(k, shown[k] - 0.95 * truth[k]));
         },
     );
     all_sensors(
         "drift",
         |unit, size| format!("drift_{unit}_per_s = -{size}"),
         |channel, _, _, errors| {
-            let (_, size) = unit_and_size(channel.quantity);
             for (k, error) in errors.iter().enumerate().take(ENDS).skip(BEGINS) {
-                let off = error + size * (k - BEGINS) as f64 * 1e-3;
-                assert!(off.abs() < 6.0 * channel.noise + channel.step, "{} {k}: {off}", channel.shown);
+                channel.expect_near(k, error + channel.of.size * (k - BEGINS) as f64 * 1e-3);
             }
         },
     );
@@ -193,22 +171,19 @@ fn sensors_are_noisy_spiky_and_coarse() {
         "noise",
         |unit, size| format!("noise_{unit} = {}", size / 2.0),
         |channel, _, _, errors| {
-            let (_, size) = unit_and_size(channel.quantity);
             let rms =
                 mean(&errors[BEGINS..ENDS].iter().map(|error| error * error).collect::<Vec<_>>()).sqrt();
             // Standard error of a deviation of a hundred draws: 7 %; five of them.
-            assert!((2.0 * rms / size - 1.0).abs() < 0.35, "{}: {rms}", channel.shown);
+            assert!((2.0 * rms / channel.of.size - 1.0).abs() < 0.35, "{}: {rms}", channel.shown);
         },
     );
     all_sensors(
         "spike",
         |unit, size| format!("spike_{unit} = -{size}\nevery_ms = 25"),
         |channel, _, _, errors| {
-            let (_, size) = unit_and_size(channel.quantity);
             for (k, error) in errors.iter().enumerate().take(ENDS).skip(BEGINS) {
-                let spike = if (k - BEGINS).is_multiple_of(25) { -size } else { 0.0 };
-                let off = error - spike;
-                assert!(off.abs() < 6.0 * channel.noise + channel.step, "{} {k}: {off}", channel.shown);
+                let spike = if (k - BEGINS).is_multiple_of(25) { -channel.of.size } else { 0.0 };
+                channel.expect_near(k, error - spike);
             }
         },
     );
@@ -216,11 +191,11 @@ fn sensors_are_noisy_spiky_and_coarse() {
         "quantisation",
         |unit, size| format!("step_{unit} = {size}"),
         |channel, shown, _, errors| {
-            let (_, size) = unit_and_size(channel.quantity);
+            let Quantity { size, noise, step, .. } = channel.of;
             for k in BEGINS..ENDS {
                 let steps = shown[k] / size;
-                assert!((steps - steps.round()).abs() * size < channel.step, "{} {k}", channel.shown);
-                assert!(errors[k].abs() < size / 2.0 + 6.0 * channel.noise + channel.step);
+                assert!((steps - steps.round()).abs() * size < step, "{} {k}", channel.shown);
+                assert!(errors[k].abs() < size / 2.0 + 6.0 * noise + step);
             }
         },
     );
@@ -232,8 +207,8 @@ fn reported(cycle: u32) -> Option<[f64; 2]> {
 }
 
 fn with_valve(name: &str, numbers: &str) -> Left {
-    let left = Plan { faults: &fault(name, "drive", numbers), act: reported, ..Plan::default() }.run();
-    left.expect_marks_in_every_log();
+    let left =
+        Plan { faults: &fault(name, "drive", numbers), act: reported, ..Plan::default() }.run_with_marks();
     let reported = left.measurement.column("drive_valve");
     assert!(
         reported[100] > 0.49 && reported[249] > 0.49 && reported[250] < -0.39,
@@ -289,9 +264,7 @@ fn a_slow_valve_follows_with_its_time_constant() {
 #[test]
 fn the_supply_sags_and_fails_with_its_time_constant() {
     let run = |name: &str, numbers: &str| {
-        let left = Plan { faults: &fault(name, "supply", numbers), ..Plan::default() }.run();
-        left.expect_marks_in_every_log();
-        left
+        Plan { faults: &fault(name, "supply", numbers), ..Plan::default() }.run_with_marks()
     };
     let sags = run("supply-sag", "drop_pa = 300000\ntime_constant_s = 0.05");
     let sagging = sags.truth.column("supply_pressure_Pa");
@@ -313,8 +286,7 @@ fn the_supply_sags_and_fails_with_its_time_constant() {
 /// Air leaves a chamber whose piston is held by friction, so that its volume stays.
 fn held(name: &str, numbers: &str) -> Left {
     let faults = fault(name, "drive.a", numbers) + &fault("friction-rise", "drive", "factor = 100.0");
-    let left = Plan { faults: &faults, ..Plan::default() }.run();
-    left.expect_marks_in_every_log();
+    let left = Plan { faults: &faults, ..Plan::default() }.run_with_marks();
     let position = left.truth.column("drive_position_m");
     assert!(
         position[BEGINS..ENDS].iter().all(|x| x.to_bits() == position[0].to_bits()),
@@ -362,8 +334,7 @@ fn a_leaking_chamber_empties_as_the_law_of_the_gap_says() {
 fn friction_that_rises_holds_an_axis_that_would_move() {
     let act = |cycle: u32| Some([if cycle < 199 { 0.0 } else { 0.5 }, if cycle < 199 { 0.0 } else { 0.5 }]);
     let faults = fault("friction-rise", "drive", "factor = 100.0");
-    let left = Plan { faults: &faults, act, ..Plan::default() }.run();
-    left.expect_marks_in_every_log();
+    let left = Plan { faults: &faults, act, ..Plan::default() }.run_with_marks();
     let way = |column: &str| {
         let x = left.truth.column(column);
         [(x[ENDS - 1] - x[BEGINS]).abs(), (x[ENDS + 99] - x[ENDS]).abs()]
@@ -405,16 +376,8 @@ fn rods_part_once_and_an_axis_hits_the_end_of_its_stroke() {
     let rig = "carriage_position_m = 0.25\nlinked = true\n";
     // Against the air that a shut valve traps, 3000 N would not do.
     let act = |cycle: u32| Some([if cycle < 249 { 0.0 } else { 1.0 }, 0.0]);
-    let left = Plan { rig, faults, cycles: 700, act, ..Plan::default() }.run();
-    left.expect_marks_in_every_log();
-    let linked: Vec<_> = left
-        .log
-        .iter()
-        .filter_map(|frame| match Frame::decode(frame) {
-            Ok(Frame::RigStatus(status)) => Some(status.linked),
-            _ => None,
-        })
-        .collect();
+    let left = Plan { rig, faults, cycles: 700, act, ..Plan::default() }.run_with_marks();
+    let linked: Vec<_> = left.statuses().map(|status| status.linked).collect();
     // The status of every tenth cycle, in the fifth.
     let parted = linked.iter().position(|linked| !linked).expect("the rods part");
     assert_eq!(parted, BEGINS / 10);

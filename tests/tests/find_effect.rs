@@ -3,9 +3,8 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::process::{Ended, PATIENCE, Running};
+use system_tests::binaries::script;
+use system_tests::process::{Ended, PATIENCE};
 use system_tests::records::json;
 
 /// Draws a leakage of 5.9 Nl/min across the load's piston: far above its detection limit.
@@ -13,10 +12,7 @@ const SEED: &str = "9";
 const HIDDEN: &str = "piston-leakage at load";
 
 fn find_effect(arguments: &[&str]) -> Ended {
-    let bench = executable(Program::Bench, Build::Shipped);
-    let mut command = Command::new(workspace().join("scripts/find-effect"));
-    command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
-    Running::start("scripts/find-effect", &mut command).wait_within(6 * PATIENCE)
+    script("find-effect", arguments, 6 * PATIENCE)
 }
 
 /// A program in place of the workflow's: finds nothing and leaves the rig as it is, or what `said` says.
@@ -37,11 +33,9 @@ fn stand_in(folder: &Path, said: &str) -> String {
 #[test]
 fn help_tells_options_files_and_exit_codes() {
     let ended = find_effect(&["--help"]).expect_code(0);
-    for part in
-        ["--seed", "--lockstep", "--expect-right", "gap.html", "Exit codes: 0 done", "130 interrupted"]
-    {
-        assert!(ended.stdout.contains(part), "'{part}' is missing in: {}", ended.stdout);
-    }
+    let parts =
+        ["--seed", "--lockstep", "--expect-right", "gap.html", "Exit codes: 0 done", "130 interrupted"];
+    ended.expect_printed(&parts);
 }
 
 #[test]
@@ -110,9 +104,8 @@ fn a_sealed_effect_is_found_over_the_bus_added_and_the_gap_shrinks() {
     let out = folder.path().join("found");
     let out = out.to_str().expect("a path in ASCII");
     let ended = find_effect(&["--lockstep", "--seed", SEED, "--expect-right", "--out", out]).expect_code(0);
-    let reported = format!("named: {HIDDEN}");
-    assert!(ended.stdout.contains(&reported), "'{reported}' is missing in: {}{}", ended.stdout, ended.stderr);
-    assert!(ended.stdout.contains(" repeated |"), "the rig itself is no column of: {}", ended.stdout);
+    // The rig itself is a column.
+    ended.expect_printed(&[&format!("named: {HIDDEN}"), " repeated |"]);
     let folder = Path::new(out).join("seed-9");
     // What names the hidden terms of the rig measured once more lies where only the last step looks.
     let repeated = folder.join("held-out/repeated");

@@ -14,7 +14,6 @@ use system_tests::process::Running;
 use system_tests::records::{bus_log, count, json};
 use system_tests::scene::Scene;
 
-/// The programs, built once.
 fn built() -> &'static Path {
     static BUILT: OnceLock<tempfile::TempDir> = OnceLock::new();
     let made = || {

@@ -18,7 +18,6 @@ use system_tests::scene::{SHORT, Scene};
 /// What the gateway may need over what it had before, KiB: 32 clients with full queues would be 14 MiB.
 const MORE_MEMORY_KIB: u64 = 24 << 10;
 
-/// A frame with a number in it.
 fn numbered(n: u32) -> CanFrame {
     CanFrame::new(0x5A5, &n.to_be_bytes())
 }

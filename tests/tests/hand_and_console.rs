@@ -18,14 +18,10 @@ fn with_people(rig: &str) -> Scene {
 }
 
 /// Runs the rig in lockstep with one member that sends what it likes; the member takes no other part.
-fn lockstep(scene: &Scene, cycles: usize, mut say: impl FnMut(u32) -> Option<Frame>) {
+fn lockstep(scene: &Scene, cycles: usize, say: impl FnMut(u32) -> Option<Frame>) {
     let seconds = cycles as f64 * 1e-3;
     let emulator = scene.emulator(Pace::Lockstep).with(&format!("--seconds {seconds}")).start();
-    scene.peer().take_part("console", |peer, cycle, _| {
-        if let Some(frame) = say(cycle) {
-            peer.send(&frame.encode().expect("what the tests send is in range").to_bytes());
-        }
-    });
+    scene.peer().be_console(say);
     let _ = emulator.wait().expect_code(0);
 }
 

@@ -1,17 +1,13 @@
 //! `scripts/latency`: help, arguments that cannot be used, and a shortest measurement as a whole.
 
 use std::path::Path;
-use std::process::Command;
-use system_tests::binaries::{Build, Program, executable, workspace};
-use system_tests::process::{Ended, PATIENCE, Running};
+use system_tests::binaries::script;
+use system_tests::process::{Ended, PATIENCE};
 use system_tests::records::json;
 use system_tests::skip;
 
 fn latency(arguments: &[&str]) -> Ended {
-    let bench = executable(Program::Bench, Build::Shipped);
-    let mut command = Command::new(workspace().join("scripts/latency"));
-    command.args(arguments).env("AIRBENCH_BIN_DIR", bench.parent().expect("a program lies in a folder"));
-    Running::start("scripts/latency", &mut command).wait_within(2 * PATIENCE)
+    script("latency", arguments, 2 * PATIENCE)
 }
 
 #[test]
@@ -49,11 +45,8 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     let load = ["--load", "sleep 1000"];
     let ended =
         latency(&[&["--pairs", "1", "--seconds", "2", "--out", out][..], &load].concat()).expect_code(0);
-    for part in
-        ["pair 1 of 1, cyclictest:", "left", "drive-round-trip p50 / ping-pong-bus p50", "spinning / claimed"]
-    {
-        assert!(ended.stdout.contains(part), "'{part}' is missing in: {}{}", ended.stdout, ended.stderr);
-    }
+    let round_trip = "drive-round-trip p50 / ping-pong-bus p50";
+    ended.expect_printed(&["pair 1 of 1, cyclictest:", "left", round_trip, "spinning / claimed"]);
     let run = Path::new(out).join("pair-01/run");
     for file in ["run.json", "summary.json", "ping-pong.json", "ping-pong-bus.hlog", "conditions.json"] {
         assert!(run.join(file).exists(), "{file}");

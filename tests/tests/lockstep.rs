@@ -21,7 +21,6 @@ enum Circumstance {
     ListenerThatNeverReads,
 }
 
-/// Runs the short experiment to its end.
 fn run(circumstance: Circumstance, options: &str) -> Scene {
     let scene = Scene::new(SHORT);
     let _busy = (circumstance == Circumstance::MachineBusy).then(BusyLoops::on_every_processor);

@@ -13,7 +13,6 @@ use system_tests::process::{Ended, Running};
 use system_tests::records::Table;
 use system_tests::scene::{SHORT, Scene};
 
-/// A run in lockstep, made once.
 fn run_folder() -> PathBuf {
     static RUN: OnceLock<Scene> = OnceLock::new();
     let scene = RUN.get_or_init(|| {
@@ -32,16 +31,11 @@ fn export(source: &Path, format: &str, out: &Path, options: &[&str]) -> Ended {
 
 /// Columns of a CSV; where a cell is empty there is no value.
 fn columns(file: &Path) -> BTreeMap<String, Vec<Option<f64>>> {
-    let text = fs::read_to_string(file).expect("the export is there");
-    let mut lines = text.lines().map(|line| line.split(','));
-    let head: Vec<_> = lines.next().expect("a head").collect();
+    let mut reader = csv::Reader::from_path(file).expect("the export is there");
     let mut table: BTreeMap<String, Vec<Option<f64>>> = BTreeMap::new();
-    for line in lines {
-        let cells: Vec<_> = line.collect();
-        assert_eq!(cells.len(), head.len());
-        for (name, cell) in head.iter().zip(cells) {
-            let value = (!cell.is_empty()).then(|| cell.parse().expect("a number"));
-            table.entry((*name).to_owned()).or_default().push(value);
+    for row in reader.deserialize::<BTreeMap<String, Option<f64>>>() {
+        for (name, value) in row.expect("a number or nothing for each name of the head") {
+            table.entry(name).or_default().push(value);
         }
     }
     table

@@ -125,7 +125,6 @@ fn a_rig_that_comes_alive_ends_a_replay_that_would_disturb_it() {
     let _ = replay(&scene, &log, "--leave-out 110").wait().expect_code(2).expect_said(&["nothing of"]);
 }
 
-/// Takes so many frames.
 fn heard_some(peer: &Peer, count: usize) -> usize {
     for _ in 0..count {
         let came = peer.receive(system_tests::process::PATIENCE);

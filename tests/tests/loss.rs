@@ -22,7 +22,6 @@ use system_tests::turn;
 
 const WIRE: &str = "loss=0.01&seed=7";
 
-/// All that was counted in a run.
 struct Counted {
     heard: Vec<CanFrame>,
     host: Value,

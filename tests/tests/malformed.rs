@@ -17,7 +17,6 @@ const EVERY: u32 = 3;
 const FILES: [&str; 3] =
     ["emulator/measurement.csv", "emulator/truth.csv", "controller/controller-drive.csv"];
 
-/// What the injector does in a cycle.
 type Act<'a> = &'a mut dyn FnMut(&Peer, u32);
 
 /// Runs the short experiment with a member that acts as `act` says; `None` runs it without one.
@@ -102,8 +101,7 @@ fn one_good_command_from_elsewhere_does_change_the_run() {
     let with = run(Some(&mut |peer, cycle| {
         if cycle == FIRST_CYCLE {
             let command = ValveCommand { opening: 1.0, alive: 5, echo: (cycle % 4096) as u16, enable: true };
-            let frame = Frame::DriveValveCommand(command).encode().expect("a good command");
-            peer.send(&frame.to_bytes());
+            peer.say(&Frame::DriveValveCommand(command));
         }
     }));
     for file in FILES {
@@ -117,7 +115,7 @@ fn a_tick_from_elsewhere_is_counted_as_a_second_rig() {
     let scene = run(Some(&mut |peer, cycle| {
         if cycle == FIRST_CYCLE {
             let tick = Frame::Tick(Tick { cycle, lockstep: true, ..Tick::default() });
-            peer.send(&tick.encode().expect("a good tick").to_bytes());
+            peer.say(&tick);
         }
     }));
     let summary = json(&scene.path("emulator/summary.json"));

@@ -5,13 +5,12 @@ use protocol::response_time::rig::{RigAnalysis, RigFrame};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
-use system_tests::binaries::workspace;
+use system_tests::binaries::shipped_experiments;
 use system_tests::launch::Pace;
 use system_tests::process::Ended;
 use system_tests::records::{bus_log, count, json};
 use system_tests::scene::{LINKED, SHORT, Scene};
 
-/// A cycle of the rig.
 const CYCLE_NS: u64 = 1_000_000;
 
 /// Runs emulator and controller over a bus with these options; the emulator ends well with the controllers, or after some time.
@@ -122,14 +121,9 @@ fn expect_arrivals_as_declared(experiment: &str, log: &Path) {
 /// bound assumes of them: distances and jitter on the model's clock, and how many come within any time.
 #[test]
 fn in_lockstep_every_shipped_experiment_keeps_the_plain_bound_and_what_it_assumes() {
-    let folder = workspace().join("controller/experiments");
-    let entries = std::fs::read_dir(&folder).expect("the folder of experiments");
-    let mut paths: Vec<_> = entries.map(|entry| entry.expect("an entry").path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
-    paths.sort();
-    assert!(paths.iter().any(|path| path.ends_with("load-step.toml")), "{paths:?}");
-    for path in paths {
-        let experiment = path.file_stem().expect("a name").to_string_lossy().into_owned();
+    let shipped = shipped_experiments();
+    assert!(shipped.iter().any(|(name, _)| name == "load-step"), "{shipped:?}");
+    for (experiment, path) in shipped {
         let scene = Scene::new(LINKED);
         let url = format!("{}?bitrate=1000000", scene.url());
         let emulator = scene.emulator(Pace::Lockstep).bus(url).experiment(&path).with("--seconds 30").start();

@@ -12,7 +12,6 @@ use system_tests::axis_table::AxisTable;
 use system_tests::bus_cycles::{Logged, read, read_to_last_whole_line};
 use system_tests::events;
 use system_tests::launch::{Pace, run_both};
-use system_tests::peer::Peer;
 use system_tests::process::{Ended, Running};
 use system_tests::records::{Table, count, json};
 use system_tests::scene::{LINKED, SHORT, Scene};
@@ -230,20 +229,12 @@ fn frames_lost_on_the_wire_do_not_stop_a_run() {
 }
 
 /// Runs both controllers beside a console that says something in a cycle.
-fn with_console(
-    experiment: &str,
-    cycles: u32,
-    mut say: impl FnMut(u32) -> Option<Frame>,
-) -> (Scene, [Ended; 2]) {
+fn with_console(experiment: &str, cycles: u32, say: impl FnMut(u32) -> Option<Frame>) -> (Scene, [Ended; 2]) {
     let scene = Scene::new(experiment);
     let options = format!("--members 3 --seconds {}", f64::from(cycles) * 1e-3);
     let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
     let controllers = ["drive", "load"].map(|axis| scene.axis_controller(Pace::Lockstep, axis).start());
-    scene.peer().take_part("console", |peer: &Peer, cycle, _| {
-        if let Some(frame) = say(cycle) {
-            peer.send(&frame.encode().expect("in range").to_bytes());
-        }
-    });
+    scene.peer().be_console(say);
     let _ = emulator.wait();
     (scene, controllers.map(Running::wait))
 }

@@ -10,7 +10,6 @@ use system_tests::records::{count, json};
 use system_tests::scene::{SHORT, Scene};
 use system_tests::turn;
 
-/// A short run in real time.
 fn run(scene: &Scene) -> PathBuf {
     let _machine = turn::take();
     let out = scene.path("run");

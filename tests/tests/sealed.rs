@@ -15,7 +15,7 @@ use system_tests::binaries::Program;
 use system_tests::hidden::{Extreme, LIVELY, drawn, everything, rig_with};
 use system_tests::launch::{Pace, run_both};
 use system_tests::process::Running;
-use system_tests::records::{bus_log, json};
+use system_tests::records::{Table, bus_log, json};
 use system_tests::scene::Scene;
 use system_tests::turn;
 
@@ -41,10 +41,10 @@ fn run(sealed: &str, pace: Pace, options: &str) -> Left {
     scene.write("sealed.toml", sealed);
     let folder = scene.path("run");
     let sealed = format!("--sealed {}", scene.path("sealed.toml").display());
-    let emulator =
-        scene.emulator(pace).out(&folder).with("--seconds 1.3").with(&sealed).with(options).start();
-    let controller = scene.controller(pace).out(&folder).with("--repeat").start();
-    let ended = [emulator.wait(), controller.wait()].map(|ended| ended.expect_code(0));
+    let ended = run_both(
+        &scene.emulator(pace).out(&folder).with("--seconds 1.3").with(&sealed).with(options),
+        &scene.controller(pace).out(&folder).with("--repeat"),
+    );
     let mut summary = Program::Bench.command();
     let summary = Running::start("bench summary", summary.arg("summary").arg(&folder)).wait().expect_code(0);
     let said =
@@ -117,32 +117,21 @@ fn telling_numbers(effects: &[Switched]) -> Vec<String> {
     texts
 }
 
-/// Identifier and length of each frame that the rig sends, in their order.
-fn rig_frames(left: &Left) -> Vec<(u16, usize)> {
+/// Identifier and length of a frame.
+type Kind = (u16, usize);
+
+/// Kinds of the frames that the rig sends, in their order, and of all frames.
+fn frames(left: &Left) -> (Vec<Kind>, BTreeSet<Kind>) {
     let of_rig =
         |id: u16| MESSAGES.iter().any(|message| message.id == id && message.sender == DRIVE_SENSORS.sender);
     let frames = bus_log(&left.path("bus.log"));
-    let frames =
+    let kinds =
         frames.iter().map(|frame| (frame.standard_id().expect("rig.dbc has no other"), frame.data().len()));
-    frames.filter(|(id, _)| of_rig(*id)).collect()
+    (kinds.clone().filter(|(id, _)| of_rig(*id)).collect(), kinds.collect())
 }
 
-/// Identifiers and lengths of all frames.
-fn kinds_of_frames(left: &Left) -> BTreeSet<(u16, usize)> {
-    let frames = bus_log(&left.path("bus.log"));
-    frames
-        .iter()
-        .map(|frame| (frame.standard_id().expect("rig.dbc has no other"), frame.data().len()))
-        .collect()
-}
-
-fn first_line(path: &Path) -> String {
-    fs::read_to_string(path)
-        .expect("a table")
-        .lines()
-        .find(|line| !line.starts_with('#'))
-        .expect("a head")
-        .to_owned()
+fn columns(left: &Left, file: &str) -> Vec<String> {
+    Table::read(&left.path(file)).names().to_vec()
 }
 
 #[test]
@@ -175,12 +164,11 @@ fn twenty_sealed_runs_tell_what_is_sealed_in_truth_csv_alone() {
             let reported = outputs.iter().find(|(_, text)| text.contains(&number));
             assert!(reported.is_none(), "{number} stands in {:?}, {what}", reported.map(|(name, _)| name));
         }
-        assert_eq!(rig_frames(&sealed), rig_frames(&open), "{what}");
-        assert_eq!(kinds_of_frames(&sealed), kinds_of_frames(&open), "{what}");
-        assert_eq!(first_line(&sealed.path("measurement.csv")), first_line(&open.path("measurement.csv")));
+        assert_eq!(frames(&sealed), frames(&open), "{what}");
+        assert_eq!(columns(&sealed, "measurement.csv"), columns(&open, "measurement.csv"));
         assert_eq!(json(&sealed.path("run.json"))["sealed"], true);
         // The one place that tells, and an effect that acts: else the test would be of nothing.
-        let head = first_line(&sealed.path("truth.csv"));
+        let head = columns(&sealed, "truth.csv").join(",");
         for effect in &effects {
             assert!(head.contains(&effect.name.replace('-', "_")), "{what}: {head}");
         }

@@ -27,10 +27,6 @@ struct Heard {
     opened: Vec<u64>,
 }
 
-fn send(peer: &Peer, frame: Frame) {
-    peer.send(&frame.encode().expect("in range").to_bytes());
-}
-
 /// Publishes a cycle of a rig whose carriage rests at 0.1 m; `silent` gets no sensors.
 fn publish(peer: &Peer, cycle: u64, silent: Option<&str>, emergency_stop: bool) {
     let sensors = Sensors {
@@ -41,19 +37,20 @@ fn publish(peer: &Peer, cycle: u64, silent: Option<&str>, emergency_stop: bool) 
         ..Sensors::default()
     };
     if silent != Some("drive") {
-        send(peer, Frame::DriveSensors(sensors));
+        peer.say(&Frame::DriveSensors(sensors));
     }
     if silent != Some("load") {
-        send(peer, Frame::LoadSensors(Sensors { position_m: 0.5, ..sensors }));
+        peer.say(&Frame::LoadSensors(Sensors { position_m: 0.5, ..sensors }));
     }
     if cycle.is_multiple_of(10) {
-        send(peer, Frame::Tick(Tick { cycle: cycle as u32, ..Tick::default() }));
+        peer.say(&Frame::Tick(Tick { cycle: cycle as u32, ..Tick::default() }));
     }
     if cycle % 10 == 5 {
-        send(
-            peer,
-            Frame::RigStatus(RigStatus { supply_pressure_pa: 7e5, emergency_stop, ..RigStatus::default() }),
-        );
+        peer.say(&Frame::RigStatus(RigStatus {
+            supply_pressure_pa: 7e5,
+            emergency_stop,
+            ..RigStatus::default()
+        }));
     }
 }
 

@@ -34,7 +34,7 @@ fn led(experiment: &str, asks: &[HandSetPoint]) -> [Vec<f64>; 2] {
         }
         if began.is_some_and(|began| cycle == began + 100) {
             for ask in asks {
-                peer.send(&Frame::HandSetPoint(*ask).encode().expect("within range").to_bytes());
+                peer.say(&Frame::HandSetPoint(*ask));
             }
         }
     });

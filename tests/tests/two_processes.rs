@@ -13,7 +13,6 @@ use system_tests::scene::{LINKED, SHORT, Scene};
 /// What a rehearsal leaves too.
 const TABLES: [&str; 4] = ["measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv"];
 
-/// Who controls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cast {
     OneProcess,

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use system_tests::firmware;
 use system_tests::foreign_python::python;
 use system_tests::guest::{Guest, compare_candump, data_frames};
-use system_tests::records::{count, json};
+use system_tests::records::{Table, count, json};
 
 /// The machine after its three jobs.
 fn machine() -> &'static Guest {
@@ -230,12 +230,8 @@ fn the_emergency_stop_of_cansend_trips_the_rig(run: &Path, log: &str) {
     );
     assert!(aborted, "the drive's main chain did not go to aborted");
 
-    let truth = fs::read_to_string(run.join("foreign/truth.csv")).unwrap();
-    let column =
-        truth.lines().next().unwrap().split(',').position(|name| name == "supply_pressure_Pa").unwrap();
-    let supply_pa = |line: &str| -> f64 { line.split(',').nth(column).unwrap().parse().unwrap() };
-    let first = supply_pa(truth.lines().nth(1).unwrap());
-    let last = supply_pa(truth.lines().last().unwrap());
+    let supply_pa = Table::read(&run.join("foreign/truth.csv")).column("supply_pressure_Pa");
+    let (first, last) = (supply_pa[0], supply_pa[supply_pa.len() - 1]);
     // The supply node decays with 50 ms from 7 bar to 1.01325 bar; seconds later nothing of it is left.
     assert!((first - 7e5).abs() < 1.0 && (last - 101_325.0).abs() < 100.0, "{first} Pa, then {last} Pa");
 }

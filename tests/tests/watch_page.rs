@@ -8,8 +8,9 @@ use protocol::frames::{EmergencyStop, Frame, HandSetPoint, HandSetPointAxis};
 use rustix::process::Signal;
 use std::path::PathBuf;
 use std::process::Command;
-use system_tests::binaries::{Program, workspace};
+use system_tests::binaries::workspace;
 use system_tests::launch::Pace;
+use system_tests::onlooker::LivePage;
 use system_tests::process::Running;
 use system_tests::records::{Table, bus_log};
 use system_tests::scene::Scene;
@@ -33,7 +34,6 @@ set-point = [
 
 /// Cases of the script that use the first run; the next one has the emulator started anew.
 const CASES_OF_FIRST_RUN: usize = 10;
-/// A supply that is discharged, Pa.
 const DISCHARGED_PA: f64 = 1.2e5;
 /// An axis that stands, m/s: the air trapped beside its piston has come to rest.
 const STANDS_M_PER_S: f64 = 1e-3;
@@ -75,13 +75,8 @@ fn the_page_shows_a_run_and_a_hand_on_it_reaches_the_rig() {
     let _machine = turn::take();
     let scene = Scene::new(TO_AND_FRO);
     let first = Rig::start(&scene, "first");
-    let mut command = Program::Bench.command();
-    command.args(["watch", "--http", "127.0.0.1:0", "--control", "--bus", &scene.url(), "--telemetry"]);
-    let mut watch = Running::start("bench watch", command.arg(scene.path("telemetry")));
-    watch.wait_for("Ctrl-C ends it");
-    let said = watch.stderr();
-    let address = said.split_whitespace().find(|word| word.starts_with("http://")).expect("an address");
-
+    let page = LivePage::open(&scene, "--control");
+    let address = format!("http://{}/#token={}", page.address, page.token);
     let mut command = Command::new("node");
     command.arg(workspace().join("tests/browser/live_page.js"));
     command.env("AIRBENCH_PAGE", address).env("AIRBENCH_BROWSER", browser_modules());
@@ -100,7 +95,7 @@ fn the_page_shows_a_run_and_a_hand_on_it_reaches_the_rig() {
     // For who reads the log of a passing test.
     eprintln!("{}", ended.stderr);
     second.end();
-    let _ = watch.interrupt();
+    page.close();
 
     two_stops_and_both_stopped_the_axis(&scene);
     one_set_point_by_hand(&scene);

@@ -57,7 +57,6 @@ fn unlock(answers: &[[u8; 8]]) -> Vec<Vec<u8>> {
     said
 }
 
-/// Unlocks, and writes a gain.
 fn write_gain(answers: &[[u8; 8]]) -> Vec<Vec<u8>> {
     let mut said = unlock(answers);
     if said.len() == 5 {

@@ -1,6 +1,5 @@
 //! Moving average over the last 0.2 s: of the position sensor for the partner, of the error at rest for the figures.
 
-/// Samples of the window.
 const WINDOW: usize = 200;
 
 #[derive(Clone, Debug)]
@@ -27,12 +26,10 @@ impl Average {
         self.samples[..count].iter().sum::<f64>() / count.max(1) as f64
     }
 
-    /// Whether the window is full.
     pub(crate) fn is_full(&self) -> bool {
         self.taken >= WINDOW
     }
 
-    /// Forgets all samples.
     pub(crate) fn clear(&mut self) {
         self.taken = 0;
     }

@@ -8,15 +8,11 @@ use crate::program::Program;
 pub struct PlannedChange {
     /// When, s from the experiment's start.
     pub at_s: f64,
-    /// Place in the list of variables.
     pub place: usize,
-    /// Its value, checked.
     pub value: f64,
 }
 
-/// The changes, and what was before.
 pub(super) struct Changes {
-    /// By time.
     planned: Vec<PlannedChange>,
     before: Vec<(usize, f64)>,
     done: usize,
@@ -45,7 +41,6 @@ impl Changes {
         }
     }
 
-    /// Takes back what was changed.
     pub(super) fn take_back(&mut self, program: &mut Program) {
         if std::mem::take(&mut self.done) > 0 {
             for (place, value) in self.before.iter().rev() {

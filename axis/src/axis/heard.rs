@@ -4,7 +4,6 @@ use crate::chains::{Console, Partner};
 use nominal::Axis;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis};
 
-/// What was heard.
 pub(super) struct Heard {
     own: Axis,
     experiment: u8,
@@ -12,9 +11,7 @@ pub(super) struct Heard {
     partner_spoke: bool,
     pub(super) console: Console,
     pub(super) stop: Option<EmergencyStopReason>,
-    /// The newest set-point by hand for this axis.
     pub(super) hand: Option<HandSetPoint>,
-    /// Cycle answered last.
     answered: Option<u64>,
 }
 

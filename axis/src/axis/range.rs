@@ -18,7 +18,6 @@ const LONGEST: u32 = 500;
 pub(super) struct Range([u32; 3]);
 
 impl Range {
-    /// Takes the rig's word for a cycle.
     pub(super) fn take(&mut self, axis: Axis, rig: Option<&RigStatus>, phase: Phase) -> Option<Fault> {
         let Some(rig) = rig.filter(|_| phase != Phase::Shut) else {
             *self = Self::default();

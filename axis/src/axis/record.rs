@@ -9,15 +9,12 @@ use protocol::frames::{
     MatchingChainState, Sensors, ValveCommand,
 };
 
-/// The answer to the sensors of a cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
     pub command: ValveCommand,
     /// The axis's own emergency stop, when it is due.
     pub emergency_stop: Option<EmergencyStop>,
-    /// States of the chains, when they are due.
     pub status: Option<ChainStatus>,
-    /// Values of the chains, when they are due.
     pub values: Option<ChainValues>,
     pub news: Option<News>,
     pub record: Option<AxisRecord>,
@@ -33,26 +30,21 @@ pub struct AxisRecord {
     pub force_chain: ForceChainState,
     pub matching: MatchingChainState,
     pub emergency_stop: EmergencyStopChainState,
-    /// Position asked for; `None` where none is.
     pub set_position: Option<SetPoint>,
-    /// Force asked for; `None` where none is.
     pub set_force: Option<ForceSetPoint>,
     /// Position sensor, less the matched offset, m.
     pub position_m: f64,
     /// Its rate, filtered, m/s.
     pub velocity_m_per_s: f64,
-    /// Force sensor, N.
     pub force_n: f64,
     /// Velocity that the algorithm wants, own extension, m/s.
     pub wanted_velocity_m_per_s: f64,
     /// Opening sent, -1 to 1.
     pub opening: f64,
-    /// Whether the valve is asked to act.
     pub enabled: bool,
 }
 
 impl AxisController {
-    /// The row of `cycle`.
     pub fn record(&self, cycle: u64, sensors: &Sensors, command: &ValveCommand) -> AxisRecord {
         let geometry = self.program.geometry();
         let status = self.status();

@@ -4,7 +4,6 @@ use super::AxisController;
 use nominal::Axis;
 use protocol::frames::{ChainStatus, ChainValues, DRIVE_CHAIN_VALUES, MainChainState};
 
-/// Period of status and values, in cycles.
 const PERIOD: u64 = protocol::periods::CHAIN_CYCLES;
 /// Cycles within the period in which status and values of drive and load are sent: none falls on the rig's tick (0) or status
 /// (5), nor on another.
@@ -15,7 +14,6 @@ const LEAST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].min;
 const MOST_M: f64 = DRIVE_CHAIN_VALUES.signals[0].max;
 const MOST_N: f64 = DRIVE_CHAIN_VALUES.signals[2].max;
 
-/// What was sent last.
 pub(super) struct Slow {
     phases: [u64; 2],
     reported: ChainStatus,
@@ -23,7 +21,6 @@ pub(super) struct Slow {
     periods: [u64; 2],
 }
 
-/// What is to be sent.
 pub(super) struct Due {
     pub(super) status: bool,
     pub(super) values: bool,
@@ -49,7 +46,6 @@ impl Slow {
 }
 
 impl AxisController {
-    /// Status for the bus.
     pub fn status(&self) -> ChainStatus {
         let (main_chain, ok, repetition) =
             self.leading.output.map_or((MainChainState::WaitingForRig, false, 0), |output| {
@@ -67,7 +63,6 @@ impl AxisController {
         }
     }
 
-    /// Values for the bus.
     pub(super) fn values(&self) -> ChainValues {
         let average_m = self.average.value();
         let demand = self.asked.as_ref().map(|asked| asked.demand);

@@ -27,29 +27,23 @@ use crate::set_point::{ForceSetPoint, ForceSource, Motion, SetPoint, SmoothWay};
 use algorithms::algorithm::Ready;
 use protocol::frames::{ForceChainState, HandSetPoint, MainChainState, MatchingChainState, RigStatus};
 
-/// What an axis does in an experiment.
 #[derive(Clone, Debug)]
 pub enum Plan {
-    /// Its valve is shut.
     Shut,
-    /// It is positioned.
     Position {
         motion: Motion,
         /// What positions given by hand keep to; `None`: none are followed.
         by_hand: Option<ByHandLimits>,
     },
-    /// It presses.
     Force(ForcePlan),
 }
 
-/// What an axis that presses does in an experiment.
 #[derive(Clone, Debug)]
 pub struct ForcePlan {
     /// Forces of the experiment, from the initial one on.
     pub source: ForceSource,
     /// How long the ramp to the initial force takes, s.
     pub initial_ramp_s: f64,
-    /// What is done before that.
     pub prepare: Vec<Prepare>,
     /// It gives way to a hand during the experiment, instead of pressing.
     pub manual: bool,
@@ -57,37 +51,31 @@ pub struct ForcePlan {
     pub by_hand: Option<ByHandLimits>,
 }
 
-/// What is asked of the program in a cycle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
     pub(super) demand: Demand,
     pub(super) hand: Hand,
 }
 
-/// What an axis sees besides its own sensors.
 pub(super) struct Seen<'a> {
     pub(super) cycle: u64,
     pub(super) rig: Option<&'a RigStatus>,
     pub(super) partner: &'a Partner,
     pub(super) still: bool,
-    /// What a person asked for since the last cycle.
     pub(super) hand: Option<HandSetPoint>,
 }
 
-/// The work of an axis, with what it remembers.
 pub(super) enum Work {
     Shut,
     Position { motion: Motion, start_m: f64, by_hand: Option<ByHand> },
     Force(Box<Pressing>),
 }
 
-/// An axis that presses.
 pub(super) struct Pressing {
     plan: ForcePlan,
     by_hand: Option<ByHand>,
     force: ForceChain,
     matching: MatchingChain,
-    /// Which step of the preparation is going on.
     step: usize,
     fault: Option<Fault>,
 }
@@ -148,7 +136,6 @@ impl Work {
         }
     }
 
-    /// What keeps the axis from what is asked of it.
     pub(super) fn error(&self, demand: &Demand, ready: &Ready) -> ControlError {
         match self {
             Self::Shut => ControlError::None,
@@ -167,7 +154,6 @@ impl Work {
         matches!(self, Self::Position { .. })
     }
 
-    /// Whether all steps of the preparation are done.
     pub(super) fn prepared(&self) -> bool {
         match self {
             Self::Force(pressing) => pressing.step >= pressing.plan.prepare.len(),
@@ -175,7 +161,6 @@ impl Work {
         }
     }
 
-    /// The fault of this cycle, if any.
     pub(super) fn fault(&mut self) -> Option<Fault> {
         match self {
             Self::Force(pressing) => pressing.fault.take(),
@@ -198,7 +183,6 @@ impl Work {
         }
     }
 
-    /// The rig's time began again.
     pub(super) fn restart(&mut self) {
         if let Self::Force(pressing) = self {
             pressing.force.restart(0);
@@ -278,7 +262,6 @@ impl Pressing {
         (needed && !self.plan.manual && !linked).then_some(Fault::NotLinked)
     }
 
-    /// The step of the preparation that is going on.
     fn preparing(&self, phase: Phase) -> Option<Prepare> {
         self.plan.prepare.get(self.step).copied().filter(|_| phase == Phase::Prepare)
     }

@@ -10,27 +10,21 @@ use protocol::frames::{
     ChainStatus, EmergencyStopChainState, EmergencyStopReason, MainChainState, RigStatus,
 };
 
-/// Nominal supply pressure, Pa.
 pub(super) const SUPPLY_PA: f64 = 7e5;
 
-/// One axis controller with what its sensors show.
 pub(super) struct One {
     pub(super) leading: Leading,
     pub(super) position_m: f64,
     pub(super) error: ControlError,
     pub(super) prepared: bool,
-    /// Sensors of this axis come.
     pub(super) sensors: bool,
     /// Its status frames reach the other.
     pub(super) heard: bool,
-    /// It runs.
     pub(super) alive: bool,
-    /// A fault that its axis tells.
     pub(super) fault: Option<Fault>,
     partner: Partner,
     pub(super) output: Option<MainOutput>,
     experiment: u8,
-    /// States as they were entered.
     pub(super) seen: Vec<(u64, MainChainState)>,
     /// It holds the emergency stop, as the rig knows it.
     holds: bool,

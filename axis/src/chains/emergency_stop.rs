@@ -46,15 +46,12 @@ const RECOVERED_SHARE: f64 = 0.9;
 /// How long the rig must have been recovered.
 const RECOVERED_S: f64 = 0.2;
 
-/// What the chain is given once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopConfig {
     pub after_emergency_stop: AfterStop,
-    /// Nominal supply pressure, absolute, Pa.
     pub supply_pressure_pa: f64,
 }
 
-/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StopInputs {
     pub cycle: u64,
@@ -62,7 +59,6 @@ pub struct StopInputs {
     pub rig: Option<RigStatus>,
     /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
     pub frame: Option<EmergencyStopReason>,
-    /// What the console said since the last cycle.
     pub console: Console,
     pub at_standstill: bool,
     /// A status of the partner came lately, or none is needed.
@@ -71,29 +67,22 @@ pub struct StopInputs {
     pub sensors_fresh: bool,
 }
 
-/// Why a state was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopCause {
     Began,
     RigRestarted,
-    /// The rig says that it is tripped.
     Rig,
     /// Somebody tripped it over the bus.
     Frame(EmergencyStopReason),
     /// This controller tripped it.
     Own(Fault),
-    /// The axis stands still.
     Standstill,
-    /// It did not stand still in time.
     NoStandstill,
-    /// Everybody has released.
     Released,
     Recovered,
-    /// The console said start.
     Started,
 }
 
-/// A stop that this controller holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Own {
     fault: Fault,
@@ -110,7 +99,6 @@ enum State {
     WaitingForStart,
 }
 
-/// What waits to be sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Frames {
     None,
@@ -119,7 +107,6 @@ enum Frames {
         next: u64,
         reason: EmergencyStopReason,
     },
-    /// One withdrawal.
     Release,
 }
 
@@ -128,12 +115,10 @@ pub struct EmergencyStopChain {
     config: StopConfig,
     state: State,
     frames: Frames,
-    /// The state entered last, when and why.
     pub(crate) entered: Entered<EmergencyStopChainState, StopCause>,
 }
 
 impl EmergencyStopChain {
-    /// A chain that is ready.
     pub fn new(config: StopConfig) -> Self {
         let entered = Entered { cycle: 0, state: EmergencyStopChainState::Ready, cause: StopCause::Began };
         Self { config, state: State::Ready, frames: Frames::None, entered }
@@ -218,7 +203,6 @@ impl EmergencyStopChain {
         inputs.rig.is_some_and(|rig| !rig.check_valves_shut && rig.supply_pressure_pa >= least_pa)
     }
 
-    /// The edge to go, if any: where to, and why.
     fn decide(&self, inputs: &StopInputs) -> Option<(EmergencyStopChainState, StopCause)> {
         use EmergencyStopChainState as S;
         let rig_tripped = inputs.rig.is_some_and(|rig| rig.emergency_stop);

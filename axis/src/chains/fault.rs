@@ -5,7 +5,6 @@
 use protocol::frames::EmergencyStopReason;
 use std::fmt;
 
-/// A named fault of one axis controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Fault {
     PartnerMissing,
@@ -42,7 +41,6 @@ impl Fault {
         Self::ControllerFault,
     ];
 
-    /// Name in files and messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::PartnerMissing => "partner-missing",
@@ -81,7 +79,6 @@ impl Fault {
         }
     }
 
-    /// What happened and what to look at.
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::PartnerMissing => {

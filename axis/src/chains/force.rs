@@ -30,11 +30,9 @@ use super::{CYCLE_S, Entered, Fault, cycles, elapsed_s};
 use protocol::frames::ForceChainState;
 use settings::parameters::declare;
 
-/// Name of the table of [`Parameters`].
 pub const TABLE: &str = "force-chain";
 
 settings::parameters! {
-    /// Parameters of the force chain.
     pub struct Parameters {
         high_force_n: declare("N", [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),
         limited_m_per_s: declare("m/s", [1e-3, 1.0], 0.02, "largest rod velocity while it is limited"),
@@ -55,52 +53,40 @@ const MEAN_VELOCITY_S: f64 = 0.15;
 /// Share of the significant velocity below which, in the mean, movement ends.
 const STILL_SHARE: f64 = 0.5;
 
-/// What the load axis is asked to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ForceAsked {
     /// Nothing: valve shut, or held still.
     #[default]
     Idle,
-    /// To relieve the linked system of stress.
     Relieve,
-    /// To give way to a hand.
     Manual,
-    /// The ramp to the initial force.
     InitialRamp,
-    /// The experiment's force.
     LoadProfile,
     /// To hold the last force.
     Done,
 }
 
-/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ForceInputs {
     pub cycle: u64,
     pub asked: ForceAsked,
-    /// Own force sensor, N.
     pub force_n: f64,
     /// Own velocity, filtered, m/s.
     pub velocity_m_per_s: f64,
 }
 
-/// What the force control must do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceOutput {
     pub state: ForceChainState,
-    /// Limit of the rod's velocity, m/s.
     pub limit_m_per_s: Option<f64>,
     pub feed_forward: bool,
-    /// The control error has its dead zone.
     pub dead_zone: bool,
     /// Set-point, N; `None` where it is the axis's own.
     pub set_force_n: Option<f64>,
-    /// The system is relieved of stress.
     pub relieved: bool,
     pub fault: Option<Fault>,
 }
 
-/// Why a state was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForceCause {
     /// The controller or the rig began.
@@ -153,7 +139,6 @@ pub struct ForceChain {
     asked: ForceAsked,
     /// Mean of the force, with the cycle of its last sample.
     mean: Option<Mean>,
-    /// The state entered last, when and why.
     pub(crate) entered: Entered<ForceChainState, ForceCause>,
 }
 
@@ -214,7 +199,6 @@ impl ForceChain {
         }
     }
 
-    /// The edge to go, if any: where to, and why.
     fn decide(&self, inputs: &ForceInputs, numbers: &Parameters) -> Option<(ForceChainState, ForceCause)> {
         use ForceChainState as S;
         let asked = inputs.asked;

@@ -13,32 +13,26 @@ use super::main::{MainChain, MainConfig, MainInputs, MainOutput, OwnAxis};
 use super::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopReason, RigStatus};
 
-/// What both are given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LeadingInputs {
     pub cycle: u64,
-    /// The rig's status if it is fresh.
     pub rig: Option<RigStatus>,
     /// Own sensors; `None` before the first, and while they are lost.
     pub own: Option<OwnAxis>,
-    /// The steps of preparing are done.
     pub prepared: bool,
     pub partner: Partner,
     /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
     pub frame: Option<EmergencyStopReason>,
-    /// What the console said since the last cycle.
     pub console: Console,
     /// A fault of the own axis that was found since the last cycle.
     pub fault: Option<Fault>,
 }
 
-/// Both chains.
 #[derive(Clone, Debug)]
 pub struct Leading {
     pub(crate) main: MainChain,
     pub(crate) stop: EmergencyStopChain,
     partner_needed: bool,
-    /// What the main chain said last.
     pub(crate) output: Option<MainOutput>,
 }
 

@@ -56,7 +56,6 @@ const APPROACH_SHORTEST_S: f64 = 0.5;
 /// For so long after a (re)start a partner that is still aborted or in fault is waited for: ten periods of its status.
 const GRACE_CYCLES: u64 = PARTNER_LOST_CYCLES;
 
-/// How a state is waited in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Wait {
     /// Last cycle in which nothing but the console's start was missing.
@@ -85,7 +84,6 @@ enum State {
     Fault { ended: Ended, fault: Fault },
 }
 
-/// An edge: where to, and why.
 type Edge = (MainChainState, MainCause);
 
 #[derive(Clone, Debug)]
@@ -99,12 +97,10 @@ pub struct MainChain {
     repetition: u32,
     /// The console's start was heard, here or by the partner.
     started: bool,
-    /// The state entered last, when and why.
     pub(crate) entered: Entered<MainChainState, MainCause>,
 }
 
 impl MainChain {
-    /// A chain that waits for the rig.
     pub fn new(config: MainConfig) -> Self {
         let entered = Entered { cycle: 0, state: MainChainState::WaitingForRig, cause: MainCause::Began };
         let settled = Settled::new(config.settled);
@@ -128,7 +124,6 @@ impl MainChain {
         self.enter(MainChainState::WaitingForRig, MainCause::RigRestarted, &inputs);
     }
 
-    /// Whether the own axis keeps still.
     pub fn still(&self) -> bool {
         self.settled.still
     }

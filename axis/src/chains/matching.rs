@@ -21,11 +21,9 @@ use super::{Entered, Fault, Partner, cycles};
 use protocol::frames::MatchingChainState;
 use settings::parameters::declare;
 
-/// Name of the table of [`Parameters`].
 pub const TABLE: &str = "matching-chain";
 
 settings::parameters! {
-    /// Parameters of the matching chain.
     pub struct Parameters {
         average_s: declare("s", [0.01, 60.0], 0.5, "time over which both positions are averaged"),
         rest_s: declare("s", [0.0, 60.0], 0.2, "how long the partner must have been at rest before"),
@@ -38,22 +36,17 @@ settings::parameters! {
 /// The partner's averaged position is taken each so many cycles, its period.
 const SAMPLE_CYCLES: u64 = 10;
 
-/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MatchingInputs {
     pub cycle: u64,
-    /// Matching is wanted.
     pub asked: bool,
-    /// The rig says that the axes are linked.
     pub linked: bool,
-    /// The own axis keeps still.
     pub still: bool,
     /// Own position sensor, without any offset, m.
     pub position_m: f64,
     pub partner: Partner,
 }
 
-/// What the chain says each cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MatchingOutput {
     pub state: MatchingChainState,
@@ -63,7 +56,6 @@ pub struct MatchingOutput {
     pub fault: Option<Fault>,
 }
 
-/// Why a state was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MatchingCause {
     /// The controller or the rig began.
@@ -78,7 +70,6 @@ pub enum MatchingCause {
     Fault(Fault),
 }
 
-/// Positions of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Positions {
     sum_m: f64,
@@ -124,7 +115,6 @@ pub struct MatchingChain {
     state: State,
     asked: bool,
     offset_m: f64,
-    /// The state entered last, when and why.
     pub(crate) entered: Entered<MatchingChainState, MatchingCause>,
 }
 
@@ -181,7 +171,6 @@ impl MatchingChain {
         }
     }
 
-    /// The edge to go, if any: where to, and why.
     fn decide(
         &self,
         inputs: &MatchingInputs,
@@ -265,7 +254,6 @@ impl MatchingChain {
     }
 }
 
-/// Where a partner that speaks says it is.
 fn partner_position_m(inputs: &MatchingInputs) -> Option<f64> {
     inputs.partner.fresh(inputs.cycle)?;
     inputs.partner.values.map(|values| values.averaged_position_m)

@@ -13,11 +13,9 @@
 use super::{cycles, elapsed_s};
 use settings::parameters::declare;
 
-/// Name of the table of [`Bounds`].
 pub const TABLE: &str = "settled";
 
 settings::parameters! {
-    /// Bounds of a settled axis.
     pub struct Bounds {
         still_m: declare("m", [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest").at_start_only(),
         position_error_m: declare("m", [1e-5, 0.5], 2e-3, "largest position error of a settled axis").at_start_only(),
@@ -28,12 +26,9 @@ settings::parameters! {
 
 /// Cycles of one bucket, and the longest gap between samples.
 const BUCKET_CYCLES: u64 = 20;
-/// Buckets of the window.
 const BUCKETS: usize = 10;
-/// Cycles of the window.
 pub const WINDOW_CYCLES: u64 = BUCKET_CYCLES * BUCKETS as u64;
 
-/// What keeps an axis from its set-point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ControlError {
     /// It has no set-point: only stillness counts.
@@ -44,7 +39,6 @@ pub enum ControlError {
     Force { error_n: f64, set_force_n: f64 },
 }
 
-/// What is known of 20 ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bucket {
     number: u64,
@@ -68,7 +62,6 @@ pub struct Settled {
 }
 
 impl Settled {
-    /// A detector that has seen nothing.
     pub fn new(bounds: Bounds) -> Self {
         Self { bounds, buckets: [None; BUCKETS], seen: None, since: None, still: false }
     }
@@ -87,7 +80,6 @@ impl Settled {
         self.since = if settled { self.since.or(Some(cycle)) } else { None };
     }
 
-    /// Forgets everything.
     pub fn clear(&mut self) {
         *self = Self::new(self.bounds);
     }
@@ -118,7 +110,6 @@ impl Settled {
         bucket.samples += 1.0;
     }
 
-    /// The buckets that are not older than the window.
     fn window(&self, cycle: u64) -> impl Iterator<Item = &Bucket> {
         let number = cycle / BUCKET_CYCLES;
         self.buckets.iter().flatten().filter(move |bucket| bucket.number + BUCKETS as u64 > number)

@@ -20,20 +20,15 @@ const STATES: i32 = 6;
 pub(super) enum Relation {
     /// Not heard, or not lately.
     Silent,
-    /// It aborted.
     Aborted,
-    /// It has a fault.
     Fault,
     /// It is where only a chain that began anew can be.
     Restarted,
-    /// One state behind.
     Behind,
     /// In the same state, and whether it is ready to leave.
     Here {
-        /// Its OK flag.
         ok: bool,
     },
-    /// In a later state.
     Ahead,
 }
 

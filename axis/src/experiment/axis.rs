@@ -28,7 +28,6 @@ use settings::parameters::Parameter;
 use settings::{Section, SettingsError};
 use std::path::{Path, PathBuf};
 
-/// What one axis does.
 #[derive(Clone, Debug)]
 pub struct AxisExperiment {
     pub program: ProgramReference,
@@ -36,7 +35,6 @@ pub struct AxisExperiment {
     pub start_m: Option<f64>,
     /// What is done after initial positioning, in this order.
     pub prepare: Vec<Prepare>,
-    /// How long the initial force is ramped to, s.
     pub initial_ramp_s: f64,
     /// A hand leads the axis during the experiment, under force control with set-point zero, instead of its set-points.
     pub manual: bool,
@@ -47,16 +45,13 @@ pub struct AxisExperiment {
     pub changes: Vec<Change>,
 }
 
-/// A program as the experiment names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProgramReference {
-    /// Name or path as written.
     pub written: String,
     /// Line in the experiment file, from 1.
     pub line: usize,
 }
 
-/// A step of the preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prepare {
     /// Relieve the linked system of stress.
@@ -74,7 +69,6 @@ pub struct ByHandLimits {
     pub range: [f64; 2],
 }
 
-/// Set-points of an axis.
 #[derive(Clone, Debug)]
 pub enum SetPoints {
     Positions(Motion),
@@ -98,7 +92,6 @@ impl SetPoints {
     }
 }
 
-/// A parameter of the axis's program that changes while running.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     /// When, s after the experiment began.

@@ -46,7 +46,6 @@ type Section = BTreeMap<String, Spanned<toml::Value>>;
 /// Texts of a program by their full key, such as `algorithm.name`.
 pub type Makings = BTreeMap<String, String>;
 
-/// Full key of the linearisation.
 const LINEARISATION: &str = "post-controller.linearisation";
 
 #[derive(Deserialize)]
@@ -67,7 +66,6 @@ struct File {
     settled: Section,
 }
 
-/// A program file as it was read, for records.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Source {
     pub path: PathBuf,
@@ -76,7 +74,6 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads the file.
     pub fn read(path: &Path) -> Result<Self, ProgramError> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| ProgramError(format!("cannot read {}: {error}", path.display())))?;

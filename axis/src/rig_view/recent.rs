@@ -8,7 +8,6 @@ const LATEST: u64 = 3;
 /// What a frame of sensors is to those of its axis that came before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Coming {
-    /// It is of a later cycle.
     Newer,
     /// It was missing, and comes after newer ones.
     Late,

@@ -11,7 +11,6 @@ fn sensors(cycle: u64) -> Sensors {
     Sensors { alive: (cycle % 16) as u8, position_m: cycle as f64, ..Sensors::default() }
 }
 
-/// The sensors of both axes.
 fn take_both(view: &mut RigView, cycle: u64) {
     Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
 }

@@ -31,23 +31,17 @@ use std::sync::Arc;
 /// Loads that depend on what the axis does.
 pub const KINDS: &[Kind] = &[spring::KIND, damper::KIND, mass::KIND, dry_friction::KIND];
 
-/// A kind of load.
 pub struct Kind {
-    /// Its name in files.
     pub name: &'static str,
-    /// What it does, in a few words.
     pub about: &'static str,
-    /// Reads one from its table.
     pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Load>, SettingsError>,
 }
 
-/// A force that depends on what the axis does.
 pub trait Load: fmt::Debug + Send + Sync {
     /// What it adds to its base force, N, and the rate of that, N/s.
     fn at(&self, actual: &Actual) -> [f64; 2];
 }
 
-/// One segment of a profile.
 #[derive(Clone, Debug)]
 pub(super) enum Segment {
     Timed(Arc<dyn Law>),
@@ -66,7 +60,6 @@ impl Lasting for Segment {
 }
 
 impl Segment {
-    /// Reads the load of a segment's table.
     pub(super) fn read_load(kind: &Kind, given: &mut Given<'_, '_>) -> Result<Self, SettingsError> {
         let load = (kind.read)(given)?;
         let base = Parameter::new(
@@ -92,12 +85,10 @@ impl ForceProfile {
         Self { row: Row::new(initial_force_n, segments), limit_n }
     }
 
-    /// How long it takes, s.
     pub fn duration_s(&self) -> f64 {
         self.row.duration_s()
     }
 
-    /// The force that it begins with, N.
     pub fn initial_force_n(&self) -> f64 {
         self.row.start()
     }
@@ -116,13 +107,11 @@ impl ForceProfile {
     }
 }
 
-/// What a profile remembers from cycle to cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Memory {
     /// Segment that is being driven, and what has happened in it.
     segment: Option<usize>,
     crossing: at_position::Crossing,
-    /// The force of the last cycle, N.
     last_n: Option<f64>,
 }
 
@@ -134,17 +123,14 @@ pub struct ForceSource {
 }
 
 impl ForceSource {
-    /// At its beginning.
     pub fn new(profile: ForceProfile) -> Self {
         Self { profile: Arc::new(profile), memory: Memory::default() }
     }
 
-    /// Begins anew.
     pub fn reset(&mut self) {
         self.memory = Memory::default();
     }
 
-    /// What is being driven.
     pub fn profile(&self) -> &ForceProfile {
         &self.profile
     }

@@ -26,19 +26,13 @@ pub const KINDS: &[Kind] = &[
     table::KIND,
 ];
 
-/// A kind of law.
 pub struct Kind {
-    /// Its name in files.
     pub name: &'static str,
-    /// What it does, in a few words.
     pub about: &'static str,
-    /// What its row may be of.
     pub serves: &'static [Quantity],
-    /// Reads one from its table.
     pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError>,
 }
 
-/// Laws of both.
 pub(super) const BOTH: &[Quantity] = &[Quantity::Position, Quantity::Force];
 
 /// A value over time, from where the row stands.
@@ -49,7 +43,6 @@ pub trait Law: fmt::Debug + Send + Sync {
     fn extent(&self) -> Extent;
 }
 
-/// How long a law takes, where it ends and how far it goes.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
     pub(super) duration_s: f64,
@@ -134,9 +127,7 @@ impl fmt::Debug for Shaped {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
     pub(crate) quantity: Quantity,
-    /// Length of the stroke, m.
     pub(crate) stroke_m: f64,
-    /// Largest force, N.
     pub(crate) force_limit_n: f64,
 }
 
@@ -157,7 +148,6 @@ impl Scale {
     }
 }
 
-/// How long a segment may be.
 const LONGEST_S: f64 = 86_400.0;
 
 /// The table of one segment, and where its row stands.
@@ -186,12 +176,10 @@ impl Given<'_, '_> {
         Parameter { name: name.into(), ..parameter }
     }
 
-    /// The `duration_s` that must be given.
     pub(crate) fn duration_s(&mut self, least_s: f64) -> Result<f64, SettingsError> {
         self.number(&Parameter::new(("duration_s", "s"), [least_s, LONGEST_S], 1.0, "how long it takes"))
     }
 
-    /// A number that must be given.
     pub(crate) fn number(&mut self, parameter: &Parameter) -> Result<f64, SettingsError> {
         self.section.needed_number(parameter)
     }

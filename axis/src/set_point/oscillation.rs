@@ -57,7 +57,6 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
-    /// Reads all but the frequencies.
     pub(super) fn read(
         given: &mut Given<'_, '_>,
         [from_hz, to_hz]: [f64; 2],

@@ -112,7 +112,6 @@ fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, Settings
     Err(given.section.wrong_at("law", &said))
 }
 
-/// The laws of a row of this quantity, for messages.
 fn names(quantity: Quantity) -> String {
     let timed = law::KINDS.iter().filter(|kind| kind.serves.contains(&quantity)).map(|kind| kind.name);
     let loads = force::KINDS.iter().filter(|_| quantity == Quantity::Force).map(|kind| kind.name);

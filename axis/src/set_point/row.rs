@@ -6,7 +6,6 @@ use std::sync::Arc;
 /// Sums of decimal fractions carry roundings: a segment begins a nanosecond early, so that it never misses its cycle of 1 ms.
 pub(super) const ROUNDING_S: f64 = 1e-9;
 
-/// What a row is made of.
 pub(super) trait Lasting {
     /// How long it takes, s, and the value from its end on.
     fn duration_and_end(&self) -> (f64, f64);
@@ -43,7 +42,6 @@ impl<S: Lasting> Row<S> {
         Self { start, segments, until_s, end }
     }
 
-    /// Which segment `time_s` lies in.
     pub(super) fn place(&self, time_s: f64) -> Place<'_, S> {
         if time_s < -ROUNDING_S {
             return Place::Before;
@@ -75,7 +73,6 @@ impl<S: Lasting> Row<S> {
     }
 }
 
-/// Where in a row a time lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Place<'a, S> {
     Before,

@@ -39,7 +39,6 @@ pub const CONSTANT: Kind = Kind {
     },
 };
 
-/// A jump and the hold after it.
 #[derive(Debug)]
 struct Step {
     from: f64,

@@ -21,13 +21,11 @@ use std::sync::Arc;
 pub const KIND: Kind =
     Kind { name: "table", about: "a course of its own, from a CSV file", serves: BOTH, read };
 
-/// The column of times.
 const TIME: &str = "time_s";
 /// The columns of values, and what they are.
 const COLUMNS: [(&str, Quantity); 2] = [("position_m", Quantity::Position), ("force_N", Quantity::Force)];
 /// How far the first position may be off the place where the row stands: below what a sensor shows.
 const START_TOLERANCE_M: f64 = 1e-5;
-/// Points that a file may hold.
 const MOST_POINTS: usize = 1_000_000;
 
 fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {

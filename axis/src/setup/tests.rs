@@ -25,16 +25,10 @@ fn controllers(experiment: &str, load: &str, set: &[&str]) -> Result<Vec<AxisCon
     };
     let (_, _) = (write("drive.toml", DRIVE), write("load.toml", load));
     let inputs = Inputs::read(&FileArguments {
-        parameters: None,
         rig: concat!(env!("CARGO_MANIFEST_DIR"), "/../plant/rig.toml").into(),
         experiment: write("experiment.toml", experiment),
-        out: "unused".into(),
-        programs: None,
-        drive_program: None,
-        load_program: None,
         set: set.iter().map(|set| (*set).to_owned()).collect(),
-        repeat: false,
-        after_emergency_stop: None,
+        ..FileArguments::default()
     });
     let inputs = inputs.map_err(|error| error.to_string())?;
     let made = Axis::ALL.map(|axis| inputs.controller(axis, MODE).map_err(|error| error.to_string()));

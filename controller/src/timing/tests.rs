@@ -340,7 +340,6 @@ fn what_finds_no_room_is_counted() {
     assert_eq!(bench.stopwatch.finish(), StopwatchAccount { dropped: 16, before_start: 0 });
 }
 
-/// The controllers of both axes on a bus.
 fn both_axes() -> ControllerNode {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = |name: &str| root.join(name).display().to_string();

@@ -8,7 +8,6 @@ use protocol::frames::{DRIVE_VALVE_COMMAND, LOAD_VALVE_COMMAND};
 use realtime::Clock;
 use std::time::Duration;
 
-/// A bus under a stopwatch.
 pub(crate) struct TimedBus<'a, C> {
     stopwatch: &'a mut Stopwatch<C>,
     bus: &'a mut dyn Bus,

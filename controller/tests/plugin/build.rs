@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use plugin::{TRIAL_LIMIT, Trier};
 
-/// A folder with libraries.
 pub(crate) struct Libraries(tempfile::TempDir);
 
 impl Libraries {
@@ -15,7 +14,6 @@ impl Libraries {
         Self(tempfile::tempdir().expect("a folder"))
     }
 
-    /// A place for `name`.
     pub(crate) fn place(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }

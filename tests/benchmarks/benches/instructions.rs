@@ -42,7 +42,6 @@ fn moving_with(on: impl Fn(&Sheet) -> bool) -> (Plant, Vec<Inputs>) {
     (plant, record.inputs[2000..].to_vec())
 }
 
-/// One effect alone.
 fn moving_with_one(name: &str) -> (Plant, Vec<Inputs>) {
     moving_with(|sheet| sheet.name == name)
 }
@@ -52,7 +51,6 @@ fn moving_with_ten() -> (Plant, Vec<Inputs>) {
     moving_with(|sheet| SHEETS.iter().step_by(4).any(|fourth| fourth.name == sheet.name))
 }
 
-/// A plant at rest.
 fn resting() -> (Plant, Vec<Inputs>) {
     let rig = RigParameters::baseline();
     let plant = Plant::new(&rig, &Setup { linked: true, ..Setup::default() }).expect("a good setup");

@@ -34,12 +34,10 @@ unsafe extern "C" {
 #[derive(Clone, Debug)]
 pub struct Floor {
     constants: Vec<u64>,
-    /// Drive and load.
     pub axes: [FloorAxis; 2],
 }
 
 impl Floor {
-    /// The plant of `rig` in the state `axes`.
     pub fn new(rig: &RigParameters, axes: &[AxisState; 2]) -> Self {
         let (supply, gas, valve) = (rig.supply(), rig.gas(), rig.valve());
         let (cylinder, friction, mass, linkage) = (rig.cylinder(), rig.friction(), rig.mass(), rig.linkage());

@@ -9,7 +9,8 @@ use system_tests::disturb::{self, Disturbance};
 
 fn main() -> ExitCode {
     let runs: u32 = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(10);
-    let kinds: Vec<_> = Disturbance::ALL.into_iter().filter(|kind| is_root() || !kind.needs_root()).collect();
+    let kinds = Disturbance::ALL.into_iter().map(|(kind, _)| kind);
+    let kinds: Vec<_> = kinds.filter(|kind| is_root() || !kind.needs_root()).collect();
     let mut counts: BTreeMap<(Disturbance, String), u32> = BTreeMap::new();
     let began = Instant::now();
     let all = runs * kinds.len() as u32;

@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use system_tests::noise::{self, Outcome};
 use system_tests::pairs::{self, Figure};
 
-/// Frames of noise each second.
 const PER_SECOND: u32 = 10_000;
 
 const FIGURES: [Figure<Outcome>; 6] = [
@@ -26,11 +25,14 @@ fn main() -> ExitCode {
         pairs,
         |with, pair| noise::run(seconds, if with { PER_SECOND } else { 0 }, u64::from(pair)),
         |without, with| {
-            format!("missed {} without, {} with; wrong openings {}", without.missed, with.missed, with.wrong)
+            format!(
+                "missed {} without, {} with; wrong openings {}",
+                without.missed, with.missed, with.obeyed.wrong
+            )
         },
     );
     print(&runs, seconds);
-    ExitCode::from(u8::from(runs.iter().any(|(_, with)| with.wrong > 0)))
+    ExitCode::from(u8::from(runs.iter().any(|(_, with)| with.obeyed.wrong > 0)))
 }
 
 #[allow(clippy::print_stdout)] // the table is the result
@@ -47,10 +49,10 @@ fn print(runs: &[(Outcome, Outcome)], seconds: u32) {
         sum(|with| with.sent.frames),
         sum(|with| with.malformed),
         sum(|with| with.unknown),
-        sum(|with| with.openings as u64),
-        sum(|with| with.wrong as u64),
-        sum(|with| with.shut as u64),
+        sum(|with| with.obeyed.openings as u64),
+        sum(|with| with.obeyed.wrong as u64),
+        sum(|with| with.obeyed.shut as u64),
         sum(|with| with.stale),
-        runs.iter().map(|(without, _)| without.shut).sum::<usize>()
+        runs.iter().map(|(without, _)| without.obeyed.shut).sum::<usize>()
     );
 }

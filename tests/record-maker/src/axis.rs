@@ -53,7 +53,6 @@ pub(super) struct Axis {
     dead_m3: [f64; 2],
 }
 
-/// What the air does at an instant.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Air {
     pub(super) pressure_pa: [f64; 2],

@@ -105,9 +105,6 @@ fn next_row(rehearsal: &mut Rehearsal<Made>) -> Result<Row, MakeError> {
 
 /// The recipe's rig under given valve commands of drive and load, one pair for each row: what the record would have been with
 /// other hidden effects under the same inputs. The valve of an axis that rests stays shut.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn replay(recipe: &Recipe, rig: &RigParameters, valves: &[[f64; 2]]) -> Result<Record, MakeError> {
     replay_with(recipe, rig, valves, STEPS_PER_MS)
 }
@@ -196,16 +193,11 @@ fn read(recipe: &Recipe, rig: &RigParameters) -> Result<(Inputs, Scene), MakeErr
     let moved = Axis::ALL.into_iter().filter(|axis| recipe.both_axes || *axis == recipe.axis);
     let set = unsettled(moved);
     let files = FileArguments {
-        parameters: None,
         rig: workspace().join("plant/rig.toml"),
         experiment,
-        out: PathBuf::new(),
         programs: Some(workspace().join("controller/programs")),
-        drive_program: None,
-        load_program: None,
         set,
-        repeat: false,
-        after_emergency_stop: None,
+        ..FileArguments::default()
     };
     let mut inputs = Inputs::read(&files)?;
     inputs.rig = rig.without_effects();
@@ -226,7 +218,6 @@ fn scene(experiment_toml: &str, file: &str, rig: &RigParameters) -> Result<Scene
     }
 }
 
-/// The rig of a recipe as a rehearsal moves it.
 pub(super) struct Made {
     pub(super) rig: Rig,
     pub(super) state: State,

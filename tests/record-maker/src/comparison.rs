@@ -13,7 +13,6 @@ use super::closed_loop::{replay_windows, run};
 use super::{MakeError, Recipe, Record, Row};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup, SetupError, State};
 
-/// Length of a window, rows.
 pub const WINDOW: usize = 100;
 
 /// Names of the signals of an axis, in the order of [`Row::without_noise`].
@@ -117,6 +116,24 @@ pub fn against_plant(record: &Record, rig: &RigParameters, rows: usize) -> Resul
     Ok(differences)
 }
 
+/// Rms of two differences from a null, and their cosine, over the signals of the first `axes` in units of the noise.
+pub fn from_null(null: &Record, one: &Record, other: &Record, axes: usize) -> [f64; 3] {
+    const NOISE: [f64; 4] = [20e-6, 0.5, 400.0, 400.0];
+    let [mut one_one, mut other_other, mut product] = [0.0; 3];
+    for ((null, one), other) in null.rows.iter().zip(&one.rows).zip(&other.rows) {
+        for (axis, signal) in (0..4 * axes).map(|i| (i / 4, i % 4)) {
+            let zero = null.without_noise[axis][signal];
+            let a = (one.without_noise[axis][signal] - zero) / NOISE[signal];
+            let b = (other.without_noise[axis][signal] - zero) / NOISE[signal];
+            one_one += a * a;
+            other_other += b * b;
+            product += a * b;
+        }
+    }
+    let count = (4 * axes * null.rows.len()) as f64;
+    [(one_one / count).sqrt(), (other_other / count).sqrt(), product / (one_one * other_other).sqrt()]
+}
+
 /// Noise of position, force and pressures, SI.
 fn noises(rig: &RigParameters) -> [f64; 4] {
     let sensors = rig.sensors();
@@ -175,9 +192,6 @@ pub fn with_effects(
 
 /// What halving the step changes: rms of the null record with so many steps in a millisecond against twice as many, in windows of
 /// equal start, in units of the noise; for drive and load and their signals.
-///
-/// # Errors
-/// As [`super::simulate`].
 pub fn of_halved_step(
     recipe: &Recipe,
     rig: &RigParameters,

@@ -12,9 +12,7 @@ use std::path::Path;
 /// A column: its name, and its value in a row of an axis.
 type Column = (&'static str, fn(&Row, usize) -> f64);
 
-/// Columns of an axis after its prefix, as in every measurement file.
 const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
-/// Columns of an axis in the truth.
 const TRUE: [Column; 21] = [
     ("extension_m", |row, i| row.axes[i].extension_m),
     ("rod_velocity_m_per_s", |row, i| row.axes[i].rod_velocity_m_per_s),
@@ -48,9 +46,6 @@ pub fn make(recipe: &Recipe, rig: &RigParameters, measurement: &Path, truth: &Pa
 }
 
 /// Writes a record's files into both folders, which are made if missing.
-///
-/// # Errors
-/// [`MakeError::File`].
 pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), MakeError> {
     save(measurement, "measurement.csv", &measurement_csv(record))?;
     save(truth, "truth.csv", &truth_csv(record))?;
@@ -60,9 +55,6 @@ pub fn write(record: &Record, measurement: &Path, truth: &Path) -> Result<(), Ma
 }
 
 /// Writes what the sensors read alone into a folder, which is made if missing.
-///
-/// # Errors
-/// [`MakeError::File`].
 pub fn write_measurement(record: &Record, folder: &Path, name: &str) -> Result<(), MakeError> {
     save(folder, name, &measurement_csv(record))
 }
@@ -79,7 +71,6 @@ fn recorded(record: &Record) -> impl Iterator<Item = Axis> + use<> {
     Axis::ALL.into_iter().filter(move |axis| both || *axis == one)
 }
 
-/// `measurement.csv`.
 pub(super) fn measurement_csv(record: &Record) -> Vec<u8> {
     let mut out = Vec::with_capacity(record.rows.len() * 64);
     put(&mut out, format_args!("# linked={} added_mass_kg={}\ntime_s", record.linked, record.added_mass_kg));

@@ -94,7 +94,6 @@ impl Default for Recipe {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hidden {
-    /// Name of its sheet.
     pub name: &'static str,
     pub place: Place,
     /// One number for each key of its sheet, in the file's units.
@@ -114,7 +113,6 @@ pub enum Experiment {
 pub struct Record {
     pub recipe: Recipe,
     pub linked: bool,
-    /// Weights on the carriage, kg.
     pub added_mass_kg: f64,
     /// One for each millisecond.
     pub rows: Vec<Row>,
@@ -131,7 +129,6 @@ pub struct Row {
     /// The same at the nominal time without noise and rounding: position m, force N, pressures Pa. Sensor effects are in it.
     pub without_noise: [[f64; 4]; 2],
     pub axes: [TrueAxis; 2],
-    /// True pressure of the supply node, Pa.
     pub supply_pressure_pa: f64,
     /// F_c, N, positive in +x on the carriage.
     pub contact_force_n: f64,
@@ -164,7 +161,6 @@ pub struct TrueAxis {
     pub friction_n: f64,
 }
 
-/// Why a record cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
     #[error("{name} = {factor}: allowed are the names {PARAMETERS:?}, with factors from 0.5 to 2")]

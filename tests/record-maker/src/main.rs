@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout)] // This is what it is for.
 
 use plant::effects::SHEETS;
+use plant::effects::sheet::{EffectKey, Sheet};
 use plant::{Axis, RigParameters};
 use record_maker::{Experiment, Hidden, ROWS, Recipe, comparison, simulate, write};
 use std::error::Error;
@@ -38,6 +39,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
+/// An effect at its first place with each key at this end of the drawn range.
+fn at_end(sheet: &Sheet, end: usize) -> Recipe {
+    let numbers = sheet.keys.iter().map(|key| key.drawn[end]).collect();
+    let hidden = vec![Hidden { name: sheet.name, place: sheet.place.places()[0], numbers }];
+    Recipe { hidden, both_axes: sheet.name.starts_with("coupling"), ..Recipe::default() }
+}
+
 /// Each effect in the record maker against the same effect in the plant, as Markdown: free runs, in units of the noise.
 fn agree() -> Result<(), Box<dyn Error>> {
     const ROWS_COMPARED: [usize; 3] = [2000, 6000, 10_000];
@@ -47,14 +55,10 @@ fn agree() -> Result<(), Box<dyn Error>> {
     );
     for sheet in SHEETS {
         for end in [0, 1] {
-            let place = sheet.place.places()[0];
-            let both_axes = sheet.name.starts_with("coupling");
-            let numbers: Vec<f64> = sheet.keys.iter().map(|key| key.drawn[end]).collect();
-            let keys: Vec<_> =
-                sheet.keys.iter().zip(&numbers).map(|(key, number)| (key.name, *number)).collect();
-            let with_it = rig.with_effect(sheet.name, &place.to_string(), &keys)?;
-            let hidden = vec![Hidden { name: sheet.name, place, numbers }];
-            let record = simulate(&Recipe { hidden, both_axes, ..Recipe::default() }, &rig)?;
+            let recipe = at_end(sheet, end);
+            let keys: Vec<_> = sheet.keys.iter().map(|key| (key.name, key.drawn[end])).collect();
+            let with_it = rig.with_effect(sheet.name, &recipe.hidden[0].place.to_string(), &keys)?;
+            let record = simulate(&recipe, &rig)?;
             let cell = |rig: &RigParameters, rows: usize| {
                 let rms = comparison::with_effects(&record, rig, rows);
                 rms.map_or_else(
@@ -70,7 +74,6 @@ fn agree() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What halving the step changes, as Markdown.
 fn steps() -> Result<(), Box<dyn Error>> {
     let rig = RigParameters::baseline();
     println!("| step | record | position | force | pressure a | pressure b |\n|---|---|---|---|---|---|");
@@ -94,34 +97,14 @@ fn forms() -> Result<(), Box<dyn Error>> {
     println!("| effect | end | catalogue | foreign | cosine |\n|---|---|---|---|---|");
     for sheet in SHEETS {
         for end in [0, 1] {
-            let place = sheet.place.places()[0];
-            let both_axes = sheet.name.starts_with("coupling");
-            let numbers: Vec<f64> = sheet.keys.iter().map(|key| key.drawn[end]).collect();
-            let hidden = vec![Hidden { name: sheet.name, place, numbers }];
-            let recipe = Recipe { hidden, both_axes, ..Recipe::default() };
+            let recipe = at_end(sheet, end);
+            let null = &null[usize::from(recipe.both_axes)];
             let made = simulate(&recipe, &rig);
             let foreign = simulate(&Recipe { foreign_form: true, ..recipe }, &rig);
             match (made, foreign) {
                 (Ok(made), Ok(foreign)) => {
-                    let null = &null[usize::from(both_axes)];
-                    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
-                    for ((one, other), base) in made.rows.iter().zip(&foreign.rows).zip(&null.rows) {
-                        for signal in 0..4 {
-                            let noise = [2e-5, 0.5, 400.0, 400.0][signal];
-                            let zero = base.without_noise[0][signal];
-                            let a = (one.without_noise[0][signal] - zero) / noise;
-                            let b = (other.without_noise[0][signal] - zero) / noise;
-                            (aa, bb, ab) = (aa + a * a, bb + b * b, ab + a * b);
-                        }
-                    }
-                    let n = 80000.0_f64;
-                    println!(
-                        "| {} | {end} | {:.2} | {:.2} | {:.2} |",
-                        sheet.name,
-                        (aa / n).sqrt(),
-                        (bb / n).sqrt(),
-                        ab / (aa * bb).sqrt()
-                    );
+                    let [made, foreign, cosine] = comparison::from_null(null, &made, &foreign, 1);
+                    println!("| {} | {end} | {made:.2} | {foreign:.2} | {cosine:.2} |", sheet.name);
                 }
                 (made, foreign) => {
                     println!("| {} | {end} | {:?} | {:?} |", sheet.name, made.err(), foreign.err())
@@ -213,7 +196,7 @@ fn hidden(name: &str, place: &str, values: &str) -> Result<Hidden, Box<dyn Error
     let sheet = plant::effects::sheet(name).ok_or_else(|| format!("no effect {name}; see `list`"))?;
     let place = sheet.place_named(place).ok_or_else(|| format!("{name} is not at {place}; see `list`"))?;
     let given = values.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>()?;
-    let number = |(index, key): (usize, &plant::effects::sheet::EffectKey)| {
+    let number = |(index, key): (usize, &EffectKey)| {
         given.get(index).copied().or(key.default).ok_or_else(|| format!("{name}: {} is missing", key.name))
     };
     let numbers = sheet.keys.iter().enumerate().map(number).collect::<Result<_, _>>()?;

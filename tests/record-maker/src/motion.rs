@@ -32,7 +32,6 @@ pub(super) struct MotionLaws {
     pub(super) stop_n_per_m: Option<f64>,
 }
 
-/// Friction and forces of one axis.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     pub(super) laws: MotionLaws,
@@ -46,13 +45,11 @@ pub(super) struct Motion {
     micro_damping_n_s_per_m: f64,
 }
 
-/// Where friction is asked for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct At {
     pub(super) extension_m: f64,
     /// Sum of both gauge pressures, Pa.
     pub(super) gauge_pa: f64,
-    /// How long the piston has been at rest, s.
     pub(super) rest_s: f64,
 }
 

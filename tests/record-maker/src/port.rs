@@ -150,7 +150,6 @@ pub(super) struct Node {
     pub(super) passage: Passage,
 }
 
-/// How a node is joined to what is outside.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Passage {
     /// An orifice of this conductance, m^3/s per Pa.

@@ -62,7 +62,6 @@ struct Line {
     leaves: [f64; 2],
 }
 
-/// What an evaluation of all laws gives.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evaluated {
     pub(super) rates: [Y; 2],
@@ -376,7 +375,6 @@ impl Rig {
     }
 }
 
-/// A state as the laws see it.
 struct Instant<'a> {
     y: &'a [Y; 2],
     bristles: [f64; 2],

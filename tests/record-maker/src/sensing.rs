@@ -34,7 +34,6 @@ pub(super) struct Sensing {
     lags: [[Option<Lag>; 3]; CHANNELS],
     before: [f64; CHANNELS],
     ring: Vec<[f64; CHANNELS]>,
-    /// Steps seen.
     steps: usize,
     noise: [Noise; CHANNELS],
 }

@@ -88,24 +88,6 @@ fn all_effects_of_an_axis_together_keep_the_rig_a_rig() {
     }
 }
 
-/// Rms of two differences from a null, and their cosine, over all signals in units of the noise.
-fn differences(null: &Record, one: &Record, other: &Record) -> [f64; 3] {
-    const NOISE: [f64; 4] = [20e-6, 0.5, 400.0, 400.0];
-    let [mut one_one, mut other_other, mut product] = [0.0; 3];
-    for ((null, one), other) in null.rows.iter().zip(&one.rows).zip(&other.rows) {
-        for (axis, signal) in (0..8).map(|i| (i / 4, i % 4)) {
-            let zero = null.without_noise[axis][signal];
-            let a = (one.without_noise[axis][signal] - zero) / NOISE[signal];
-            let b = (other.without_noise[axis][signal] - zero) / NOISE[signal];
-            one_one += a * a;
-            other_other += b * b;
-            product += a * b;
-        }
-    }
-    let count = (8 * null.rows.len()) as f64;
-    [(one_one / count).sqrt(), (other_other / count).sqrt(), product / (one_one * other_other).sqrt()]
-}
-
 #[test]
 fn a_foreign_form_differs_from_the_catalogues_and_means_the_same() {
     let valves = commands(1500);
@@ -117,7 +99,7 @@ fn a_foreign_form_differs_from_the_catalogues_and_means_the_same() {
         let own = replay(&recipe, &rig(), &valves).unwrap();
         let foreign = replay(&Recipe { foreign_form: true, ..recipe.clone() }, &rig(), &valves).unwrap();
         let null = &null[usize::from(recipe.both_axes)];
-        let [one, other, cosine] = differences(null, &own, &foreign);
+        let [one, other, cosine] = comparison::from_null(null, &own, &foreign, 2);
         let name = sheet.name;
         assert!(
             own.rows.iter().zip(&foreign.rows).any(|(a, b)| a.without_noise != b.without_noise),
@@ -197,7 +179,7 @@ fn halving_the_step_changes_next_to_nothing_with_the_stiffest_effects() {
         let own = replay_with(&recipe, &rig(), &valves, STEPS_PER_MS).unwrap();
         let halved = replay_with(&recipe, &rig(), &valves, 2 * STEPS_PER_MS).unwrap();
         let null = Record { rows: own.rows.clone(), ..own.clone() };
-        let [_, rms, _] = differences(&null, &own, &halved);
+        let [_, rms, _] = comparison::from_null(&null, &own, &halved, 2);
         // A free run under given commands, where what was missed once stays: a fifth of the noise.
         assert!(rms < 0.2, "{name}: {rms}");
     }

@@ -37,7 +37,6 @@ const PARAMETER_FACTOR: f64 = 1.05;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Member {
-    /// Name of the effect, or `parameter:…`.
     pub effect: String,
     /// Where it is; nothing for a parameter.
     #[serde(rename = "where")]
@@ -64,7 +63,6 @@ pub struct HiddenClass {
 pub struct DrawClasses {
     pub schema_version: u32,
     pub number: usize,
-    /// One for each hidden effect.
     pub hidden: Vec<HiddenClass>,
 }
 
@@ -73,7 +71,6 @@ pub struct DrawClasses {
 #[serde(deny_unknown_fields)]
 pub struct Classes {
     pub plan: Plan,
-    /// One for each draw that hides something.
     pub draws: Vec<DrawClasses>,
 }
 

@@ -14,7 +14,6 @@ use crate::score::Score;
 use crate::score::tables::{Line, Split, Spread};
 use std::fmt::Write;
 
-/// Why scores cannot stand side by side.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
     #[error("nothing to compare: give LABEL@FOLDER, once for each program")]
@@ -214,7 +213,6 @@ pub(crate) fn verdicts(split: &LeftSplit) -> String {
     reported.join(", ")
 }
 
-/// A table in Markdown.
 pub(crate) fn grid(heads: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     // A bar within a cell would end it.
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));

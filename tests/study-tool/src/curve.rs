@@ -23,7 +23,6 @@ mod picture;
 /// Ends of the bins of amplitude, in limits; below the first and above the last there is one each.
 const ENDS: [f64; 6] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 
-/// Why there are no curves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CurveError {
     #[error("nothing to draw: give LABEL@FOLDER, once for each noise factor")]
@@ -36,13 +35,11 @@ pub enum CurveError {
     Picture(String),
 }
 
-/// A curve: its name, and a rate at each place.
 pub(crate) struct Curve {
     pub(crate) name: String,
     pub(crate) points: Vec<(f64, Rate)>,
 }
 
-/// All curves of some scores.
 pub struct Curves<'a> {
     /// By their noise; of the amplitudes as they are drawn.
     scores: Vec<&'a Score>,

@@ -52,7 +52,6 @@ fn told_excited(limit: &Limit) -> &'static str {
     if limit.excited { "" } else { "not excited" }
 }
 
-/// Three significant digits.
 fn digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -64,7 +63,6 @@ fn digits(value: f64) -> String {
 
 /// The table of twins: for each effect with whom, in how many of its draws, and the largest cosine of all.
 pub fn twin_table(classes: &Classes) -> String {
-    /// What is reported of an effect.
     #[derive(Default)]
     struct Row<'a> {
         draws: usize,

@@ -30,15 +30,10 @@ pub const ALONE: [&str; 4] =
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
-    /// Draws of each effect.
     pub each: u32,
-    /// Draws with nothing hidden.
     pub nulls: u32,
-    /// Draws of each parameter of [`ALONE`].
     pub parameters: u32,
-    /// Draws of two effects.
     pub pairs: u32,
-    /// Draws of three effects.
     pub triples: u32,
     /// Noise of all records; 1 is as specified.
     pub noise_factor: f64,
@@ -67,7 +62,6 @@ impl Shape {
         noise_factor: 1.0,
         weaker_factor: 1.0,
     };
-    /// Something of each kind.
     pub(crate) const SMALL: Shape =
         Shape { each: 1, nulls: 2, parameters: 1, pairs: 1, triples: 1, ..Shape::NO_DRAW };
 }
@@ -86,11 +80,9 @@ impl Default for Shape {
     }
 }
 
-/// What a draw is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// One effect of the catalogue.
     Single,
     /// Nothing hidden; parameters of the baseline may be off by little.
     Null,
@@ -110,7 +102,6 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// The recipe of one of its three records.
     pub fn recipe(&self, experiment: Experiment) -> Recipe {
         Recipe { experiment, ..self.recipe.clone() }
     }
@@ -177,7 +168,6 @@ impl Generator {
         Generator(Pcg64::seed_from_u64(own))
     }
 
-    /// Uniform in [0, 1).
     fn share(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }

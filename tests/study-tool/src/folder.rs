@@ -58,7 +58,6 @@ impl Plan {
     }
 }
 
-/// Why a study's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     #[error("{path}: {error}")]
@@ -72,7 +71,6 @@ impl FolderError {
         move |error| FolderError::File { path: path.display().to_string(), error }
     }
 
-    /// A file whose content is wrong.
     pub(crate) fn content(path: &Path, what: impl ToString) -> Self {
         FolderError::Content { path: path.display().to_string(), what: what.to_string() }
     }
@@ -123,7 +121,6 @@ impl Study {
         self.root.join("truth").join(name(number))
     }
 
-    /// Folder of what a program made of a draw.
     pub fn run(&self, label: &str, number: usize) -> PathBuf {
         self.root.join("runs").join(label).join(name(number))
     }
@@ -167,10 +164,6 @@ fn hidden_as_json(hidden: &Hidden) -> Value {
     json!({"effect": hidden.name, "where": hidden.place.to_string(), "numbers": numbers})
 }
 
-/// The text of a file.
-///
-/// # Errors
-/// [`FolderError`] with its path.
 pub fn read(path: &Path) -> Result<String, FolderError> {
     fs::read_to_string(path).map_err(FolderError::file(path))
 }
@@ -190,18 +183,12 @@ pub(crate) fn read_left<T: DeserializeOwned>(
 }
 
 /// Writes a file so that it is whole or absent.
-///
-/// # Errors
-/// [`FolderError`] with its path.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
     parts::write_whole(path, bytes).map_err(FolderError::file(path))
 }
 
 /// Makes a folder so that it is whole or absent: `fill` fills another one, which then gets the name. When two starts are at the
 /// same folder, the first that is done has made it.
-///
-/// # Errors
-/// Those of `fill`, and [`FolderError`] with the path.
 pub fn make_whole<T, E: From<FolderError>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<T, E>,

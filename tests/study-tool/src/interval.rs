@@ -14,16 +14,13 @@
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, Normal};
 
-/// Probability that an interval holds the rate.
 const CONFIDENCE: f64 = 0.95;
 
 /// So many of so many, with intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rate {
     pub count: usize,
-    /// Of how many.
     pub of: usize,
-    /// The rate; `None` of nothing.
     pub share: Option<f64>,
     /// Wilson's interval of the rate.
     pub interval: [f64; 2],
@@ -32,7 +29,6 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// The rate of so many of so many.
     pub fn new(count: usize, of: usize) -> Self {
         let share = (of > 0).then(|| count as f64 / of as f64);
         Rate { count, of, share, interval: wilson(count, of), at_most: at_most(count, of) }

@@ -23,18 +23,15 @@ use std::collections::BTreeSet;
 /// Most alternatives of an ambiguous verdict that may lie beyond the class.
 const MOST_BEYOND: usize = 2;
 
-/// What a case came to.
 #[derive(Debug, Clone, Serialize)]
 pub struct Judgement {
     /// What it was called: an effect, or `nothing`, `parameter`, `outside`, `ambiguous`, `error`.
     pub called: String,
-    /// Why there is no good report.
     pub error: Option<String>,
     /// For each hidden effect whether a name of its class was there, and at the right place.
     pub hidden: Vec<HiddenJudged>,
     /// Whether the first name is the one hidden effect itself.
     pub top: bool,
-    /// Whether it is right alone.
     pub alone: bool,
     /// Names that stand for nothing hidden.
     pub too_many: usize,
@@ -50,35 +47,26 @@ pub struct Judgement {
     pub claimed_white: Option<bool>,
 }
 
-/// What became of one hidden effect.
 #[derive(Debug, Clone, Serialize)]
 pub struct HiddenJudged {
     pub effect: &'static str,
-    /// Where it was.
     #[serde(rename = "where", serialize_with = "as_text")]
     pub place: Place,
-    /// Effects of its class, itself included.
     pub class_size: usize,
-    /// Whether a name of its class was there.
     pub right: bool,
-    /// Whether that name's place is right.
     pub where_right: bool,
     /// Its numbers against the truth, when the effect itself was named at its place.
     pub numbers: Vec<NumberJudged>,
 }
 
-/// A fitted number against the truth.
 #[derive(Debug, Clone, Serialize)]
 pub struct NumberJudged {
-    /// Key of the sheet.
     pub name: &'static str,
-    /// Whether it is the effect's amplitude.
     pub amplitude: bool,
     /// |fitted - true| / |true|.
     pub off_ratio: f64,
     /// Standard error / |true|.
     pub error_ratio: Option<f64>,
-    /// Whether two standard errors cover the truth.
     pub covered: Option<bool>,
 }
 

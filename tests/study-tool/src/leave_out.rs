@@ -48,7 +48,6 @@ pub const WITH_MEMORY: [&str; 13] = [
 /// Variables of a report that are looked at.
 const FIRST: usize = 2;
 
-/// What must show when an effect is left out.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expected {
@@ -64,23 +63,18 @@ pub type Expectations = BTreeMap<String, Expected>;
 /// What a program said without the hidden effect in its catalogue.
 #[derive(Debug, Clone, Serialize)]
 pub struct LeftOut {
-    /// Effects that it had to do without.
     pub without: Vec<String>,
     /// Its verdict, or `error`.
     pub verdict: &'static str,
     /// Whether there is a good report that names nothing.
     pub no_wrong_name: bool,
-    /// The balance it reported.
     pub balance: Option<String>,
     /// All variables it reported, the strongest first.
     pub variables: Vec<String>,
-    /// The formula it reported.
     pub formula: Option<String>,
-    /// Whether the balance is right.
     pub balance_right: bool,
     /// Whether one of the first two variables is right.
     pub variable_right: bool,
-    /// Whether the effect remembers.
     pub with_memory: bool,
 }
 

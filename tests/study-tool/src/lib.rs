@@ -52,5 +52,4 @@ pub mod signature;
 pub mod step;
 pub mod trajectory;
 
-/// Version of every JSON file of the study.
 pub const SCHEMA_VERSION: u32 = 1;

@@ -42,13 +42,9 @@ const LEAST_SHARE: f64 = 1e-6;
 /// Where the baseline lies on an amplitude's scale, and to which side of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scale {
-    /// At 0.
     Zero,
-    /// At a number of the rig file; `true`: above it.
     About(f64, bool),
-    /// At infinity.
     Infinite,
-    /// Nowhere.
     None,
 }
 
@@ -81,7 +77,6 @@ impl Scale {
         }
     }
 
-    /// Value of an excursion.
     #[must_use]
     pub fn value(self, excursion: f64) -> f64 {
         match self {
@@ -117,17 +112,13 @@ pub fn threshold(two_sided: bool) -> f64 {
     quantile(1.0 - if two_sided { FALSE_ALARMS / 2.0 } else { FALSE_ALARMS }) + quantile(SEEN)
 }
 
-/// The limit of one effect at one place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limit {
-    /// Name of the effect.
     pub effect: String,
     #[serde(rename = "where")]
     pub place: String,
-    /// Key of its amplitude.
     pub key: String,
-    /// Unit of the amplitude.
     pub unit: String,
     /// `above` or `below` a number of the rig file.
     pub side: Option<String>,
@@ -136,7 +127,6 @@ pub struct Limit {
     pub limit_value: Option<f64>,
     /// |M J| / threshold at the most that is drawn; of the weakest of the drawn range where there is no neutral value.
     pub strength: f64,
-    /// Whether the most that is drawn is seen.
     pub excited: bool,
 }
 
@@ -144,13 +134,9 @@ pub struct Limit {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    /// Version of the file.
     pub schema_version: u32,
-    /// Milliseconds of a window.
     pub window_ms: u32,
-    /// Seed of the records they were computed from.
     pub seed: u64,
-    /// One for each effect, place and side.
     pub limits: Vec<Limit>,
 }
 
@@ -182,7 +168,6 @@ fn side(scale: Scale) -> Option<String> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
     One(Axis),
-    /// Both, linked.
     Both,
 }
 
@@ -250,7 +235,6 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
     })
 }
 
-/// The least strength over a drawn range.
 fn weakest(
     key: &EffectKey,
     strength_at: impl Fn(f64) -> Result<f64, ParameterError>,
@@ -268,13 +252,11 @@ struct Ends {
     least: f64,
     /// That a file may hold.
     most: f64,
-    /// The most that is drawn.
     drawn: f64,
 }
 
 struct Found {
     limit: Option<f64>,
-    /// At the most that is drawn.
     strength: f64,
 }
 

@@ -25,17 +25,13 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use wait4::Wait4;
 
-/// How often a running program is looked at.
 const POLL: Duration = Duration::from_millis(20);
 
-/// The program under study.
 #[derive(Debug, Clone)]
 pub struct Program {
     /// The executable, absolute.
     pub path: PathBuf,
-    /// More arguments for it.
     pub arguments: Vec<String>,
-    /// Longest time it may take.
     pub limit: Duration,
     identity: Identity,
 }
@@ -44,11 +40,9 @@ pub struct Program {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
-    /// File name of the executable.
     pub name: String,
     /// CRC-32 of its bytes.
     pub crc32: u32,
-    /// More arguments it got.
     pub arguments: Vec<String>,
     /// Whether it had to do without what was hidden; absent in a file when it had not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -62,37 +56,26 @@ impl Identity {
     }
 }
 
-/// How a program ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ended {
-    /// By itself, with this code.
     Exited(i32),
-    /// By this signal.
     Signalled(i32),
-    /// It was killed at its time limit.
     TimedOut,
-    /// The system did not start it.
     NotStarted,
 }
 
-/// What one start took.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Taken {
-    /// How it ended.
     pub ended: Ended,
     /// Wall time, s.
     pub wall_s: f64,
-    /// Largest resident set, KiB.
     pub memory_kib: u64,
 }
 
-/// What is of one start alone.
 #[derive(Debug, Clone, Copy)]
 pub struct Start<'a> {
-    /// The folder that it runs in.
     pub folder: &'a Path,
-    /// Training records in it.
     pub train: &'a [&'a str],
     /// Arguments behind those of every start.
     pub own: &'a [String],
@@ -104,9 +87,6 @@ pub struct Interrupted;
 
 impl Program {
     /// A program that exists.
-    ///
-    /// # Errors
-    /// What the system says of its file.
     pub fn new(path: &Path, arguments: Vec<String>, limit: Duration) -> io::Result<Self> {
         let path = path.canonicalize()?;
         let crc32 = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&fs::read(&path)?);
@@ -115,7 +95,6 @@ impl Program {
         Ok(Program { path, arguments, limit, identity })
     }
 
-    /// Which program it is.
     pub fn identity(&self) -> &Identity {
         &self.identity
     }

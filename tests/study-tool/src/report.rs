@@ -18,19 +18,15 @@ pub struct Report {
     pub verdict: Verdict,
     /// What is missing, the best first.
     pub named: Vec<Named>,
-    /// Numbers of the baseline that were off.
     pub parameters: Vec<Parameter>,
-    /// The gap to the measurement, for each signal.
     pub gap: BTreeMap<String, Gap>,
     /// What is missing that the catalogue does not have.
     pub outside: Option<Outside>,
     /// What the program says of its model on the held-out record.
     pub verification: Option<Verification>,
-    /// What the program would measure next.
     pub next: Option<Next>,
 }
 
-/// What a program would measure next.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 pub struct Next {
     /// File of an experiment, beside the report.
@@ -48,12 +44,10 @@ pub struct Named {
     pub alternatives: Vec<Named>,
 }
 
-/// A number with its error.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Parameter {
     /// Key of the effect's sheet, or name of a parameter of the baseline.
     pub name: String,
-    /// In its unit.
     pub value: f64,
     pub unit: String,
     /// Its standard error, in its unit; some programs have none.
@@ -64,13 +58,10 @@ pub struct Parameter {
 /// The gap of one signal; all in one unit, which is the program's choice.
 #[derive(Debug, Clone, Copy, Deserialize)]
 pub struct Gap {
-    /// Of the baseline.
     #[serde(rename = "before")]
     pub before_value: Option<f64>,
-    /// Of the extended model.
     #[serde(rename = "after")]
     pub after_value: Option<f64>,
-    /// Of the sensor's noise.
     #[serde(rename = "floor")]
     pub floor_value: Option<f64>,
     /// Share of the gap to the noise floor that was closed, as the program claims.
@@ -86,11 +77,9 @@ pub struct Outside {
     /// What it depends on, the strongest first.
     #[serde(default)]
     pub variables: Vec<Dependence>,
-    /// A short formula, if one fits.
     pub formula: Option<String>,
 }
 
-/// How a disagreement depends on a variable.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Dependence {
     /// Its name, as in `outside-expected.json`.
@@ -98,7 +87,6 @@ pub struct Dependence {
     /// Share of the variance that it explains.
     #[serde(rename = "r2")]
     pub r2_ratio: f64,
-    /// Significance.
     #[serde(rename = "p_value")]
     pub p_value_ratio: f64,
 }
@@ -154,10 +142,6 @@ pub fn read(path: &Path) -> Result<Report, String> {
     parse(&bytes)
 }
 
-/// Reads the text of a report.
-///
-/// # Errors
-/// A sentence for the list of errors.
 pub fn parse(bytes: &[u8]) -> Result<Report, String> {
     let raw: RawReport = serde_json::from_slice(bytes).map_err(|error| format!("report.json: {error}"))?;
     let named = raw.named.into_iter().map(known).collect::<Result<Vec<_>, _>>()?;

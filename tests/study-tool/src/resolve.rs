@@ -41,17 +41,13 @@ pub use tables::Table;
 /// What makes the noise of the new record another one; below 2^53, as seeds are.
 const OWN_NOISE: u64 = 0x4e_4558_5400;
 
-/// How a draw ended that was ambiguous.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// The right name alone.
     Resolved,
     /// The right name among others.
     StillAmbiguous,
-    /// The right name is gone.
     Wrong,
-    /// There is no good report.
     Error,
 }
 
@@ -62,7 +58,6 @@ pub struct Resolution {
     pub schema_version: u32,
     pub number: usize,
     pub program: Identity,
-    /// File of the experiment.
     pub experiment: String,
     /// Why the experiment was not run, or not given to the program.
     pub problem: Option<String>,
@@ -82,7 +77,6 @@ pub fn ambiguous<'a>(draw: &Draw, report: &'a Report) -> Option<&'a Named> {
     open.into_iter().find(|entry| names(entry).any(|name| is_truth(name, hidden)))
 }
 
-/// Whether a report leaves anything ambiguous.
 pub fn leaves_open(report: &Report) -> bool {
     report.verdict == Verdict::Ambiguous || report.named.iter().any(|entry| !entry.alternatives.is_empty())
 }
@@ -120,14 +114,12 @@ pub fn recipe(draw: &Draw) -> Recipe {
     Recipe { seed: draw.recipe.seed ^ OWN_NOISE, ..draw.recipe.clone() }
 }
 
-/// What there was to do for a draw.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Found {
     /// Nothing: it has no result yet, is not of one effect, or leaves the truth not open.
     NotOpen,
     /// Nothing: the program says that no experiment can tell.
     NothingProposed,
-    /// What was proposed was measured.
     Measured(Resolution),
 }
 

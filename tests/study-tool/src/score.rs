@@ -48,7 +48,6 @@ pub struct Case {
     /// Whether two or more hidden effects are of different classes, and all three times above their limits.
     pub separable: bool,
     pub foreign_form: bool,
-    /// Whether parameters are off besides.
     pub wrong_parameters: bool,
     /// Whether its noise is coloured and its sampling jitters.
     pub coloured_noise: bool,
@@ -57,13 +56,11 @@ pub struct Case {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<LeftOut>,
     pub wall_s: f64,
-    /// Largest resident set of the program, KiB.
     pub memory_kib: u64,
     /// The command that repeats it, as far as the program goes.
     pub repeat: String,
 }
 
-/// Why a study cannot be scored.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
     #[error(transparent)]

@@ -60,7 +60,6 @@ struct Run {
     jumps: Vec<bool>,
 }
 
-/// What the initial state of a window explains.
 #[derive(Debug)]
 struct Window {
     /// One column for each number of the state, all of one length.
@@ -107,7 +106,6 @@ impl Observer {
         &self.trajectory.rig
     }
 
-    /// Whitened readings in a window.
     fn rows(&self) -> usize {
         WINDOW * CHANNELS * self.trajectory.measured.iter().filter(|measured| **measured).count()
     }

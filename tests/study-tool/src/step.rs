@@ -28,9 +28,7 @@ pub const EXPERIMENTS: [(Experiment, &str); 3] = [
     (Experiment::HeldOut(1), "held-out-1"),
 ];
 
-/// Largest report that is kept.
 const LARGEST_REPORT: u64 = 64 << 20;
-/// Largest experiment that is kept.
 const LARGEST_EXPERIMENT: u64 = 1 << 20;
 /// Most that is kept of what a program says.
 const MOST_SAID: u64 = 1 << 20;
@@ -38,10 +36,6 @@ const MOST_SAID: u64 = 1 << 20;
 /// Makes a record: measurement into the first folder, truth into the second; says why it cannot.
 pub type Make<'a> = &'a (dyn Fn(&Recipe, &RigParameters, &Path, &Path) -> Result<(), String> + Sync);
 
-/// Makes a record with the record maker.
-///
-/// # Errors
-/// What it says.
 pub fn make_record(
     recipe: &Recipe,
     rig: &RigParameters,
@@ -68,7 +62,6 @@ pub struct Step<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// Why a step cannot be taken; what is done stays.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
     #[error(transparent)]
@@ -92,7 +85,6 @@ pub struct RunResult {
     pub schema_version: u32,
     pub number: usize,
     pub program: Identity,
-    /// How it ended, time, memory.
     pub taken: Taken,
     /// Effects that were left out of its catalogue; absent in a file when none was.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -101,9 +93,6 @@ pub struct RunResult {
 
 impl Step<'_> {
     /// Makes the records of a draw, unless they are there.
-    ///
-    /// # Errors
-    /// [`StepError`] when they cannot be made.
     pub fn records(&self, draw: &Draw) -> Result<(), StepError> {
         if self.study.records(draw.number).exists() {
             return Ok(());
@@ -257,7 +246,6 @@ fn keep(out: &Path, folder: &Path, name: &str, largest: u64) -> io::Result<()> {
     Ok(())
 }
 
-/// Refuses what another program left.
 pub(crate) fn check_program(
     path: &Path,
     own: &Identity,
@@ -284,7 +272,6 @@ pub(crate) fn whole_run<T>(
     }
 }
 
-/// Why a run's folder is not finished.
 enum StepEnd {
     Interrupted,
     Error(StepError),

@@ -2,7 +2,6 @@
 
 use plant::{Inputs, RigParameters, State, Truth};
 
-/// Milliseconds of a window.
 pub const WINDOW: usize = 100;
 
 /// The trajectory of a record, as only its maker knows it.
@@ -13,7 +12,6 @@ pub struct TrueTrajectory {
     pub measured: [bool; 2],
     /// State at the start, from which everything but the points is carried on.
     pub start: State,
-    /// What acts over each millisecond.
     pub inputs: Vec<Inputs>,
     /// The true mechanical state and pressures at the start of each millisecond.
     pub points: Vec<[Point; 2]>,
@@ -29,11 +27,9 @@ pub struct Point {
     pub pressures_pa: [f64; 2],
 }
 
-/// Numbers of a point.
 pub const POINT_NUMBERS: usize = 4;
 
 impl Point {
-    /// The points of both axes at an instant.
     pub fn of(truth: &Truth, stroke_m: f64) -> [Point; 2] {
         std::array::from_fn(|i| {
             let axis = &truth.axes[i];

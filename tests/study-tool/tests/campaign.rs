@@ -18,7 +18,6 @@ const INTERRUPTED: i32 = 130;
 const SHAPE: [&str; 10] =
     ["--each", "0", "--nulls", "2", "--parameters", "0", "--pairs", "1", "--triples", "0"];
 
-/// The study's program.
 const STUDY: &str = env!("CARGO_BIN_EXE_study");
 
 /// A folder with a campaign file and a program that is judged.

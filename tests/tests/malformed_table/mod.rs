@@ -6,7 +6,6 @@ use protocol::checksum;
 const DRIVE: u16 = 0x110;
 const LOAD: u16 = 0x111;
 
-/// Where a frame is counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Counter {
     /// Not as `rig.dbc` says.
@@ -55,7 +54,6 @@ impl Counter {
     }
 }
 
-/// One line of the table.
 pub(crate) struct Injection {
     pub(crate) what: String,
     pub(crate) counter: Counter,
@@ -90,7 +88,6 @@ fn spoiled(what: impl Into<String>, id: u16, spoil: impl Fn(&mut [u8; 5]) + 'sta
     })
 }
 
-/// The whole table.
 pub(crate) fn table() -> Vec<Injection> {
     [commands(), stops_and_others(), identifiers(), packets(), stale()].into_iter().flatten().collect()
 }
@@ -188,7 +185,6 @@ fn identifiers() -> Vec<Injection> {
     ]
 }
 
-/// Packets that are no frame.
 fn packets() -> Vec<Injection> {
     let mut table = Vec::new();
     for length in [1, 8, 15, 17, 31, 32, 33, 63, 64, 65, 72, 1000] {

@@ -6,31 +6,24 @@
 mod rust;
 mod text;
 
-/// A tracked text file.
 pub(crate) struct File {
     /// Path from the checkout's root.
     pub(crate) path: String,
-    /// Whether it is tracked as executable.
     pub(crate) executable: bool,
-    /// What it holds.
     pub(crate) text: String,
 }
 
 /// A line and what to do about it.
 pub(crate) struct Problem {
-    /// Line, from 1.
     pub(crate) line: usize,
-    /// What to do instead.
     pub(crate) advice: String,
 }
 
-/// One rule with its samples.
 pub(crate) struct Rule {
     /// Short name, reported with each complaint.
     pub(crate) name: &'static str,
     /// Whether the rule looks at the file of this path.
     pub(crate) applies: fn(&str) -> bool,
-    /// What it finds.
     pub(crate) check: fn(&File) -> Vec<Problem>,
     /// Path, text and line of the one problem that must be found.
     pub(crate) bad: &'static [(&'static str, &'static str, usize)],
@@ -59,7 +52,6 @@ impl File {
         Self { path: name.into(), executable: name != path, text: text.into() }
     }
 
-    /// Lines with their numbers, from 1.
     fn lines(&self) -> impl Iterator<Item = (usize, &str)> {
         (1..).zip(self.text.lines())
     }

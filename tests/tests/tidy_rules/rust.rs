@@ -389,7 +389,6 @@ fn has_unit(name: &str) -> bool {
     UNITS.iter().any(|unit| name.ends_with(&format!("_{unit}")))
 }
 
-/// Longest line of Rust, in characters.
 const LONGEST_LINE: usize = 130;
 /// Files whose longer lines are rows of a table.
 const TABLES: &[&str] =

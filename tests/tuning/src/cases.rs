@@ -11,7 +11,7 @@ use figures::{self, Figures, position};
 use plant::{Axis, Scene};
 use rehearsal::Rehearsed;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// An experiment with the programs that it is tried with.
 pub struct Case {
@@ -23,9 +23,7 @@ pub struct Case {
 #[derive(Clone, Copy, Default)]
 pub struct Made<'a> {
     pub experiment: &'a str,
-    /// The drive's program, if not the experiment's.
     pub drive: Option<&'a str>,
-    /// The load's program, if not the experiment's.
     pub load: Option<&'a str>,
     /// Numbers in place of the programs', such as `drive.algorithm.gain_per_s=30`.
     pub set: &'a [String],
@@ -36,16 +34,12 @@ impl Case {
         let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../controller");
         let program = |name: Option<&str>| Some(room.join(format!("programs/{}.toml", name?)));
         let files = FileArguments {
-            parameters: None,
             rig: room.join("../plant/rig.toml"),
             experiment: room.join(format!("experiments/{}.toml", made.experiment)),
-            out: PathBuf::new(),
-            programs: None,
             drive_program: program(made.drive),
             load_program: program(made.load),
             set: made.set.to_vec(),
-            repeat: false,
-            after_emergency_stop: None,
+            ..FileArguments::default()
         };
         let inputs = Inputs::read(&files)?;
         let scene = Scene::from_toml(&inputs.experiment_toml, made.experiment, &inputs.rig)?;
@@ -57,7 +51,6 @@ impl Case {
     }
 }
 
-/// The tables that the run would have left.
 pub fn record(run: &Run) -> Record {
     let rows = |axis: Axis| {
         run.rows.iter().filter_map(move |row| Some((time_s(row), row.axes[axis.index()].as_ref()?)))
@@ -100,7 +93,6 @@ fn measured(run: &Run) -> Table {
     table
 }
 
-/// A controller's table.
 fn controller<'a>(rows: impl Iterator<Item = (f64, &'a AxisRecord)> + Clone) -> Table {
     let mut table = Table::default();
     let mut put = |name, of: fn(&AxisRecord) -> Option<f64>| {

@@ -21,17 +21,12 @@ use rayon::prelude::*;
 
 /// Factors that a gain margin is looked for in.
 pub const FACTORS: [f64; 8] = [1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0];
-/// Added masses of the corners, kg.
 pub const MASSES_KG: [f64; 4] = [0.0, 5.0, 10.0, 20.0];
-/// Supply pressures of the corners, bar.
 pub const SUPPLIES_BAR: [f64; 4] = [5.0, 6.0, 7.0, 8.0];
 
-/// Under which conditions a program is tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// Weights on the carriage, kg.
     pub added_mass_kg: f64,
-    /// Absolute supply pressure, bar.
     pub supply_bar: f64,
     /// What the valves pass more than their table says.
     pub loop_factor: f64,
@@ -46,7 +41,6 @@ impl Default for Trial {
 }
 
 impl Trial {
-    /// All corners of mass and supply, row by row.
     pub fn corners() -> Vec<Self> {
         let corner = |added_mass_kg, supply_bar| Self { added_mass_kg, supply_bar, ..Self::default() };
         let row = |mass_kg| SUPPLIES_BAR.map(|supply_bar| corner(mass_kg, supply_bar));
@@ -67,7 +61,6 @@ impl Trial {
     }
 }
 
-/// Why a trial could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
     #[error(transparent)]
@@ -81,9 +74,6 @@ pub enum TrialError {
 }
 
 /// Largest of [`FACTORS`] up to which `is_still`; 0 if it is not even as it is.
-///
-/// # Errors
-/// Those of `is_still`.
 pub fn largest_factor(
     trial: &Trial,
     mut is_still: impl FnMut(&Trial) -> Result<bool, TrialError>,
@@ -109,6 +99,12 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync 
 /// Means of all windows of so many values.
 fn means(values: &[f64], window: usize) -> Vec<f64> {
     values.windows(window).map(|part| part.iter().sum::<f64>() / window as f64).collect()
+}
+
+/// A number in decimals, without the sign of a zero.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let unit = 10_f64.powi(decimals as i32);
+    format!("{:.decimals$}", (value * unit).round() / unit + 0.0)
 }
 
 /// Largest less least; 0 of nothing.

@@ -29,7 +29,6 @@ pub const RIPPLE_M: f64 = 2e-3;
 /// A move along a Bestehorn sinoid and the rest behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Move {
-    /// Where it ends, m.
     pub to_m: f64,
     /// How long it takes, s; 0 is a step.
     pub duration_s: f64,
@@ -41,7 +40,6 @@ const fn to(to_m: f64, duration_s: f64, rest_s: f64) -> Move {
     Move { to_m, duration_s, rest_s }
 }
 
-/// Where all moves start, m.
 const START_M: f64 = 0.1;
 /// The paper's positioning, Fig. 8, twice: the first repetition has the chamber pressures of the start, the others do not.
 pub const POINT_TO_POINT: &[Move] =
@@ -53,7 +51,6 @@ pub const STEP: &[Move] = &[to(0.3, 0.0, 2.0), to(0.1, 0.0, 2.0)];
 /// What wakes up an oscillation: both ends, the soft middle, a step.
 pub const EXCITATION: &[Move] = &[to(0.4, 3.0, 3.0), to(0.1, 3.0, 3.0), to(0.25, 0.0, 4.0)];
 
-/// What came of a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Largest |error| while the set-point moves, m.
@@ -64,7 +61,6 @@ pub struct Figures {
     pub rest_peak_to_peak_m: f64,
     /// Largest error during moves beside its mean over 0.3 s, m.
     pub ripple_m: f64,
-    /// Largest overshoot after a step, m.
     pub overshoot_m: f64,
     /// Longest time from a step until the error stays within 2 mm, s.
     pub settling_s: f64,
@@ -85,9 +81,6 @@ pub fn attempt(program: Program, moves: &[Move], trial: &Trial) -> Result<Figure
 }
 
 /// The positioning with each of [`WEIGHTS_KG`]: the worst of all.
-///
-/// # Errors
-/// As [`attempt`].
 pub fn positioning(program: impl Fn() -> Program) -> Result<Figures, TrialError> {
     let mut worst = Figures::default();
     for added_mass_kg in WEIGHTS_KG {
@@ -133,17 +126,11 @@ fn attempt_late(
 }
 
 /// Largest of [`FACTORS`](super::FACTORS) up to which nothing oscillates; 0 if something does as it is.
-///
-/// # Errors
-/// As [`attempt`].
 pub fn gain_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<f64, TrialError> {
     largest_factor(trial, |trial| Ok(attempt(program(), EXCITATION, trial)?.is_still()))
 }
 
 /// How many cycles a command may be late without oscillation, up to 20; `None` if something oscillates as it is.
-///
-/// # Errors
-/// As [`attempt`].
 pub fn delay_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<Option<usize>, TrialError> {
     for late_cycles in 0..=20 {
         if !attempt_late(program(), EXCITATION, trial, late_cycles)?.is_still() {
@@ -153,7 +140,6 @@ pub fn delay_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<Opti
     Ok(Some(20))
 }
 
-/// The closed loop: plant, sensors, and the commands on their way.
 struct Bench {
     plant: Plant,
     sensors: plant::Sensors,

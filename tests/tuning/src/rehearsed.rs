@@ -39,7 +39,6 @@ pub struct Run {
     pub done: bool,
 }
 
-/// What of a run says whether it oscillated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unrest {
     pub done: bool,
@@ -78,17 +77,11 @@ pub fn rehearse(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<Run, Tr
 }
 
 /// Largest of [`FACTORS`](super::FACTORS) up to which the rig does not oscillate; 0 if it does as it is.
-///
-/// # Errors
-/// As [`rehearse`].
 pub fn gain_margin(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<f64, TrialError> {
     super::largest_factor(trial, |trial| is_still(inputs, scene, trial))
 }
 
 /// The least margin of all corners, by [`in_parallel`].
-///
-/// # Errors
-/// As [`rehearse`].
 pub fn worst_gain_margin(inputs: &Inputs, scene: &Scene) -> Result<f64, TrialError> {
     super::largest_factor(&Trial::default(), |Trial { loop_factor, .. }| {
         let corners =
@@ -109,7 +102,6 @@ fn is_still(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<bool, Trial
 }
 
 impl Run {
-    /// What says whether it oscillated.
     pub fn unrest(&self) -> Unrest {
         let drive = |row: &Rehearsed| row.axes[Axis::Drive.index()];
         let in_experiment =

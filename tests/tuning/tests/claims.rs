@@ -16,7 +16,6 @@ fn case(made: &Made) -> Case {
     Case::new(made).unwrap()
 }
 
-/// Figures of an experiment with these programs.
 fn rehearsed(made: &Made) -> impl Fn(&str) -> f64 + use<> {
     let run = case(made).run(&Trial::default()).unwrap();
     assert!(run.done, "{} came to no end", made.experiment);

@@ -17,7 +17,6 @@ fn rig(emergency_stop: bool) -> RigStatus {
     }
 }
 
-/// A chain with its rig.
 struct Play {
     chain: EmergencyStopChain,
     inputs: StopInputs,

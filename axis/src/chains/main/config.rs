@@ -21,7 +21,6 @@ pub struct Lengths {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
-    /// Nothing.
     #[default]
     ByItself,
     /// `RunControl` start: once for all repetitions, again after an abort.
@@ -31,9 +30,7 @@ pub enum Start {
 /// Configuration of the main chain of one axis. Both axes must be given the same, save for what is called own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MainConfig {
-    /// Number of the experiment, 1 to 255.
     pub experiment: u8,
-    /// Whether the other axis's controller is waited for.
     pub partner_needed: bool,
     /// Own: where the initial positioning ends, m; `None` for an axis that is not positioned.
     pub start_m: Option<f64>,
@@ -51,11 +48,8 @@ pub struct MainConfig {
     pub settling_s: f64,
     /// How long each state may take beyond what it is meant to, s.
     pub settling_timeout_s: f64,
-    /// What begins the experiment.
     pub start: Start,
-    /// What follows an emergency stop.
     pub after_emergency_stop: AfterStop,
-    /// What counts as settled.
     pub settled: Bounds,
 }
 

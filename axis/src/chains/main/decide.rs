@@ -7,7 +7,6 @@ use crate::chains::{AfterStop, Fault, cycles};
 use protocol::frames::{ChainStatus, EmergencyStopChainState, MainChainState};
 
 impl MainChain {
-    /// The edge to go, if any.
     pub(super) fn decide(&self, inputs: &MainInputs) -> Option<Edge> {
         match &self.state {
             State::Fault { ended, .. } => self.decide_ended(ended, inputs),
@@ -53,7 +52,6 @@ impl MainChain {
         })
     }
 
-    /// The partner ended, fell silent or began anew.
     fn decide_partner_gone(&self, inputs: &MainInputs) -> Option<Edge> {
         if !self.config.partner_needed {
             return None;
@@ -73,7 +71,6 @@ impl MainChain {
         partner_ended(status.main_chain)
     }
 
-    /// Both are ready.
     fn decide_ready(&self, inputs: &MainInputs) -> Option<Edge> {
         use MainChainState as S;
         let partner_ok = !self.config.partner_needed || self.relation(inputs).ok();
@@ -94,7 +91,6 @@ impl MainChain {
         Some((next, MainCause::Ready))
     }
 
-    /// A state has been waited in for too long.
     fn decide_late(&self, wait: &Wait, inputs: &MainInputs) -> Option<Edge> {
         let timeout = cycles(self.config.settling_timeout_s);
         let [own, either] = self.expected_cycles();
@@ -113,7 +109,6 @@ impl MainChain {
         late.then_some(fault(cause))
     }
 
-    /// The way back from aborted and fault.
     fn decide_ended(&self, ended: &Ended, inputs: &MainInputs) -> Option<Edge> {
         let ready = |state| state == EmergencyStopChainState::Ready;
         if self.config.after_emergency_stop == AfterStop::End || !ready(inputs.emergency_stop) {
@@ -159,7 +154,6 @@ impl MainChain {
         }
     }
 
-    /// The OK flag.
     pub(super) fn ok(&self, inputs: &MainInputs) -> bool {
         let waits = self.entered.state == MainChainState::Settling && self.config.start == Start::OnStart;
         self.held(inputs) && (self.started || !waits)
@@ -181,7 +175,6 @@ impl MainChain {
     }
 }
 
-/// More than `length` cycles have passed.
 fn passed(since: u64, length: u64, cycle: u64) -> bool {
     cycle.saturating_sub(since) > length
 }

@@ -5,27 +5,22 @@ use crate::chains::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopChainState, MainChainState};
 use std::fmt;
 
-/// Own sensors in this cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnAxis {
     /// Position sensor as it came, less the matched offset, rig coordinates, m.
     pub position_m: f64,
-    /// What keeps the axis from its set-point.
     pub error: ControlError,
 }
 
-/// What the chain is given each cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MainInputs {
     pub cycle: u64,
     /// Own sensors; `None` before the first.
     pub own: Option<OwnAxis>,
-    /// The steps of preparing are done.
     pub prepared: bool,
     pub partner: Partner,
     /// State of the own emergency stop chain in this cycle.
     pub emergency_stop: EmergencyStopChainState,
-    /// What the console said since the last cycle.
     pub console: Console,
     /// A fault of the own axis: sensors, limits, algorithm, force or matching chain.
     pub fault: Option<Fault>,
@@ -51,7 +46,6 @@ pub enum Phase {
     HoldEnd,
 }
 
-/// What the chain says each cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MainOutput {
     pub state: MainChainState,
@@ -60,11 +54,9 @@ pub struct MainOutput {
     /// The condition for leaving the state is fulfilled on this side.
     pub ok: bool,
     pub phase: Phase,
-    /// The fault, while in fault.
     pub fault: Option<Fault>,
 }
 
-/// Why a state was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MainCause {
     Began,

@@ -6,7 +6,6 @@ use MatchingChainState as S;
 use proptest::prelude::*;
 use protocol::frames::{ChainStatus, ChainValues};
 
-/// Offset of the load's sensor, m.
 const OFFSET_M: f64 = 0.8e-3;
 
 struct Play {

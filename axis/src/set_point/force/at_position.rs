@@ -15,7 +15,6 @@ use settings::parameters::Parameter;
 /// The key that tells this step from one in time.
 pub(in crate::set_point) const KEY: &str = "at_position_m";
 
-/// Which way the axis passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Direction {
     Positive,

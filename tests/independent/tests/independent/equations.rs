@@ -189,7 +189,6 @@ impl System<'_> {
         force / self.mass(axis)
     }
 
-    /// Time derivatives of all states.
     pub(crate) fn rates(&self, y: &[f64], rate: &mut [f64]) {
         let mut drawn = 0.0;
         for axis in 0..2 {

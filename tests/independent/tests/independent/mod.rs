@@ -88,7 +88,6 @@ pub(crate) const PUSHING: Motion = Motion {
     ..EXTENDING
 };
 
-/// All motions.
 pub(crate) const MOTIONS: [Motion; 6] = [EXTENDING, RETRACTING, SWEEP, CREEPING, INTO_THE_END, PUSHING];
 
 impl Motion {
@@ -134,7 +133,6 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
-    /// The worst of what the sensors show.
     pub(crate) fn worst_shown(&self) -> f64 {
         self.shown.iter().copied().fold(0.0, f64::max)
     }
@@ -157,7 +155,6 @@ pub(crate) fn with(rig: &RigParameters, sheet: &Sheet, place: &str) -> RigParame
     rig.with_effect(sheet.name, place, &numbers).expect("the middle is allowed")
 }
 
-/// The baseline with one effect at all its places.
 pub(crate) fn alone(sheet: &Sheet) -> RigParameters {
     sheet.place.names().iter().fold(RigParameters::baseline(), |rig, place| with(&rig, sheet, place))
 }
@@ -182,7 +179,6 @@ pub(crate) fn is_smooth(sheet: &Sheet) -> bool {
     Numbers::of(&with(&RigParameters::baseline(), sheet, &sheet.place.names()[0])).is_some()
 }
 
-/// The motion in which an effect alone shows.
 pub(crate) fn motion_of(sheet: &Sheet) -> Motion {
     match sheet.name {
         "stribeck-friction" | "presliding" => CREEPING,
@@ -203,7 +199,6 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Solves a motion of a rig.
     pub(crate) fn new(rig: RigParameters, motion: &Motion) -> Self {
         let numbers = Numbers::of(&rig).expect("only smooth effects");
         let start = motion.start();

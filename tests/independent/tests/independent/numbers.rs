@@ -25,7 +25,6 @@ pub(crate) const OPENING: [f64; 6] = [0.0, 0.03, 0.2, 0.5, 0.8, 1.0];
 pub(crate) const KV_SUPPLY: [f64; 6] = [0.0, 0.0, 0.115, 0.36, 0.60, 0.66];
 pub(crate) const KV_EXHAUST: [f64; 6] = [0.0, 0.0, 0.095, 0.30, 0.52, 0.58];
 
-/// Numbers of one axis.
 #[derive(Debug, Clone)]
 pub(crate) struct AxisNumbers {
     pub(crate) critical_ratio: f64,
@@ -66,7 +65,6 @@ pub(crate) struct AxisNumbers {
     pub(crate) skew: [f64; 4],
 }
 
-/// Numbers of the rig.
 #[derive(Debug, Clone)]
 pub(crate) struct Numbers {
     pub(crate) axes: [AxisNumbers; 2],

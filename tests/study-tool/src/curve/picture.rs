@@ -5,7 +5,6 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// One pair of axes.
 pub(super) struct Panel<'a> {
     pub(super) title: &'a str,
     /// Places of the axis that are named; they span it.

@@ -39,7 +39,6 @@ fn entry(text: &str) -> String {
     )
 }
 
-/// A report of this verdict with these names.
 pub(crate) fn said(verdict: &str, names: &[&str]) -> Result<Report, String> {
     let names: Vec<_> = names.iter().map(|name| entry(name)).collect();
     parse(format!(r#"{{"verdict": "{verdict}", "named": [{}]}}"#, names.join(",")).as_bytes())

@@ -11,32 +11,24 @@ use std::collections::BTreeMap;
 /// Share of the gap that must close for effects without memory.
 const STILL_CLOSED: f64 = 0.6;
 
-/// All tables of this mode.
 #[derive(Debug, Serialize)]
 pub struct Tables {
     /// By memory, amplitude and difficulties.
     pub splits: Vec<Split>,
-    /// Effect by effect.
     pub effects: Vec<Split>,
 }
 
-/// Rates of a part of the cases.
 #[derive(Debug, Clone, Serialize)]
 pub struct Split {
     pub name: String,
-    /// Nothing of the catalogue is named.
     pub no_wrong_name: Rate,
-    /// The balance is right.
     pub balance_right: Rate,
-    /// One of the first two variables is right.
     pub variable_right: Rate,
-    /// Both are.
     pub both_right: Rate,
     /// Share of the gap that the program claims to have closed, the worst signal.
     pub claimed_closed_ratio: Spread,
     /// The same of all signals together, each in units of its noise.
     pub claimed_joint_ratio: Spread,
-    /// How often which verdict.
     pub verdicts: BTreeMap<&'static str, usize>,
 }
 
@@ -76,7 +68,6 @@ fn split(name: &str, cases: &[(&Case, &LeftOut)]) -> Split {
     }
 }
 
-/// The lines that the targets are about.
 pub fn headline(cases: &[Case]) -> Vec<Line> {
     let left = || cases.iter().filter_map(|case| case.left_out.as_ref());
     let line = |name: &str, wanted, rate| Line { name: name.to_owned(), rate, wanted };

@@ -26,7 +26,6 @@ pub struct Table {
     pub program: Option<Identity>,
     pub seed: u64,
     pub shape: Shape,
-    /// Draws of one effect that have a result.
     pub singles: usize,
     /// Those among them whose report leaves something open.
     pub open: usize,
@@ -38,15 +37,12 @@ pub struct Table {
     pub cases: Vec<Case>,
 }
 
-/// An ambiguous draw and what became of it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Case {
     pub number: usize,
-    /// The hidden effect and its place.
     pub truth: String,
     /// What could not be distinguished, each with its place, the best first.
     pub between: Vec<String>,
-    /// Which class that is.
     pub class: String,
     /// What would tell where no experiment does.
     pub otherwise: Option<String>,
@@ -70,15 +66,12 @@ pub struct Class {
     pub no_experiment: usize,
     /// What would tell these, and how often it was said.
     pub otherwise: BTreeMap<String, usize>,
-    /// What was proposed, and how often.
     pub experiments: BTreeMap<String, usize>,
     /// Of the proposed experiments that were run: how many resolved.
     pub resolved: Rate,
     pub still_ambiguous: usize,
-    /// The right name was gone.
     pub wrong: usize,
     pub errors: usize,
-    /// Proposed, but not run yet.
     pub not_run: usize,
 }
 

@@ -13,11 +13,9 @@ pub const BESIDE: [&str; 5] = ["nothing", "parameter", "outside", "ambiguous", "
 
 #[derive(Debug, Serialize)]
 pub struct Tables {
-    /// The lines that the targets are about.
     pub headline: Vec<Line>,
     /// Single effects, split by difficulty and by amplitude.
     pub splits: Vec<Split>,
-    /// Single effects, one by one.
     pub effects: Vec<Split>,
     /// True effects against what they were called.
     pub confusion: Vec<ConfusionRow>,
@@ -25,7 +23,6 @@ pub struct Tables {
     pub nothing_hidden: Vec<ConfusionRow>,
     pub numbers: Numbers,
     pub wall_s: Spread,
-    /// Largest resident set, MiB.
     pub memory_mib: Spread,
     /// Share of the gap that the program claims to have closed on the held-out record, single effects that were named right.
     pub claimed_closed_ratio: Spread,
@@ -35,13 +32,10 @@ pub struct Tables {
     pub errors: BTreeMap<String, usize>,
 }
 
-/// A rate with its name and what is wanted.
 #[derive(Debug, Clone, Serialize)]
 pub struct Line {
-    /// What is counted.
     pub name: String,
     pub rate: Rate,
-    /// What is wanted, in words.
     pub wanted: &'static str,
 }
 
@@ -52,13 +46,10 @@ impl Line {
     }
 }
 
-/// Rates of a part of the single effects.
 #[derive(Debug, Clone, Serialize)]
 pub struct Split {
     pub name: String,
-    /// A name of the class.
     pub class_right: Rate,
-    /// The first name is the effect itself.
     pub top: Rate,
     /// The effect itself alone, of those that are alone in their class.
     pub alone: Rate,
@@ -90,7 +81,6 @@ pub struct Numbers {
     pub untold: usize,
 }
 
-/// Least, median, 90th percentile, largest.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Spread {
     pub of: usize,
@@ -153,7 +143,6 @@ fn of_kind(cases: &[Case], kind: Kind) -> impl Iterator<Item = &Case> {
     cases.iter().filter(move |case| case.kind == kind)
 }
 
-/// The one hidden effect of a single case.
 pub(crate) fn hidden(case: &Case) -> &HiddenJudged {
     &case.judgement.hidden[0]
 }
@@ -162,7 +151,6 @@ fn right(case: &Case) -> bool {
     hidden(case).right
 }
 
-/// The amplitude of a single case over its limit.
 pub(crate) fn over_limit(case: &Case) -> Option<f64> {
     case.over_limit.first().copied().flatten()
 }
@@ -236,7 +224,6 @@ fn headline(cases: &[Case], singles: &[&Case]) -> Vec<Line> {
     ]
 }
 
-/// Whether a case is of a part.
 pub(crate) type IsPart = Box<dyn Fn(&Case) -> bool>;
 
 /// Parts of single effects, by amplitude and by what was made hard.

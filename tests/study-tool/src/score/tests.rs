@@ -25,7 +25,6 @@ fn part_of_study(root: &Path, program: &str, holds: impl Fn(usize) -> bool) -> S
     study
 }
 
-/// What a program left of a draw.
 fn leave(study: &Study, number: usize, program: Identity, without: Vec<String>, report: &Value) {
     let taken = Taken { ended: Ended::Exited(0), wall_s: 2.0, memory_kib: 2048 };
     let result = RunResult { schema_version: 1, number, program, taken, without };

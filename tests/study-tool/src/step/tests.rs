@@ -42,7 +42,6 @@ impl Bench {
         }
     }
 
-    /// Takes the step of each draw.
     fn run(&self, change: impl Fn(&Draw, &mut Step<'_>)) -> Result<Vec<Option<RunResult>>, StepError> {
         let make = |recipe: &Recipe, _: &RigParameters, measurement: &Path, truth: &Path| {
             if self.tripped == Some(recipe.seed) {

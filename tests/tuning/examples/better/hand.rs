@@ -14,7 +14,6 @@ const EXPERIMENT: &str = "manual-let-go";
 const PULL_N: f64 = 3.0;
 const PULL_TO_S: f64 = 60.0;
 
-/// A way to treat the axis.
 struct Subject {
     name: &'static str,
     load: &'static str,

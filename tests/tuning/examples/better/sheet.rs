@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use tuning::cases::{Case, Made, figures};
-use tuning::{Trial, TrialError, in_parallel};
+use tuning::{Trial, TrialError, in_parallel, rounded};
 
 pub(crate) const SEEDS: [u64; 5] = [1, 2, 3, 4, 5];
 
@@ -14,7 +14,6 @@ pub(crate) struct Subject {
     pub(crate) papers: bool,
 }
 
-/// A figure and how it is shown.
 pub(crate) struct Column {
     pub(crate) head: &'static str,
     pub(crate) figure: &'static str,
@@ -50,17 +49,12 @@ impl Spread {
     pub(crate) fn cell(spread: Option<Self>, scale: f64) -> String {
         let Some(Self { mean, least, most }) = spread else { return "-".into() };
         let decimals = if (mean * scale).abs() < 9.95 { 2 } else { 1 };
-        // Without the sign of a zero.
-        let show = |value: f64| {
-            let unit = 10_f64.powi(decimals);
-            format!("{:.*}", decimals as usize, (value * scale * unit).round() / unit + 0.0)
-        };
+        let show = |value: f64| rounded(value * scale, decimals);
         format!("{} ({} to {})", show(mean), show(least), show(most))
     }
 }
 
 impl Sheet<'_> {
-    /// Rehearses everything and prints the table.
     pub(crate) fn print(&self) -> Result<(), Box<dyn Error>> {
         let heads: Vec<_> = self.columns.iter().map(|column| column.head).collect();
         println!("| | {} |", heads.join(" | "));

@@ -4,7 +4,7 @@ use crate::{corners, mark};
 use std::error::Error;
 use tuning::cases::{Case, Made, figures};
 use tuning::rehearsed::{gain_margin, worst_gain_margin};
-use tuning::{Trial, TrialError, in_parallel};
+use tuning::{Trial, TrialError, in_parallel, rounded};
 
 struct Ladder {
     load: &'static str,
@@ -58,45 +58,26 @@ impl Ladder {
     }
 }
 
-/// Figures of a step and of rests; the worst of some runs.
-#[derive(Clone, Copy, Default)]
-struct Figures {
-    settling_s: f64,
-    overshoot: f64,
-    speed_ratio: f64,
-    peak_m: f64,
-    motion_n: f64,
-    rest_m: f64,
-    rest_n: f64,
+/// Figures of a step and of rests.
+const FIGURES: [&str; 7] = [
+    "force_settling_s",
+    "force_overshoot_ratio",
+    "drive_speed_ratio_least",
+    "position_error_peak_after_step_m",
+    "force_error_motion_rms_n",
+    "position_rest_peak_to_peak_smoothed_m",
+    "force_rest_peak_to_peak_n",
+];
+type Figures = [f64; FIGURES.len()];
+
+fn figures_of(case: &Case, trial: &Trial) -> Result<Figures, TrialError> {
+    let figure = figures(&case.run(trial)?);
+    // What is absent never came about.
+    Ok(FIGURES.map(|name| figure(name).unwrap_or(f64::INFINITY)))
 }
 
-impl Figures {
-    fn of(case: &Case, trial: &Trial) -> Result<Self, TrialError> {
-        let figure = figures(&case.run(trial)?);
-        // What is absent never came about.
-        let figure = |name: &str| figure(name).unwrap_or(f64::INFINITY);
-        Ok(Self {
-            settling_s: figure("force_settling_s"),
-            overshoot: figure("force_overshoot_ratio"),
-            speed_ratio: figure("drive_speed_ratio_least"),
-            peak_m: figure("position_error_peak_after_step_m"),
-            motion_n: figure("force_error_motion_rms_n"),
-            rest_m: figure("position_rest_peak_to_peak_smoothed_m"),
-            rest_n: figure("force_rest_peak_to_peak_n"),
-        })
-    }
-
-    fn worst(self, other: Self) -> Self {
-        Self {
-            settling_s: self.settling_s.max(other.settling_s),
-            overshoot: self.overshoot.max(other.overshoot),
-            speed_ratio: self.speed_ratio.max(other.speed_ratio),
-            peak_m: self.peak_m.max(other.peak_m),
-            motion_n: self.motion_n.max(other.motion_n),
-            rest_m: self.rest_m.max(other.rest_m),
-            rest_n: self.rest_n.max(other.rest_n),
-        }
-    }
+fn worst(one: Figures, other: Figures) -> Figures {
+    std::array::from_fn(|place| one[place].max(other[place]))
 }
 
 const HEAD: &str = "settling 5 % 0 kg / worst corner, ms | overshoot 0 kg / worst corner, % | speed ratio | peak error, mm | in motion, N | rest p-p, mm / N | margin 0 kg | margin, worst corner |";
@@ -111,32 +92,30 @@ struct Told {
 
 impl Told {
     fn of(case: &Case) -> Result<Self, TrialError> {
-        let worst = |trials: &[Trial]| {
-            let runs = in_parallel(trials, |trial| Figures::of(case, trial)).into_iter();
+        let worst_of = |trials: &[Trial]| {
+            let runs = in_parallel(trials, |trial| figures_of(case, trial)).into_iter();
             Ok::<_, TrialError>(
-                runs.collect::<Result<Vec<_>, _>>()?.into_iter().reduce(Figures::worst).unwrap_or_default(),
+                runs.collect::<Result<Vec<_>, _>>()?.into_iter().reduce(worst).unwrap_or_default(),
             )
         };
         Ok(Self {
-            nominal: worst(&SEEDS.map(|seed| Trial { seed, ..Trial::default() }))?,
-            corners: worst(&Trial::corners())?,
+            nominal: worst_of(&SEEDS.map(|seed| Trial { seed, ..Trial::default() }))?,
+            corners: worst_of(&Trial::corners())?,
             margin: gain_margin(&case.inputs, &case.scene, &Trial::default())?,
             worst_margin: worst_gain_margin(&case.inputs, &case.scene)?,
         })
     }
 
-    /// The cells under [`HEAD`].
     fn cells(&self) -> String {
-        let Self { nominal: figures, corners, margin, worst_margin } = self;
-        let overshoots = [figures, corners].map(|figures| number(figures.overshoot * 1e2, 1)).join(" / ");
-        let rest = [number(figures.rest_m * 1e3, 2), number(figures.rest_n, 1)].join(" / ");
+        let Self { nominal, corners, margin, worst_margin } = self;
+        let [_, _, speed_ratio, peak_m, motion_n, rest_m, rest_n] = *nominal;
         [
-            [figures, corners].map(|figures| ms(figures.settling_s)).join(" / "),
-            overshoots,
-            number(figures.speed_ratio, 2),
-            number(figures.peak_m * 1e3, 1),
-            number(figures.motion_n, 1),
-            rest,
+            [nominal, corners].map(|[settling_s, ..]| ms(*settling_s)).join(" / "),
+            [nominal, corners].map(|[_, overshoot, ..]| number(overshoot * 1e2, 1)).join(" / "),
+            number(speed_ratio, 2),
+            number(peak_m * 1e3, 1),
+            number(motion_n, 1),
+            [number(rest_m * 1e3, 2), number(rest_n, 1)].join(" / "),
             margin.to_string(),
             worst_margin.to_string(),
         ]
@@ -145,7 +124,6 @@ impl Told {
     }
 }
 
-/// Figures and margins over the gain.
 fn by_gain(ladder: &Ladder) -> Result<(), Box<dyn Error>> {
     println!("| gain, {} | {HEAD}", ladder.unit);
     println!("|---|---|---|---|---|---|---|---|---|");
@@ -156,7 +134,6 @@ fn by_gain(ladder: &Ladder) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The paper's force program over both its numbers.
 fn by_feed_forward() -> Result<(), Box<dyn Error>> {
     println!("| gain, m/(N s) | {} |", SHARES.map(|share| format!("feed-forward {share}")).join(" | "));
     println!("|---{}|", "|---".repeat(SHARES.len()));
@@ -169,20 +146,15 @@ fn by_feed_forward() -> Result<(), Box<dyn Error>> {
             ];
             let made = Made { experiment: "load-step", drive: Some(DRIVE), load: Some("force-p"), set: &set };
             let case = Case::new(&made)?;
-            let figures = Figures::of(&case, &Trial::default())?;
+            let [settling_s, overshoot, ..] = figures_of(&case, &Trial::default())?;
             let margin = worst_gain_margin(&case.inputs, &case.scene)?;
-            cells.push(format!(
-                "{} ms / {} % / {margin}",
-                ms(figures.settling_s),
-                number(figures.overshoot * 1e2, 1)
-            ));
+            cells.push(format!("{} ms / {} % / {margin}", ms(settling_s), number(overshoot * 1e2, 1)));
         }
         println!("| {gain} | {} |", cells.join(" | "));
     }
     Ok(())
 }
 
-/// Programs of the drive under both force programs.
 fn by_drive() -> Result<(), Box<dyn Error>> {
     println!("| load, drive | {HEAD}");
     println!("|---|---|---|---|---|---|---|---|---|");
@@ -198,9 +170,9 @@ fn by_drive() -> Result<(), Box<dyn Error>> {
 /// Margin of the shipped gain in each corner, and the step's settling and overshoot there.
 fn by_corner(case: &Case) -> Result<(), TrialError> {
     let cells = in_parallel(&Trial::corners(), |trial| {
-        let figures = Figures::of(case, trial)?;
+        let [settling_s, overshoot, ..] = figures_of(case, trial)?;
         let margin = gain_margin(&case.inputs, &case.scene, trial)?;
-        Ok(format!("{margin} / {} ms / {} %", ms(figures.settling_s), number(figures.overshoot * 1e2, 1)))
+        Ok(format!("{margin} / {} ms / {} %", ms(settling_s), number(overshoot * 1e2, 1)))
     });
     corners(&cells.into_iter().collect::<Result<Vec<_>, TrialError>>()?);
     Ok(())
@@ -213,12 +185,9 @@ fn ms(time_s: f64) -> String {
 
 /// A dash for what never came about.
 fn number(value: f64, decimals: usize) -> String {
-    // Without the sign of a zero.
-    let unit = 10_f64.powi(decimals as i32);
-    if value.is_finite() { format!("{:.decimals$}", (value * unit).round() / unit + 0.0) } else { "-".into() }
+    if value.is_finite() { rounded(value, decimals) } else { "-".into() }
 }
 
-/// The number in the load's program.
 fn shipped(case: &Case, name: &str) -> Option<f64> {
     let mode = axis_control::setup::Mode { partner_needed: true, real_time: false, forever: false };
     let controller = case.inputs.controller(plant::Axis::Load, mode).ok()?;

@@ -26,7 +26,6 @@ fn nominal() -> usize {
     Trial::corners().iter().position(|trial| *trial == Trial::default()).expect("0 kg and 7 bar are a corner")
 }
 
-/// `text` in bold if `shipped`.
 fn mark(text: f64, shipped: bool) -> String {
     if shipped { format!("**{text}**") } else { text.to_string() }
 }

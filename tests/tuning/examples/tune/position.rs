@@ -49,7 +49,6 @@ impl Shipped {
         Ok(program)
     }
 
-    /// Figures and margins over the gain.
     fn by_gain(&self, gains: &[f64]) -> Result<(), Box<dyn Error>> {
         println!(
             "| gain, 1/s | dynamic, mm | static, mm | rest p-p, mm | step overshoot 0 kg / worst corner, mm | margin 0 kg | margin, worst corner |"

@@ -58,7 +58,6 @@ fn say(line: &str) {
     eprintln!("study: {line}");
 }
 
-/// Where the committed files are.
 fn committed(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)
 }

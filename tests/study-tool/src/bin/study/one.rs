@@ -118,7 +118,6 @@ fn found(name: &Path) -> PathBuf {
     places.find(|place| place.is_file()).unwrap_or_else(|| name.to_owned())
 }
 
-/// What came of the experiment that was measured.
 fn outcome(step: &Step<'_>, draw: &Draw, found: &Found) -> Option<resolve::Outcome> {
     let Found::Measured(resolution) = found else { return None };
     let folder = step.study.run(&resolve::label(step.label), draw.number);
