@@ -69,23 +69,12 @@ pub fn faults() -> Vec<Value> {
 }
 
 fn fault(spec: &FaultSpec) -> Value {
-    let number = |key: &FaultKey| {
-        json!({
-            "key": key.name,
-            "unit": key.unit,
-            "min": key.min,
-            "max": key.max,
-            "whole": key.whole,
-            "default": key.default,
-            "meaning": key.meaning,
-        })
-    };
     json!({
         "fault": spec.name,
         "group": spec.group.name(),
         "about": spec.about,
         "places": spec.places.names(),
-        "keys": spec.keys.iter().map(number).collect::<Vec<_>>(),
+        "keys": spec.keys,
     })
 }
 

@@ -7,27 +7,21 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::io::{self, Write};
 
-/// Columns of `faults.csv`.
 pub const COLUMNS: &str = "time_s,number,what,fault,at,numbers,cause";
 
 /// Who asked for a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The script, in this line.
     Script {
         /// Line, from 1.
         line: u32,
     },
-    /// Somebody at the console.
     Console,
 }
 
-/// What happened to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
-    /// It is there.
     Begins,
-    /// It is gone.
     Ends,
     /// Its time passed, and its condition never held.
     NeverBegan,
@@ -40,7 +34,6 @@ pub enum What {
 pub struct Mark {
     /// Its number in this run; the script's are those of the file, from 1.
     pub number: u16,
-    /// What happened.
     pub what: What,
     pub fault: Fault,
     /// Who asked for it.

@@ -18,11 +18,9 @@ const M3_PER_S_PER_NL_PER_MIN: f64 = 1e-3 / 60.0;
 /// What all active faults together do.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Overlay {
-    /// To the plant.
     pub plant: Faults,
     /// To the sensors of drive and load: position, force, pressure a, pressure b.
     pub sensors: [[SensorFault; 4]; 2],
-    /// From outside.
     pub hands: HandForces,
 }
 
