@@ -56,16 +56,10 @@ pub enum RunError {
     Bus(#[from] BusError),
     /// A file of the run's folder cannot be written.
     #[error("cannot write {file}: {reason}; choose another folder with --out")]
-    Output {
-        /// The file or folder.
-        file: String,
-        /// What the system said.
-        reason: String,
-    },
+    Output { file: String, reason: String },
 }
 
 impl RunError {
-    /// The exit code that the error leads to.
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {

@@ -62,7 +62,7 @@ impl RigTiming {
             trips: VecDeque::new(),
             command_age,
             ages: CommandAges::default(),
-            wall_clock: WallClockWatch::new(),
+            wall_clock: WallClockWatch::begin(),
             steps: Vec::new(),
         })
     }
