@@ -389,7 +389,6 @@ impl Controller {
         Ok(Some(Self(child)))
     }
 
-    /// How it ended, if it has.
     fn ended(&mut self) -> Option<ExitStatus> {
         self.0.try_wait().ok().flatten()
     }

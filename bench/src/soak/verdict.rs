@@ -67,7 +67,6 @@ fn named_broken(segment: &Segment) -> Vec<String> {
     segment.broken().map(|check| format!("{} {}: {}", segment.folder, check.name, check.detail)).collect()
 }
 
-/// `soak.md`.
 #[must_use]
 pub fn page(soak: &Soak) -> String {
     let mut page = format!("# Soak\n\n**{}**\n\n", soak.verdict);
