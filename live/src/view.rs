@@ -10,7 +10,7 @@ use super::wire::{News, Wire};
 use protocol::can::CanFrame;
 use runlog::candump::FrameRecord;
 use runlog::telemetry::Packet;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 
@@ -294,7 +294,6 @@ impl View {
         })
     }
 
-    /// What is so now.
     #[must_use]
     pub fn state(&self, audience: Audience) -> Value {
         let status = self.wire.status();
@@ -342,19 +341,10 @@ impl View {
 /// The table of faults in the words of the page.
 fn faults(listed: &Value) -> Value {
     let number = |key: &Value| {
-        let mut reported = Map::new();
-        for (name, of) in [
-            ("name", "key"),
-            ("unit", "unit"),
-            ("low", "min"),
-            ("high", "max"),
-            ("default", "default"),
-            ("whole", "whole"),
-            ("about", "meaning"),
-        ] {
-            reported.insert(name.into(), key[of].clone());
-        }
-        reported
+        json!({
+            "name": key["key"], "unit": key["unit"], "low": key["min"], "high": key["max"],
+            "default": key["default"], "whole": key["whole"], "about": key["meaning"],
+        })
     };
     let fault = |fault: &Value| {
         let numbers = fault["keys"].as_array().into_iter().flatten().map(number);
