@@ -37,18 +37,14 @@ quit                  ends the run; everything is saved";
 pub enum Command {
     /// Something that a person does to the rig.
     Act(Action),
-    /// A hand pushes from now on.
+    /// A hand pushes in +x from now on.
     Hand {
-        /// On what.
         on: Part,
-        /// In +x, N.
         force_n: f64,
     },
-    /// Something breaks.
     Break(Fault),
     /// Something is mended: what is broken like this, or everything.
     Mend(Option<Fault>),
-    /// End the run.
     Quit,
 }
 

@@ -40,7 +40,6 @@ pub struct NodeParts {
     pub sensors: Sensors,
     /// Who does what to it by hand.
     pub people: People,
-    /// What breaks.
     pub faults: FaultSchedule,
     /// What is typed at the console, if it is open.
     pub console: Option<Receiver<Command>>,

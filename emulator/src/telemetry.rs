@@ -44,7 +44,6 @@ pub struct Telemetry {
 /// Late wake-ups beyond those that are kept for viewers to come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Untold {
-    /// How many.
     pub overruns: u64,
     /// Cycles that they skipped.
     pub skipped: u64,
@@ -69,7 +68,6 @@ impl Telemetry {
         Ok(Self { socket, description, with_truth, console, viewers: Vec::new(), packet: Vec::new() })
     }
 
-    /// Tells a cycle.
     pub fn cycle(&mut self, record: &CycleRecord) {
         if self.viewers.is_empty() {
             return;
@@ -85,7 +83,6 @@ impl Telemetry {
         self.viewers.iter_mut().for_each(|viewer| viewer.offer(&self.packet));
     }
 
-    /// Tells an event.
     pub fn event(&mut self, event: &Event) {
         if !self.viewers.is_empty() {
             self.packet.clear();

@@ -165,7 +165,6 @@ pub fn definition(name: &str) -> Option<&'static Definition> {
     definitions().find(|definition| definition.name == name)
 }
 
-/// The list for a terminal.
 #[must_use]
 pub fn list() -> String {
     let width = definitions().map(|definition| definition.name.len()).max().unwrap_or(0);

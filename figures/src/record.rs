@@ -198,7 +198,6 @@ pub struct Step {
 }
 
 impl Step {
-    /// The signed height.
     #[must_use]
     pub fn height_value(&self) -> f64 {
         self.after_value - self.before_value

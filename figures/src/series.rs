@@ -78,7 +78,6 @@ impl Series {
         self.values.len()
     }
 
-    /// Whether there is no sample.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()

@@ -94,7 +94,6 @@ pub fn percentiles(reported: &PercentilesNs) -> Option<PercentilesNs> {
     })
 }
 
-/// All samples of all runs by tag.
 #[must_use]
 pub fn add_up(runs: &[BTreeMap<String, Series>]) -> BTreeMap<String, Samples> {
     let mut sums: BTreeMap<String, Samples> = BTreeMap::new();

@@ -230,7 +230,6 @@ impl RunFiles {
         self.description().started_unix_s
     }
 
-    /// How long it was, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         let cycles = self.counted().cycles;

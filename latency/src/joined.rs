@@ -36,7 +36,6 @@ impl Series {
 /// What joining gave.
 #[derive(Clone, Debug, Default)]
 pub struct OneWay {
-    /// By tag.
     pub series: BTreeMap<String, Series>,
     /// Latencies below what the stamps can tell.
     pub below_zero: u64,

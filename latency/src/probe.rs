@@ -8,7 +8,6 @@ const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// CPU on which the probe was.
     pub cpu: u64,
     /// Last look before, ns of CLOCK_MONOTONIC.
     pub from_ns: u64,

@@ -28,7 +28,6 @@ const READ_A_TURN: usize = 16 << 10;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// It asks.
     Asking,
     /// Its request is being obeyed elsewhere.
     Waiting,

@@ -10,7 +10,6 @@ use std::net::IpAddr;
 pub const LONGEST_HEAD: usize = 16 << 10;
 /// Longest body of a request, bytes.
 pub const LONGEST_BODY: usize = 64 << 10;
-/// Most header fields.
 const MOST_FIELDS: usize = 64;
 
 /// Sent with everything: the page loads nothing from elsewhere, is in no frame of another, and tells nobody where it is.
@@ -25,7 +24,6 @@ pub struct Request {
     pub method: String,
     /// Its path, without what follows a question mark.
     pub path: String,
-    /// What follows it.
     pub query: String,
     /// Whose it was, as `127.0.0.1:8080`.
     pub host: Option<String>,
@@ -40,7 +38,6 @@ pub struct Request {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress {
     Partial,
-    /// All of it.
     Whole(Request),
     /// It is none, or more than is taken: what to answer.
     Refused(Status),

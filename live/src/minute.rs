@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 
 /// Longest record, s.
 pub const LONGEST_S: f64 = 60.0;
-/// Cycles that are kept.
 const CYCLES_KEPT: usize = 60_000;
 /// Frames that are kept: those of a minute, with room for noise.
 const FRAMES_KEPT: usize = 600_000;
@@ -42,7 +41,6 @@ pub struct Saved {
     cut: String,
 }
 
-/// How the rig is set up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetUp {
     pub linked: bool,

@@ -22,11 +22,9 @@ use runlog::run_folder::SCHEMA_VERSION;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What is described.
 pub struct Described<'a> {
     /// How the emulator was started.
     pub arguments: &'a RunArguments,
-    /// What it read.
     pub inputs: &'a Inputs,
     /// Columns of `truth.csv` after the baseline's.
     pub terms: &'a [String],
@@ -50,7 +48,6 @@ impl Described<'_> {
     }
 }
 
-/// The description as JSON.
 #[must_use]
 pub fn description(run: &Described<'_>) -> Value {
     let Described { arguments, inputs, started_unix_s, .. } = run;

@@ -58,7 +58,6 @@ pub(super) struct SocketPeer<L> {
 }
 
 impl<L: Link> SocketPeer<L> {
-    /// Opens the bus now.
     pub(super) fn open(link: L, url: &BusUrl, clock: StampClock) -> Result<Self, BusError> {
         let mut peer = Self::new(link, url, clock);
         match peer.connect() {
