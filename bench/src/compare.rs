@@ -16,7 +16,6 @@ use runlog::run_folder::FileError;
 use std::path::{Path, PathBuf};
 
 /// The table: a row for each figure that any run has, and the change against the first run.
-#[must_use]
 pub fn table(runs: &[Run]) -> Grid {
     let Some((first, others)) = runs.split_first() else { return Grid::default() };
     let mut head = vec!["figure".to_owned(), first.name.clone()];

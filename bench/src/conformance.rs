@@ -84,7 +84,6 @@ pub enum ConformanceError {
 
 impl ConformanceError {
     /// The exit code that tells it.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) => Exit::BusFailed,

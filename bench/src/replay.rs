@@ -70,7 +70,6 @@ pub enum ReplayError {
 
 impl ReplayError {
     /// The exit code that the error leads to.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Bus(_) | Self::NoBus(_) => Exit::BusFailed,

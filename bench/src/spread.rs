@@ -44,7 +44,6 @@ fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
     rows().filter_map(spread).collect()
 }
 
-#[must_use]
 pub fn table(runs: &[Run]) -> Grid {
     let head = ["figure", "n", "mean", "standard deviation", "least", "most"];
     let rows = spreads(runs).into_iter().map(|(name, unit, spread)| {
@@ -64,7 +63,6 @@ pub fn table(runs: &[Run]) -> Grid {
 }
 
 /// The spreads as JSON, SI, by the figures' names.
-#[must_use]
 pub fn json(runs: &[Run]) -> Value {
     let figures: Map<_, _> =
         spreads(runs).into_iter().map(|(name, _, spread)| (name.to_owned(), json!(spread))).collect();

@@ -72,7 +72,6 @@ pub enum EventKind {
 
 impl EventKind {
     /// Whether it is a fault, of which one wants to know what was going on before.
-    #[must_use]
     pub fn is_fault(&self) -> bool {
         matches!(
             self,

@@ -88,7 +88,6 @@ impl ExchangeWatch {
         }
     }
 
-    #[must_use]
     pub fn cycle(&self) -> AxisCycle {
         self.now
     }
@@ -102,7 +101,6 @@ impl Default for ExchangeWatch {
 
 impl AxisCycle {
     /// Age in ns at the start of the first cycle in which the command acts, `due_ns`; `None` when none newly acts.
-    #[must_use]
     pub fn age_ns(&self, due_ns: u64) -> Option<u64> {
         let known = self.exchange.command_ns != 0 && self.answered_sensors_ns != 0;
         known.then(|| due_ns.saturating_sub(self.answered_sensors_ns))

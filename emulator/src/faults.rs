@@ -61,9 +61,6 @@ pub const NEEDS_HOST: &str =
 
 impl Fault {
     /// A fault of this name at this place, for comparisons: its numbers mean nothing.
-    ///
-    /// # Errors
-    /// [`FaultError`] with what is allowed.
     pub fn like(name: &str, at: Option<&str>) -> Result<Self, FaultError> {
         let spec = table::spec(name).ok_or_else(|| FaultError::Unknown(name.to_owned()))?;
         let numbers: Vec<_> =
@@ -73,9 +70,6 @@ impl Fault {
 
     /// The fault of this name at this place (`None`: where it can be at one place only, or at the bus as a whole), with the
     /// numbers that are given by key: as number, and as written.
-    ///
-    /// # Errors
-    /// [`FaultError`] with what is allowed.
     pub fn new(
         name: &str,
         at: Option<&str>,
@@ -121,13 +115,11 @@ impl Fault {
     }
 
     /// Its place by name.
-    #[must_use]
     pub fn place(&self) -> String {
         self.spec.places.names().swap_remove(usize::from(self.place))
     }
 
     /// Its place among those of its kind.
-    #[must_use]
     pub fn place_index(&self) -> usize {
         usize::from(self.place)
     }
@@ -138,7 +130,6 @@ impl Fault {
     }
 
     /// Its numbers, in the order of the table's keys.
-    #[must_use]
     pub fn values(&self) -> [f64; MOST_KEYS] {
         self.values
     }

@@ -125,12 +125,10 @@ impl Recorder {
     }
 
     /// Whether there is no room for a cycle, and a writer who will make some.
-    #[must_use]
     pub fn is_full(&self) -> bool {
         self.cycles.is_full() && self.writer_alive.strong_count() > 0
     }
 
-    #[must_use]
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

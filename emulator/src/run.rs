@@ -60,7 +60,6 @@ pub enum RunError {
 }
 
 impl RunError {
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Input(_)
@@ -146,9 +145,6 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
 }
 
 /// Watches for Ctrl-C and SIGTERM.
-///
-/// # Errors
-/// [`RunError::Input`] when the system takes no handler.
 pub fn watch_interrupt() -> Result<Interrupt, RunError> {
     Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }

@@ -59,9 +59,6 @@ struct Told<'a> {
 
 impl Telemetry {
     /// Opens the socket at `path`, readable and writable by this user alone.
-    ///
-    /// # Errors
-    /// [`SocketFileError`] when it cannot be had.
     pub fn open(path: &Path, run: &Described<'_>, console: Option<Console>) -> Result<Self, SocketFileError> {
         let socket = SocketFile::bind(path, SocketType::STREAM, false)?;
         let (description, with_truth) = (description(run), run.with_truth());

@@ -333,7 +333,6 @@ fn decided() -> bool {
 
 impl BoundResult {
     /// Kept, broken, or neither.
-    #[must_use]
     pub fn verdict(&self) -> Verdict {
         match (self.resolved, self.kept) {
             (false, _) => Verdict::NotResolved { pairs: self.pairs_to_resolve },

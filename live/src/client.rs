@@ -214,7 +214,6 @@ pub fn wait<'a>(
 }
 
 /// Whether a socket that does not block has nothing to say yet.
-#[must_use]
 pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }

@@ -75,7 +75,6 @@ impl Status {
 }
 
 /// Reads what has come of a request so far.
-#[must_use]
 pub fn parse(bytes: &[u8]) -> Progress {
     let mut fields = [httparse::EMPTY_HEADER; MOST_FIELDS];
     let mut head = httparse::Request::new(&mut fields);
@@ -123,7 +122,6 @@ pub fn parse(bytes: &[u8]) -> Progress {
 
 /// Whether a request was meant for the server at `port`, by a name that no foreign page can have: `localhost`, or an address in
 /// digits. A name of somebody's own that leads here (DNS rebinding) would make a foreign page's requests look like ours.
-#[must_use]
 pub fn is_ours(host: &str, port: u16) -> bool {
     let (name, reported) = match host.rsplit_once(':') {
         Some((name, reported)) if !reported.ends_with(']') => (name, reported),
@@ -134,7 +132,6 @@ pub fn is_ours(host: &str, port: u16) -> bool {
     reported.parse() == Ok(port) && (name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok())
 }
 
-#[must_use]
 pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     let head = format!(
         "HTTP/1.1 {}\r\nContent-Type: {content_type}\r\nContent-Length: {}\r\nCache-Control: no-store\r\n{SECURITY}\
@@ -145,19 +142,16 @@ pub fn response(status: Status, content_type: &str, body: &[u8]) -> Vec<u8> {
     [head.as_bytes(), body].concat()
 }
 
-#[must_use]
 pub fn json_response(status: Status, value: &Value) -> Vec<u8> {
     response(status, "application/json", value.to_string().as_bytes())
 }
 
 /// What is said when something was refused or done.
-#[must_use]
 pub fn said(status: Status, message: &str) -> Vec<u8> {
     json_response(status, &json!({ "ok": status == Status::Good, "message": message }))
 }
 
 /// The head of a stream of Server-Sent Events, which ends with the connection.
-#[must_use]
 pub fn stream_head() -> Vec<u8> {
     format!(
         "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n{SECURITY}Connection: close\r\n\r\n"
@@ -165,7 +159,6 @@ pub fn stream_head() -> Vec<u8> {
     .into_bytes()
 }
 
-#[must_use]
 pub fn event(name: &str, data: &Value) -> Vec<u8> {
     // JSON without line breaks, as it is written here, is one line of data.
     format!("event: {name}\ndata: {data}\n\n").into_bytes()

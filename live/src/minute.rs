@@ -75,7 +75,6 @@ impl Minute {
 
     /// The last so many seconds, to be written to a folder of their own in `folder`. A record tells one set-up for all of it,
     /// which is that of its end: it begins no earlier than the last change.
-    #[must_use]
     pub fn last(&self, seconds: f64, folder: &Path, interface: &str, set_up: SetUp) -> Saved {
         let newest = self.cycles.back().map_or(0, |measured| measured.cycle);
         let oldest = self.cycles.front().map_or(0, |measured| measured.cycle);

@@ -83,13 +83,11 @@ impl Rows {
     }
 
     /// The rows of the last so many seconds.
-    #[must_use]
     pub fn last(&self, seconds: f64) -> Value {
         let rows = (seconds * 1000.0 / SPACING_CYCLES as f64) as usize;
         table(self.kept.range(self.kept.len().saturating_sub(rows)..))
     }
 
-    #[must_use]
     pub fn newest(&self) -> Map<String, Value> {
         let Some(row) = self.kept.back() else { return Map::new() };
         let values = row.values.iter().map(|value| json!(value.map(short)));

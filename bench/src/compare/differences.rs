@@ -50,7 +50,6 @@ fn difference(first: &Run, run: &Run, column: &str) -> Series {
 }
 
 /// The rms of each signal's difference from the first run; changes are against the second.
-#[must_use]
 pub fn table(runs: &[Run]) -> Grid {
     let Some((first, others)) = runs.split_first() else { return Grid::default() };
     let mut head = vec![format!("rms difference from {}", first.name)];
@@ -80,7 +79,6 @@ pub fn table(runs: &[Run]) -> Grid {
 }
 
 /// The picture: a panel for each signal, a curve for each run but the first.
-#[must_use]
 pub fn pictures(runs: &[Run]) -> Vec<Picture> {
     let Some((first, others)) = runs.split_first() else { return Vec::new() };
     let panels = shown().map(|quantity| {

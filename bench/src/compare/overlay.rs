@@ -58,7 +58,6 @@ const QUANTITIES: &[Quantity] = &[
 ];
 
 /// The whole experiment, and what is around its step if it has one.
-#[must_use]
 pub fn pictures(runs: &[Run]) -> Vec<Picture> {
     let Some(first) = runs.first() else { return Vec::new() };
     let whole = whole(first.title(), runs, panels(runs, Run::start_s));

@@ -43,7 +43,6 @@ pub struct GapWatch {
 
 impl GapWatch {
     /// A watch whose first look is at `now_ns`.
-    #[must_use]
     pub fn new(gap_ns: u64, now_ns: u64) -> Self {
         Self { gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
     }

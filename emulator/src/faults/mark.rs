@@ -42,7 +42,6 @@ pub struct Mark {
 
 impl What {
     /// As in `faults.csv`.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Begins => "begins",
@@ -70,9 +69,6 @@ impl Mark {
     }
 
     /// Writes a row of `faults.csv`.
-    ///
-    /// # Errors
-    /// What `out` says.
     pub fn write(&self, out: &mut impl Write, cycle: u64) -> io::Result<()> {
         let Self { number, what, fault, cause } = self;
         let (name, at, numbers) = (fault.spec.name, fault.place(), self.numbers(";"));

@@ -70,7 +70,6 @@ impl Overlay {
 }
 
 /// The fault as the wire knows it, and the frames that it concerns; `None` for one that is none of the wire's.
-#[must_use]
 pub fn on_wire(fault: &Fault) -> Option<(WireFault, Frames)> {
     let Kind::Bus(kind) = fault.spec.kind else { return None };
     let place = fault.place_index();

@@ -95,7 +95,6 @@ pub fn signals() -> impl Iterator<Item = &'static str> {
 
 impl Condition {
     /// Whether it holds, given the truth and the commands that act.
-    #[must_use]
     pub fn holds(&self, truth: &Truth, valve: [f64; 2]) -> bool {
         let value = SIGNALS[self.signal].1(truth, valve);
         if self.above { value > self.threshold } else { value < self.threshold }
@@ -131,9 +130,6 @@ const OWN_KEYS: [&str; 8] = ["name", "at", "from_s", "to_s", "for_s", "when", "a
 
 impl FaultScript {
     /// The script in `text`; `file` is for messages.
-    ///
-    /// # Errors
-    /// [`ScriptError`] with file, line, key, value and what is allowed.
     pub fn from_toml(text: &str, file: &str) -> Result<Self, ScriptError> {
         Reader { text, file }.read()
     }

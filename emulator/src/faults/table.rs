@@ -143,7 +143,6 @@ pub const NODES: [(&str, WireNode); 3] = [
 ];
 
 impl Places {
-    #[must_use]
     pub fn names(self) -> Vec<String> {
         let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         let frame = |name: &str| format!("bus.{name}");
@@ -162,13 +161,11 @@ impl Places {
     }
 
     /// Whether the first place is meant when none is named.
-    #[must_use]
     pub fn has_usual_place(self) -> bool {
         matches!(self, Self::Supply | Self::Linkage | Self::Bus | Self::Frames)
     }
 
     /// The identifier that a place of frames names; `None` for all frames.
-    #[must_use]
     pub fn frame_id(self, place: usize) -> Option<u16> {
         match self {
             Self::Frames => place.checked_sub(1).map(|message| MESSAGES[message].id),
@@ -187,12 +184,10 @@ const COUNTED: [(&str, u16); 4] = [
 
 impl FaultKey {
     /// Whether the value is one; a NaN lies in no range.
-    #[must_use]
     pub fn allows(&self, value: f64) -> bool {
         (self.min..=self.max).contains(&value) && (!self.whole || value == value.trunc())
     }
 
-    #[must_use]
     pub fn range(&self) -> String {
         let whole = if self.whole { "whole numbers from " } else { "" };
         let unit = if self.unit == "1" { "" } else { self.unit };
@@ -201,7 +196,6 @@ impl FaultKey {
 }
 
 impl Group {
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Sensor => "sensor",
@@ -220,7 +214,6 @@ pub fn all() -> impl Iterator<Item = &'static FaultSpec> {
     TABLE.iter().flat_map(|rows| rows.iter())
 }
 
-#[must_use]
 pub fn spec(name: &str) -> Option<&'static FaultSpec> {
     all().find(|spec| spec.name == name)
 }

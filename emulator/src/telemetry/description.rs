@@ -34,7 +34,6 @@ pub struct Described<'a> {
 
 impl Described<'_> {
     /// Whether viewers get what only a simulation knows. Of sealed effects nothing but `truth.csv` may tell.
-    #[must_use]
     pub fn with_truth(&self) -> bool {
         !self.inputs.sealed
     }
@@ -48,7 +47,6 @@ impl Described<'_> {
     }
 }
 
-#[must_use]
 pub fn description(run: &Described<'_>) -> Value {
     let Described { arguments, inputs, started_unix_s, .. } = run;
     let (cylinder, supply, mass) = (inputs.rig.cylinder(), inputs.rig.supply(), inputs.rig.mass());
